@@ -1,0 +1,18 @@
+"""Models with dead time from measured responses, as python-control systems.
+
+record = cr.read_record("valve.csv")      # or cr.Record(t, u, y)
+sys    = cr.identify(record)              # a control.StateSpace with z^-d
+ct.bode_plot([sys, cr.read_frf("frf.csv")])
+"""
+
+from .errors import CtrlRealizeError as CtrlRealizeError
+from .errors import CtrlRealizeWarning as CtrlRealizeWarning
+from .results import Flag as Flag
+from .signals import FilterSpec as FilterSpec
+from .signals import ImpulseResponse as ImpulseResponse
+from .signals import MeasuredFRF as MeasuredFRF
+from .signals import Record as Record
+from .signals import StepEdge as StepEdge
+from .signals import StepResponse as StepResponse
+
+__version__ = "0.1.0"

@@ -1,0 +1,48 @@
+"""Checks of arguments that many public functions share."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+from typing import Any
+
+from .errors import OptionError
+
+
+def positive(value: Any, name: str, what: str) -> float:
+    """Return `value` as a float when it is a finite number above zero.
+
+    Raises
+    ------
+    OptionError
+        Anything else; `what` says in the message what the number is.
+    """
+    number = real(value, name, what)
+    if number <= 0:
+        raise OptionError(f"{name}={value!r}; needed is a positive {what}")
+    return number
+
+
+def real(value: Any, name: str, what: str) -> float:
+    """Return `value` as a float when it is a finite real number."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise OptionError(f"{name}={value!r}; needed is a finite number: {what}")
+    return float(value)
+
+
+def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
+    """Return `value` as an int when it is a whole number in low...high."""
+    limits = f">= {low}" if high is None else f"in {low}...{high}"
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise OptionError(f"{name}={value!r}; needed is a whole number {limits}")
+    number = int(value)
+    if number < low or (high is not None and number > high):
+        raise OptionError(f"{name}={number}; needed is a whole number {limits}")
+    return number
+
+
+def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:
+    """Return `value` when it is one of the choices."""
+    if value not in choices:
+        raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
+    return str(value)

@@ -1,0 +1,64 @@
+"""Errors and warnings of the toolbox.
+
+Every error derives from `CtrlRealizeError` and from the builtin that a user would catch
+without knowing this package. Errors are for what cannot be answered, warnings for answers
+that one should look at.
+"""
+
+from __future__ import annotations
+
+
+class CtrlRealizeError(Exception):
+    """Base of all errors that this toolbox raises on purpose."""
+
+
+class DataError(CtrlRealizeError, ValueError):
+    """The data cannot be used: wrong shape, not finite, too short, constant."""
+
+
+class TimeAxisError(DataError):
+    """The time axis is not uniform, or does not run forward."""
+
+
+class NoStepError(DataError):
+    """The record has no step to work on."""
+
+
+class OrderError(CtrlRealizeError, ValueError):
+    """The asked model order does not fit the data."""
+
+
+class DelayRangeError(CtrlRealizeError, ValueError):
+    """The asked delay or range of delays does not fit the data."""
+
+
+class OptionError(CtrlRealizeError, ValueError):
+    """An argument has a value that makes no sense."""
+
+
+class UnsuitableSystemError(CtrlRealizeError, ValueError):
+    """The system is of a kind that the function cannot handle."""
+
+
+class FileFormatError(CtrlRealizeError, ValueError):
+    """The file is there, but is not what it should be."""
+
+
+class MissingFileError(CtrlRealizeError, FileNotFoundError):
+    """The file is not there."""
+
+
+class CtrlRealizeWarning(UserWarning):
+    """Base of all warnings of this toolbox."""
+
+
+class DataWarning(CtrlRealizeWarning):
+    """The data were usable only in part."""
+
+
+class DelayWarning(CtrlRealizeWarning):
+    """The delay is less certain than it looks."""
+
+
+class ModelWarning(CtrlRealizeWarning):
+    """The model has a property that one should know before using it."""

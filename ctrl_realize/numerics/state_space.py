@@ -1,0 +1,183 @@
+"""Responses of discrete state-space models, without their delay chain.
+
+The transfer-function polynomial is never formed: with poles that crowd at z = 1, as those of
+oversampled records do, its coefficients lose all digits from order 10 on. Frequency responses
+go through the complex Schur form, time responses through block powers; both need no
+eigenvectors, so defective and unstable A are fine.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import schur
+
+from .arrays import ComplexArray, FloatArray
+
+BLOCK = 64
+"""Samples that are computed together; block powers are built by doubling up to here."""
+
+
+def schur_form(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return T and Q with A = Q T Q^H, T upper triangular.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n, n)
+
+    Returns
+    -------
+    T, Q : ndarray, shape (n, n)
+    """
+    if A.shape[0] == 0:
+        empty = np.zeros((0, 0), dtype=np.complex128)
+        return empty, empty
+    T, Q = schur(A, output="complex")
+    return np.asarray(T, dtype=np.complex128), np.asarray(Q, dtype=np.complex128)
+
+
+def frequency_response(
+    form: tuple[ComplexArray, ComplexArray],
+    B: FloatArray,
+    C: FloatArray,
+    D: FloatArray,
+    points: ComplexArray,
+) -> ComplexArray:
+    """Evaluate C (x I - A)^-1 B + D at many points by back substitution.
+
+    Parameters
+    ----------
+    form : (T, Q)
+        Schur form of A, from `schur_form`.
+    B, C, D : ndarray, shapes (n, m), (p, n), (p, m)
+    points : ndarray, shape (K,)
+        Points x in the complex plane. At a pole the result is not finite.
+
+    Returns
+    -------
+    ndarray, shape (p, m, K)
+    """
+    T, Q = form
+    n, m = B.shape
+    K = points.size
+    if n == 0:
+        return np.repeat(D[:, :, None].astype(np.complex128), K, axis=2)
+    right = Q.conj().T @ B
+    left = C @ Q
+    states = np.empty((n, m * K), dtype=np.complex128)
+    for i in range(n - 1, -1, -1):
+        row = np.repeat(right[i], K)
+        if i + 1 < n:
+            row += T[i, i + 1 :] @ states[i + 1 :]
+        states[i] = (row.reshape(m, K) / (points - T[i, i])).ravel()
+    return (left @ states).reshape(-1, m, K) + D[:, :, None]
+
+
+def _observability_blocks(
+    A: FloatArray, C: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Stack C, CA, ..., CA^(count-1) by doubling; also return A^count. Count: a power of two."""
+    stack = C[None]
+    power = A
+    while stack.shape[0] < count:
+        stack = np.concatenate([stack, stack @ power])
+        power = power @ power
+    return stack, power
+
+
+def markov(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: int) -> FloatArray:
+    """Compute the Markov parameters D, CB, CAB, ....
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+    count : int
+        How many.
+
+    Returns
+    -------
+    ndarray, shape (p, m, count)
+    """
+    n, m = B.shape
+    p = C.shape[0]
+    out = np.zeros((p, m, count))
+    if count > 0:
+        out[:, :, 0] = D
+    if count > 1 and n > 0:
+        block = min(BLOCK, 1 << (count - 2).bit_length())
+        rows, jump = _observability_blocks(A, C, block)
+        columns = [B]
+        for _ in range((count - 2) // block):
+            columns.append(jump @ columns[-1])
+        # rows (L, p, n) times columns (blocks, n, m) -> (blocks, L, p, m)
+        values = np.einsum("lpn,bnm->pmbl", rows, np.stack(columns), optimize=True)
+        out[:, :, 1:] = values.reshape(p, m, -1)[:, :, : count - 1]
+    return out
+
+
+def step_response(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: int
+) -> FloatArray:
+    """Compute the response to a unit step at k = 0 on each input.
+
+    Returns
+    -------
+    ndarray, shape (p, m, count)
+    """
+    n, m = B.shape
+    # [[A, B], [0, I]] carries the held input: its Markov parameters are the step response,
+    # without the running sum that would lose digits in long records.
+    held = np.block([[A, B], [np.zeros((m, n)), np.eye(m)]])
+    start = np.vstack([np.zeros((n, m)), np.eye(m)])
+    seen = np.hstack([C, D])
+    return markov(held, start, seen, np.zeros_like(D), count + 1)[:, :, 1:]
+
+
+def simulate(
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    D: FloatArray,
+    inputs: FloatArray,
+    initial_state: FloatArray | None = None,
+) -> FloatArray:
+    """Compute the response to any input, block by block.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+    inputs : ndarray, shape (m, N)
+    initial_state : ndarray, shape (n,), optional
+        Zero when absent.
+
+    Returns
+    -------
+    ndarray, shape (p, N)
+    """
+    n, m = B.shape
+    p = C.shape[0]
+    N = inputs.shape[1]
+    if n == 0:
+        return D @ inputs
+    L = BLOCK
+    blocks = -(-N // L)
+    padded = np.zeros((m, blocks * L))
+    padded[:, :N] = inputs
+    U = padded.reshape(m, blocks, L).transpose(1, 2, 0).reshape(blocks, L * m)
+
+    rows, jump = _observability_blocks(A, C, L)
+    pulses = markov(A, B, C, D, L).transpose(2, 0, 1)  # (L, p, m)
+    inside = np.zeros((L, p, L, m))
+    for lag in range(L):
+        index = np.arange(L - lag)
+        inside[index + lag, :, index, :] = pulses[lag]
+    reach, _ = _observability_blocks(A.T, B.T, L)  # (B^T (A^T)^l) = (A^l B)^T
+    into = reach[::-1].transpose(2, 0, 1).reshape(n, L * m)
+
+    kicks = U @ into.T
+    states = np.empty((blocks, n))
+    state = np.zeros(n) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
+    for b in range(blocks):
+        states[b] = state
+        state = jump @ state + kicks[b]
+    out = states @ rows.reshape(L * p, n).T + U @ inside.reshape(L * p, L * m).T
+    return out.reshape(blocks, L, p).transpose(2, 0, 1).reshape(p, -1)[:, :N]

@@ -1,0 +1,99 @@
+"""What all results have in common: a card in a notebook, the same card as text, a plot.
+
+A result is a frozen dataclass. It names itself (`_title`), lists its numbers with their units
+(`_rows`), and may carry `flags`, the things that one should know before trusting it.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Flag:
+    """Something one should know before trusting a result.
+
+    Attributes
+    ----------
+    code : str
+        Short fixed name, for programs: ``"delay_at_bound"``.
+    message : str
+        What was seen, with its numbers, and what to try.
+    """
+
+    code: str
+    message: str
+
+    def __str__(self) -> str:
+        return self.message
+
+
+class Result:
+    """Mixin of all results: `report`, `plot` and the card that a notebook shows."""
+
+    def _title(self) -> str:
+        return type(self).__name__
+
+    def _rows(self) -> list[tuple[str, str]]:
+        raise AssertionError(f"{type(self).__name__} does not list its numbers")
+
+    def _notes(self) -> list[str]:
+        flags: tuple[Flag, ...] = getattr(self, "flags", ())
+        return [str(flag) for flag in flags]
+
+    def report(self) -> str:
+        """Tell the result as plain text, flags included."""
+        return text_card(self._title(), self._rows(), self._notes())
+
+    def _repr_html_(self) -> str:
+        return html_card(self._title(), self._rows(), self._notes())
+
+    def plot(self, **kwargs: Any) -> Any:
+        """Draw the result; returns a `control.ControlPlot`.
+
+        Keyword arguments go to the function of `ctrl_realize.plots` that draws this kind of
+        result.
+        """
+        # The one way up in the layers: drawing is looked up when somebody asks for it, so that
+        # computing needs no matplotlib.
+        return import_module("ctrl_realize.plots").draw(self, **kwargs)
+
+
+def text_card(title: str, rows: Sequence[tuple[str, str]], notes: Sequence[str] = ()) -> str:
+    """Lay out label-value rows as text, notes below them.
+
+    Examples
+    --------
+    >>> from ctrl_realize.results import text_card
+    >>> print(text_card("Delay", [("delay", "37 samples"), ("order", "3")], ["look twice"]))
+    Delay
+      delay  37 samples
+      order  3
+      ! look twice
+    """
+    width = max((len(label) for label, _ in rows), default=0)
+    lines = [title]
+    lines += [f"  {label:<{width}}  {value}" for label, value in rows]
+    lines += [f"  ! {note}" for note in notes]
+    return "\n".join(lines)
+
+
+def html_card(title: str, rows: Sequence[tuple[str, str]], notes: Sequence[str] = ()) -> str:
+    """Lay out label-value rows as a small HTML table; everything is escaped."""
+    body = "".join(
+        f"<tr><th style='text-align:left;font-weight:500;padding:2px 16px 2px 0'>"
+        f"{html.escape(label)}</th>"
+        f"<td style='text-align:left;padding:2px 0'>{html.escape(value)}</td></tr>"
+        for label, value in rows
+    )
+    warnings = "".join(f"<div style='margin-top:4px'>⚠ {html.escape(note)}</div>" for note in notes)
+    return (
+        "<div style='display:inline-block;border:1px solid #8886;border-radius:6px;"
+        "padding:8px 14px;max-width:46em'>"
+        f"<div style='font-weight:600;margin-bottom:4px'>{html.escape(title)}</div>"
+        f"<table style='border-collapse:collapse;margin:0'>{body}</table>{warnings}</div>"
+    )

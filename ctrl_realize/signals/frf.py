@@ -1,0 +1,166 @@
+"""A measured frequency response that python-control can draw beside a model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import DataError, OptionError
+from ..numerics.arrays import ComplexArray, FloatArray, read_only
+
+
+class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is untyped
+    """Measured frequency response function.
+
+    It is a `control.FrequencyResponseData` without a time base (``dt=None``), the form in which
+    python-control draws and combines it with continuous and discrete systems alike.
+
+    Parameters
+    ----------
+    response : array_like, shape (K,) or (p, m, K)
+        Complex response.
+    frequency_hz : array_like, shape (K,)
+        Frequencies in Hz, in any order; they are sorted.
+    coherence : array_like, same shape as `response`, optional
+        Squared coherence, 0...1.
+    std : array_like, same shape as `response`, optional
+        Standard deviation of the complex response (root mean square of the error).
+    name : str, optional
+    inputs, outputs : str or sequence of str, optional
+        Signal names, as python-control takes them.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (K,)
+    complex : ndarray
+        The complex response (python-control's attribute), sorted by frequency.
+    coherence, std : ndarray or None
+
+    Raises
+    ------
+    DataError
+        Shapes that do not match, values that are not finite, negative frequencies.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> frf = cr.MeasuredFRF([1.0, 0.5 - 0.5j, -0.1j], [0.1, 1.0, 10.0])
+    >>> frf.between_hz(0.5, 20.0)
+    <MeasuredFRF 'measured': 2 points, 1...10 Hz>
+    """
+
+    coherence: FloatArray | None
+    std: FloatArray | None
+    frequency_hz: FloatArray
+
+    def __init__(
+        self,
+        response: ArrayLike,
+        frequency_hz: ArrayLike,
+        *,
+        coherence: ArrayLike | None = None,
+        std: ArrayLike | None = None,
+        name: str = "measured",
+        inputs: Any = None,
+        outputs: Any = None,
+    ) -> None:
+        values = np.asarray(response, dtype=np.complex128)
+        grid = np.asarray(frequency_hz, dtype=np.float64)
+        if grid.ndim != 1 or grid.size == 0:
+            raise DataError(f"frequency_hz has shape {grid.shape}; needed is (K,), K >= 1")
+        if values.ndim not in (1, 3) or values.shape[-1] != grid.size:
+            raise DataError(
+                f"response has shape {values.shape}, frequency_hz has {grid.size} points; "
+                "needed is (K,) or (outputs, inputs, K)"
+            )
+        _check_finite(grid, "frequency_hz")
+        _check_finite(values, "response")
+        if np.any(grid < 0):
+            raise DataError(f"frequency_hz goes down to {grid.min():g} Hz; needed is >= 0")
+        order = np.argsort(grid, kind="stable")
+        grid = grid[order]
+        values = values[..., order]
+        signals = {key: given for key, given in (("inputs", inputs), ("outputs", outputs)) if given}
+        # Interpolation is what margins and products with systems need; it wants rising points.
+        rising = grid.size > 1 and bool(np.all(np.diff(grid) > 0))
+        super().__init__(
+            values, 2 * np.pi * grid, dt=None, name=str(name), smooth=rising, **signals
+        )
+        self._single = values.ndim == 1
+        self.frequency_hz = read_only(grid)
+        self.coherence = _beside(coherence, values, order, "coherence")
+        self.std = _beside(std, values, order, "std")
+        if self.coherence is not None and (
+            self.coherence.min() < 0 or self.coherence.max() > 1 + 1e-9
+        ):
+            raise DataError(
+                f"coherence runs from {self.coherence.min():g} to {self.coherence.max():g}; "
+                "needed are values in 0...1"
+            )
+        if self.std is not None and self.std.min() < 0:
+            raise DataError(f"std goes down to {self.std.min():g}; needed is >= 0")
+
+    def __repr__(self) -> str:
+        return (
+            f"<MeasuredFRF {self.name!r}: {self.frequency_hz.size} points, "
+            f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz>"
+        )
+
+    def _repr_html_(self) -> str | None:
+        return None
+
+    def between_hz(self, low: float, high: float) -> MeasuredFRF:
+        """Cut out the points with low <= frequency <= high, in Hz."""
+        return self._select(
+            (self.frequency_hz >= low) & (self.frequency_hz <= high),
+            f"between {low:g} and {high:g} Hz",
+        )
+
+    def trusted(self, min_coherence: float = 0.95) -> MeasuredFRF:
+        """Keep the points whose coherence is at least `min_coherence` (in every channel)."""
+        if self.coherence is None:
+            raise DataError(
+                "this FRF has no coherence; choose a band with between_hz(low, high) instead"
+            )
+        if not 0 <= min_coherence <= 1:
+            raise OptionError(f"min_coherence={min_coherence!r}; needed is a value in 0...1")
+        good = self.coherence.reshape(-1, self.frequency_hz.size).min(axis=0) >= min_coherence
+        return self._select(good, f"with a coherence of {min_coherence:g}")
+
+    def _select(self, keep: np.ndarray[Any, np.dtype[np.bool_]], where: str) -> MeasuredFRF:
+        if not keep.any():
+            raise DataError(
+                f"no point of the FRF lies {where}; it has {self.frequency_hz.size} points, "
+                f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz"
+            )
+        return MeasuredFRF(
+            (self.frdata[0, 0] if self._single else self.frdata)[..., keep],
+            self.frequency_hz[keep],
+            coherence=None if self.coherence is None else self.coherence[..., keep],
+            std=None if self.std is None else self.std[..., keep],
+            name=self.name,
+            inputs=self.input_labels,
+            outputs=self.output_labels,
+        )
+
+
+def _beside(
+    values: ArrayLike | None, response: ComplexArray, order: np.ndarray[Any, Any], what: str
+) -> FloatArray | None:
+    if values is None:
+        return None
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != response.shape:
+        raise DataError(f"{what} has shape {array.shape}, response has {response.shape}")
+    _check_finite(array, what)
+    return read_only(array[..., order])
+
+
+def _check_finite(values: np.ndarray[Any, Any], what: str) -> None:
+    bad = ~np.isfinite(values)
+    if bad.any():
+        first = int(np.flatnonzero(bad.reshape(-1, values.shape[-1]).any(axis=0))[0])
+        raise DataError(f"{what} has {int(bad.sum())} non-finite values, the first at {first}")

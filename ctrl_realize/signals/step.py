@@ -1,0 +1,100 @@
+"""An edge in a measured input, and the step response that follows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..numerics.arrays import FloatArray, read_only
+
+
+@dataclass(frozen=True)
+class StepEdge:
+    """Where and how far an input stepped.
+
+    ``input[index - 1]`` is still at rest, ``input[index]`` has moved, and from
+    ``index + samples - 1`` on the input stays at ``rest + amplitude``.
+
+    Attributes
+    ----------
+    index : int
+        First sample at which the input has left its rest level.
+    time : float
+        Time of that sample in s.
+    amplitude : float
+        New level minus rest level, in the unit of the input.
+    rest : float
+        Level before the edge.
+    samples : int
+        Samples that the edge takes; 1 is an ideal step.
+    start, stop : int
+        The input is at rest from sample `start` on, and at its new level up to sample
+        `stop` (exclusive).
+    edges : tuple of StepEdge
+        All edges of the record, this one among them; empty on the members.
+    """
+
+    index: int
+    time: float
+    amplitude: float
+    rest: float
+    samples: int
+    start: int
+    stop: int
+    edges: tuple[StepEdge, ...] = field(default=(), repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class StepResponse:
+    """Response to a unit step, cut out of a record.
+
+    ``output[k] = (y[edge.index + k] - rest_output - drift * k * dt) / amplitude``; `pre` is the
+    same before the edge, so it holds the noise of the measurement in the same unit.
+
+    Attributes
+    ----------
+    time : ndarray, shape (N,)
+        Time in s after the sample at which the input moved.
+    output : ndarray, shape (N,)
+        Unit step response S_0, S_1, ... (output unit per input unit).
+    input : ndarray, shape (N,)
+        Measured input, scaled to a step from 0 to 1.
+    pre : ndarray, shape (P,)
+        The samples before the edge, P = 0 where the record starts at the step.
+    dt : float
+        Sample time in s.
+    amplitude : float
+        Input step that the data were divided by.
+    rest_output : float
+        Output level before the edge.
+    drift : float
+        Slope of the output before the edge that was removed, per s; 0 when none was significant.
+    edge : StepEdge
+    name : str
+    """
+
+    time: FloatArray
+    output: FloatArray
+    input: FloatArray
+    pre: FloatArray
+    dt: float
+    amplitude: float
+    rest_output: float
+    drift: float
+    edge: StepEdge
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for what in ("time", "output", "input", "pre"):
+            object.__setattr__(self, what, read_only(getattr(self, what)))
+
+    @property
+    def n_samples(self) -> int:
+        """Samples from the edge on."""
+        return int(self.output.size)
+
+    def __repr__(self) -> str:
+        name = f" {self.name!r}" if self.name else ""
+        return (
+            f"<StepResponse{name}: {self.n_samples} samples of {self.dt:g} s after a step of "
+            f"{self.amplitude:g}, {self.pre.size} before>"
+        )
