@@ -5,6 +5,8 @@ sys    = cr.identify(record)              # a control.StateSpace with z^-d
 ct.bode_plot([sys, cr.read_frf("frf.csv")])
 """
 
+from .delayed import DelayedStateSpace as DelayedStateSpace
+from .delayed import delayed_ss as delayed_ss
 from .errors import CtrlRealizeError as CtrlRealizeError
 from .errors import CtrlRealizeWarning as CtrlRealizeWarning
 from .results import Flag as Flag

@@ -1,0 +1,116 @@
+"""Build a system with dead time from any linear system, sampled exactly if it is continuous."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..checks import positive, real
+from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ..numerics.sampling import sample_with_dead_time, split_dead_time
+from .system import DelayedStateSpace, check_core
+
+
+def delayed_ss(
+    core: ct.StateSpace | ct.TransferFunction,
+    delay: int | Sequence[int] | None = None,
+    *,
+    dead_time: float | None = None,
+    dt: float | None = None,
+    output_delay: int | Sequence[int] = 0,
+    fit: Any = None,
+    name: str | None = None,
+    inputs: str | Sequence[str] | None = None,
+    outputs: str | Sequence[str] | None = None,
+) -> DelayedStateSpace:
+    """Put a dead time before a system.
+
+    Parameters
+    ----------
+    core : control.StateSpace or control.TransferFunction
+        Discrete, or continuous with `dt`: it is then sampled exactly behind a zero-order hold,
+        any fraction of a sample included.
+    delay : int or sequence of int, optional
+        Dead time in samples; one for each input if they differ.
+    dead_time : float, optional
+        The same in s, instead of `delay`. For a discrete core it must be a multiple of its
+        sample time; for a continuous one it may be anything. A dead time of (d + f) samples,
+        0 < f < 1, gives a core of the same order with feedthrough and the delay d + 1.
+    dt : float, optional
+        Sample time in s for a continuous core.
+    output_delay, fit, name, inputs, outputs
+        As for `DelayedStateSpace`.
+
+    Returns
+    -------
+    DelayedStateSpace
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A core that is no linear system, a continuous one without `dt`, or a fractional delay of
+        a core with a direct term.
+    DelayRangeError
+        A negative delay, or one that is no multiple of a discrete core's sample time.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> lag = ct.tf([1], [0.08, 1])
+    >>> cr.delayed_ss(lag, dead_time=0.0289, dt=7.8125e-4).delay
+    37
+    >>> cr.delayed_ss(lag, dead_time=0.025, dt=0.01)
+    <DelayedStateSpace: u -> y, order 1, z^-3 (0.03 s), dt = 0.01 s>
+    """
+    if not isinstance(core, (ct.StateSpace, ct.TransferFunction)):
+        raise UnsuitableSystemError(
+            f"core is a {type(core).__name__}; needed is a control.StateSpace or TransferFunction"
+        )
+    if delay is not None and dead_time is not None:
+        raise OptionError(f"delay={delay!r} and dead_time={dead_time!r}: give one of them")
+    system = core if isinstance(core, ct.StateSpace) else ct.ss(core)
+    settings: dict[str, Any] = {
+        "output_delay": output_delay,
+        "fit": fit,
+        "name": name,
+        "inputs": inputs,
+        "outputs": outputs,
+    }
+    wait = None if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
+    if wait is not None and wait < 0:
+        raise DelayRangeError(f"dead_time={wait:g} s; needed is >= 0")
+    if system.isctime(strict=True) or (dt is not None and system.dt is None):
+        if dt is None:
+            raise UnsuitableSystemError("the core is continuous; give dt, its sample time in s")
+        step = positive(dt, "dt", "sample time in s")
+        if delay is None and split_dead_time(wait or 0.0, step)[1] and np.any(system.D):
+            raise UnsuitableSystemError(
+                "the core has a direct term D, whose response jumps between two samples when the "
+                f"dead time is {(wait or 0.0) / step:.6g} samples; use a whole number of samples"
+            )
+        *sampled, samples = sample_with_dead_time(
+            system.A, system.B, system.C, system.D, step, wait or 0.0
+        )
+        discrete = ct.StateSpace(
+            *sampled,
+            step,
+            inputs=system.input_labels,
+            outputs=system.output_labels,
+            remove_useless_states=False,
+        )
+        return DelayedStateSpace(discrete, samples if delay is None else delay, **settings)
+    check_core(system)
+    if dt is not None and not np.isclose(positive(dt, "dt", "sample time in s"), system.dt):
+        raise OptionError(f"dt={dt:g} s, but the core has the sample time {system.dt:g} s")
+    if wait is not None:
+        delay, rest = split_dead_time(wait, system.dt)
+        if rest:
+            raise DelayRangeError(
+                f"dead_time={wait:g} s is {wait / system.dt:.6g} samples of {system.dt:g} s; a "
+                "discrete core takes whole samples (a continuous core takes any)"
+            )
+    return DelayedStateSpace(system, 0 if delay is None else delay, **settings)
