@@ -9,6 +9,8 @@ from .delayed import DelayedStateSpace as DelayedStateSpace
 from .delayed import delayed_ss as delayed_ss
 from .errors import CtrlRealizeError as CtrlRealizeError
 from .errors import CtrlRealizeWarning as CtrlRealizeWarning
+from .io import read_frf as read_frf
+from .io import read_record as read_record
 from .results import Flag as Flag
 from .signals import FilterSpec as FilterSpec
 from .signals import ImpulseResponse as ImpulseResponse

@@ -1,0 +1,66 @@
+"""What is asked of any file before it is opened: it exists, is a file, is not too large."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from ..errors import FileFormatError, MissingFileError, OptionError
+
+MAX_BYTES = 2 * 2**30
+"""Largest data file that is read unless the caller says more."""
+
+
+def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
+    """Return `path` if it is a regular, readable, non-empty file of at most `max_bytes`.
+
+    Raises
+    ------
+    MissingFileError
+        If there is nothing at `path`, or it may not be read.
+    FileFormatError
+        If it is a folder, a device or a pipe (which might never end), empty, or too large.
+    """
+    if not max_bytes > 0:
+        raise OptionError(f"max_bytes={max_bytes} must be positive")
+    try:
+        path = Path(path)
+        status = path.stat()
+    except (OSError, ValueError) as error:
+        # ValueError: a NUL character in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise MissingFileError(f"{os.fspath(path)!r} cannot be read: {reason}") from error
+    if stat.S_ISDIR(status.st_mode):
+        raise FileFormatError(f"{path} is a folder, a file is needed")
+    if not stat.S_ISREG(status.st_mode):
+        raise FileFormatError(f"{path} is a device or a pipe, a regular file is needed")
+    if not os.access(path, os.R_OK):
+        raise MissingFileError(f"{path} cannot be read: no permission")
+    if status.st_size == 0:
+        raise FileFormatError(f"{path} is empty")
+    check_size(path, status.st_size, max_bytes)
+    return path
+
+
+def check_size(path: Path, n_bytes: int, max_bytes: float, what: str = "") -> None:
+    """Refuse what is larger than `max_bytes`, before memory is given to it."""
+    if n_bytes > max_bytes:
+        raise FileFormatError(
+            f"{path}{what} is {n_bytes / 2**20:.4g} MiB, "
+            f"max_bytes={max_bytes:.0f} allows {max_bytes / 2**20:.4g} MiB"
+        )
+
+
+def read_head(path: Path, n_bytes: int) -> bytes:
+    """First `n_bytes` of a file."""
+    with path.open("rb") as file:
+        return file.read(n_bytes)
+
+
+def read_tail(path: Path, n_bytes: int) -> bytes:
+    """Last `n_bytes` of a file (of the whole file, if it is shorter)."""
+    with path.open("rb") as file:
+        # an even start keeps two-byte characters whole
+        file.seek(max(0, path.stat().st_size - n_bytes) // 2 * 2)
+        return file.read()

@@ -1,0 +1,137 @@
+"""Text tables: parsed by pandas, after `sniff` has found out how they are written."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import warnings
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from ..errors import DataWarning, FileFormatError
+from .checks import read_tail
+from .sniff import NUMBER, TextLayout, TextOptions, sniff, split_line
+from .tables import Column, Table
+
+_TAIL_BYTES = 1 << 16
+_TAIL_LINES = 50
+
+
+def read_delimited(path: Path, options: TextOptions) -> Table:
+    """Read a text table (CSV, TSV, columns between blanks).
+
+    A last line that was cut off while it was written is left out with a `DataWarning`.
+
+    Raises
+    ------
+    FileFormatError
+        If it is not a table: binary, no numbers, rows longer than the others.
+    """
+    layout = sniff(path, options)
+    frame = _parse(path, layout)
+    cut = _cut_last_line(path, layout)
+    if cut and len(frame) > 1:
+        warnings.warn(f"{path}: the last line is left out, {cut}", DataWarning, stacklevel=4)
+        # columns that are text only because of the cut line become numbers in Table.numbers
+        frame = frame.iloc[:-1]
+    while len(frame) and _is_blank(frame.iloc[-1]):
+        frame = frame.iloc[:-1]
+    columns = [
+        Column(layout.names[k], layout.units[k], frame.iloc[:, k].to_numpy())
+        for k in range(layout.n_columns)
+    ]
+    if len(columns) > 1 and not columns[-1].name and _is_blank(columns[-1].cells):
+        # every line ends in a delimiter
+        columns.pop()
+    return Table(
+        path, tuple(columns), decimal=layout.decimal, place=lambda row: _place(path, layout, row)
+    )
+
+
+def _parse(path: Path, layout: TextLayout) -> Any:
+    import pandas as pd
+
+    separator = r"\s+" if layout.delimiter == " " else layout.delimiter
+    keywords: dict[str, Any] = {}
+    if tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1):
+        # the default of later versions; before, the last digit could be wrong
+        keywords["float_precision"] = "round_trip"
+    try:
+        frame = pd.read_csv(
+            path,
+            sep=separator,
+            decimal=layout.decimal,
+            header=None,
+            skiprows=layout.first_line,
+            comment=layout.comment,
+            encoding=layout.encoding,
+            # numbers are ASCII in all encodings here; a wrong letter in a name does no harm
+            encoding_errors="replace",
+            compression=None,
+            skipinitialspace=True,
+            # an empty cell or a "NaN" makes its column text, and is complained about there
+            na_filter=False,
+            low_memory=False,
+            **keywords,
+        )
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeError, OverflowError) as error:
+        reason = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        raise FileFormatError(f"{path} is not a table: {reason}") from error
+    if frame.shape[1] != layout.n_columns:
+        raise FileFormatError(
+            f"{path}: line {layout.first_line + 1} has {frame.shape[1]} cells, most lines have "
+            f"{layout.n_columns}; say delimiter=, or skip_rows= if the table starts further down"
+        )
+    return frame
+
+
+def _is_blank(cells: Any) -> bool:
+    return all(isinstance(cell, str) and not cell.strip() for cell in cells)
+
+
+def _cut_last_line(path: Path, layout: TextLayout) -> str:
+    """Say how one sees that the last line was cut off while it was written, or ``""``."""
+    raw = read_tail(path, _TAIL_BYTES)
+    # the mark at the start is not in the tail, and UTF-16 without it is told by its zeros
+    encoding = layout.encoding
+    if encoding == "utf-16":
+        encoding = "utf-16-be" if raw[:64:2].count(0) > raw[1:64:2].count(0) else "utf-16-le"
+    text = codecs.getincrementaldecoder(encoding)("replace").decode(raw)
+    lines = [line for line in re.split(r"\r\n|\n|\r", text)[-_TAIL_LINES:] if line.strip()]
+    if layout.comment:
+        lines = [line for line in lines if not line.lstrip().startswith(layout.comment)]
+    if len(lines) < 2:
+        return ""
+    rows = [split_line(line.rstrip("\0"), layout.delimiter) for line in lines]
+    *before, last = rows
+    if len(last) < min(layout.n_columns, len(before[-1])):
+        return f"it has {len(last)} of {layout.n_columns} cells"
+    if text.endswith(("\n", "\r")) or len(last) != layout.n_columns:
+        return ""
+    pattern = NUMBER[layout.decimal]
+    if not pattern.fullmatch(last[-1]) and pattern.fullmatch(before[-1][-1]):
+        return f"it ends in {last[-1][:20]!r} and has no line end"
+    # written with a fixed number of decimals, except here: 27.02 of 27.0223
+    decimals = {len(row[-1].rpartition(layout.decimal)[2]) for row in before if row[-1]}
+    fixed = all(layout.decimal in row[-1] for row in before if row[-1])
+    if fixed and len(decimals) == 1 and len(before) >= 3:
+        short = len(last[-1].rpartition(layout.decimal)[2]) < min(decimals)
+        if short or layout.decimal not in last[-1]:
+            return f"it ends in {last[-1]!r}, with fewer decimals than all others and no line end"
+    return ""
+
+
+def _place(path: Path, layout: TextLayout, row: int) -> str:
+    """Line of the file on which a row of the table stands."""
+    with path.open(encoding=layout.encoding, errors="replace") as file:
+        numbered = enumerate(file, start=1)
+        data = (
+            number
+            for number, line in numbered
+            if number > layout.first_line
+            and line.strip()
+            and not (layout.comment and line.lstrip().startswith(layout.comment))
+        )
+        number = next(islice(data, row, None), None)
+    return f"row {row}" if number is None else f"line {number}"

@@ -1,0 +1,252 @@
+"""Read a measured frequency response from a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..errors import DataError, OptionError
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..signals import MeasuredFRF
+from .checks import MAX_BYTES
+from .columns import check_lengths, find_column, has_header, named, plain_name
+from .sniff import TextOptions
+from .tables import Table, read_table
+from .units import plain_unit
+
+_NAMES = {
+    "frequency": {"f", "freq", "frequency", "frequencies", "frequenz", "fréquence", "frecuencia",
+                  "omega", "ω", "w"},
+    "magnitude": {"magnitude", "mag", "gain", "amplitude", "amp", "abs", "|g|", "|h|", "betrag",
+                  "verstärkung", "magnitude ratio", "amplitude ratio"},
+    "phase": {"phase", "phi", "φ", "arg", "angle", "phase angle", "phasenwinkel"},
+    "real": {"real", "re", "real part", "realteil"},
+    "imag": {"imag", "im", "imaginary", "imaginary part", "imaginärteil"},
+    "response": {"response", "g", "h", "frf", "resp", "complex"},
+    "coherence": {"coherence", "coh", "gamma2", "γ2", "γ²", "cxy", "kohärenz"},
+    "std": {"std", "sigma", "std dev", "stddev", "standard deviation", "σ"},
+}  # fmt: skip
+
+_IN_HZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "rad/s": 1 / (2 * np.pi)}
+
+
+def read_frf(
+    path: str | os.PathLike[str],
+    *,
+    frequency: str | int | None = None,
+    magnitude: str | int | None = None,
+    phase: str | int | None = None,
+    real: str | int | None = None,
+    imag: str | int | None = None,
+    response: str | int | None = None,
+    coherence: str | int | None = None,
+    std: str | int | None = None,
+    frequency_unit: str = "auto",
+    magnitude_unit: str = "auto",
+    phase_unit: str = "auto",
+    delimiter: str = "auto",
+    decimal: str = "auto",
+    encoding: str = "auto",
+    comment: str | None = "auto",
+    header: bool | Literal["auto"] = "auto",
+    skip_rows: int = 0,
+    variable: str | None = None,
+    name: str | None = None,
+    max_bytes: float = MAX_BYTES,
+) -> MeasuredFRF:
+    r"""Read a measured frequency response from a CSV, TSV, ``.npz``, ``.mat`` or Parquet file.
+
+    Columns are found by their names (``frequency_hz``, ``omega``, ``magnitude_db``,
+    ``phase [rad]``, ``real``, ``imag``, ``coherence``, ``std``); without a header, three columns
+    are frequency, magnitude and phase. Units are taken from the header; where it has none,
+    frequency is in Hz (``omega``: rad/s), magnitude a ratio and phase in degrees, unless the
+    values speak against it, which is an error.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; its first bytes tell of what kind it is.
+    frequency, magnitude, phase, real, imag, response, coherence, std : str or int, optional
+        Columns, by name or by number from 0. The response is magnitude and phase, or real and
+        imaginary part, or one complex array. `std` is the standard deviation of the complex
+        response, in its unit.
+    frequency_unit : str, optional
+        ``"Hz"``, ``"kHz"``, ``"MHz"`` or ``"rad/s"``.
+    magnitude_unit : str, optional
+        ``"abs"`` or ``"dB"``.
+    phase_unit : str, optional
+        ``"deg"`` or ``"rad"``.
+    delimiter, decimal, encoding, comment, header, skip_rows, variable, max_bytes
+        As for `read_record`.
+    name : str, optional
+        Name of the system; default: the file's, without its ending.
+
+    Returns
+    -------
+    MeasuredFRF
+
+    Warns
+    -----
+    DataWarning
+        The last line was cut off while it was written; it is left out.
+
+    Raises
+    ------
+    MissingFileError, FileFormatError, DataError, OptionError
+        As for `read_record`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import ctrl_realize as cr
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "bench.csv"
+    ...     _ = file.write_text("f [Hz],gain [dB],phase [deg]\n1,0,0\n10,-20,-90\n")
+    ...     frf = cr.read_frf(file)
+    >>> frf
+    <MeasuredFRF 'bench': 2 points, 1...10 Hz>
+    >>> print(abs(frf.frdata[0, 0]).round(6))
+    [1.  0.1]
+    """
+    asked = {
+        "frequency": frequency, "magnitude": magnitude, "phase": phase, "real": real,
+        "imag": imag, "response": response, "coherence": coherence, "std": std,
+    }  # fmt: skip
+    units = _Units(
+        _checked_unit(frequency_unit, "frequency_unit", _IN_HZ),
+        _checked_unit(magnitude_unit, "magnitude_unit", ("", "db")),
+        _checked_unit(phase_unit, "phase_unit", ("deg", "rad")),
+    )
+    options = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
+    table = read_table(path, options, variable=variable, max_bytes=max_bytes)
+    columns = _columns(table, asked)
+    check_lengths(table, columns.values())
+    extras = {key: table.numbers(columns[key]) for key in ("coherence", "std") if key in columns}
+    try:
+        return MeasuredFRF(
+            _response(table, columns, units),
+            _frequency_hz(table, columns["frequency"], units.frequency),
+            name=_system_name(Path(path).stem) if name is None else name,
+            **extras,
+        )
+    except DataError as error:
+        if str(error).startswith(str(table.path)):
+            raise
+        raise DataError(f"{table.path}: {error}") from error
+
+
+@dataclass(frozen=True)
+class _Units:
+    """What the caller says; None is found out."""
+
+    frequency: str | None
+    magnitude: str | None
+    phase: str | None
+
+
+def _checked_unit(unit: str, argument: str, known: Iterable[str]) -> str | None:
+    if unit == "auto":
+        return None
+    plain = plain_unit(unit)
+    if plain not in known:
+        names = ", ".join(repr(one or "abs") for one in known)
+        raise OptionError(f"{argument}={unit!r} must be one of {names} or 'auto'")
+    return plain
+
+
+def _columns(table: Table, asked: dict[str, str | int | None]) -> dict[str, int]:
+    """Position of each part that is there."""
+    columns = {
+        part: find_column(table, wanted, part)
+        for part, wanted in asked.items()
+        if wanted is not None
+    }
+    if not has_header(table) and not columns and len(table.columns) == 3:
+        return {"frequency": 0, "magnitude": 1, "phase": 2}
+    given = set(columns)
+    for part, names in _NAMES.items():
+        found = named(table, names, columns.values()) if part not in given else []
+        if len(found) > 1:
+            raise OptionError(
+                f"{table.path} has {len(found)} columns that could be {part}; say {part}=name or "
+                f"number; it has {table.listing()}"
+            )
+        if found:
+            columns[part] = found[0]
+    forms = [("response",), ("real", "imag"), ("magnitude", "phase")]
+    # what the caller named counts before what was found by name
+    forms.sort(key=lambda form: -len(given.intersection(form)))
+    complete = [form for form in forms if all(part in columns for part in form)]
+    if "frequency" not in columns or not complete:
+        missing = "the frequency" if "frequency" not in columns else "the response"
+        raise OptionError(
+            f"{table.path}: cannot tell which column is {missing}; say frequency= and magnitude= "
+            f"with phase=, or real= with imag=; it has {table.listing()}"
+        )
+    kept = {"frequency", "coherence", "std", *complete[0]}
+    return {part: index for part, index in columns.items() if part in kept}
+
+
+def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
+    column = table.columns[index]
+    if unit is None:
+        named_omega = plain_name(column.name) in ("omega", "ω", "w")
+        unit = column.unit or ("rad/s" if named_omega else "hz")
+    if unit not in _IN_HZ:
+        raise OptionError(
+            f"{table.path}: {table.title(index)} is in {unit!r}; say frequency_unit='Hz', 'kHz', "
+            "'MHz' or 'rad/s'"
+        )
+    return table.numbers(index) * _IN_HZ[unit]
+
+
+def _response(table: Table, columns: dict[str, int], units: _Units) -> ComplexArray:
+    if "response" in columns:
+        return np.asarray(table.values(columns["response"]), dtype=np.complex128)
+    if "real" in columns:
+        return table.numbers(columns["real"]) + 1j * table.numbers(columns["imag"])
+    magnitude = _magnitude(table, columns["magnitude"], units.magnitude)
+    phase = _phase(table, columns["phase"], units.phase)
+    return np.asarray(magnitude * np.exp(1j * phase), dtype=np.complex128)
+
+
+def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
+    values = table.numbers(index)
+    unit = table.columns[index].unit if unit is None else unit
+    if unit == "db":
+        if values.max() > 400:
+            raise DataError(f"{table.path}: {table.title(index)} goes up to {values.max():g} dB")
+        return np.asarray(10 ** (values / 20), dtype=np.float64)
+    if values.min() < 0:
+        raise OptionError(
+            f"{table.path}: {table.title(index)} has negative values; is it in dB? say "
+            "magnitude_unit='dB'"
+        )
+    return values
+
+
+def _phase(table: Table, index: int, unit: str | None) -> FloatArray:
+    """Phase in rad."""
+    values = table.numbers(index)
+    unit = table.columns[index].unit if unit is None else unit
+    if unit not in ("", "deg", "rad"):
+        raise OptionError(
+            f"{table.path}: {table.title(index)} is in {unit!r}; say phase_unit='deg' or 'rad'"
+        )
+    if not unit and values.any() and np.abs(values).max() <= 2 * np.pi:
+        raise OptionError(
+            f"{table.path}: {table.title(index)} could be in degrees or in radians; say "
+            "phase_unit='deg' or 'rad'"
+        )
+    return values if unit == "rad" else np.deg2rad(values)
+
+
+def _system_name(stem: str) -> str:
+    # python-control keeps dots for its own use
+    return stem.replace(".", "_")

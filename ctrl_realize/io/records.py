@@ -1,0 +1,251 @@
+"""Read a measured experiment from a file."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import DataError, OptionError, TimeAxisError
+from ..numerics.arrays import FloatArray
+from ..signals import Record
+from .checks import MAX_BYTES
+from .columns import (
+    Selector,
+    check_lengths,
+    find_column,
+    find_columns,
+    has_header,
+    holds_numbers,
+    named,
+)
+from .sniff import TextOptions
+from .tables import Table, read_table
+from .time_column import time_in_seconds
+
+TIME_NAMES = frozenset(
+    {"t", "time", "times", "timestamp", "timestamps", "datetime", "date time", "elapsed",
+     "elapsed time", "time elapsed", "seconds", "sec", "zeit", "zeitstempel", "temps", "tiempo",
+     "tempo", "tijd", "tid", "czas"}
+)  # fmt: skip
+INPUT_NAMES = frozenset(
+    {"u", "in", "input", "inputs", "input signal", "drive", "command", "cmd", "excitation",
+     "stimulus", "eingang", "entrée", "entree", "entrada", "ingresso"}
+)  # fmt: skip
+OUTPUT_NAMES = frozenset(
+    {"y", "out", "output", "outputs", "output signal", "response", "measured", "measurement",
+     "ausgang", "sortie", "salida", "uscita"}
+)  # fmt: skip
+_DT_NAMES = frozenset({"dt", "ts", "sample time", "sampletime", "sampling time"})
+_RATE_NAMES = frozenset({"fs", "sample rate", "samplerate", "sampling rate"})
+
+
+def read_record(
+    path: str | os.PathLike[str],
+    *,
+    time: str | int | None = None,
+    input: Selector | None = None,
+    output: Selector | None = None,
+    dt: float | None = None,
+    time_unit: str = "auto",
+    time_format: str | None = None,
+    delimiter: str = "auto",
+    decimal: str = "auto",
+    encoding: str = "auto",
+    comment: str | None = "auto",
+    header: bool | Literal["auto"] = "auto",
+    skip_rows: int = 0,
+    variable: str | None = None,
+    resample: bool = False,
+    name: str | None = None,
+    max_bytes: float = MAX_BYTES,
+) -> Record:
+    r"""Read a measured experiment from a CSV, TSV, ``.npz``, ``.mat`` or Parquet file.
+
+    Columns are found by their names (``time_s``, ``t``, ``Zeit [ms]``; ``input``, ``u``;
+    ``output``, ``y``; numbered ones are channels). Without a header, three columns are time,
+    input and output, and two with `dt` are input and output. Whatever is less clear is an error
+    that lists the columns.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; its first bytes tell of what kind it is.
+    time : str or int, optional
+        Time column, by name or by number from 0: numbers, ISO dates or times of day.
+    input, output : str, int or sequence of them, optional
+        Columns of the signals; several make a record of several channels.
+    dt : float, optional
+        Sample time in s, in place of a time column.
+    time_unit : str, optional
+        ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"`` or ``"h"``; ``"auto"``: the header's, or s.
+    time_format : str, optional
+        How dates are written, as for `datetime.strptime`, where they are not ISO 8601.
+    delimiter, decimal, encoding, comment : str, optional
+        How text is written; ``"auto"``: found out from the first lines.
+    header : bool or "auto", optional
+        Whether the first line has the names.
+    skip_rows : int, optional
+        Lines of text to leave out at the start.
+    variable : str, optional
+        Matrix or struct of a ``.mat`` or ``.npz`` file to look into.
+    resample : bool, optional
+        Put samples that jitter onto a uniform time axis, see `Record.resampled`.
+    name : str, optional
+        Name of the record; default: the file's, without its ending.
+    max_bytes : float, optional
+        Largest file, packed or unpacked; 2 GiB.
+
+    Returns
+    -------
+    Record
+
+    Warns
+    -----
+    DataWarning
+        The last line was cut off while it was written; it is left out.
+
+    Raises
+    ------
+    MissingFileError
+        There is no such file, or no permission to read it.
+    FileFormatError
+        The file is empty, too large, damaged, or no table of numbers.
+    DataError
+        A cell is no finite number: its line is named.
+    TimeAxisError
+        Time jitters, has gaps, repeats or runs back.
+    OptionError
+        The columns are not clear, or the asked ones are not there.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import ctrl_realize as cr
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "valve.csv"
+    ...     _ = file.write_text("Zeit [ms];u;y\n0;0;1,5\n10;1;1,5\n20;1;1,75\n")
+    ...     record = cr.read_record(file)
+    >>> record
+    <Record 'valve': 3 samples of 0.01 s, 1 input, 1 output>
+    """
+    options = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
+    if dt is not None and not (_is_number(dt) and dt > 0 and math.isfinite(dt)):
+        raise OptionError(f"dt={dt!r} must be a positive number of seconds")
+    table = read_table(path, options, variable=variable, max_bytes=max_bytes)
+    parts = _parts(table, time, input, output, dt)
+    used = [*parts.inputs, *parts.outputs] + ([] if parts.time is None else [parts.time])
+    check_lengths(table, used)
+    signals = (_stacked(table, parts.inputs), _stacked(table, parts.outputs))
+    if parts.time is None:
+        stamps = parts.dt * np.arange(signals[0].shape[-1])
+    else:
+        stamps = time_in_seconds(table, parts.time, time_unit, time_format)
+    labels = {
+        "name": Path(path).stem if name is None else name,
+        "input_labels": _labels(table, parts.inputs),
+        "output_labels": _labels(table, parts.outputs),
+    }
+    make: Any = Record.resampled if resample else Record
+    try:
+        record: Record = make(stamps, *signals, **labels)
+    except DataError as error:
+        kind = TimeAxisError if isinstance(error, TimeAxisError) else DataError
+        raise kind(f"{table.path}: {error}") from error
+    return record
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Positions of the columns; ``dt`` counts where there is no time column."""
+
+    time: int | None
+    dt: float
+    inputs: list[int]
+    outputs: list[int]
+
+
+def _parts(
+    table: Table,
+    time: str | int | None,
+    input: Selector | None,
+    output: Selector | None,
+    dt: float | None,
+) -> _Parts:
+    if time is not None and dt is not None:
+        raise OptionError("time= and dt= are both given; one of them sets the time axis")
+    inputs = [] if input is None else find_columns(table, input, "input")
+    outputs = [] if output is None else find_columns(table, output, "output")
+    clock = None if time is None else find_column(table, time, "time")
+    step = dt
+    if clock is None and dt is None:
+        clock, step = _guessed_clock(table, [*inputs, *outputs])
+    # with dt= given, a time column in the file is still not a signal
+    clocks = named(table, TIME_NAMES) if clock is None else [clock]
+    inputs = inputs or named(table, INPUT_NAMES, [*clocks, *outputs])
+    outputs = outputs or named(table, OUTPUT_NAMES, [*clocks, *inputs])
+    rest = [
+        k
+        for k in range(len(table.columns))
+        if k not in (*clocks, *inputs, *outputs) and holds_numbers(table, k)
+    ]
+    if not inputs and not outputs and not has_header(table) and len(rest) == 2:
+        inputs, outputs = rest[:1], rest[1:]
+    elif len(rest) == 1 and bool(inputs) != bool(outputs):
+        inputs, outputs = inputs or rest, outputs or rest
+    for signal, found in (("input", inputs), ("output", outputs)):
+        if not found:
+            raise OptionError(
+                f"{table.path}: cannot tell which column is the {signal}; say {signal}=name or "
+                f"number; it has {table.listing()}"
+            )
+    used = [*inputs, *outputs] + ([] if clock is None else [clock])
+    if len(set(used)) != len(used):
+        raise OptionError("a column is asked for twice among time=, input= and output=")
+    return _Parts(clock, math.nan if step is None else step, inputs, outputs)
+
+
+def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, float | None]:
+    """Time column by its name, else the sample time beside the arrays, else the first column."""
+    clocks = named(table, TIME_NAMES, taken)
+    if len(clocks) == 1:
+        return clocks[0], None
+    if len(clocks) > 1:
+        raise OptionError(
+            f"{table.path} has {len(clocks)} columns that could be time; say time=name or number; "
+            f"it has {table.listing()}"
+        )
+    for key, value in table.constants.items():
+        plain = key.rpartition(".")[2].replace("_", " ").lower()
+        if plain in _DT_NAMES | _RATE_NAMES:
+            step = value if plain in _DT_NAMES else 1 / value if value else math.inf
+            if not (math.isfinite(step) and step > 0):
+                raise DataError(f"{table.path}: {key}={value} is no sample time; say dt=")
+            return None, step
+    if 0 not in taken and not has_header(table) and len(table.columns) >= 3:
+        return 0, None
+    raise OptionError(
+        f"{table.path}: cannot tell which column is time; say time=name or number, or dt= in s; "
+        f"it has {table.listing()}"
+    )
+
+
+def _stacked(table: Table, indices: list[int]) -> FloatArray:
+    rows = [table.numbers(k) for k in indices]
+    return rows[0] if len(rows) == 1 else np.stack(rows)
+
+
+def _labels(table: Table, indices: list[int]) -> list[str] | None:
+    # python-control keeps dots for its own use
+    names = [table.columns[k].name.replace(".", "_") for k in indices]
+    return names if all(names) and len(set(names)) == len(names) else None
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)

@@ -1,0 +1,98 @@
+"""Time in seconds from a column of numbers, dates or times of day."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from ..errors import DataError
+from ..numerics.arrays import FloatArray
+from .columns import holds_numbers
+from .tables import Table
+from .units import checked_time_unit, to_seconds
+
+# from here on neighbouring integers are one double
+_EXACT_INTEGERS = 2**53
+
+
+def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None) -> FloatArray:
+    """Return the time column in s; dates and times of day count from the first row.
+
+    Parameters
+    ----------
+    table : Table
+    index : int
+        Position of the time column.
+    unit : str
+        Unit of numbers, or ``"auto"``: the one in the header, else s.
+    time_format : str or None
+        How dates are written (as for `datetime.strptime`), where it is not ISO 8601.
+
+    Raises
+    ------
+    DataError
+        A cell that is no time.
+    OptionError
+        A unit that is not one of time.
+    """
+    cells = table.columns[index].cells
+    if cells.dtype.kind in "mM":
+        return _from_stamps(table, index, cells)
+    if time_format is not None or not holds_numbers(table, index):
+        return _from_stamps(table, index, _parsed_dates(table, index, time_format))
+    unit = checked_time_unit((table.columns[index].unit or "s") if unit == "auto" else unit)
+    if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
+        # nanoseconds since 1970 do not fit into a double, their differences do
+        return to_seconds((cells - cells[0]).astype(np.float64), unit)
+    return to_seconds(table.numbers(index), unit)
+
+
+def _from_stamps(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> FloatArray:
+    missing = np.isnat(stamps)
+    if missing.any():
+        row = int(np.argmax(missing))
+        raise DataError(f"{table.path}: {table.title(index)}, {table.place(row)}: no time there")
+    return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
+
+
+def _parsed_dates(table: Table, index: int, time_format: str | None) -> np.ndarray[Any, Any]:
+    import pandas as pd
+
+    cells = [str(cell).strip() for cell in table.columns[index].cells]
+    if time_format is None:
+        cells = [cell.replace(",", ".") for cell in cells]
+        if all(re.fullmatch(r"\d{1,3}:\d{2}(:\d{2}(\.\d*)?)?", cell) for cell in cells[:3]):
+            return _parsed_times_of_day(table, index, cells)
+    stamps = pd.to_datetime(
+        pd.Series(cells), format=time_format or "ISO8601", utc=True, errors="coerce"
+    )
+    bad = stamps.isna().to_numpy()
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise DataError(
+            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is no "
+            f"number and no time as {time_format or 'ISO 8601 writes it'}; say time_format=, "
+            "or dt= to do without the column"
+        )
+    return np.asarray(stamps.dt.tz_localize(None).to_numpy())
+
+
+def _parsed_times_of_day(table: Table, index: int, cells: list[str]) -> np.ndarray[Any, Any]:
+    """Times as 12:34 (minutes), 12:34:56 or 12:34:56.789, on one day or over midnights."""
+    import pandas as pd
+
+    full = [cell if cell.count(":") == 2 else cell + ":00" for cell in cells]
+    spans = pd.to_timedelta(pd.Series(full), errors="coerce")
+    bad = spans.isna().to_numpy()
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise DataError(
+            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is no "
+            "time of day"
+        )
+    stamps = np.asarray(spans.to_numpy())
+    # a clock that falls back by most of a day has passed midnight
+    days = np.cumsum(np.diff(stamps) < -np.timedelta64(12, "h"))
+    return stamps + np.concatenate([[0], days]) * np.timedelta64(1, "D")

@@ -1,0 +1,86 @@
+"""Units in the names of columns: ``time_ms``, ``t [s]``, ``Zeit/ms``, ``phase (deg)``."""
+
+from __future__ import annotations
+
+import re
+
+from ..errors import OptionError
+from ..numerics.arrays import FloatArray
+
+# Scale as (multiplier, divisor): t / 1000 is the double nearest to the decimal number that the
+# file means, t * 0.001 often is its neighbour.
+TIME_UNITS: dict[str, tuple[float, float]] = {
+    "s": (1.0, 1.0),
+    "ms": (1.0, 1e3),
+    "us": (1.0, 1e6),
+    "ns": (1.0, 1e9),
+    "min": (60.0, 1.0),
+    "h": (3600.0, 1.0),
+}
+
+_SPELLINGS = {
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sek": "s", "sekunden": "s",
+    "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "millis": "ms",
+    "µs": "us", "μs": "us", "usec": "us", "microsecond": "us", "microseconds": "us",
+    "micros": "us",
+    "nsec": "ns", "nanosecond": "ns", "nanoseconds": "ns",
+    "minute": "min", "minutes": "min", "hr": "h", "hour": "h", "hours": "h",
+    "hertz": "hz", "rad_s": "rad/s", "rads": "rad/s", "rad/sec": "rad/s", "rps": "rad/s",
+    "degree": "deg", "degrees": "deg", "°": "deg",
+    "radian": "rad", "radians": "rad", "decibel": "db",
+    "-": "", "1": "", "abs": "", "linear": "",
+}  # fmt: skip
+
+_KNOWN = {*TIME_UNITS, "hz", "khz", "mhz", "rad/s", "deg", "rad", "db"}
+
+_IN_BRACKETS = re.compile(r"^(.*?)[\s_/]*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]$")
+_BEHIND = re.compile(r"^(.+?)[\s_/]+(rad[_/]s|rad/sec|\S+)$", re.IGNORECASE)
+
+
+def plain_unit(text: str) -> str:
+    """Spell a unit in one way: ``"Sec" -> "s"``, ``"µs" -> "us"``, ``"Degrees" -> "deg"``."""
+    # MHz is the one unit here whose meaning is in its capital letter, and mHz is not in use
+    lower = text.strip().strip("[](){}<>").strip().lower()
+    return _SPELLINGS.get(lower, lower)
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Split a column's name into what it is and its unit.
+
+    Examples
+    --------
+    >>> from ctrl_realize.io.units import split_unit
+    >>> split_unit("time_ms"), split_unit("Zeit [s]"), split_unit("output_1")
+    (('time', 'ms'), ('Zeit', 's'), ('output_1', ''))
+    """
+    name = name.strip()
+    if match := _IN_BRACKETS.match(name):
+        return match[1].strip() or name, plain_unit(match[2])
+    match = _BEHIND.match(name)
+    if match and plain_unit(match[2]) in _KNOWN:
+        return match[1].strip(), plain_unit(match[2])
+    return name, ""
+
+
+def is_units_line(cells: list[str]) -> bool:
+    """Tell whether the cells below a header are units and not names or numbers."""
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    bracketed = [cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled]
+    known = [plain_unit(cell) in _KNOWN for cell in filled]
+    return bool(filled) and (all(bracketed) or any(known))
+
+
+def to_seconds(values: FloatArray, unit: str) -> FloatArray:
+    """Scale time values to seconds."""
+    multiplier, divisor = TIME_UNITS[checked_time_unit(unit)]
+    return values * multiplier / divisor
+
+
+def checked_time_unit(unit: str) -> str:
+    """Return the plain spelling of a unit of time, or say which ones there are."""
+    plain = plain_unit(unit)
+    if plain not in TIME_UNITS:
+        raise OptionError(
+            f"{unit!r} is not a known unit of time; say time_unit= one of " + ", ".join(TIME_UNITS)
+        )
+    return plain
