@@ -5,10 +5,18 @@ sys    = cr.identify(record)              # a control.StateSpace with z^-d
 ct.bode_plot([sys, cr.read_frf("frf.csv")])
 """
 
+from . import bench as bench
+from . import paper as paper
 from .delayed import DelayedStateSpace as DelayedStateSpace
 from .delayed import delayed_ss as delayed_ss
 from .errors import CtrlRealizeError as CtrlRealizeError
 from .errors import CtrlRealizeWarning as CtrlRealizeWarning
+from .frequency import FRFComparison as FRFComparison
+from .frequency import compare_frf as compare_frf
+from .frequency import stepped_sine_frf as stepped_sine_frf
+from .identification.steps import detect_step as detect_step
+from .identification.steps import impulse_from_step as impulse_from_step
+from .identification.steps import unit_step as unit_step
 from .io import read_frf as read_frf
 from .io import read_record as read_record
 from .results import Flag as Flag
