@@ -1,1 +1,9 @@
-"""bench"""
+"""Simulated set-ups with known truth. Nothing here is measured."""
+
+from __future__ import annotations
+
+from .control_valve import Valve as Valve
+from .control_valve import valve as valve
+from .truth import ValveTruth as ValveTruth
+
+__all__ = ["Valve", "ValveTruth", "valve"]

@@ -1,1 +1,7 @@
-"""frequency"""
+"""Frequency responses: measured, estimated, compared with models."""
+
+from __future__ import annotations
+
+from .compare import compare_frf as compare_frf
+from .comparison import FRFComparison as FRFComparison
+from .stepped_sine import stepped_sine_frf as stepped_sine_frf

@@ -1,0 +1,75 @@
+"""What keeps measured records from being clean: noise, spikes, rounding, friction."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy.signal import firwin, oaconvolve
+
+from ..numerics.arrays import FloatArray
+
+
+def band_limited_noise(
+    n_samples: int, std: float, rng: np.random.Generator, *, limited: bool
+) -> FloatArray:
+    """Draw Gaussian noise, behind the anti-aliasing filter if `limited`.
+
+    The filter is flat up to 1/2.56 of the sample rate, as those of FFT analysers are; it is
+    linear-phase, and the analyser takes its delay out. `std` is that of the noise in the record.
+    """
+    if std == 0.0:
+        return np.zeros(n_samples)
+    if not limited:
+        return std * rng.standard_normal(n_samples)
+    taps = _anti_aliasing_taps()
+    white = rng.standard_normal(n_samples + taps.size - 1)
+    return np.asarray(std * oaconvolve(white, taps, mode="valid"))
+
+
+@cache
+def _anti_aliasing_taps() -> FloatArray:
+    """Return a linear-phase low-pass that leaves white noise its variance."""
+    taps = firwin(101, 2 / 2.56, window=("kaiser", 6.0))
+    return np.asarray(taps / np.sqrt(np.sum(taps**2)))
+
+
+def drive_spikes(
+    n_samples: int, mean_count: float, height: float, rng: np.random.Generator
+) -> FloatArray:
+    """Draw short sharp peaks, one or two samples long, of either sign and up to `height`."""
+    spikes = np.zeros(n_samples)
+    for start in rng.integers(0, n_samples, size=rng.poisson(mean_count)):
+        length = int(rng.integers(1, 3))
+        spikes[start : start + length] += rng.choice([-1.0, 1.0]) * height * rng.uniform(0.3, 1.0)
+    return spikes
+
+
+def converted(volts: FloatArray, bits: int | None, full_scale: float) -> FloatArray:
+    """Pass volts through an AD converter of `bits` over -+ `full_scale`; None rounds nothing."""
+    if bits is None:
+        return volts
+    step = 2 * full_scale / 2**bits
+    return np.asarray(np.clip(np.round(volts / step) * step, -full_scale, full_scale))
+
+
+def slew_limited(position: FloatArray, limit: float, dt: float) -> FloatArray:
+    """Follow `position` no faster than `limit` per second."""
+    largest = limit * dt
+    out = np.empty_like(position)
+    current = float(position[0])
+    for k, wanted in enumerate(position.tolist()):
+        current += min(max(wanted - current, -largest), largest)
+        out[k] = current
+    return out
+
+
+def with_play(position: FloatArray, width: float) -> FloatArray:
+    """Follow `position` through a mechanical play of total `width`, starting in its middle."""
+    half = width / 2
+    out = np.empty_like(position)
+    current = float(position[0])
+    for k, wanted in enumerate(position.tolist()):
+        current = min(max(current, wanted - half), wanted + half)
+        out[k] = current
+    return out

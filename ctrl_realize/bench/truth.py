@@ -1,0 +1,97 @@
+"""What a simulated set-up is made of: the answer that an estimate can be held against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+
+from ..delayed import DelayedStateSpace, delayed_ss
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..results import Result
+from ..signals import MeasuredFRF
+from .linear import Core, dc_gain
+
+
+@dataclass(frozen=True, eq=False)
+class ValveTruth(Result):
+    """The linear part of a simulated valve, from drive current to measured displacement.
+
+    ``response(omega) == C (j omega I - A)^-1 B exp(-j omega dead_time)`` with the matrices of
+    the continuous `core`; `sampled` is its exact model behind a zero-order hold.
+    Friction, slew limits and everything random is not in it.
+
+    Parameters
+    ----------
+    matrices : tuple of ndarray
+        A, B, C, D of converter, actuator, LVDT (and analog anti-aliasing filter), in mm per mA.
+    dead_time : float
+        Transport delay in s.
+    dt : float
+        Sample time in s.
+    """
+
+    matrices: Core
+    dead_time: float
+    dt: float
+
+    @property
+    def core(self) -> ct.StateSpace:
+        """The continuous system without its dead time."""
+        return ct.ss(*self.matrices, name="truth_simulated", inputs="u", outputs="y")
+
+    @property
+    def delay(self) -> float:
+        """Transport delay in samples; need not be whole."""
+        return self.dead_time / self.dt
+
+    @property
+    def gain(self) -> float:
+        """Static gain in mm per mA."""
+        return dc_gain(self.matrices)
+
+    @property
+    def total_delay(self) -> float:
+        """Delay of slow signals in s: dead time and the sum of all lags."""
+        A, B, C, _ = self.matrices
+        first = np.linalg.solve(A, B)
+        return self.dead_time + float((C @ np.linalg.solve(A, first))[0, 0]) / self.gain
+
+    @property
+    def sampled(self) -> DelayedStateSpace:
+        """Exact model of held input and sampled output, at the valve's sample time."""
+        return delayed_ss(self.core, dead_time=self.dead_time, dt=self.dt, name="truth_simulated")
+
+    def response(self, omega: FloatArray) -> ComplexArray:
+        """Evaluate the frequency response at `omega` in rad/s, dead time included."""
+        A, B, C, _ = self.matrices
+        points = 1j * np.asarray(omega, dtype=np.float64)
+        systems = points.reshape(-1, 1, 1) * np.eye(A.shape[0]) - A
+        values = (C @ np.linalg.solve(systems, B.astype(complex)))[:, 0, 0]
+        return np.asarray(values.reshape(points.shape) * np.exp(-points * self.dead_time))
+
+    def frf(self, frequency_hz: FloatArray) -> MeasuredFRF:
+        """Evaluate the frequency response as an FRF object, ready for plots and comparisons."""
+        grid = np.asarray(frequency_hz, dtype=np.float64)
+        return MeasuredFRF(self.response(2 * np.pi * grid), grid, name="truth (simulated)")
+
+    def _title(self) -> str:
+        return "Simulated valve: truth"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        poles = np.sort_complex(np.linalg.eigvals(self.matrices[0]))[::-1] / (2 * np.pi)
+        shown = [
+            f"{abs(p):.4g} Hz" + (f" (damping {-p.real / abs(p):.2g})" if p.imag > 0 else "")
+            for p in poles
+            if p.imag >= 0
+        ]
+        return [
+            ("gain", f"{self.gain:.4g} mm/mA"),
+            ("poles", ", ".join(shown)),
+            ("dead time", f"{1e3 * self.dead_time:.5g} ms = {self.delay:.5g} samples"),
+            ("total delay at DC", f"{1e3 * self.total_delay:.5g} ms"),
+        ]
+
+    def __repr__(self) -> str:
+        return f"<ValveTruth order {self.matrices[0].shape[0]}, dead time {self.delay:g} samples>"

@@ -1,0 +1,258 @@
+"""How far a model is from a measured frequency response, and where the measurement is good."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import control as ct
+import numpy as np
+
+from ..checks import one_of, real
+from ..delayed import DelayedStateSpace
+from ..errors import DataError, OptionError, UnsuitableSystemError
+from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.bands import running_median, widest_run
+from ..numerics.spectra import hold_response, unwrapped_phase
+from ..results import Flag
+from .comparison import FRFComparison, decibels, hertz
+
+DEFAULT_MIN_COHERENCE = 0.95
+DEFAULT_MAX_RELATIVE_STD = 0.1
+_SMOOTHED_POINTS = 5
+
+
+def compare_frf(
+    system: ct.LTI,
+    frf: ct.FrequencyResponseData,
+    *,
+    min_coherence: float | None = None,
+    band_hz: tuple[float, float] | None = None,
+    hold: Literal["auto", "zoh"] | None = "auto",
+) -> FRFComparison:
+    """Compare a model with a measured frequency response.
+
+    Parameters
+    ----------
+    system : control.LTI
+        One input, one output; discrete or continuous, with or without dead time.
+    frf : MeasuredFRF
+        Measured response; any `control.FrequencyResponseData` will do.
+    min_coherence : float, optional
+        Coherence that makes a point trusted. Default 0.95 where the FRF has a coherence;
+        otherwise points with a standard deviation of at most 10 % of the response are trusted,
+        and all points where it has neither.
+    band_hz : tuple of float, optional
+        Compare in this band in Hz instead.
+    hold : {"auto", "zoh", None}
+        "zoh": divide the zero-order hold out of a discrete model. None: do not. "auto": do so for
+        a discrete model, unless its ``.fit`` says that it is impulse-invariant.
+
+    Returns
+    -------
+    FRFComparison
+
+    Raises
+    ------
+    DataError
+        No point in the band, or none below the model's Nyquist frequency.
+    OptionError
+        A coherence outside 0...1, or asked for where there is none; a hold of a continuous model.
+    UnsuitableSystemError
+        A system or FRF with several inputs or outputs.
+
+    Notes
+    -----
+    A *step-invariant* model (backward difference, ``ct.sample_system(..., "zoh")``) is the plant
+    behind a hold. Its frequency response lags that of the plant by half a sample, ``w dt / 2``:
+    1.83 degrees at 13 Hz and 1280 Hz. An FRF that was measured on the plant with analog signals
+    has no hold in it, and the hold is divided out of the model before they are compared. An
+    *impulse-invariant* model (central difference) needs no such thing, nor does an FRF that was
+    itself estimated from the samples of a held input: pass ``hold=None``.
+
+    The trusted band is the widest stretch (in octaves) in which the coherence, smoothed by a
+    running median of five points, stays up.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = ct.tf([1], [0.1, 1])
+    >>> f = np.geomspace(0.1, 13, 50)
+    >>> frf = cr.MeasuredFRF(plant(2j * np.pi * f), f)
+    >>> model = ct.ss(ct.sample_system(plant, 7.8125e-4, "zoh"))
+    >>> lagging = cr.compare_frf(model, frf, hold=None)
+    >>> print(round(lagging.phase_error_deg[-1], 2))
+    -1.83
+    >>> print(f"{cr.compare_frf(model, frf).max_relative_error:.2%}")
+    0.03%
+    """
+    _check_single(system, frf)
+    frequency = np.asarray(frf.omega, dtype=np.float64) / (2 * np.pi)
+    measured = np.asarray(frf.frdata[0, 0], dtype=np.complex128)
+    coherence = getattr(frf, "coherence", None)
+    std = getattr(frf, "std", None)
+    if coherence is not None:
+        coherence = np.reshape(coherence, -1)
+    if std is not None:
+        std = np.reshape(std, -1)
+    order = np.argsort(frequency, kind="stable")
+    dt = _sample_time(system)
+    flags: list[Flag] = []
+    usable = np.abs(measured[order]) > 0
+    if dt is not None:
+        usable &= frequency[order] < 0.5 / dt
+        beyond = int(np.sum(frequency >= 0.5 / dt))
+        if beyond:
+            flags.append(
+                Flag(
+                    "beyond_nyquist",
+                    f"{beyond} points at or above the model's Nyquist frequency of "
+                    f"{hertz(0.5 / dt)} are left out",
+                )
+            )
+    kept = order[usable]
+    if kept.size == 0:
+        raise DataError(
+            f"nothing to compare: the FRF has {frequency.size} points from "
+            f"{hertz(frequency.min())} to {hertz(frequency.max())}, none of them non-zero and below the model's Nyquist "
+            "frequency"
+        )
+    frequency, measured = frequency[kept], measured[kept]
+    coherence = None if coherence is None else coherence[kept]
+    std = None if std is None else std[kept]
+
+    used_hold = _hold(system, dt, hold)
+    omega = 2 * np.pi * frequency
+    model = _evaluate(system, omega, dt)
+    if used_hold is not None and dt is not None:
+        model = model / hold_response(omega, dt)
+    good, source = _good_points(frequency, measured, coherence, std, min_coherence, band_hz)
+    delay = float(system.dead_time) if isinstance(system, DelayedStateSpace) else 0.0
+    ratio = model / measured
+    first = int(np.argmax(good))
+    error = np.unwrap(np.angle(ratio))
+    error -= 2 * np.pi * np.round(error[first] / (2 * np.pi))
+    model_phase = unwrapped_phase(model, omega, delay)
+    if not np.all(np.isfinite(ratio)) or np.any(np.abs(ratio) == 0):
+        raise UnsuitableSystemError(
+            "the model's response is zero or not finite at a measured frequency; is a pole or "
+            "zero of it on the grid?"
+        )
+    return FRFComparison(
+        frequency_hz=read_only(frequency),
+        measured=_locked(measured),
+        model=_locked(model),
+        gain_error_db=read_only(decibels(ratio)),
+        phase_error_deg=read_only(np.degrees(error)),
+        relative_error=read_only(np.abs(ratio - 1)),
+        measured_phase_deg=read_only(np.degrees(model_phase - error)),
+        model_phase_deg=read_only(np.degrees(model_phase)),
+        trusted=_locked(good),
+        band_hz=(float(frequency[good][0]), float(frequency[good][-1])),
+        band_from=source,
+        coherence=None if coherence is None else read_only(coherence),
+        std=None if std is None else read_only(std),
+        hold=used_hold,
+        name=f"{system.name or 'model'} and {frf.name or 'measured'}",
+        flags=tuple(flags),
+    )
+
+
+def _check_single(system: Any, frf: Any) -> None:
+    if not isinstance(system, ct.LTI):
+        raise UnsuitableSystemError(
+            f"system is a {type(system).__name__}; needed is a system of python-control"
+        )
+    if not isinstance(frf, ct.FrequencyResponseData):
+        raise UnsuitableSystemError(
+            f"frf is a {type(frf).__name__}; needed is a MeasuredFRF or a control FRD"
+        )
+    for thing, what in ((system, "system"), (frf, "frf")):
+        if (thing.noutputs, thing.ninputs) != (1, 1):
+            raise UnsuitableSystemError(
+                f"{what} has {thing.ninputs} inputs and {thing.noutputs} outputs; compare one "
+                f"channel at a time, as {what}[i, j]"
+            )
+
+
+def _sample_time(system: Any) -> float | None:
+    """Return the sample time of a discrete system in s, None for a continuous one."""
+    if system.dt is None or system.dt == 0:
+        return None
+    if system.dt is True:
+        raise UnsuitableSystemError(
+            "the system is discrete without a sample time (dt=True); set its dt in s"
+        )
+    return float(system.dt)
+
+
+def _hold(system: Any, dt: float | None, hold: str | None) -> Literal["zoh"] | None:
+    """Decide whether the hold is divided out."""
+    if hold is None:
+        return None
+    one_of(hold, "hold", ("auto", "zoh"))
+    if dt is None:
+        if hold == "zoh":
+            raise OptionError("hold='zoh' needs a discrete model; this one is continuous")
+        return None
+    fit = getattr(system, "fit", None)
+    for holder in (fit, getattr(fit, "impulse", None)):
+        if getattr(holder, "sampling", None) == "impulse-invariant" and hold == "auto":
+            return None
+    return "zoh"
+
+
+def _evaluate(system: Any, omega: FloatArray, dt: float | None) -> ComplexArray:
+    points = 1j * omega if dt is None else np.exp(1j * omega * dt)
+    response = np.asarray(system(points, squeeze=False), dtype=np.complex128)
+    return np.asarray(response[0, 0])
+
+
+def _good_points(
+    frequency: FloatArray,
+    measured: ComplexArray,
+    coherence: FloatArray | None,
+    std: FloatArray | None,
+    min_coherence: float | None,
+    band_hz: tuple[float, float] | None,
+) -> tuple[np.ndarray[Any, np.dtype[np.bool_]], Literal["coherence", "std", "all"]]:
+    """Find the trusted band."""
+    if min_coherence is not None:
+        if not 0 <= real(min_coherence, "min_coherence", "value in 0...1") <= 1:
+            raise OptionError(f"min_coherence={min_coherence!r}; needed is a value in 0...1")
+        if coherence is None:
+            raise OptionError(
+                "min_coherence is given, but the FRF has no coherence; pass band_hz=(low, high)"
+            )
+    if band_hz is not None:
+        low, high = (real(edge, "band_hz", "frequency in Hz") for edge in band_hz)
+        inside = (frequency >= low) & (frequency <= high)
+        if not inside.any():
+            raise DataError(
+                f"band_hz={band_hz!r} holds no point; the FRF runs from {hertz(frequency[0])} to "
+                f"{hertz(frequency[-1])}"
+            )
+        return inside, "all"
+    if coherence is not None:
+        limit = DEFAULT_MIN_COHERENCE if min_coherence is None else min_coherence
+        level, source = running_median(coherence, _SMOOTHED_POINTS), "coherence"
+        good = level >= limit
+        wanted = f"a coherence of {limit:g} is reached nowhere"
+    elif std is not None:
+        relative = running_median(std / np.abs(measured), _SMOOTHED_POINTS)
+        good, source = relative <= DEFAULT_MAX_RELATIVE_STD, "std"
+        wanted = f"the standard deviation is above {DEFAULT_MAX_RELATIVE_STD:.0%} everywhere"
+    else:
+        return np.ones(frequency.size, dtype=bool), "all"
+    if not good.any():
+        raise DataError(
+            f"there is no trusted band: {wanted}; lower it, or pass band_hz=(low, high)"
+        )
+    return widest_run(good, frequency), "coherence" if source == "coherence" else "std"
+
+
+def _locked(values: Any) -> Any:
+    copy = np.array(values)
+    copy.flags.writeable = False
+    return copy

@@ -1,0 +1,170 @@
+"""The result of comparing a model with a measured frequency response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..results import Flag, Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class FRFComparison(Result):
+    """A model beside a measured frequency response, point by point.
+
+    With ``r = model / measured``: ``gain_error_db == 20 log10 |r|``, ``phase_error_deg`` is the
+    unwrapped angle of ``r`` in degrees, and ``relative_error == |r - 1|``. A positive phase error
+    is a model that lags less than the plant. Summaries (`rms_gain_error_db` and so on) are taken
+    over the points with ``trusted``, all of which lie inside `band_hz`.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (K,)
+    measured, model : ndarray of complex, shape (K,)
+        What was compared; a hold that was divided out of the model is out of `model`.
+    gain_error_db, phase_error_deg, relative_error : ndarray, shape (K,)
+    measured_phase_deg, model_phase_deg : ndarray, shape (K,)
+        Unwrapped with the model's dead time taken out first, so right at any delay.
+    trusted : ndarray of bool, shape (K,)
+        Points inside the band.
+    band_hz : tuple of float
+        Lowest and highest frequency of the trusted band.
+    band_from : {"coherence", "std", "all"}
+        What the band was taken from.
+    coherence, std : ndarray or None
+        Those of the measurement.
+    hold : {"zoh", None}
+        The hold that was divided out of the model.
+    name : str
+        Names of model and measurement.
+    """
+
+    frequency_hz: FloatArray
+    measured: ComplexArray
+    model: ComplexArray
+    gain_error_db: FloatArray
+    phase_error_deg: FloatArray
+    relative_error: FloatArray
+    measured_phase_deg: FloatArray
+    model_phase_deg: FloatArray
+    trusted: np.ndarray[Any, np.dtype[np.bool_]]
+    band_hz: tuple[float, float]
+    band_from: Literal["coherence", "std", "all"]
+    coherence: FloatArray | None
+    std: FloatArray | None
+    hold: Literal["zoh"] | None
+    name: str
+    flags: tuple[Flag, ...] = field(default=())
+
+    @property
+    def rms_gain_errordecibels(self) -> float:
+        """Root mean square of the gain error in the band, in dB."""
+        return _rms(self.gain_error_db[self.trusted])
+
+    @property
+    def rms_phase_error_deg(self) -> float:
+        """Root mean square of the phase error in the band, in degrees."""
+        return _rms(self.phase_error_deg[self.trusted])
+
+    @property
+    def rms_relative_error(self) -> float:
+        """Root mean square of the relative error in the band."""
+        return _rms(self.relative_error[self.trusted])
+
+    @property
+    def max_relative_error(self) -> float:
+        """Largest relative error in the band."""
+        return float(np.max(self.relative_error[self.trusted]))
+
+    @property
+    def relative_noise(self) -> float | None:
+        """Relative error that the measurement's own noise would make, rms in the band."""
+        if self.std is None:
+            return None
+        return _rms((self.std / np.abs(self.measured))[self.trusted])
+
+    def table(self) -> pd.DataFrame:
+        """List all points, one a row."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {
+            "frequency_hz": self.frequency_hz,
+            "measured_gain_db": decibels(self.measured),
+            "model_gain_db": decibels(self.model),
+            "measured_phase_deg": self.measured_phase_deg,
+            "model_phase_deg": self.model_phase_deg,
+            "gain_error_db": self.gain_error_db,
+            "phase_error_deg": self.phase_error_deg,
+            "relative_error": self.relative_error,
+        }
+        if self.coherence is not None:
+            columns["coherence"] = self.coherence
+        if self.std is not None:
+            columns["std"] = self.std
+        columns["trusted"] = self.trusted
+        return pd.DataFrame(columns)
+
+    def _title(self) -> str:
+        return f"FRF comparison: {self.name}"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        inside = self.trusted
+        worst = int(np.argmax(np.where(inside, self.relative_error, -1.0)))
+        source = {
+            "coherence": "where the coherence is good",
+            "std": "where the standard deviation is small",
+            "all": "all points: no coherence, no std",
+        }[self.band_from]
+        rows = [
+            ("trusted band", f"{hertz(self.band_hz[0])} to {hertz(self.band_hz[1])} ({source})"),
+            ("points", f"{int(inside.sum())} of {inside.size}"),
+            ("gain error", _rms_max(self.gain_error_db[inside], "dB")),
+            ("phase error", _rms_max(self.phase_error_deg[inside], "deg")),
+            (
+                "relative error",
+                f"{100 * self.rms_relative_error:.3g} % rms, largest "
+                f"{100 * self.max_relative_error:.3g} % at {hertz(self.frequency_hz[worst])}",
+            ),
+        ]
+        if self.relative_noise is not None:
+            rows.append(("noise of the FRF", f"{100 * self.relative_noise:.3g} % rms"))
+        rows.append(
+            (
+                "hold",
+                "zero-order hold divided out of the model (half a sample of lag)"
+                if self.hold
+                else "none divided out",
+            )
+        )
+        return rows
+
+    def __repr__(self) -> str:
+        return (
+            f"<FRFComparison {self.name}: {100 * self.rms_relative_error:.3g} % rms in "
+            f"{hertz(self.band_hz[0])} to {hertz(self.band_hz[1])}>"
+        )
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def decibels(values: ComplexArray) -> FloatArray:
+    """Return the magnitude in dB."""
+    return np.asarray(20 * np.log10(np.abs(values)), dtype=np.float64)
+
+
+def hertz(value: float) -> str:
+    """Write a frequency with its unit."""
+    return f"{value:.4g} Hz"
+
+
+def _rms_max(values: FloatArray, unit: str) -> str:
+    largest = values[int(np.argmax(np.abs(values)))]
+    return f"{_rms(values):.3g} {unit} rms, largest {largest:+.3g} {unit}"

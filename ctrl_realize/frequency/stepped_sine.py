@@ -1,0 +1,254 @@
+"""A frequency response from records of sines, one frequency after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from ..checks import real
+from ..errors import DataError, OptionError
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.sines import SineFit, dominant_frequency, fit_sines
+from ..signals import MeasuredFRF, Record
+
+_BATCH_SAMPLES = 2_000_000
+_STEADY_RATIO = 1.5
+_MIN_PERIODS = 0.9
+
+Sweep: TypeAlias = Sequence[Record] | Sequence[Sequence[Record]]
+
+
+def stepped_sine_frf(
+    records: Sweep,
+    *,
+    frequency_hz: Sequence[float] | None = None,
+    settle: float | None = None,
+    free_frequency: bool = True,
+    drift: bool = False,
+    name: str = "measured",
+) -> MeasuredFRF:
+    r"""Estimate a frequency response from a stepped-sine measurement.
+
+    In each record one sine with offset is fitted to input and output by least squares, at one
+    frequency that both share and that is estimated as well. The response is the ratio of their
+    phasors. Repeats of a frequency are averaged.
+
+    Parameters
+    ----------
+    records : sequence of Record, or sequence of sequences of Record
+        One record for each frequency, or for each frequency its repeats. Frequencies in any
+        order; sample times and lengths may differ from record to record.
+    frequency_hz : sequence of float, optional
+        Frequency of each point in Hz, where the sines were generated. The start of the fit, or
+        with ``free_frequency=False`` the truth. By default the strongest line of the input.
+    settle : float, optional
+        Time in s to leave out at the start of each record. By default it is found: from where
+        on the misfit of the sine stays at the level of the last half.
+    free_frequency : bool, default True
+        Estimate the frequency of each record.
+    drift : bool, default False
+        Fit a straight line, too, not just an offset.
+    name : str, default "measured"
+        Name of the result in plots.
+
+    Returns
+    -------
+    MeasuredFRF
+        At the frequencies as measured (mean over the repeats), sorted. `std` is that of the
+        averaged complex response: from the scatter of the repeats where there are at least
+        three, from the misfit of the sines otherwise.
+
+    Raises
+    ------
+    DataError
+        No records, records with several signals, too short for a sine, or an input without one.
+    OptionError
+        As many frequencies as points are needed.
+
+    Notes
+    -----
+    The coherence is that of all samples kept at one frequency,
+
+    .. math:: \gamma^2 = \frac{|\sum_i Y_i \bar U_i|^2}
+              {4 \sum_i P_{u,i} \; \sum_i P_{y,i}},
+
+    with the phasors :math:`U_i, Y_i` of repeat *i* and the power :math:`P` of sine and misfit.
+    It is the part of the output's power that is a sine and repeats: 1 for
+    a perfect linear plant, and ``1 / (1 + noise power / sine power)`` with noise on the output.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(400)
+    >>> u, y = np.sin(6 * t), 0.5 * np.sin(6 * t - 0.3)
+    >>> frf = cr.stepped_sine_frf([cr.Record(t, u, y)])
+    >>> print(np.round(2 * np.pi * frf.frequency_hz, 9), np.round(np.angle(frf.complex), 9))
+    [6.] [-0.3]
+    """
+    points = _as_points(records)
+    flat = [record for point in points for record in point]
+    starts = _start_frequencies(points, flat, frequency_hz)
+    if settle is not None and real(settle, "settle", "time in s") < 0:
+        raise OptionError(f"settle={settle!r}; needed is >= 0 s")
+
+    omega = np.empty(len(flat))
+    phasors = np.empty((len(flat), 2), dtype=np.complex128)
+    power = np.empty((len(flat), 2))
+    relative_variance = np.empty(len(flat))
+    for batch in _batches(flat):
+        fit = _fit_batch([flat[i] for i in batch], starts[batch], settle, free_frequency, drift)
+        omega[batch], phasors[batch] = fit.omega, fit.phasor
+        power[batch] = 0.5 * np.abs(fit.phasor) ** 2 + fit.noise_variance
+        # Total variance of a phasor is the trace; that of a ratio adds the relative ones.
+        variance = np.trace(fit.phasor_covariance, axis1=2, axis2=3)
+        relative_variance[batch] = (variance / np.abs(fit.phasor) ** 2).sum(axis=1)
+    return _averaged(points, omega, phasors, power, relative_variance, name)
+
+
+def _as_points(records: Sweep) -> list[list[Record]]:
+    """Check the records and give every point a list of repeats."""
+    points = [[entry] if isinstance(entry, Record) else list(entry) for entry in records]
+    if not points or not all(points):
+        raise DataError("no records; needed is at least one for each frequency")
+    for point in points:
+        for record in point:
+            if not isinstance(record, Record):
+                raise DataError(f"got a {type(record).__name__} among the records")
+            if not record.issiso:
+                raise DataError(
+                    f"{record!r} has several signals; stepped_sine_frf takes one input and one "
+                    "output"
+                )
+            if record.n_samples < 8:
+                raise DataError(f"{record!r} is too short for a sine; at least 8 samples")
+            if np.ptp(record.input) == 0:
+                raise DataError(f"the input of {record!r} is constant; there is no sine in it")
+    return points
+
+
+def _start_frequencies(
+    points: list[list[Record]], flat: list[Record], frequency_hz: Sequence[float] | None
+) -> FloatArray:
+    """Give every record a frequency to start from, in rad/s."""
+    if frequency_hz is None:
+        starts = np.empty(len(flat))
+        for batch in _batches(flat):
+            inputs = np.stack([np.asarray(flat[i].input).ravel() for i in batch])
+            # The second half: a transient of the input, if any, is over.
+            starts[batch] = dominant_frequency(inputs[:, inputs.shape[1] // 2 :], flat[batch[0]].dt)
+            whole = dominant_frequency(inputs, flat[batch[0]].dt)
+            span = flat[batch[0]].dt * inputs.shape[1]
+            # Fewer than three periods in the half record: the whole one knows better.
+            starts[batch] = np.where(starts[batch] * span < 12 * np.pi, whole, starts[batch])
+        return starts
+    given = np.asarray(frequency_hz, dtype=np.float64)
+    if given.shape != (len(points),) or not np.all(np.isfinite(given)) or np.any(given <= 0):
+        raise OptionError(
+            f"frequency_hz has shape {given.shape}; needed are {len(points)} frequencies above 0, "
+            "one for each point"
+        )
+    return 2 * np.pi * np.repeat(given, [len(point) for point in points])
+
+
+def _batches(flat: list[Record]) -> list[list[int]]:
+    """Group records of one length and sample time, in pieces that fit into memory."""
+    groups: dict[tuple[int, float], list[int]] = {}
+    for index, record in enumerate(flat):
+        groups.setdefault((record.n_samples, record.dt), []).append(index)
+    pieces = []
+    for (n_samples, _), members in groups.items():
+        size = max(1, _BATCH_SAMPLES // n_samples)
+        pieces += [members[i : i + size] for i in range(0, len(members), size)]
+    return pieces
+
+
+def _fit_batch(
+    records: list[Record],
+    starts: FloatArray,
+    settle: float | None,
+    free_frequency: bool,
+    drift: bool,
+) -> SineFit:
+    """Fit records of one length: once where it is settled for sure, then where it really is."""
+    n_samples, dt = records[0].n_samples, records[0].dt
+    time = dt * np.arange(n_samples, dtype=np.float64)
+    signals = np.stack([[record.input, record.output] for record in records])
+    if settle is None:
+        late = np.broadcast_to((np.arange(n_samples) >= n_samples // 2) * 1.0, signals[:, 0].shape)
+        first = fit_sines(
+            time, signals, starts, free_frequency=free_frequency, drift=drift, mask=late
+        )
+        mask = _steady(time, signals, first)
+        starts = first.omega if free_frequency else starts
+    else:
+        kept = (time >= settle - 1e-9 * dt) * 1.0
+        if kept.sum() < 8:
+            raise DataError(
+                f"settle={settle:g} s leaves {int(kept.sum())} samples of {records[0]!r}; "
+                "at least 8 are needed"
+            )
+        mask = np.broadcast_to(kept, signals[:, 0].shape)
+    short = starts * dt * mask.sum(axis=1) < _MIN_PERIODS * 2 * np.pi
+    if short.any():
+        worst = int(np.flatnonzero(short)[0])
+        raise DataError(
+            f"{records[worst]!r} keeps less than one period of {starts[worst] / 2 / np.pi:g} Hz; "
+            "record longer, or state a shorter settle"
+        )
+    return fit_sines(time, signals, starts, free_frequency=free_frequency, drift=drift, mask=mask)
+
+
+def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
+    """Mark the samples from where on the late half's sine explains the record."""
+    n_samples = time.size
+    turning = np.exp(1j * late.omega[:, None] * time)
+    model = (late.phasor[..., None] * turning[:, None]).real
+    model += late.offset[..., None] + late.slope[..., None] * time
+    blocks = 32
+    edges = np.linspace(0, n_samples, min(blocks, n_samples // 4) + 1).astype(int)
+    squares = np.add.reduceat((signals - model) ** 2, edges[:-1], axis=2) / np.diff(edges)
+    half = squares.shape[2] // 2
+    # Rounding is a misfit, too: without noise nothing but the exact sine would be steady.
+    floor = (1e-6 * np.abs(late.phasor[..., None])) ** 2
+    level = np.maximum(squares[..., half:].mean(axis=2, keepdims=True), floor)
+    # The largest of half the blocks reaches beyond its mean by chance; so may an early one.
+    bound = np.maximum(_STEADY_RATIO * level, squares[..., half:].max(axis=2, keepdims=True))
+    moving = np.any(squares > bound, axis=1)
+    moving[:, half:] = False
+    start = edges[np.where(moving.any(axis=1), half - np.argmax(moving[:, half - 1 :: -1], 1), 0)]
+    return np.asarray((np.arange(n_samples) >= start[:, None]) * 1.0)
+
+
+def _averaged(
+    points: list[list[Record]],
+    omega: FloatArray,
+    phasors: ComplexArray,
+    power: FloatArray,
+    relative_variance: FloatArray,
+    name: str,
+) -> MeasuredFRF:
+    """Average the repeats of each point."""
+    response = np.empty(len(points), dtype=np.complex128)
+    frequency, coherence, std = (np.empty(len(points)) for _ in range(3))
+    start = 0
+    for k, point in enumerate(points):
+        these = slice(start, start + len(point))
+        start += len(point)
+        u, y = phasors[these, 0], phasors[these, 1]
+        if np.any(np.abs(u) == 0):
+            raise DataError(f"the input of {point[0]!r} has no sine in it")
+        values = y / u
+        # H1 over the repeats: the strong ones count more, and coherence belongs to it.
+        response[k] = (y @ u.conj()) / (u @ u.conj()).real
+        frequency[k] = omega[these].mean() / (2 * np.pi)
+        total = 4 * power[these, 0].sum() * power[these, 1].sum()
+        coherence[k] = min(abs(y @ u.conj()) ** 2 / total, 1.0) if total > 0 else 0.0
+        if len(point) >= 3:
+            variance = np.var(values, ddof=1) / len(point)
+        else:
+            variance = np.mean(np.abs(values) ** 2 * relative_variance[these]) / len(point)
+        std[k] = np.sqrt(variance)
+    return MeasuredFRF(response, frequency, coherence=coherence, std=std, name=name)

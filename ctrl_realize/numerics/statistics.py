@@ -1,0 +1,101 @@
+"""Robust summaries of repeated estimates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from .arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class TrimmedStatistics:
+    """Mean and scatter of the values that are left after trimming both ends.
+
+    ``mean`` and ``variance`` are those of the ``count`` values left;
+    ``std_error`` is Yuen's, ``winsorized std / ((1 - 2 share) sqrt(n))`` with ``share = trim / n``,
+    and ``interval`` is ``mean -+ t std_error`` with ``count - 1`` degrees of freedom.
+
+    Parameters
+    ----------
+    mean : float
+        Mean of the values left.
+    variance : float
+        Variance of the values left, with divisor ``count - ddof``.
+    std_error : float
+        Standard error of `mean` as an estimate of the trimmed mean of the population.
+    interval : tuple of float
+        Confidence interval of the trimmed mean.
+    count : int
+        Number of values left.
+    dropped : int
+        Number of values dropped, both ends together.
+    """
+
+    mean: float
+    variance: float
+    std_error: float
+    interval: tuple[float, float]
+    count: int
+    dropped: int
+
+
+def trimmed_statistics(
+    values: FloatArray, trim: int, *, ddof: int = 1, confidence: float = 0.95
+) -> TrimmedStatistics:
+    """Drop the `trim` smallest and the `trim` largest values and summarize the rest.
+
+    Parameters
+    ----------
+    values : ndarray
+        Values; all axes are pooled.
+    trim : int
+        Values to drop at each end, ``0 <= 2 trim < size``.
+    ddof : int, default 1
+        Divisor of the variance is ``count - ddof``.
+    confidence : float, default 0.95
+        Level of the interval.
+
+    Returns
+    -------
+    TrimmedStatistics
+        The standard error is NaN where fewer than two values are left.
+
+    Notes
+    -----
+    The paper pools the 40 delays of its Table 1 and leaves out "the three smallest and highest
+    values", which gives 36.68 -> 37 with variance 2.04 (`ddof` 0) or 2.10 (`ddof` 1) -> 2.
+
+    References
+    ----------
+    .. [1] K. K. Yuen, The two-sample trimmed t for unequal population variances,
+       Biometrika 61 (1974), 165-170.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> summary = trimmed_statistics(np.array([1.0, 5.0, 6.0, 7.0, 90.0]), 1)
+    >>> summary.mean, summary.variance
+    (6.0, 1.0)
+    """
+    ordered = np.sort(np.ravel(values).astype(np.float64))
+    n = ordered.size
+    kept = ordered[trim : n - trim]
+    mean = float(kept.mean())
+    winsorized = np.clip(ordered, kept[0], kept[-1])
+    std_error = float("nan")
+    half_width = float("nan")
+    if kept.size > 1:
+        std_error = float(winsorized.std(ddof=1) / ((kept.size / n) * np.sqrt(n)))
+        half_width = float(special.stdtrit(kept.size - 1, 0.5 + confidence / 2)) * std_error
+    variance = float(kept.var(ddof=ddof)) if kept.size > ddof else float("nan")
+    return TrimmedStatistics(
+        mean=mean,
+        variance=variance,
+        std_error=std_error,
+        interval=(mean - half_width, mean + half_width),
+        count=int(kept.size),
+        dropped=2 * trim,
+    )
