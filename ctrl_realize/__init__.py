@@ -17,8 +17,10 @@ from .frequency import stepped_sine_frf as stepped_sine_frf
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step
+from .io import load_model as load_model
 from .io import read_frf as read_frf
 from .io import read_record as read_record
+from .io import save_model as save_model
 from .results import Flag as Flag
 from .signals import FilterSpec as FilterSpec
 from .signals import ImpulseResponse as ImpulseResponse

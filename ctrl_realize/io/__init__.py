@@ -1,4 +1,7 @@
 """Files in and out: records, frequency responses, models."""
 
+from .fit_summary import FitSummary as FitSummary
 from .frf import read_frf as read_frf
+from .model_files import load_model as load_model
+from .model_files import save_model as save_model
 from .records import read_record as read_record

@@ -1,0 +1,74 @@
+"""Take values out of parsed JSON that may hold anything."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileFormatError
+from ..numerics.arrays import FloatArray
+
+MAX_TEXT = 1000
+
+
+def field(content: Mapping[str, Any], key: str, kind: Any) -> Any:
+    """Return ``content[key]`` if it is of the kind asked for."""
+    value = content.get(key)
+    if not isinstance(value, kind) or (isinstance(value, str) and not _is_text(value)):
+        raise FileFormatError(f"{key!r} is missing, or not of its kind")
+    return value
+
+
+def boolean_free(content: Mapping[str, Any], key: str, kind: Any) -> Any:
+    """Return a number; in Python true and false are numbers too, here they are not."""
+    if isinstance(content.get(key), bool):
+        raise FileFormatError(f"{key!r} is true or false, a number is needed")
+    return field(content, key, kind)
+
+
+def texts(content: Mapping[str, Any], key: str) -> list[str]:
+    """Return a list of different texts."""
+    values: list[str] = field(content, key, list)
+    if not all(isinstance(value, str) and _is_text(value) for value in values):
+        raise FileFormatError(f"{key!r} holds something that is not text")
+    if len(set(values)) != len(values):
+        raise FileFormatError(f"{key!r} holds a name twice")
+    return values
+
+
+def whole_numbers(content: Mapping[str, Any], key: str, count: int) -> list[int]:
+    """Return `count` whole numbers, none negative."""
+    values: list[int] = field(content, key, list)
+    whole = all(isinstance(value, int) and not isinstance(value, bool) for value in values)
+    if not whole or len(values) != count or min(values, default=0) < 0:
+        raise FileFormatError(f"{key!r} must hold {count} whole numbers, none negative")
+    return values
+
+
+def matrix(content: Mapping[str, Any], key: str, shape: tuple[int, int]) -> FloatArray:
+    """Return a matrix of finite numbers from a list of its rows."""
+    rows: list[Any] = field(content, key, list)
+    numbers = (
+        len(rows) == shape[0]
+        and all(isinstance(row, list) and len(row) == shape[1] for row in rows)
+        and all(type(value) in (int, float) and _is_finite(value) for row in rows for value in row)
+    )
+    if not numbers:
+        raise FileFormatError(f"{key!r} must be {shape[0]} rows of {shape[1]} finite numbers")
+    return np.array(rows, dtype=np.float64).reshape(shape)
+
+
+def _is_finite(value: int | float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        # a whole number beyond the doubles
+        return False
+
+
+def _is_text(value: str) -> bool:
+    """No endless names, and no half characters, which could not be printed or written."""
+    return len(value) <= MAX_TEXT and not any("\ud800" <= letter <= "\udfff" for letter in value)
