@@ -4,4 +4,5 @@ from __future__ import annotations
 
 from .compare import compare_frf as compare_frf
 from .comparison import FRFComparison as FRFComparison
+from .spectral import spectral_frf as spectral_frf
 from .stepped_sine import stepped_sine_frf as stepped_sine_frf

@@ -115,8 +115,8 @@ def compare_frf(
     if kept.size == 0:
         raise DataError(
             f"nothing to compare: the FRF has {frequency.size} points from "
-            f"{hertz(frequency.min())} to {hertz(frequency.max())}, none of them non-zero and below the model's Nyquist "
-            "frequency"
+            f"{hertz(frequency.min())} to {hertz(frequency.max())}, none of them non-zero and "
+            "below the model's Nyquist frequency"
         )
     frequency, measured = frequency[kept], measured[kept]
     coherence = None if coherence is None else coherence[kept]

@@ -1,0 +1,256 @@
+"""A frequency response from records of noise, operating data or periodic signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+import numpy as np
+from scipy.signal import get_window
+
+from ..checks import one_of, real, whole
+from ..errors import DataError, OptionError, TimeAxisError
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.spectra import (
+    SpectralSums,
+    independent_segments,
+    period_statistics,
+    segment_sums,
+)
+from ..signals import MeasuredFRF, Record
+
+_LONGEST_DEFAULT_SEGMENT = 8192
+_MIN_LINE_POWER = 1e-4
+_MIN_LINE_TO_NOISE = 10.0
+
+
+def spectral_frf(
+    records: Record | Iterable[Record],
+    *,
+    method: Literal["H1", "H2", "Hv"] = "H1",
+    segment: int | None = None,
+    window: str | tuple[str, float] = "hann",
+    overlap: float = 0.5,
+    delay: int = 0,
+    period: int | None = None,
+    skip_periods: int = 1,
+    name: str = "measured",
+) -> MeasuredFRF:
+    r"""Estimate a frequency response from input and output spectra.
+
+    Without `period`: Welch's method, the averaged spectra of overlapping windowed segments.
+    With `period`: the mean over whole periods of a periodic input (multisine), which has no
+    leakage, at the lines that the input excites.
+
+    Parameters
+    ----------
+    records : Record or iterable of Record
+        One input and one output. An iterable is gone through once and never held in memory, so
+        it may be a generator that reads a long file piece by piece. No segment reaches from one
+        record into the next.
+    method : {"H1", "H2", "Hv"}
+        "H1" is for noise on the output, "H2" for noise on the input, "Hv" is their geometric
+        mean. For periodic records all three are the ratio of the mean spectra.
+    segment : int, optional
+        Samples in a segment; default a power of two, about an eighth of the first record, at
+        most 8192.
+    window : str or tuple, default "hann"
+        Any window that `scipy.signal.get_window` knows.
+    overlap : float, default 0.5
+        Part of a segment that the next one shares, in 0...0.95.
+    delay : int, default 0
+        Dead time in samples that is known beforehand. The output is shifted by it before the
+        segments are cut and the phase is put back afterwards: the segments of input and output
+        then belong together, and the estimate loses its bias of ``delay / segment``.
+    period : int, optional
+        Samples in a period of the input.
+    skip_periods : int, default 1
+        Periods to leave out at the start of each record, where the transient is.
+    name : str, default "measured"
+        Name of the result in plots.
+
+    Returns
+    -------
+    MeasuredFRF
+        With coherence and the standard deviation of the complex response.
+
+    Raises
+    ------
+    DataError
+        Records too short for two segments or periods, with several signals, of different
+        sample time, or an input that does not excite.
+    OptionError
+        Options that make no sense.
+
+    Notes
+    -----
+    The coherence is :math:`\gamma^2 = |S_{yu}|^2 / (S_{uu} S_{yy})`. The variance of the complex
+    response is :math:`|H|^2 (1 - \gamma^2) / (\gamma^2 K)` with K independent segments: the
+    number of segments, reduced for what overlapping ones share (Welch 1967). For periods it
+    comes from their scatter [1]_.
+
+    An input that is held between the samples makes this the response of the *sampled* plant,
+    which has the hold in it: ``compare_frf(..., hold=None)``.
+
+    References
+    ----------
+    .. [1] R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*,
+       2nd ed., section 2.5.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> u = np.random.default_rng(0).standard_normal(20_000)
+    >>> y = 2 * np.roll(u, 5)
+    >>> frf = cr.spectral_frf(cr.Record(0.01 * np.arange(u.size), u, y), delay=5)
+    >>> print(round(abs(frf.complex[10]), 3), frf.coherence.min() > 0.9999)
+    2.0 True
+    """
+    one_of(method, "method", ("H1", "H2", "Hv"))
+    whole(delay, "delay", 0)
+    stream = _aligned(records, delay)
+    if period is not None:
+        whole(period, "period", 4)
+        whole(skip_periods, "skip_periods", 0)
+        if segment is not None:
+            raise OptionError("segment and period are given; periodic records take period alone")
+        response, frequency, coherence, std, dt = _from_periods(stream, period, skip_periods)
+    else:
+        if not 0 <= real(overlap, "overlap", "part in 0...0.95") <= 0.95:
+            raise OptionError(f"overlap={overlap!r}; needed is a part in 0...0.95")
+        response, frequency, coherence, std, dt = _from_segments(
+            stream, method, segment, window, overlap
+        )
+    response = response * np.exp(-2j * np.pi * frequency * delay * dt)
+    return MeasuredFRF(response, frequency, coherence=coherence, std=std, name=name)
+
+
+_Estimate = tuple[ComplexArray, FloatArray, FloatArray, FloatArray, float]
+
+
+def _aligned(
+    records: Record | Iterable[Record], delay: int
+) -> Iterator[tuple[FloatArray, FloatArray, float]]:
+    """Yield input, output (moved earlier by `delay`) and sample time of each record."""
+    first_dt = None
+    for record in [records] if isinstance(records, Record) else records:
+        if not isinstance(record, Record):
+            raise DataError(f"got a {type(record).__name__}; needed are records")
+        if not record.issiso:
+            raise DataError(
+                f"{record!r} has several signals; spectral_frf takes one input and one output"
+            )
+        if first_dt is None:
+            first_dt = record.dt
+        elif abs(record.dt - first_dt) > 1e-6 * first_dt:
+            raise TimeAxisError(
+                f"records have sample times of {first_dt:g} s and {record.dt:g} s; one is needed"
+            )
+        u, y = np.ravel(record.input), np.ravel(record.output)
+        if delay >= u.size:
+            raise DataError(f"delay={delay} leaves nothing of {record!r}")
+        yield u[: u.size - delay], y[delay:], record.dt
+    if first_dt is None:
+        raise DataError("no records; needed is at least one")
+
+
+def _from_segments(
+    stream: Iterator[tuple[FloatArray, FloatArray, float]],
+    method: str,
+    segment: int | None,
+    window: str | tuple[str, float],
+    overlap: float,
+) -> _Estimate:
+    """Estimate by Welch's method."""
+    sums: SpectralSums | None = None
+    taps, hop, dt, longest = np.ones(1), 1, 0.0, 0
+    for u, y, sample_time in stream:
+        dt = sample_time
+        longest = max(longest, u.size)
+        if sums is None and taps.size == 1:
+            taps = _window(segment or _default_segment(u.size), window)
+            hop = max(1, round(taps.size * (1 - overlap)))
+        if u.size >= taps.size:
+            part = segment_sums(u, y, taps, hop)
+            sums = part if sums is None else sums + part
+    if sums is None or sums.count < 2:
+        raise DataError(
+            f"records of up to {longest} samples hold {0 if sums is None else sums.count} segments "
+            f"of {taps.size}; at least two are needed: state a shorter segment"
+        )
+    frequency = np.fft.rfftfreq(taps.size, dt)
+    # Zero was removed with the mean; the last line is the Nyquist frequency.
+    lines = slice(1, (taps.size + 1) // 2)
+    uu, yy, yu = sums.uu[lines], sums.yy[lines], sums.yu[lines]
+    if not np.any(uu > 0):
+        raise DataError("the input is constant: it does not excite the plant")
+    excited = (uu > np.finfo(float).eps ** 2 * uu.max()) & (yy > 0) & (np.abs(yu) > 0)
+    if not excited.any():
+        raise DataError("the output is constant: there is no response to estimate")
+    uu, yy, yu = uu[excited], yy[excited], yu[excited]
+    h1, h2 = yu / uu, yy / yu.conj()
+    response = {"H1": h1, "H2": h2, "Hv": yu / np.abs(yu) * np.sqrt(yy / uu)}[method]
+    coherence = np.minimum(np.abs(yu) ** 2 / (uu * yy), 1.0)
+    averages = independent_segments(taps, hop, sums.count)
+    std = np.abs(h1) * np.sqrt((1 - coherence) / (coherence * averages))
+    return response, frequency[lines][excited], coherence, std, dt
+
+
+def _window(length: int, window: str | tuple[str, float]) -> FloatArray:
+    whole(length, "segment", 8)
+    try:
+        return np.asarray(get_window(window, length), dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        raise OptionError(f"window={window!r} is none that scipy knows: {error}") from error
+
+
+def _default_segment(n_samples: int) -> int:
+    length = 1 << max(3, (n_samples // 8).bit_length() - 1)
+    return min(length, _LONGEST_DEFAULT_SEGMENT)
+
+
+def _from_periods(
+    stream: Iterator[tuple[FloatArray, FloatArray, float]], period: int, skip: int
+) -> _Estimate:
+    """Estimate by averaging whole periods."""
+    inputs, outputs, dt, n_skipped = [], [], 0.0, 0
+    for u, y, sample_time in stream:
+        dt = sample_time
+        whole_periods = u.size // period
+        n_skipped += min(skip, whole_periods)
+        span = slice(skip * period, whole_periods * period)
+        inputs.append(u[span].reshape(-1, period))
+        outputs.append(y[span].reshape(-1, period))
+    stats = None
+    count = sum(part.shape[0] for part in inputs)
+    if count >= 2:
+        stats = period_statistics(np.vstack(inputs), np.vstack(outputs))
+    if stats is None:
+        raise DataError(
+            f"the records hold {count} periods of {period} samples after {n_skipped} were left "
+            "out; at least two are needed"
+        )
+    power = np.abs(stats.mean_u) ** 2
+    lines = np.arange(power.size)
+    inside = (lines > 0) & (lines < (period + 1) // 2)
+    strongest = power[inside].max()
+    if strongest == 0:
+        raise DataError("the input is constant: it does not excite the plant")
+    excited = inside & (power > _MIN_LINE_POWER * strongest)
+    excited &= power > _MIN_LINE_TO_NOISE * stats.var_u / count
+    excited &= np.abs(stats.mean_y) > 0
+    if not excited.any():
+        raise DataError(
+            f"no line stands out of the input's noise; is its period really {period} samples?"
+        )
+    U, Y = stats.mean_u[excited], stats.mean_y[excited]
+    var_u, var_y, cov = stats.var_u[excited], stats.var_y[excited], stats.cov_yu[excited]
+    response = Y / U
+    relative = var_y / np.abs(Y) ** 2 + var_u / np.abs(U) ** 2 - 2 * (cov / (Y * U.conj())).real
+    std = np.abs(response) * np.sqrt(np.maximum(relative, 0.0) / count)
+    # Sums over the periods from means and scatter: sum |U|^2 = P |mean|^2 + (P - 1) var.
+    share = (count - 1) / count
+    uu, yy = np.abs(U) ** 2 + share * var_u, np.abs(Y) ** 2 + share * var_y
+    coherence = np.minimum(np.abs(Y * U.conj() + share * cov) ** 2 / (uu * yy), 1.0)
+    return response, np.fft.rfftfreq(period, dt)[excited], coherence, std, dt
