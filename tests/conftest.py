@@ -1,0 +1,42 @@
+"""Fixtures that all tests share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+from hypothesis import HealthCheck, settings
+
+mpl.use("Agg")
+
+# Same examples on every run: a failure seen once is seen again. CI machines are slow at times,
+# so no deadline on a single example.
+settings.register_profile(
+    "suite",
+    derandomize=True,
+    deadline=None,
+    max_examples=30,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.register_profile("long", parent=settings.get_profile("suite"), max_examples=1000)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
+
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture
+def shared_data() -> Path:
+    """Folder of measured records, which are not part of the project."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip(f"measured records are not there ({SHARED_DATA.name}/ beside the project)")
+    return SHARED_DATA
+
+
+@pytest.fixture(autouse=True)
+def _no_figure_left_open():
+    yield
+    import matplotlib.pyplot as plt
+
+    plt.close("all")

@@ -1,0 +1,305 @@
+"""Laws of systems that carry a dead time."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
+from tests.rigs import R3, TS, exact_step, lag
+
+CONTROLLER = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.5]], TS)  # a PI controller
+
+
+def valve(delay: int = 37, **names) -> cr.DelayedStateSpace:
+    return cr.delayed_ss(R3, delay, dt=TS, **names)
+
+
+def circle(count: int = 60, dt: float = TS) -> np.ndarray:
+    return np.exp(1j * np.geomspace(0.1, 0.99 * np.pi / dt, count) * dt)
+
+
+def mimo_core() -> ct.StateSpace:
+    rng = np.random.default_rng(3)
+    A = rng.standard_normal((4, 4))
+    A /= 1.2 * np.abs(np.linalg.eigvals(A)).max()
+    return ct.ss(A, rng.standard_normal((4, 2)), rng.standard_normal((3, 4)), np.ones((3, 2)), 0.1)
+
+
+@pytest.mark.parametrize("delay", [0, 1, 37, 300])
+def test_response_is_core_times_shift(delay):
+    sys = valve(delay)
+    z = np.concatenate([circle(), 0.9 * circle(7)])
+    free = cr.DelayedStateSpace(sys.delay_free)
+    assert_array_equal(sys(z), free(z) * z**-delay if delay else free(z))
+    # python-control solves for the core at each point: 5e-12 is lost near Nyquist.
+    assert_allclose(sys(z), sys.delay_free(z) * z ** float(-delay), rtol=1e-10)
+
+
+@pytest.mark.parametrize("delay", [0, 1, 37, 100])
+def test_python_control_finds_the_same_response_in_the_matrices(delay):
+    sys = valve(delay)
+    # 1e-10: what the 40-state solve of python-control leaves near Nyquist, where |G| is 1e-8.
+    assert_allclose(ct.ss(sys)(circle()), sys(circle()), rtol=1e-10, atol=1e-13)
+
+
+def test_states_are_core_then_past_inputs():
+    sys = valve(3, inputs="i", outputs="x")
+    assert sys.state_labels == ["x[0]", "x[1]", "x[2]", "i[k-1]", "i[k-2]", "i[k-3]"]
+    u = np.arange(1.0, 9.0)
+    states = ct.forced_response(sys, TS * np.arange(8), u, return_states=True).states
+    assert_array_equal(states[3, 1:], u[:-1])
+    assert_array_equal(states[5, 3:], u[:-3])
+
+
+KEEPING = {
+    "negation": lambda S: (-S, -1.0),
+    "number * S": lambda S: (2 * S, 2.0),
+    "S * number": lambda S: (S * 2.5, 2.5),
+    "S / number": lambda S: (S / 4, 0.25),
+    "numpy number * S": lambda S: (np.float64(3) * S, 3.0),
+    "array * S": lambda S: (np.array([[2.0]]) * S, 2.0),
+    "S * array": lambda S: (S * np.array([[2.0]]), 2.0),
+    "copy": lambda S: (S.copy(), 1.0),
+    "copy.copy": lambda S: (copy.copy(S), 1.0),
+    "copy.deepcopy": lambda S: (copy.deepcopy(S), 1.0),
+    "pickle": lambda S: (pickle.loads(pickle.dumps(S)), 1.0),
+    "power one": lambda S: (S**1, 1.0),
+    "replace": lambda S: (S.replace(name="other"), 1.0),
+}
+
+
+@pytest.mark.parametrize("operation", KEEPING)
+@pytest.mark.parametrize("delay", [0, 1, 37])
+def test_scalar_operations_and_copies_keep_the_delay(operation, delay):
+    S = valve(delay)
+    result, factor = KEEPING[operation](S)
+    assert isinstance(result, cr.DelayedStateSpace)
+    assert result.delay == delay
+    # Near Nyquist, where |G| is 1e-8, the sum of the core's parts cancels to 1e-11.
+    assert_allclose(result(circle()), factor * S(circle()), rtol=1e-10)
+    assert_allclose(ct.ss(result)(circle()), factor * S(circle()), rtol=1e-10, atol=1e-13)
+
+
+SERIES = {
+    "K * S": lambda S: (CONTROLLER * S, 1),
+    "S * K": lambda S: (S * CONTROLLER, 1),
+    "series(S, K)": lambda S: (ct.series(S, CONTROLLER), 1),
+    "series(K, S)": lambda S: (ct.series(CONTROLLER, S), 1),
+    "S * tf": lambda S: (S * ct.tf(CONTROLLER), 1),
+    "S * S": lambda S: (S * S, 2),
+    "S ** 2": lambda S: (S**2, 2),
+}
+
+
+@pytest.mark.parametrize("operation", SERIES)
+@pytest.mark.parametrize("delay", [0, 1, 37])
+def test_series_keeps_and_adds_delays(operation, delay):
+    S = valve(delay)
+    result, times = SERIES[operation](S)
+    assert isinstance(result, cr.DelayedStateSpace)
+    assert result.delay == times * delay
+    other = S if times == 2 else CONTROLLER
+    assert_allclose(result(circle()), S(circle()) * other(circle()), rtol=1e-9, atol=1e-14)
+
+
+PLAIN = {
+    "S + S": (lambda S: S + S, lambda g, k: 2 * g),
+    "S - 1": (lambda S: S - 1, lambda g, k: g - 1),
+    "feedback": (lambda S: ct.feedback(S, CONTROLLER), lambda g, k: g / (1 + g * k)),
+    "parallel": (lambda S: ct.parallel(S, CONTROLLER), lambda g, k: g + k),
+    "index": (lambda S: S[0, 0], lambda g, k: g),
+    "ss": (lambda S: ct.ss(S), lambda g, k: g),
+}
+
+
+@pytest.mark.parametrize("operation", PLAIN)
+@pytest.mark.parametrize("delay", [0, 1, 37])
+def test_what_cannot_keep_the_delay_is_plain_and_right(operation, delay):
+    S = valve(delay)
+    function, expected = PLAIN[operation]
+    result = function(S)
+    assert type(result) is ct.StateSpace
+    assert_allclose(
+        result(circle()), expected(S(circle()), CONTROLLER(circle())), rtol=1e-9, atol=1e-12
+    )
+
+
+def test_append_leaves_its_systems_alone():
+    S = valve(5)
+    both = ct.append(S, ct.ss([], [], [], 2.0, None))
+    assert type(both) is ct.StateSpace
+    assert S.dt == TS
+    assert both.dt == TS
+
+
+def test_a_fit_survives_copies_and_names_but_not_algebra():
+    S = valve(2).replace(fit={"found": "here"})
+    for kept in (S.copy("b"), pickle.loads(pickle.dumps(S)), S.replace(name="c")):
+        assert kept.fit == {"found": "here"}
+    assert (2 * S).fit is None
+
+
+def test_a_copy_computes_with_its_own_matrices():
+    S = valve(3)
+    twin = S.copy()
+    t = TS * np.arange(20)
+    a = ct.forced_response(twin, t, np.ones(20)).outputs
+    b = ct.input_output_response(twin, t, np.ones(20)).outputs
+    assert_allclose(a, b, rtol=1e-12)
+    assert twin._core is not S._core
+
+
+def test_matrices_cannot_be_written():
+    S = valve(2)
+    with pytest.raises(ValueError, match="read-only"):
+        S.A[0, 0] = 1.0
+    with pytest.raises(AttributeError, match="fixed"):
+        S.A = np.eye(5)
+    with pytest.raises(AttributeError, match="fixed"):
+        S.dt = 1.0
+
+
+def test_poles_of_the_delay_are_exactly_zero():
+    poles = valve(300).poles()
+    assert np.count_nonzero(poles == 0) == 300
+    assert_allclose(np.sort(poles[:3]), np.sort(valve(0).poles()), rtol=0, atol=0)
+
+
+def test_zeros_are_those_of_the_core():
+    assert_allclose(valve(300).zeros(), valve(0).zeros(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0, 37, 300])
+def test_fast_step_and_markov_equal_python_control(delay):
+    S = valve(delay)
+    t = TS * np.arange(800)
+    assert_allclose(S.step(800), ct.step_response(S, t).outputs, rtol=0, atol=1e-12)
+    assert_allclose(S.markov(800), TS * ct.impulse_response(S, t).outputs, rtol=0, atol=1e-13)
+    u = np.random.default_rng(0).standard_normal(800)
+    assert_allclose(S.simulate(u), ct.forced_response(S, t, u).outputs, rtol=0, atol=1e-12)
+
+
+@given(
+    samples=st.floats(0, 60, allow_nan=False),
+    dt=st.floats(1e-4, 5e-3),
+)
+def test_a_fractional_dead_time_is_sampled_exactly(samples, dt):
+    S = cr.delayed_ss(R3, dead_time=samples * dt, dt=dt)
+    t = dt * np.arange(120)
+    # The exact step response jumps nowhere, so rounding of the dead time moves it by 1e-12.
+    assert_allclose(S.step(120), exact_step(R3, t - samples * dt), rtol=0, atol=1e-9)
+    assert S.delay_free.nstates == 3
+
+
+def test_bandwidth_is_that_of_the_continuous_plant():
+    from scipy.optimize import brentq
+
+    exact = brentq(lambda w: abs(R3(1j * w)) - 10 ** (-3 / 20), 1, 100)
+    # The hold weakens the gain by (w dt)^2 / 24 = 5e-6 there.
+    assert_allclose(valve(37).bandwidth(), exact, rtol=1e-5)
+    assert_allclose(cr.delayed_ss(lag(2.0), 5, dt=TS).bandwidth(), 4 * np.pi, rtol=3e-3)
+
+
+def test_damp_does_not_warn_of_the_delay_poles():
+    assert np.count_nonzero(np.isinf(valve(4).damp()[0])) == 4
+
+
+def test_transfer_function_has_the_delay_as_zeros_of_the_denominator():
+    S = valve(300)
+    G = S.to_tf()
+    assert G.den[0][0].size == 304
+    assert_allclose(G(circle(20)), S(circle(20)), rtol=1e-6)
+
+
+def test_several_channels_have_their_own_delays():
+    core = mimo_core()
+    S = cr.delayed_ss(core, [2, 5], output_delay=[0, 3, 1])
+    z = circle(dt=0.1)
+    expected = core(z) * (z ** -np.add.outer([0, 3, 1], [2, 5])[:, :, None])
+    assert_allclose(S(z), expected, rtol=1e-12)
+    assert_allclose(ct.ss(S)(z), expected, rtol=1e-9, atol=1e-12)
+    assert_array_equal(S.delay, np.add.outer([0, 3, 1], [2, 5]))
+    assert S.nstates == 4 + 7 + 4
+    t = 0.1 * np.arange(40)
+    u = np.random.default_rng(1).standard_normal((2, 40))
+    assert_allclose(S.simulate(u), ct.forced_response(S, t, u).outputs, rtol=0, atol=1e-12)
+    assert_allclose(S.markov(40)[1, 1, :8], np.zeros(8), atol=0)
+
+
+def test_products_of_channels_with_different_delays_stay_right():
+    core = mimo_core()
+    S = cr.delayed_ss(core, [2, 5])
+    M = np.array([[1.0, 2.0], [0.5, -1.0]])
+    z = circle(9, dt=0.1)
+    mixed = S * M
+    assert type(mixed) is ct.StateSpace
+    assert_allclose(mixed(z), np.einsum("pmk,mn->pnk", S(z), M), rtol=1e-9, atol=1e-12)
+    outer = np.array([[1.0, 0.0, 2.0]]) * S
+    assert isinstance(outer, cr.DelayedStateSpace)
+    assert outer.input_delays == (2, 5)
+    assert_allclose(outer(z)[0], S(z)[0] + 2 * S(z)[2], rtol=1e-12)
+
+
+def test_interconnect_and_feedback_with_names_work():
+    S = valve(37, name="valve", inputs="i", outputs="x")
+    K = ct.ss(CONTROLLER, name="pi", inputs="e", outputs="i")
+    loop = ct.interconnect(
+        [S, K, ct.summing_junction(["r", "-x"], "e")], inplist="r", outlist="x", name="loop"
+    )
+    direct = ct.feedback(S * CONTROLLER, 1)
+    t = TS * np.arange(200)
+    assert_allclose(
+        ct.step_response(loop, t).outputs, ct.step_response(direct, t).outputs, atol=1e-9
+    )
+
+
+def test_plots_of_python_control_take_the_system():
+    S = valve(37)
+    w = np.geomspace(0.6, 300, 50)
+    ct.bode_plot(S, w)
+    ct.nyquist_plot(S, w)
+    ct.nichols_plot(S, w)
+
+
+def test_cards_show_core_and_shift():
+    S = valve(37, name="valve", inputs="i", outputs="x")
+    assert "order 3, z^-37 (0.0289063 s)" in repr(S)
+    assert "z^-37" in S._repr_html_()
+    assert "times z^-37" in str(S)
+    hostile = valve(1, name="<script>alert(1)</script>")
+    assert "<script>" not in hostile._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "match"),
+    [
+        (lambda: cr.delayed_ss(R3, 3), UnsuitableSystemError, "give dt"),
+        (lambda: cr.delayed_ss("valve", 3), UnsuitableSystemError, "is a str"),
+        (lambda: cr.delayed_ss(R3, -1, dt=TS), DelayRangeError, "delay=-1"),
+        (lambda: cr.delayed_ss(R3, 2.5, dt=TS), DelayRangeError, "fractional"),
+        (lambda: cr.delayed_ss(R3, dead_time=-0.1, dt=TS), DelayRangeError, ">= 0"),
+        (lambda: cr.delayed_ss(R3, dead_time=np.nan, dt=TS), OptionError, "finite"),
+        (lambda: cr.delayed_ss(R3, 1, dead_time=0.1, dt=TS), OptionError, "one of them"),
+        (lambda: cr.delayed_ss(R3, 1, dt=-1.0), OptionError, "positive sample time"),
+        (lambda: cr.delayed_ss(CONTROLLER, dead_time=1.5 * TS), DelayRangeError, "whole samples"),
+        (lambda: cr.delayed_ss(CONTROLLER, 1, dt=0.1), OptionError, "sample time"),
+        (lambda: cr.delayed_ss(1 + R3, dead_time=1.5 * TS, dt=TS), UnsuitableSystemError, "jumps"),
+        (lambda: cr.DelayedStateSpace(ct.ss(R3), 3), UnsuitableSystemError, "sample time"),
+        (lambda: cr.delayed_ss(CONTROLLER, 10**6), DelayRangeError, "states"),
+        (lambda: cr.delayed_ss(CONTROLLER, [1, 2]), DelayRangeError, "1 input"),
+        (lambda: valve().simulate(np.ones((2, 5))), DataError, r"\(1, N\)"),
+        (lambda: valve().markov(0), OptionError, ">= 1"),
+    ],
+)
+def test_unusable_arguments_are_refused(make, error, match):
+    with pytest.raises(error, match=match):
+        make()

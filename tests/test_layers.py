@@ -1,0 +1,83 @@
+"""Folders are floors: imports only go down."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "ctrl_realize"
+
+FLOORS = {
+    "errors": 0,
+    "checks": 0,
+    "numerics": 1,
+    "results": 2,
+    "signals": 3,
+    "delayed": 3,
+    "identification": 4,
+    "frequency": 4,
+    "design": 5,
+    "bench": 5,
+    "paper": 5,
+    "io": 5,
+    "plots": 6,
+    "report": 7,
+    "cli": 8,
+    "__main__": 9,
+    "__init__": 9,
+}
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def floor_name(path: Path) -> str:
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return parts[0]
+
+
+def imported_names(path: Path) -> set[str]:
+    """Every module that a file imports, at top level or inside functions, as absolute names."""
+    package = ["ctrl_realize", *path.relative_to(PACKAGE).parent.parts]
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            if node.module:
+                names.add(module)
+            names |= {f"{module}.{alias.name}" for alias in node.names}
+    return names
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_only_go_down(path):
+    here = FLOORS[floor_name(path)]
+    for name in imported_names(path):
+        parts = name.split(".")
+        if parts[0] == "ctrl_realize" and len(parts) > 1 and parts[1] in FLOORS:
+            assert FLOORS[parts[1]] <= here, f"{path.name} imports {name}, a floor above it"
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "numerics").rglob("*.py")), ids=lambda p: p.name)
+def test_numerics_know_only_arrays(path):
+    roots = {name.split(".")[0] for name in imported_names(path)}
+    assert not roots & {"control", "matplotlib", "pandas", "pathlib", "joblib"}
+
+
+def test_every_file_stands_on_a_floor():
+    assert {floor_name(path) for path in MODULES} <= set(FLOORS)
+
+
+def test_only_the_package_face_re_exports_everything():
+    # A module that imports from the package's face would hide an upward import.
+    offenders = [
+        path
+        for path in MODULES
+        if floor_name(path) not in ("__init__", "__main__", "cli")
+        and any(name == "ctrl_realize" for name in imported_names(path))
+    ]
+    assert offenders == []
