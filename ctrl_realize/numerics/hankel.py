@@ -13,7 +13,6 @@ from copy import copy
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.sparse.linalg import LinearOperator
 
 from .arrays import ComplexArray, FloatArray, IntArray
 
@@ -108,8 +107,8 @@ class HankelStack:
         return self._product[:, : self.size]
 
 
-class BlockHankel(LinearOperator):  # type: ignore[misc]  # scipy's class is untyped where it is subclassed
-    """Matrix-free block Hankel matrix of ``(p, m, N)`` Markov parameters.
+class BlockHankel:
+    """Products with one block Hankel matrix and its transpose, by FFT.
 
     Memory is that of the parameters' spectrum; a product costs ``p + m``
     real FFTs and a ``p x m`` product per frequency.
@@ -132,27 +131,29 @@ class BlockHankel(LinearOperator):  # type: ignore[misc]  # scipy's class is unt
         self._spectrum: ComplexArray = np.ascontiguousarray(
             np.fft.rfft(used, n=self.points).transpose(2, 0, 1)
         )
-        super().__init__(
-            dtype=np.dtype(np.float64), shape=(rows * self.outputs, columns * self.inputs)
-        )
 
-    def _matmat(self, x: FloatArray) -> FloatArray:
-        vectors = x.reshape(self.columns, self.inputs, -1)
-        transform = np.conjugate(np.fft.rfft(vectors, n=self.points, axis=0))
-        product = np.fft.irfft(self._spectrum @ transform, n=self.points, axis=0)
-        return product[: self.rows].reshape(self.shape[0], -1)
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the whole matrix."""
+        return self.rows * self.outputs, self.columns * self.inputs
 
-    def _matvec(self, x: FloatArray) -> FloatArray:
-        return self._matmat(x.reshape(-1, 1))[:, 0]
+    def times(self, vector: FloatArray) -> FloatArray:
+        """Return ``H @ vector``."""
+        return self._correlate(self._spectrum, vector, self.inputs, self.rows)
 
-    def _rmatmat(self, x: FloatArray) -> FloatArray:
-        vectors = x.reshape(self.rows, self.outputs, -1)
-        transform = np.conjugate(np.fft.rfft(vectors, n=self.points, axis=0))
-        product = np.fft.irfft(self._spectrum.transpose(0, 2, 1) @ transform, n=self.points, axis=0)
-        return product[: self.columns].reshape(self.shape[1], -1)
+    def transposed_times(self, vector: FloatArray) -> FloatArray:
+        """Return ``H.T @ vector``."""
+        transposed = self._spectrum.transpose(0, 2, 1)
+        return self._correlate(transposed, vector, self.outputs, self.columns)
 
-    def _rmatvec(self, x: FloatArray) -> FloatArray:
-        return self._rmatmat(x.reshape(-1, 1))[:, 0]
+    def _correlate(
+        self, spectrum: ComplexArray, vector: FloatArray, channels: int, length: int
+    ) -> FloatArray:
+        signals = vector.reshape(-1, channels).T
+        transform = np.conjugate(np.fft.rfft(signals, n=self.points))
+        product = np.matmul(spectrum, transform.T[:, :, np.newaxis])[:, :, 0]
+        response: FloatArray = np.fft.irfft(product.T, n=self.points)
+        return response[:, :length].T.ravel()
 
 
 def hankel_norm_squared(h: FloatArray, rows: int, columns: int) -> float:

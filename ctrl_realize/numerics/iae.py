@@ -1,4 +1,4 @@
-"""Misfit of many single-channel models at once: integrated absolute error.
+"""Misfit of many models at once: integrated absolute error.
 
 Model responses come from block powers: ``C A^(i + L j) B`` is the product of
 ``[C; C A; ...; C A^(L-1)]`` and ``[B, A^L B, ...]``, both built by doubling.
@@ -46,7 +46,7 @@ def markov_stack(A: FloatArray, B: FloatArray, C: FloatArray, count: int) -> Flo
         np.matmul(power, columns[:, :, :more], out=columns[:, :, have : have + more])
         power = np.matmul(power, power)
         have += more
-    response = np.matmul(columns.transpose(0, 2, 1), rows.transpose(0, 2, 1))
+    response: FloatArray = np.matmul(columns.transpose(0, 2, 1), rows.transpose(0, 2, 1))
     return response.reshape(models, -1)[:, :count]
 
 
@@ -84,7 +84,7 @@ def integrated_absolute_error(
         difference = np.abs(np.subtract(response, data, out=response))
         after = np.arange(count) >= (window - 1 - delays)[:, np.newaxis]
         difference[after] = 0.0
-        misfit = difference.sum(axis=1)
+        misfit: FloatArray = difference.sum(axis=1)
     magnitude = np.abs(markov)
     before = np.concatenate([[0.0], np.cumsum(magnitude)])[delays]
     misfit += before + np.abs(markov[delays] - D)
