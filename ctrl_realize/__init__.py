@@ -13,6 +13,7 @@ from .errors import CtrlRealizeError as CtrlRealizeError
 from .errors import CtrlRealizeWarning as CtrlRealizeWarning
 from .frequency import FRFComparison as FRFComparison
 from .frequency import compare_frf as compare_frf
+from .frequency import spectral_frf as spectral_frf
 from .frequency import stepped_sine_frf as stepped_sine_frf
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
