@@ -113,12 +113,11 @@ def _cut_last_line(path: Path, layout: TextLayout) -> str:
     if not pattern.fullmatch(last[-1]) and pattern.fullmatch(before[-1][-1]):
         return f"it ends in {last[-1][:20]!r} and has no line end"
     # written with a fixed number of decimals, except here: 27.02 of 27.0223
-    decimals = {len(row[-1].rpartition(layout.decimal)[2]) for row in before if row[-1]}
-    fixed = all(layout.decimal in row[-1] for row in before if row[-1])
-    if fixed and len(decimals) == 1 and len(before) >= 3:
-        short = len(last[-1].rpartition(layout.decimal)[2]) < min(decimals)
-        if short or layout.decimal not in last[-1]:
-            return f"it ends in {last[-1]!r}, with fewer decimals than all others and no line end"
+    ends = [row[-1] for row in before if pattern.fullmatch(row[-1])]
+    decimals = {len(end.partition(layout.decimal)[2]) for end in ends}
+    written = len(last[-1].partition(layout.decimal)[2])
+    if len(ends) >= 3 and len(decimals) == 1 and written < min(decimals):
+        return f"it ends in {last[-1]!r}, with fewer decimals than all others and no line end"
     return ""
 
 

@@ -38,7 +38,8 @@ class FitSummary(Result):
     Examples
     --------
     >>> from ctrl_realize.io import FitSummary
-    >>> summary = FitSummary("DelayScan", "Delay scan", (("delay", "37 samples"),), (("delay", 37),))
+    >>> rows = (("delay", "37 samples"),)
+    >>> summary = FitSummary("DelayScan", "Delay scan", rows, values=(("delay", 37),))
     >>> summary["delay"]
     37
     >>> print(summary.report())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -155,9 +156,12 @@ def read_record(
     make: Any = Record.resampled if resample else Record
     try:
         record: Record = make(stamps, *signals, **labels)
+    except TimeAxisError as error:
+        row = re.search(r"row (\d+)", str(error))
+        place = f" ({table.place(int(row[1]))})" if row else ""
+        raise TimeAxisError(f"{table.path}{place}: {error}") from error
     except DataError as error:
-        kind = TimeAxisError if isinstance(error, TimeAxisError) else DataError
-        raise kind(f"{table.path}: {error}") from error
+        raise DataError(f"{table.path}: {error}") from error
     return record
 
 

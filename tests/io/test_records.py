@@ -1,0 +1,368 @@
+"""Text files as they come from loggers, scopes, spreadsheets and other programs."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import (
+    DataError,
+    DataWarning,
+    FileFormatError,
+    MissingFileError,
+    OptionError,
+    TimeAxisError,
+)
+from ctrl_realize.io import read_record
+
+U = np.array([0.0, 0.0, 1.5, 1.5, -1.5])
+Y = np.array([10.25, 10.0, 9.75, 12.5, 12.0])
+T = np.array([0.0, 0.5, 1.0, 1.5, 2.0])
+
+
+def check(record, *, time=T, input=U, output=Y):
+    assert_array_equal(record.time, time)
+    assert_array_equal(record.input, input)
+    assert_array_equal(record.output, output)
+
+
+def table(delimiter=",", decimal=".", header=None, end="\n", last_end=True, columns=(T, U, Y)):
+    """The record above, written in one of many ways."""
+    lines = [] if header is None else [header]
+    for row in zip(*columns, strict=True):
+        lines.append(delimiter.join(f"{value:g}".replace(".", decimal) for value in row))
+    return end.join(lines) + (end if last_end else "")
+
+
+PLAIN = "time,input,output"
+GERMAN = "Zeit [s];Eingang [mA];Ausgang [V]"
+
+WRITTEN = {
+    "plain": table(header=PLAIN),
+    "no header": table(),
+    "no line end at the end": table(header=PLAIN, last_end=False),
+    "carriage returns": table(header=PLAIN, end="\r\n"),
+    "old Macintosh": table(header=PLAIN, end="\r"),
+    "tabs": table("\t", header="t\tu\ty"),
+    "semicolons, decimal comma": table(";", ",", GERMAN),
+    "tabs, decimal comma": table("\t", ",", "t\tu\ty"),
+    "blanks, decimal comma": table("  ", ",", "t u y"),
+    "bars": table("|", header="t|u|y"),
+    "aligned with blanks": table("   ", header="   t    u    y").replace("\n", "\n "),
+    "names with blanks": table("  ", header="Time (s)  input signal  output signal"),
+    "comma and blank": table(", ", header="t, u, y"),
+    "quoted header": table(header='"time","input","output"'),
+    "quoted numbers": '"' + table('","', header='t","u","y', end='"\n"', last_end=False) + '"\n',
+    "quoted decimal commas": "t,u,y\n"
+    + "".join(
+        ",".join(f'"{value:g}"'.replace(".", ",") for value in row) + "\n"
+        for row in zip(T, U, Y, strict=True)
+    ),
+    "units below the names": table(header="time,input,output\ns,mA,V"),
+    "units in brackets below": table(header="time,input,output\n[s],[mA],[V]"),
+    "comments above": table(header="# bench 3\n# valve\ntime,input,output"),
+    "header in a comment, as savetxt": table(" ", header="# time input output"),
+    "header in a comment, other delimiter": table(",", header="# time input output"),
+    "percent comments": table(header="% made by hand\nt,u,y"),
+    "words above": table(header="Bench 3\nMonday\n\ntime,input,output"),
+    "scope settings above": table(header="Sample Interval,0.5\nPoints,5\n\ntime,input,output"),
+    "blank lines": table(header=PLAIN, end="\n\n"),
+    "lines of blanks": table(header=PLAIN).replace("\n", "\n   \n", 3),
+    "empty rows of a spreadsheet": table(header=PLAIN) + ",,\n,,\n",
+    "delimiter at the end": table(header=PLAIN).replace("\n", ",\n"),
+    "delimiter at the end of the data": PLAIN + "\n" + table().replace("\n", ",\n"),
+    "a comment in the middle": table(header="# log\n" + PLAIN).replace("\n1,", "\n# restart\n1,"),
+    "other order": table(header="output,time,input", columns=(Y, T, U)),
+    "capital letters": table(header="TIME,Input,OUTPUT"),
+    "a column of text": "t,u,y,remark\n"
+    + "".join(f"{t:g},{u:g},{y:g},good\n" for t, u, y in zip(T, U, Y, strict=True)),
+    "one signal by its name": table(header="t,u,pressure"),
+    "exponents": "t,u,y\n"
+    + "".join(f"{t:.3e},{u:+.2E},{y:.4e}\n" for t, u, y in zip(T, U, Y, strict=True)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", WRITTEN.values(), ids=WRITTEN.keys())
+def test_the_same_record_is_read_however_it_is_written(tmp_path, text):
+    file = tmp_path / "record.csv"
+    file.write_bytes(text.encode())
+    check(read_record(file))
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1252"]
+)
+def test_the_encoding_does_not_matter(tmp_path, encoding):
+    file = tmp_path / "größe.csv"
+    file.write_bytes(table(";", ",", "Zeit [s];Eingang;Ausgang [°C]").encode(encoding))
+    record = read_record(file)
+    check(record)
+    assert record.name == "größe"
+
+
+def test_the_encoding_can_be_said(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_bytes(table(header="t,u,y").encode("utf-32"))
+    check(read_record(file, encoding="utf-32"))
+    with pytest.raises(OptionError, match="'klingon'"):
+        read_record(file, encoding="klingon")
+
+
+def test_names_of_columns_become_labels(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(table(header="t,u.1,pressure [bar]"))
+    record = read_record(file, input=1)
+    assert record.input_labels == ("u_1",)
+    assert record.output_labels == ("pressure [bar]",)
+
+
+@pytest.mark.parametrize("choice", [{"input": "in", "output": "out"}, {"input": 2, "output": 1}])
+def test_columns_are_chosen_by_name_or_number(tmp_path, choice):
+    file = tmp_path / "a.csv"
+    file.write_text(table(header="t,out,in,extra", columns=(T, Y, U, T)))
+    check(read_record(file, **choice))
+
+
+def test_a_file_without_time_takes_dt(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(table(columns=(U, Y)))
+    check(read_record(file, dt=0.5))
+    check(read_record(file, dt=0.5, input=0, output=1))
+
+
+def test_dt_takes_the_place_of_a_time_column(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(table(header="t,u,y", columns=(np.round(T), U, Y)))
+    check(read_record(file, dt=0.5))
+
+
+def test_numbered_names_are_channels(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(table(header="time_s,u1,u2,y[0],y[1]", columns=(T, U, -U, Y, 2 * Y)))
+    record = read_record(file)
+    check(record, input=[U, -U], output=[Y, 2 * Y])
+    assert record.input_labels == ("u1", "u2")
+    check(read_record(file, input="u2", output=["y[1]", "y[0]"]), input=-U, output=[2 * Y, Y])
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "factor"),
+    [("t_ms,u,y", "auto", 1e3), ("t [us],u,y", "auto", 1e6), ("t,u,y\nms,V,V", "auto", 1e3),
+     ("t,u,y", "ms", 1e3), ("t_ms,u,y", "s", 1.0), ("t/min,u,y", "auto", 1 / 60)],
+)  # fmt: skip
+def test_time_is_in_seconds_whatever_its_unit(tmp_path, header, unit, factor):
+    file = tmp_path / "a.csv"
+    file.write_text(header + "\n" + "".join(f"{k * 30 * factor!r},{k},{k}\n" for k in range(5)))
+    # half an ulp from writing in the other unit, half from dividing
+    np.testing.assert_allclose(
+        read_record(file, time_unit=unit).time, 30.0 * np.arange(5), rtol=3e-16
+    )
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        ["2026-03-01 11:59:59.900", "2026-03-01 12:00:00.000", "2026-03-01 12:00:00.100"],
+        ["2026-03-01T11:59:59,900", "2026-03-01T12:00:00,000", "2026-03-01T12:00:00,100"],
+        ["2026-03-01T11:59:59.9Z", "2026-03-01T12:00:00Z", "2026-03-01T12:00:00.1Z"],
+        ["2026-03-01T11:59:59.9+01:00", "2026-03-01T13:00:00+02:00", "2026-03-01T11:00:00.1Z"],
+        ["11:59:59.9", "12:00:00.0", "12:00:00.1"],
+        ["23:59:59.9", "00:00:00.0", "00:00:00.1"],
+    ],
+)
+def test_dates_and_times_of_day_count_from_the_first_row(tmp_path, stamps):
+    file = tmp_path / "a.csv"
+    file.write_text("timestamp;u;y\n" + "".join(f"{stamp};1;2\n" for stamp in stamps))
+    # nanoseconds are exact
+    np.testing.assert_allclose(read_record(file).time, [0.0, 0.1, 0.2], rtol=0, atol=1e-15)
+
+
+def test_other_dates_need_their_format(tmp_path):
+    file = tmp_path / "a.csv"
+    rows = [f"03.02.2026 10:00:0{k},{k},{k}" for k in range(4)]
+    file.write_text("\n".join(["date time,u,y", *rows]) + "\n")
+    with pytest.raises(DataError, match=r"line 2: '03\.02\.2026 10:00:00'.*time_format="):
+        read_record(file)
+    assert_array_equal(read_record(file, time_format="%d.%m.%Y %H:%M:%S").time, np.arange(4.0))
+
+
+def test_nanoseconds_since_1970_keep_their_steps(tmp_path):
+    file = tmp_path / "a.csv"
+    start = 1_774_000_000_123_456_789
+    file.write_text("t_ns,u,y\n" + "".join(f"{start + 78_125 * k},{k},{k}\n" for k in range(50)))
+    np.testing.assert_allclose(read_record(file).time, 78_125e-9 * np.arange(50), rtol=3e-16)
+
+
+def test_jitter_is_refused_and_resampled_on_request(tmp_path):
+    file = tmp_path / "a.csv"
+    times = np.arange(50.0) + 0.2 * np.sin(np.arange(50.0))
+    file.write_text(table(header="t,u,y", columns=(times, times, 2 * times)))
+    with pytest.raises(TimeAxisError, match=r"a\.csv.*resample=True"):
+        read_record(file)
+    record = read_record(file, resample=True)
+    # linear signals are interpolated exactly, up to the six digits in the file
+    np.testing.assert_allclose(record.output, 2 * record.time, atol=1e-4)
+
+
+CUT = {
+    "in a number": "1.5,1.5,12.5000\n2,-1.5,12.0",
+    "before a number": "1.5,1.5,12.5000\n2,-1.5,",
+    "after a sign": "1.5,1.5,12.5000\n2,-1.5,-",
+    "in an exponent": "1.5,1.5,12.5000\n2,-1.5,1.2e-",
+    "a column early": "1.5,1.5,12.5000\n2,-1",
+    "in the first column": "1.5,1.5,12.5000\n2",
+    "with zeros behind": "1.5,1.5,12.5000\n2,-1.5,12\0\0\0\0",
+    "and a line of zeros": "1.5,1.5,12.5000\n\0\0\0\0\0\0\0",
+    "and a line end": "1.5,1.5,12.5000\n2,-1.5\n",
+}
+
+
+@pytest.mark.parametrize("end", CUT.values(), ids=CUT.keys())
+def test_a_last_line_that_was_cut_is_left_out_with_a_warning(tmp_path, end):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n" + end)
+    with pytest.warns(DataWarning, match="the last line is left out") as caught:
+        record = read_record(file)
+    check(record, time=T[:4], input=U[:4], output=Y[:4])
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("last", ["2,-1.5,12.0000", "2,-1.5,12.0000\n", "2,-1.5,12.0000\n\n"])
+def test_a_whole_last_line_is_kept(tmp_path, last):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n1.5,1.5,12.5000\n" + last)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check(read_record(file))
+
+
+BAD = {
+    "text": ("1,1.5,high\n", DataError, r"column 'y', line 4: 'high': is not a number"),
+    "NaN": ("1,1.5,NaN\n", DataError, r"column 'y', line 4: 'NaN': a value is missing"),
+    "nothing": ("1,,3\n", DataError, r"column 'u', line 4: '': a value is missing"),
+    "infinity": ("1,inf,3\n", DataError, r"column 'u', line 4: inf is not finite"),
+    "too large": ("1,1e999,3\n", DataError, r"column 'u', line 4: inf is not finite .or too large"),
+    "hexadecimal": ("1,0x10,3\n", DataError, r"'0x10': is not a number"),
+    "underscore": ("1,1_0,3\n", DataError, r"'1_0': is not a number"),
+    "other digits": ("1,²,3\n", DataError, r"'²': is not a number"),
+    "decimal comma": ('1,"1,5",3\n', DataError, r"'1,5': is not a number; decimal="),
+    "too many cells": ("1,2,3,4\n", FileFormatError, r"Expected 3 fields in line 4, saw 4"),
+    "too few cells": ("1,2\n", DataError, r"column 'y', line 4: ''"),
+    "time twice": ("0.5,1,2\n", TimeAxisError, r"a\.csv \(line 4\): .* row 2"),
+    "time back": ("0.25,1,2\n", TimeAxisError, r"a\.csv \(line 4\): .* row 2"),
+    "a gap": ("", TimeAxisError, r"a\.csv \(line 4\): .* row 2"),
+    "a quote": ('1,"2,3\n', FileFormatError, "EOF inside string"),
+}
+
+
+@pytest.mark.parametrize(("row", "error", "match"), BAD.values(), ids=BAD.keys())
+def test_a_bad_row_is_named(tmp_path, row, error, match):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y\n0,0,1\n0.5,0,1\n" + row + "1.5,0,1\n2,0,1\n2.5,0,1\n3,0,1\n")
+    with pytest.raises(error, match=match):
+        read_record(file)
+
+
+def test_the_line_of_a_bad_cell_counts_comments_and_blank_lines(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("# bench\n\nt,u,y\n0,0,1\n\n# restart\n1,0,bad\n2,0,1\n3,0,1\n4,0,1\n")
+    with pytest.raises(DataError, match="line 7: 'bad'"):
+        read_record(file)
+
+
+def test_a_bad_cell_in_a_column_that_is_not_used_does_no_harm(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y,z\n0,0,1,\n1,0,1,NaN\n2,0,1,x\n3,0,1,2\n")
+    assert read_record(file).n_samples == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "kwargs", "match"),
+    [
+        ("t,valve,level,flow\n", {}, r"which column is the input.*1 'valve', 2 'level', 3 'flow'"),
+        ("t,u,level,flow\n", {}, r"which column is the output.*2 'level', 3 'flow'"),
+        ("a,u,y,b\n", {}, r"which column is time; say time=name or number, or dt="),
+        ("t,time,u,y\n", {}, r"2 columns that could be time"),
+        ("t,u,y,y\n", {"output": "y"}, r"fits 2 columns"),
+        ("t,u,y,z\n", {"input": "U2"}, r"input='U2'.*columns 0 't', 1 'u'"),
+        ("t,u,y,z\n", {"input": 4}, r"input=4.*count from 0"),
+        ("t,u,y,z\n", {"input": -1}, r"input=-1.*count from 0"),
+        ("t,u,y,z\n", {"input": True}, r"must be a column's name or number"),
+        ("t,u,y,z\n", {"input": []}, r"must name one or more"),
+        ("t,u,y,z\n", {"time": 0, "dt": 1.0}, r"both given"),
+        ("t,u,y,z\n", {"dt": -1.0}, r"dt=-1.0 must be a positive"),
+        ("t,u,y,z\n", {"dt": math.nan}, r"dt=nan must be a positive"),
+        ("t,u,y,z\n", {"input": "u", "output": "u"}, r"asked for twice"),
+        ("t [ticks],u,y,z\n", {}, r"'ticks' is not a known unit of time"),
+        ("t,u,y,z\n", {"time_unit": "years"}, r"'years' is not a known unit of time"),
+        ("", {}, r"which column is the input.*4 columns without a header"),
+        ("", {"delimiter": ",,"}, r"delimiter=',,' must be one character"),
+        ("", {"decimal": "'"}, r"decimal=.* must be '\.', ','"),
+        ("", {"header": 3}, r"header=3 must be"),
+        ("", {"skip_rows": -1}, r"skip_rows=-1"),
+        ("", {"comment": "REM"}, r"comment='REM' must be one"),
+        ("", {"max_bytes": 0}, r"max_bytes=0"),
+    ],
+)  # fmt: skip
+def test_what_is_not_clear_is_asked(tmp_path, text, kwargs, match):
+    file = tmp_path / "a.csv"
+    file.write_text(text + table(columns=(T, U, Y, Y)))
+    with pytest.raises(OptionError, match=match):
+        read_record(file, **kwargs)
+
+
+def test_a_header_that_does_not_fit_the_rows_is_named(tmp_path):
+    # decimal commas between commas: nobody can tell
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y\n0,0,1,5,2,5\n0,1,1,5,2,5\n0,2,1,5,2,5\n")
+    with pytest.raises(FileFormatError, match=r"line 1 .* has 3 cells, the lines below have 6"):
+        read_record(file)
+
+
+def test_a_mixture_of_decimal_signs_is_not_guessed(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("t;u;y\n0.0;1,5;2\n0.1;1,5;2\n0.2;1,5;2\n")
+    with pytest.raises(DataError, match=r"line 2.*decimal="):
+        read_record(file)
+
+
+def test_rows_and_header_can_be_overruled(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("9,9,9\n1,2,3\n" + table())
+    check(read_record(file, skip_rows=2))
+    check(read_record(file, skip_rows=1, header=True, time=0, input=1, output=2))
+    with pytest.raises(TimeAxisError):
+        read_record(file)
+
+
+def test_a_missing_file_is_a_file_not_found_error(tmp_path):
+    with pytest.raises(MissingFileError, match=r"no\.csv' cannot be read: No such file"):
+        read_record(tmp_path / "no.csv")
+    with pytest.raises(FileNotFoundError):
+        read_record("no\0.csv")
+
+
+@given(
+    st.lists(
+        st.tuples(*[st.floats(allow_nan=False, allow_infinity=False, width=64)] * 2),
+        min_size=3,
+        max_size=20,
+    ),
+    st.sampled_from([",", ";", "\t", " ", "|"]),
+    st.booleans(),
+)
+def test_every_double_comes_back_to_the_last_bit(tmp_path_factory, rows, delimiter, header):
+    lines = ["u y".replace(" ", delimiter)] * header
+    lines += [f"{u!r}{delimiter}{y!r}" for u, y in rows]
+    file = tmp_path_factory.mktemp("bits") / "a.csv"
+    file.write_text("\n".join(lines) + "\n")
+    record = cr.read_record(file, dt=1.0)
+    assert_array_equal(record.input, [u for u, _ in rows])
+    assert_array_equal(record.output, [y for _, y in rows])
