@@ -65,12 +65,23 @@ def find_edges(values: FloatArray, spike_samples: int, min_share: float) -> list
         In order of time; empty when the input holds still.
     """
     clean = despike(values, spike_samples)
-    noise = difference_noise(clean)
-    span = float(clean.max() - clean.min())
-    # Rounding of a constant is no step, and neither is noise (8 sigma: a range of Gaussian
-    # noise over a million samples stays below 10 sigma; the edges below must beat 5 of them).
-    if span <= 1e-9 * float(np.abs(clean).max()) or span <= 10 * noise:
+    # A median over w samples leaves 1.25 / sqrt(w) of white noise.
+    noise = difference_noise(values) * (
+        1.25 / np.sqrt(2 * spike_samples + 1) if spike_samples else 1.0
+    )
+    span = _significant_range(clean, noise)
+    if span == 0.0:
         return []
+    if spike_samples and clean.size > 4 * spike_samples:
+        # At the ends a spike cannot be told from a level. Where the rest of the record has a
+        # step of its own it is taken for a spike; where not, it is the rest level of a record
+        # that starts at its step.
+        inner = clean.copy()
+        inner[:spike_samples] = clean[spike_samples]
+        inner[-spike_samples:] = clean[-spike_samples - 1]
+        inner_span = _significant_range(inner, noise)
+        if inner_span > 0.0:
+            clean, span = inner, inner_span
     threshold = max(min_share * span, 5 * noise)
     width = spike_samples + 1
     # Level before and after each sample; an edge is where they differ.
@@ -93,6 +104,14 @@ def find_edges(values: FloatArray, spike_samples: int, min_share: float) -> list
         )
         for i, e in enumerate(edges)
     ]
+
+
+def _significant_range(values: FloatArray, noise: float) -> float:
+    """Range of a signal; 0 when rounding (of a constant) or noise explains it."""
+    span = float(values.max() - values.min())
+    if span <= 1e-9 * float(np.abs(values).max()) or span <= 10 * noise:
+        return 0.0
+    return span
 
 
 def _side_medians(values: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:

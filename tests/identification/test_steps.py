@@ -1,0 +1,294 @@
+"""From a measured step to an impulse response."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, NoStepError, OptionError
+from tests.rigs import R1, R3, TS, exact_step, step_record
+
+
+def record_of(u: np.ndarray, y: np.ndarray | None = None, dt: float = 0.01) -> cr.Record:
+    return cr.Record(dt * np.arange(u.size), u, np.zeros(u.size) if y is None else y)
+
+
+def step_input(n: int = 400, at: int = 100, low: float = 4.0, high: float = 20.0) -> np.ndarray:
+    return np.where(np.arange(n) < at, low, high)
+
+
+@given(
+    at=st.integers(1, 380),
+    low=st.floats(-1e3, 1e3),
+    jump=st.floats(1e-2, 1e3),
+    up=st.booleans(),
+)
+def test_a_clean_step_is_found_to_the_sample(at, low, jump, up):
+    high = low + jump if up else low - jump
+    edge = cr.detect_step(record_of(step_input(400, at, low, high)))
+    assert edge.index == at
+    assert edge.samples == 1
+    assert_allclose([edge.rest, edge.amplitude], [low, high - low], rtol=1e-9, atol=1e-9)
+
+
+@given(positions=st.lists(st.integers(0, 399), min_size=1, max_size=4), seed=st.integers(0, 99))
+def test_spikes_shorter_than_the_window_change_nothing(positions, seed):
+    rng = np.random.default_rng(seed)
+    u = step_input()
+    for k in positions:
+        # Two spikes closer than two windows may join to one that is longer than the window.
+        if all(abs(k - other) > 8 for other in positions if other != k) and abs(k - 100) > 8:
+            u[k : k + 3] += rng.choice([-30.0, 50.0])
+    edge = cr.detect_step(record_of(u))
+    assert (edge.index, edge.amplitude, edge.rest) == (100, 16.0, 4.0)
+
+
+def test_a_drive_spike_on_the_step_itself_leaves_it_in_place():
+    u = step_input()
+    u[100:102] = 60.0
+    assert cr.detect_step(record_of(u)).index == 100
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.5])
+def test_noise_moves_neither_place_nor_height_much(sigma):
+    rng = np.random.default_rng(1)
+    u = step_input(2000, 700) + sigma * rng.standard_normal(2000)
+    edge = cr.detect_step(record_of(u))
+    assert edge.index == 700
+    # A median of 20 samples of the filtered input: 5 sigma of its own error.
+    assert_allclose(edge.amplitude, 16.0, atol=5 * sigma / np.sqrt(10))
+    assert len(edge.edges) == 1
+
+
+@pytest.mark.parametrize("length", [2, 5, 12, 40])
+def test_a_ramp_is_found_from_its_first_sample_to_its_last(length):
+    k = np.arange(1000)
+    u = 4 + 16 * np.clip((k - 299) / length, 0, 1)
+    edge = cr.detect_step(record_of(u))
+    slack = int(np.ceil(0.02 * length))  # the level counts as left, and reached, within 2 %
+    assert abs(edge.index - 300) <= slack
+    assert abs(edge.samples - length) <= 2 * slack
+    assert_allclose([edge.rest, edge.amplitude], [4.0, 16.0], atol=1e-9)
+
+
+def test_a_drifting_input_keeps_its_step():
+    k = np.arange(3000)
+    u = step_input(3000, 1500) + 1e-3 * k
+    edge = cr.detect_step(record_of(u))
+    assert edge.index == 1500
+    assert_allclose(edge.amplitude, 16.0, atol=0.05)
+
+
+def test_all_edges_are_listed_and_the_first_large_one_is_taken():
+    u = np.concatenate([np.full(100, 9.0), np.full(80, 4.0), np.full(60, 8.0), np.full(90, 3.0)])
+    edge = cr.detect_step(record_of(u))
+    assert [e.index for e in edge.edges] == [100, 180, 240]
+    assert [e.amplitude for e in edge.edges] == [-5.0, 4.0, -5.0]
+    assert (edge.index, edge.start, edge.stop) == (100, 0, 180)
+    assert (edge.edges[1].start, edge.edges[1].stop) == (100, 240)
+    second = cr.unit_step(record_of(u, 2 * u), edge.edges[1])
+    assert_allclose(second.output, 2.0, atol=1e-12)
+    assert second.n_samples == 60
+
+
+def test_a_small_step_before_a_large_one_is_not_the_step():
+    u = np.concatenate([np.full(50, 0.0), np.full(50, 2.0), np.full(100, 20.0)])
+    edge = cr.detect_step(record_of(u))
+    assert (edge.index, len(edge.edges)) == (100, 2)
+
+
+def test_a_record_that_starts_at_its_step_is_understood():
+    u = np.full(500, 25.0)
+    u[0] = 0.0
+    edge = cr.detect_step(record_of(u))
+    assert (edge.index, edge.rest, edge.amplitude) == (1, 0.0, 25.0)
+
+
+def test_a_step_in_a_short_record_is_found():
+    edge = cr.detect_step(record_of(step_input(12, 5)))
+    assert (edge.index, edge.amplitude) == (5, 16.0)
+
+
+@pytest.mark.parametrize(
+    "u",
+    [
+        np.full(200, 3.0),
+        np.zeros(200),
+        np.random.default_rng(0).standard_normal(2000),
+        1e-14 * np.random.default_rng(0).standard_normal(200) + 5.0,
+        np.where(np.arange(200) == 80, 10.0, 0.0),  # nothing but a spike
+    ],
+    ids=["constant", "zero", "noise", "rounding", "spike"],
+)
+def test_an_input_without_step_is_refused(u):
+    with pytest.raises(NoStepError, match="no step"):
+        cr.detect_step(record_of(u))
+
+
+def test_a_step_at_the_last_sample_is_refused():
+    u = np.zeros(200)
+    u[-1] = 5.0
+    with pytest.raises(NoStepError, match="nothing was recorded after it"):
+        cr.detect_step(record_of(u))
+
+
+def test_the_unit_step_is_the_exact_step():
+    step = cr.unit_step(step_record(delay=37.0))
+    assert_allclose(step.output, exact_step(R3, step.time - 37 * TS), rtol=0, atol=1e-12)
+    assert_allclose(step.pre, 0.0, atol=1e-12)
+    assert_allclose(step.input, 1.0, atol=1e-12)
+    assert (step.amplitude, step.rest_output) == (16.0, pytest.approx(0.3, abs=1e-12))
+
+
+@given(
+    gain=st.floats(0.01, 100),
+    offset=st.floats(-100, 100),
+    rest=st.floats(-20, 20),
+    start=st.floats(-10, 10),
+)
+def test_offsets_scale_and_start_time_change_nothing(gain, offset, rest, start):
+    base = step_record(R1, before=200, after=300, dt=5e-3, delay=6)
+    moved = cr.Record(base.time + start, gain * (base.input + rest), gain * base.output + offset)
+    # The offset costs the digits that it adds in front.
+    slack = 1e-13 * (1 + abs(offset)) / (gain * 16) + 1e-11
+    assert_allclose(cr.unit_step(moved).output, cr.unit_step(base).output, rtol=0, atol=slack)
+
+
+def test_significant_drift_is_removed_and_noise_is_not_taken_for_drift():
+    base = step_record(noise=1e-3, seed=3)
+    slope = 0.02 * 16.0  # 2 % of the step per second
+    drifting = cr.Record(base.time, base.input, base.output + slope * base.time)
+    assert cr.unit_step(base).drift == 0.0
+    removed = cr.unit_step(drifting)
+    # Standard error of the slope: sigma sqrt(12 / n) / T = 0.016 * 0.056 / 3 s.
+    assert_allclose(removed.drift, slope, atol=5 * 3e-4)
+    assert cr.unit_step(drifting, remove_drift=False).drift == 0.0
+
+
+def test_backward_difference_sums_to_the_step():
+    step = cr.unit_step(step_record())
+    g = cr.impulse_from_step(step, cutoff_hz=None)
+    assert_allclose(np.cumsum(g.markov), step.output, rtol=0, atol=1e-12)
+    assert g.filter is None
+    assert g.sampling == "step-invariant"
+
+
+def test_central_difference_samples_the_impulse_response():
+    step = cr.unit_step(step_record(delay=37.0))
+    g = cr.impulse_from_step(step, cutoff_hz=None, difference="central")
+    h = 1e-7
+    k = np.arange(60, 500)
+    density = (exact_step(R3, (k - 37) * TS + h) - exact_step(R3, (k - 37) * TS - h)) / (2 * h)
+    # Fourth order: (w Ts)^4 / 30 of the largest, w = 50 rad/s.
+    assert_allclose(g.density[k], density, rtol=0, atol=1e-6 * density.max())
+    assert g.sampling == "impulse-invariant"
+
+
+def test_the_gain_survives_filter_and_difference():
+    step = cr.unit_step(step_record(after=6000))
+    for options in ({}, {"zero_phase": False}, {"difference": "central"}, {"cutoff_hz": 50.0}):
+        g = cr.impulse_from_step(step, **options)
+        assert_allclose(g.markov.sum(), 1.0, atol=2e-3)  # the step's tail and the filter's edge
+
+
+def test_causal_filter_delays_by_its_group_delay_and_zero_phase_does_not():
+    step = cr.unit_step(step_record(after=6000))
+    k = np.arange(step.n_samples)
+
+    def centroid(**options):
+        g = cr.impulse_from_step(step, **options).markov
+        return (k * g).sum() / g.sum()
+
+    plain = centroid(cutoff_hz=None)
+    assert_allclose(centroid(cutoff_hz=50.0, zero_phase=False) - plain, 13.12, atol=0.02)
+    assert_allclose(centroid(cutoff_hz=50.0) - plain, 0.0, atol=0.02)
+
+
+def test_the_filter_that_is_left_is_recorded():
+    step = cr.unit_step(step_record())
+    g = cr.impulse_from_step(step, cutoff_hz=50.0, zero_phase=False)
+    assert g.filter == cr.FilterSpec(5, 50.0, False, TS)
+
+
+def test_the_automatic_cutoff_is_13_bandwidths():
+    g = cr.impulse_from_step(cr.unit_step(step_record(noise=5e-3)))
+    # Bandwidth 2.19 Hz; rise time times bandwidth is 0.35 within 5 % for lags.
+    assert_allclose(g.filter.cutoff_hz, 13 * 2.19, rtol=0.1)
+
+
+def test_the_automatic_cutoff_leaves_coarse_data_alone():
+    fast = step_record(R1, dt=0.05, delay=3, before=50, after=100)
+    assert cr.impulse_from_step(cr.unit_step(fast)).filter is None
+
+
+def test_pre_step_noise_is_carried_along():
+    record = step_record(noise=0.01, seed=5, after=8000)
+    g = cr.impulse_from_step(cr.unit_step(record), cutoff_hz=50.0)
+    assert g.noise.size == 3840
+    # 50 Hz of noise over 3 s are 300 independent values: their spread is known to 4 %.
+    tail = g.markov[2000:-200]
+    assert_allclose(g.noise.std(), tail.std(), rtol=0.15)
+
+
+def test_noise_gains_of_the_two_differences():
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal(400_000)
+    from ctrl_realize.numerics.differences import backward_difference, central_difference
+
+    # paper.md E7: variances 2 and .903; 400 000 samples know them to 0.5 %.
+    assert_allclose(backward_difference(noise)[5:-5].var(), 2.0, rtol=0.02)
+    assert_allclose(central_difference(noise)[5:-5].var(), 0.903, rtol=0.02)
+
+
+def test_arrays_are_not_changed():
+    record = step_record(noise=0.01)
+    before = record.output.copy()
+    cr.impulse_from_step(cr.unit_step(record))
+    assert_array_equal(record.output, before)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"cutoff_hz": 640.0}, "below half the sample rate"),
+        ({"cutoff_hz": -1.0}, "positive"),
+        ({"cutoff_hz": "fast"}, "'auto'"),
+        ({"filter_order": 0}, "1...10"),
+        ({"difference": "forward"}, "'backward', 'central'"),
+    ],
+)
+def test_unusable_options_are_refused(options, match):
+    with pytest.raises(OptionError, match=match):
+        cr.impulse_from_step(cr.unit_step(step_record()), **options)
+
+
+def test_several_channels_are_refused_by_name():
+    record = cr.Record(TS * np.arange(50), np.ones((2, 50)), np.ones(50))
+    with pytest.raises(DataError, match=r"2 inputs \(u\[0\], u\[1\]\)"):
+        cr.detect_step(record)
+
+
+def test_an_edge_of_another_record_is_refused():
+    edge = cr.detect_step(step_record())
+    short = record_of(step_input(50, 20))
+    with pytest.raises(DataError, match="another record"):
+        cr.unit_step(short, edge)
+
+
+def test_too_little_after_the_step_is_refused():
+    with pytest.raises(DataError, match="at least 5"):
+        cr.unit_step(record_of(step_input(103, 100)))
+
+
+def test_measured_records_have_one_step_where_it_is(shared_data):
+    from ctrl_realize import read_record
+
+    expected = {"dc_motor_tacho/up.csv": (1366, 4.05), "air_duct/45.csv": (480, 4.0)}
+    for name, (index, amplitude) in expected.items():
+        edge = cr.detect_step(read_record(shared_data / name))
+        assert (edge.index, len(edge.edges)) == (index, 1)
+        assert_allclose(edge.amplitude, amplitude, atol=0.01)

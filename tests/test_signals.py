@@ -1,0 +1,253 @@
+"""Records and responses: what they accept, keep and refuse."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError, TimeAxisError
+from ctrl_realize.numerics.filters import butterworth_group_delay
+
+T = 0.01 * np.arange(100)
+ONES = np.ones(100)
+
+
+@given(dt=st.floats(1e-6, 1e3), start=st.floats(-1e3, 1e3), count=st.integers(3, 2000))
+def test_any_uniform_axis_is_accepted(dt, start, count):
+    time = start + dt * np.arange(count)
+    if np.abs(start) < 1e6 * dt:  # beyond it the stamps themselves lose the step to rounding
+        record = cr.Record(time, np.zeros(count), np.zeros(count))
+        assert_allclose(record.dt, dt, rtol=1e-6)
+
+
+def test_sample_time_is_free_of_rounding():
+    assert cr.Record(0.01 * np.arange(1, 18062), *np.zeros((2, 18061))).dt == 0.01
+    assert cr.Record(7.8125e-4 * np.arange(6440), *np.zeros((2, 6440))).dt == 7.8125e-4
+
+
+def test_stamps_printed_with_few_digits_are_accepted():
+    time = np.round(7.3242e-5 * np.arange(4400), 6)
+    assert_allclose(cr.Record(time, *np.zeros((2, 4400))).dt, 7.3242e-5, rtol=1e-5)
+
+
+def broken(kind: str) -> np.ndarray:
+    time = T.copy()
+    if kind == "gap":
+        time[40:] += 0.05
+    elif kind == "repeat":
+        time[40] = time[39]
+    elif kind == "back":
+        time[40] = 0.2
+    elif kind == "reversed":
+        time = time[::-1].copy()
+    elif kind == "jitter":
+        time[40] += 0.003
+    return time
+
+
+@pytest.mark.parametrize(
+    ("kind", "match"),
+    [
+        ("gap", r"gap at row 40.*5 sample"),
+        ("repeat", "repeats at row 40"),
+        ("back", "jumps back at row 40"),
+        ("reversed", "backwards: row 1"),
+        ("jitter", "row 40 is 0.30 samples off"),
+    ],
+)
+def test_broken_time_is_named_with_its_first_bad_row(kind, match):
+    with pytest.raises(TimeAxisError, match=match):
+        cr.Record(broken(kind), ONES, ONES)
+
+
+def test_small_jitter_is_resampled_on_request():
+    rng = np.random.default_rng(0)
+    time = T + rng.uniform(-0.002, 0.002, T.size)
+    record = cr.Record.resampled(time, 3 * time, np.stack([time, -time]), name="jitter")
+    assert_allclose(record.input, 3 * record.time, atol=1e-12)
+    assert_allclose(record.output[1], -record.time, atol=1e-12)
+    assert record.output.shape[0] == 2
+
+
+@pytest.mark.parametrize("kind", ["gap", "repeat", "back", "reversed"])
+def test_what_resampling_cannot_mend_is_refused(kind):
+    with pytest.raises(TimeAxisError, match="row"):
+        cr.Record.resampled(broken(kind), ONES, ONES)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "match"),
+    [
+        (([], [], []), DataError, r"shape \(0,\)"),
+        ((T[:2], ONES[:2], ONES[:2]), DataError, "N >= 3"),
+        ((T, ONES[:50], ONES), DataError, "input has 50 samples, time has 100"),
+        ((T, ONES, np.ones((100, 2))), DataError, r"transposed, pass output.T"),
+        ((T, ONES, np.where(T == 0.5, np.nan, 1)), DataError, "first at index 50"),
+        ((T, np.where(T > 0.97, np.inf, 1), ONES), DataError, "2 non-finite samples"),
+        ((T, ["a"] * 100, ONES), DataError, "real numbers"),
+        ((T, 1j * ONES, ONES), DataError, "real numbers"),
+        ((T, np.ones((1, 1, 100)), ONES), DataError, r"\(signals, N\)"),
+        ((T[None], ONES, ONES), DataError, r"shape \(1, 100\)"),
+    ],
+)
+def test_unusable_arrays_are_refused(arguments, error, match):
+    with pytest.raises(error, match=match):
+        cr.Record(*arguments)
+
+
+def test_labels_must_fit():
+    with pytest.raises(OptionError, match="1 different names"):
+        cr.Record(T, ONES, ONES, input_labels=["a", "b"])
+    assert cr.Record(T, ONES, np.ones((2, 100))).output_labels == ("y[0]", "y[1]")
+
+
+def test_a_record_does_not_change():
+    u = ONES.copy()
+    record = cr.Record(T, u, ONES)
+    u[0] = 9.0
+    assert record.input[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        record.input[0] = 2.0
+    with pytest.raises(AttributeError, match="does not change"):
+        record.dt = 1.0
+
+
+@pytest.mark.parametrize(
+    "twin", [copy.copy, copy.deepcopy, lambda r: pickle.loads(pickle.dumps(r))]
+)
+def test_copies_are_equal_and_read_only(twin):
+    record = twin(cr.Record(T, ONES, 2 * ONES, name="a", input_labels=["i"]))
+    assert_array_equal(record.output, 2 * ONES)
+    assert (record.name, record.input_labels, record.dt) == ("a", ("i",), 0.01)
+    assert not record.input.flags.writeable
+
+
+def test_between_cuts_inclusively():
+    part = cr.Record(T, ONES, ONES, name="a").between(0.1, 0.2)
+    assert (part.n_samples, part.name) == (11, "a")
+    with pytest.raises(DataError, match="0 samples"):
+        cr.Record(T, ONES, ONES).between(5.0, 6.0)
+
+
+def test_round_trip_through_a_response():
+    plant = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01, inputs="i", outputs="x", name="v")
+    response = ct.forced_response(plant, T, np.sin(T))
+    record = cr.Record.from_response(response)
+    back = cr.Record.from_response(record.to_response())
+    for one, other in ((record, response), (back, response)):
+        assert_allclose(one.input, np.ravel(other.inputs), atol=0)
+        assert_allclose(one.output, np.ravel(other.outputs), atol=0)
+    assert back.input_labels == ("i",)
+    record.to_response().plot()
+
+
+def test_a_response_without_input_is_refused():
+    with pytest.raises(DataError, match="no input"):
+        cr.Record.from_response(ct.TimeResponseData(T, ONES, issiso=True))
+
+
+def test_density_is_per_second():
+    g = cr.ImpulseResponse([0.0, 1.0, 0.5], 0.1)
+    assert_allclose(g.density, g.markov / 0.1, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("markov", "dt", "error", "match"),
+    [
+        ([1.0], 0.1, DataError, "N >= 2"),
+        (np.ones((2, 5)), 0.1, DataError, r"shape \(2, 5\)"),
+        ([1.0, np.nan], 0.1, DataError, "first at index 1"),
+        ([1.0, 2.0], -0.1, OptionError, "dt=-0.1"),
+        ([1.0, 2.0], True, OptionError, "dt=True"),
+        (["a", "b"], 0.1, DataError, "real numbers"),
+    ],
+)
+def test_unusable_impulse_responses_are_refused(markov, dt, error, match):
+    with pytest.raises(error, match=match):
+        cr.ImpulseResponse(markov, dt)
+
+
+def test_paper_filter_delays_by_13_samples_and_lags_48_degrees_at_13_hz():
+    spec = cr.FilterSpec(5, 50.0, False, 7.8125e-4)
+    # paper.md E11 and section 0.3: 13.1 samples, 10.25 ms, 48.4 degrees
+    assert_allclose(spec.group_delay, 13.12, atol=0.01)
+    assert_allclose(spec.group_delay * spec.dt, 10.25e-3, atol=0.01e-3)
+    lag = -np.degrees(np.angle(spec.response(2 * np.pi * 13.0)[0]))
+    assert_allclose(lag, 48.4, atol=0.1)
+
+
+def test_group_delay_is_the_slope_of_the_phase():
+    spec = cr.FilterSpec(4, 30.0, False, 1e-3)
+    omega = 1e-3
+    slope = -np.angle(spec.response(omega)[0]) / (omega * spec.dt)
+    assert_allclose(butterworth_group_delay(4, 30.0, 1e-3), slope, rtol=1e-5)
+
+
+def test_zero_phase_filter_has_no_phase_and_half_gain_at_cutoff():
+    spec = cr.FilterSpec(5, 50.0, True, 1e-3)
+    response = spec.response(2 * np.pi * np.array([1.0, 50.0]))
+    assert_allclose(response.imag, 0, atol=0)
+    assert_allclose(response[1].real, 0.5, atol=1e-9)  # -3 dB twice
+    assert spec.group_delay == 0.0
+
+
+def frf() -> cr.MeasuredFRF:
+    f = np.array([10.0, 0.1, 1.0])
+    return cr.MeasuredFRF(1 / (1 + 1j * f), f, coherence=[0.2, 1.0, 0.99], std=[0.1, 0.2, 0.3])
+
+
+def test_frf_is_sorted_with_all_that_belongs_to_it():
+    F = frf()
+    assert_array_equal(F.frequency_hz, [0.1, 1.0, 10.0])
+    assert_array_equal(F.coherence, [1.0, 0.99, 0.2])
+    assert_array_equal(F.std, [0.2, 0.3, 0.1])
+    assert_allclose(F.complex, 1 / (1 + 1j * F.frequency_hz))
+
+
+def test_frf_goes_into_python_control_beside_a_model():
+    F = frf()
+    assert isinstance(F, ct.FrequencyResponseData)
+    assert F.dt is None
+    model = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    plot = ct.bode_plot(model, np.geomspace(0.1, 100, 20), Hz=True)
+    ct.bode_plot(F, Hz=True, ax=plot.axes)
+    assert_allclose((2 * F).complex, 2 * F.complex)
+    twin = pickle.loads(pickle.dumps(F))
+    assert_array_equal(twin.frequency_hz, F.frequency_hz)
+
+
+def test_frf_bands():
+    assert_array_equal(frf().between_hz(0.5, 20).frequency_hz, [1.0, 10.0])
+    assert_array_equal(frf().trusted(0.9).std, [0.2, 0.3])
+    with pytest.raises(DataError, match="no point"):
+        frf().between_hz(20, 30)
+    with pytest.raises(DataError, match="no coherence"):
+        cr.MeasuredFRF([1.0], [1.0]).trusted(0.9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "match"),
+    [
+        (([1.0, 2.0], [1.0]), "1 points"),
+        (([], []), "K >= 1"),
+        (([1.0], [-1.0]), ">= 0"),
+        (([np.nan], [1.0]), "non-finite"),
+        (([1.0], [np.inf]), "non-finite"),
+    ],
+)
+def test_unusable_frfs_are_refused(arguments, match):
+    with pytest.raises(DataError, match=match):
+        cr.MeasuredFRF(*arguments)
+
+
+def test_coherence_outside_0_1_is_refused():
+    with pytest.raises(DataError, match=r"0\.\.\.1"):
+        cr.MeasuredFRF([1.0], [1.0], coherence=[1.5])
