@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import positive
+from ..checks import one_of, positive
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.time_axis import axis_fault, sample_time
 
 MIN_SAMPLES = 3
+MISSING = ("refuse", "keep")
 
 
 class Record:
@@ -30,12 +31,17 @@ class Record:
         Shown in tables and plots.
     input_labels, output_labels : sequence of str, optional
         Names of the signals; default ``u`` and ``y`` (``u[0]``, ``u[1]``, ... for several).
+    missing : {"refuse", "keep"}, optional
+        What to do with NaN in `input` and `output`. ``"keep"`` states that these samples are
+        missing; `impulse_from_io` works around them, the step functions need complete records.
 
     Attributes
     ----------
     dt : float
         Sample time in s.
     n_samples, n_inputs, n_outputs : int
+    n_missing : int
+        Samples of `input` and `output` that are NaN.
 
     Raises
     ------
@@ -54,7 +60,16 @@ class Record:
     <Record 'bench': 500 samples of 0.01 s, 1 input, 1 output>
     """
 
-    __slots__ = ("dt", "input", "input_labels", "name", "output", "output_labels", "time")
+    __slots__ = (
+        "dt",
+        "input",
+        "input_labels",
+        "missing",
+        "name",
+        "output",
+        "output_labels",
+        "time",
+    )
 
     time: FloatArray
     input: FloatArray
@@ -63,6 +78,7 @@ class Record:
     name: str
     input_labels: tuple[str, ...]
     output_labels: tuple[str, ...]
+    missing: str
 
     def __init__(
         self,
@@ -73,6 +89,7 @@ class Record:
         name: str = "",
         input_labels: Sequence[str] | None = None,
         output_labels: Sequence[str] | None = None,
+        missing: Literal["refuse", "keep"] = "refuse",
     ) -> None:
         stamps = _numbers(time, "time")
         if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
@@ -82,8 +99,9 @@ class Record:
         signals = {"input": _numbers(input, "input"), "output": _numbers(output, "output")}
         for what, values in signals.items():
             _check_shape(values, what, stamps.size)
-        for what, values in {"time": stamps, **signals}.items():
-            _check_finite(values, what)
+        _check_finite(stamps, "time")
+        for what, values in signals.items():
+            _check_finite(values, what, allow_nan=one_of(missing, "missing", MISSING) == "keep")
         fault = axis_fault(stamps)
         if fault is not None:
             raise TimeAxisError(
@@ -96,6 +114,7 @@ class Record:
         fix(self, "output", read_only(signals["output"]))
         fix(self, "dt", sample_time(stamps))
         fix(self, "name", str(name))
+        fix(self, "missing", str(missing))
         fix(self, "input_labels", _labels(input_labels, self.n_inputs, "u", "input_labels"))
         fix(self, "output_labels", _labels(output_labels, self.n_outputs, "y", "output_labels"))
 
@@ -112,6 +131,7 @@ class Record:
                 self.name,
                 self.input_labels,
                 self.output_labels,
+                self.missing,
             ),
         )
 
@@ -136,6 +156,11 @@ class Record:
     def n_outputs(self) -> int:
         """Number of output signals."""
         return 1 if self.output.ndim == 1 else int(self.output.shape[0])
+
+    @property
+    def n_missing(self) -> int:
+        """Number of values of input and output that are NaN."""
+        return int(np.isnan(self.input).sum() + np.isnan(self.output).sum())
 
     @property
     def issiso(self) -> bool:
@@ -165,6 +190,7 @@ class Record:
             name=self.name,
             input_labels=self.input_labels,
             output_labels=self.output_labels,
+            missing="keep" if self.missing == "keep" else "refuse",
         )
 
     @classmethod
@@ -274,9 +300,16 @@ def _rebuild(
     name: str,
     input_labels: tuple[str, ...],
     output_labels: tuple[str, ...],
+    missing: Literal["refuse", "keep"],
 ) -> Record:
     return Record(
-        time, input, output, name=name, input_labels=input_labels, output_labels=output_labels
+        time,
+        input,
+        output,
+        name=name,
+        input_labels=input_labels,
+        output_labels=output_labels,
+        missing=missing,
     )
 
 
@@ -299,8 +332,8 @@ def _check_shape(values: FloatArray, what: str, samples: int) -> None:
         raise DataError(f"{what} has {values.shape[-1]} samples, time has {samples}{hint}")
 
 
-def _check_finite(values: FloatArray, what: str) -> None:
-    bad = ~np.isfinite(values)
+def _check_finite(values: FloatArray, what: str, *, allow_nan: bool = False) -> None:
+    bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
     if bad.any():
         first = int(np.flatnonzero(bad.any(axis=0) if values.ndim == 2 else bad)[0])
         count = int(bad.sum())
@@ -321,3 +354,18 @@ def _labels(given: Sequence[str] | None, count: int, letter: str, argument: str)
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def check_complete(record: Record, task: str) -> None:
+    """Refuse a record with missing samples; `task` says in the message who needs them all.
+
+    Raises
+    ------
+    DataError
+        When a value of input or output is NaN.
+    """
+    if record.missing == "keep" and record.n_missing:
+        raise DataError(
+            f"{task} needs every sample, and {record.n_missing} of this record are missing; cut "
+            "out a complete part with record.between(t0, t1), or interpolate"
+        )
