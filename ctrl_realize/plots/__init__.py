@@ -1,1 +1,59 @@
-"""plots"""
+"""Plots of results; each returns a `control.ControlPlot` and never calls show."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import control as ct
+
+from ..errors import OptionError
+from .frequencies import comparison_plot as comparison_plot
+from .frequencies import frf_plot as frf_plot
+from .impulses import impulse_plot as impulse_plot
+from .records import onset_plot as onset_plot
+from .records import record_plot as record_plot
+from .records import step_plot as step_plot
+
+_DRAWN_BY = {
+    "FRFComparison": "frequencies:comparison_plot",
+    "ImpulseResponse": "impulses:impulse_plot",
+    "MeasuredFRF": "frequencies:frf_plot",
+    "Record": "records:record_plot",
+    "StepResponse": "records:step_plot",
+}
+"""Class of a result -> module of this package and function that draws it."""
+
+
+def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
+    """Draw any result with the function that is made for its kind.
+
+    ``result.plot(**kwargs)`` does the same.
+
+    Parameters
+    ----------
+    result : Result
+        Any result of this toolbox.
+    **kwargs
+        Passed on to the function.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Raises
+    ------
+    OptionError
+        There is no picture of such a thing.
+    """
+    for kind in type(result).__mro__:
+        if kind.__name__ in _DRAWN_BY:
+            module, function = _DRAWN_BY[kind.__name__].split(":")
+            drawn: ct.ControlPlot = getattr(import_module(f".{module}", __name__), function)(
+                result, **kwargs
+            )
+            return drawn
+    raise OptionError(
+        f"there is no picture of a {type(result).__name__}; there is one of "
+        f"{', '.join(sorted(_DRAWN_BY))}"
+    )

@@ -1,0 +1,257 @@
+"""Plots of what was measured in time: records, step responses and their onset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import wrap
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ..delayed import DelayedStateSpace
+from ..errors import DataError
+from ..identification.steps import unit_step
+from ..numerics.arrays import FloatArray
+from ..signals import Record, StepResponse
+from . import style
+from .dead_times import mark_dead_time
+
+UNIT_STEP = "unit step response\n[output / input]"
+
+
+def record_plot(
+    record: Record, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw a record: outputs above, inputs below (Fig. 3).
+
+    Parameters
+    ----------
+    record : Record
+    ax : sequence of two Axes, or Figure, optional
+    title : str, optional
+        Default: the record's name, in a new figure.
+    **kwargs
+        Line properties of the outputs.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> cplt = plots.record_plot(cr.bench.valve().step_record(16, rng=5))
+    >>> cplt.axes.shape
+    (2, 1)
+    """
+    with style.context():
+        upper, lower = axes = style.axes_for(ax, 2, size=(8.0, 5.2), heights=(2.2, 1.0))
+        factor, unit = style.time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
+        time = factor * record.time
+        measured = _signals(upper, time, record.output, record.output_labels, **kwargs)
+        driven = _signals(lower, time, record.input, record.input_labels, color=style.INPUT)
+        upper.set_ylabel(_axis_label(record.output_labels, "output"))
+        lower.set_ylabel(_axis_label(record.input_labels, "input"))
+        lower.set_xlabel(f"time [{unit}]")
+        return style.finished(
+            axes,
+            [measured, driven],
+            legends=[row for row, n in enumerate((record.n_outputs, record.n_inputs)) if n > 1],
+            title=record.name if title is None else title,
+            own_figure=ax is None,
+        )
+
+
+def step_plot(
+    step: Record | StepResponse | Sequence[Record | StepResponse],
+    system: DelayedStateSpace | None = None,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw responses to a unit step, and a model's on top.
+
+    Parameters
+    ----------
+    step : Record or StepResponse, or sequence of them
+        Records are cut and scaled by `unit_step`.
+    system : DelayedStateSpace, optional
+        Model, drawn dashed.
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the measured responses.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    steps = _steps(step)
+    with style.context():
+        axes = style.axes_for(ax)
+        factor, unit = style.time_unit(max(float(s.time[-1]) for s in steps), axes[0])
+        lines = _measured_steps(axes[0], steps, factor, **kwargs)
+        if system is not None:
+            lines += _model_step(axes[0], system, max(float(s.time[-1]) for s in steps), factor)
+        axes[0].set_xlabel(f"time after the step [{unit}]")
+        axes[0].set_ylabel(UNIT_STEP)
+        return style.finished(
+            axes,
+            [lines],
+            title=steps[0].name if title is None else title,
+            own_figure=ax is None,
+            loc="lower right" if steps[0].output[-1] > 0 else "upper right",
+        )
+
+
+def onset_plot(
+    step: Record | StepResponse | Sequence[Record | StepResponse],
+    system: DelayedStateSpace | None = None,
+    *,
+    ax: style.AxesLike = None,
+    span: float | None = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the first moments after a step, with the dead time of a model (Fig. 4).
+
+    Parameters
+    ----------
+    step : Record or StepResponse, or sequence of them
+        Records are cut and scaled by `unit_step`.
+    system : DelayedStateSpace, optional
+        Model, whose response, dead time and interval are drawn.
+    ax : Axes or Figure, optional
+    span : float, optional
+        Time after the step to show, in s. Default: three dead times, and enough to see the
+        response rise.
+    title : str, optional
+    **kwargs
+        Line properties of the measured responses.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    steps = _steps(step)
+    with style.context():
+        axes = style.axes_for(ax)
+        shown = _onset_span(steps[0], system) if span is None else float(span)
+        factor, unit = style.time_unit(shown, axes[0])
+        near = [_until(one, shown) for one in steps]
+        lines = _measured_steps(axes[0], near, factor, before=0.35 * shown, **kwargs)
+        axes[0].axvline(0.0, color=style.INPUT, linewidth=1.5, linestyle=":")
+        axes[0].annotate(
+            "step", (0.0, 0.94), (-5, 0), xycoords=("data", "axes fraction"),
+            textcoords="offset points", ha="right", color=style.INPUT,
+        )  # fmt: skip
+        if system is not None:
+            lines += _model_step(axes[0], system, shown, factor)
+            mark_dead_time(axes[0], system, factor)
+        axes[0].set_xlim(-0.35 * shown * factor, shown * factor)
+        axes[0].set_xlabel(f"time after the step [{unit}]")
+        axes[0].set_ylabel(UNIT_STEP)
+        return style.finished(
+            axes,
+            [lines],
+            title=(f"{steps[0].name}: onset" if steps[0].name else "onset")
+            if title is None
+            else title,
+            own_figure=ax is None,
+            loc="center left",
+        )
+
+
+def _signals(
+    axes: Axes, time: FloatArray, signals: FloatArray, labels: Sequence[str], **kwargs: Any
+) -> list[Line2D]:
+    rows = np.atleast_2d(signals)
+    lines: list[Line2D] = []
+    for index, (row, label) in enumerate(zip(rows, labels, strict=True)):
+        first = {"color": style.MEASURED} if index == 0 else {}
+        looks = {
+            "color": style.OTHERS[(index - 1) % len(style.OTHERS)],
+            "linewidth": 1.5,
+            "label": _plain(label),
+            **first,
+            **(kwargs if len(rows) == 1 else {k: v for k, v in kwargs.items() if k != "color"}),
+        }
+        lines += axes.plot(time, row, **looks)
+    return lines
+
+
+def _steps(given: Any) -> list[StepResponse]:
+    items = [given] if isinstance(given, Record | StepResponse) else list(given)
+    if not items:
+        raise DataError("no step responses to draw")
+    return [unit_step(item) if isinstance(item, Record) else item for item in items]
+
+
+def _measured_steps(
+    axes: Axes, steps: Sequence[StepResponse], factor: float, before: float = 0.0, **kwargs: Any
+) -> list[Line2D]:
+    looks: dict[str, Any] = {
+        "color": style.MEASURED,
+        "linewidth": 1.5 if len(steps) == 1 else 0.8,
+        "alpha": 1.0 if len(steps) == 1 else 0.6,
+    }
+    looks.update(kwargs)
+    lines: list[Line2D] = []
+    for index, step in enumerate(steps):
+        early = min(step.pre.size, int(before / step.dt))
+        time = step.dt * np.arange(-early, step.n_samples)
+        values = np.concatenate([step.pre[step.pre.size - early :], step.output])
+        label = "measured" if len(steps) == 1 else f"measured, {len(steps)} records"
+        lines += axes.plot(factor * time, values, label=label if index == 0 else None, **looks)
+    return lines
+
+
+def _model_step(axes: Axes, system: DelayedStateSpace, until: float, factor: float) -> list[Line2D]:
+    count = max(int(np.ceil(until / system.dt)) + 1, 2)
+    response = np.asarray(system.step(count)).reshape(-1, count)[0]
+    return list(
+        axes.plot(
+            factor * system.dt * np.arange(count),
+            response,
+            color=style.MODEL,
+            linestyle=style.DASHES[0],
+            label="model",
+        )
+    )
+
+
+def _until(step: StepResponse, end: float) -> StepResponse:
+    count = min(int(np.ceil(end / step.dt)) + 1, step.n_samples)
+    changes = {"time": step.time[:count], "output": step.output[:count]}
+    return StepResponse(
+        **{
+            name: changes.get(name, getattr(step, name))
+            for name in StepResponse.__dataclass_fields__
+        }
+    )
+
+
+def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
+    """Show three dead times, or up to a quarter of the way where the response is slower."""
+    final = float(np.median(step.output[-max(step.n_samples // 20, 1) :]))
+    reached = np.flatnonzero(np.abs(step.output) >= 0.25 * abs(final))
+    rise = step.dt * (int(reached[0]) if reached.size else step.n_samples // 4)
+    wait = 0.0 if system is None else float(np.max(system.dead_time))
+    return float(min(max(3 * wait, 1.3 * rise, 12 * step.dt), step.time[-1]))
+
+
+def _plain(label: str) -> str:
+    """Keep matplotlib from reading a leading underscore or a dollar sign as an instruction."""
+    return label.replace("$", r"\$").lstrip("_") or "signal"
+
+
+def _axis_label(labels: Sequence[str], kind: str) -> str:
+    if len(labels) > 1:
+        return f"{kind}s"
+    default = {"output": "y", "input": "u"}[kind]
+    return kind if labels[0] == default else "\n".join(wrap(_plain(labels[0]), 26)[:3])
