@@ -15,6 +15,12 @@ from .frequency import FRFComparison as FRFComparison
 from .frequency import compare_frf as compare_frf
 from .frequency import spectral_frf as spectral_frf
 from .frequency import stepped_sine_frf as stepped_sine_frf
+from .identification.delay_scan import DelayScan as DelayScan
+from .identification.delay_scan import estimate_delay as estimate_delay
+from .identification.orders import OrderScan as OrderScan
+from .identification.orders import scan_orders as scan_orders
+from .identification.realization import Realization as Realization
+from .identification.realization import realize as realize
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step
