@@ -53,7 +53,8 @@ def read_mat(path: Path, *, variable: str | None, max_bytes: float) -> Table:
         raise
     # SciPy's parser meets broken input with every kind of exception that Python has
     except Exception as error:
-        raise FileFormatError(f"{path} is no .mat file, or a damaged one: {error}") from error
+        reason = str(error).partition("\n")[0][:200]
+        raise FileFormatError(f"{path} is no .mat file, or a damaged one: {reason}") from error
     arrays: dict[str, AnyArray] = {}
     for name, value in content.items():
         if not name.startswith("__"):

@@ -1,0 +1,273 @@
+"""Records in .npz, .npy, .mat and Parquet files."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import struct
+import sys
+import zipfile
+import zlib
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+from numpy.testing import assert_array_equal
+
+from ctrl_realize.errors import DataError, FileFormatError, OptionError
+from ctrl_realize.io import read_record
+
+N = 40
+T = 0.25 * np.arange(N)
+U = (T > 2).astype(float)
+Y = np.cumsum(U)
+
+
+def check(record, *, time=T, input=U, output=Y):
+    assert_array_equal(record.time, time)
+    assert_array_equal(record.input, input)
+    assert_array_equal(record.output, output)
+
+
+ARRAYS = {
+    "time and signals": {"t": T, "u": U, "y": Y},
+    "sample time": {"u": U, "y": Y, "dt": 0.25},
+    "sample rate": {"u": U, "y": Y, "fs": 4},
+    "columns": {"time": T[:, None], "input": U[:, None], "output": Y[None]},
+    "other arrays beside": {"t": T, "u": U, "y": Y, "period": 10, "note": "bench", "x": T[:7]},
+    "whole numbers": {"t": T, "u": U.astype(np.int16), "y": Y.astype(np.uint8)},
+    "single precision": {"t": T.astype(np.float32), "u": U.astype(">f4"), "y": Y},
+    "Fortran order": {"x": np.asfortranarray(np.stack([T, U, Y], axis=1))},
+    "one matrix": {"data": np.stack([T, U, Y], axis=1)},
+    "one matrix, turned": {"data": np.stack([T, U, Y])},
+}
+
+
+@pytest.mark.parametrize("arrays", ARRAYS.values(), ids=ARRAYS.keys())
+@pytest.mark.parametrize("kind", ["npz", "packed npz", "mat", "packed mat", "old mat"])
+def test_arrays_are_found_by_their_names(tmp_path, arrays, kind):
+    file = tmp_path / ("a.mat" if "mat" in kind else "a.npz")
+    if "mat" in kind:
+        old = kind == "old mat"
+        native = {
+            name: np.asarray(a).astype(float) if old and np.asarray(a).dtype.kind in "iub" else a
+            for name, a in arrays.items()
+        }
+        scipy.io.savemat(
+            file, native, do_compression=kind.startswith("packed"), format="4" if old else "5"
+        )
+    else:
+        (np.savez if kind == "npz" else np.savez_compressed)(file, **arrays)
+    check(read_record(file))
+
+
+def test_the_kind_of_file_is_told_by_its_content(tmp_path):
+    np.savez(tmp_path / "a.npz", t=T, u=U, y=Y)
+    (tmp_path / "a.npz").rename(tmp_path / "a.csv")
+    check(read_record(tmp_path / "a.csv"))
+
+
+def test_channels_are_the_shorter_side(tmp_path):
+    file = tmp_path / "a.npz"
+    np.savez(file, u=np.stack([U, -U], axis=1), y=np.stack([Y, 2 * Y, 3 * Y]), dt=0.25)
+    record = read_record(file)
+    check(record, input=[U, -U], output=[Y, 2 * Y, 3 * Y])
+    assert record.input_labels == ("u[0]", "u[1]")
+    check(read_record(file, input="u[1]", output=["y[0]", "y[2]"]), input=-U, output=[Y, 3 * Y])
+
+
+def test_a_variable_can_be_chosen(tmp_path):
+    file = tmp_path / "a.npz"
+    np.savez(file, first=np.stack([T, U, Y]), second=np.stack([T, U, 2 * Y]))
+    check(read_record(file, variable="second"), output=2 * Y)
+    with pytest.raises(OptionError, match=r"which column is time.*'first\[0\]'"):
+        read_record(file)
+    with pytest.raises(FileFormatError, match="no variable 'third'; it has first, second"):
+        read_record(file, variable="third")
+
+
+def test_npy_files_and_structured_arrays_are_read(tmp_path):
+    np.save(tmp_path / "plain.npy", np.stack([T, U, Y], axis=1))
+    check(read_record(tmp_path / "plain.npy"))
+    table = np.rec.fromarrays([Y, U, T], names="y,u,t")
+    np.save(tmp_path / "named.npy", table)
+    check(read_record(tmp_path / "named.npy"))
+
+
+def test_structs_of_matlab_are_read_field_by_field(tmp_path):
+    file = tmp_path / "a.mat"
+    simulink = {"time": T, "signals": {"values": Y, "label": "level"}}
+    scipy.io.savemat(file, {"run": {"t": T, "u": U, "y": Y}, "scope": simulink})
+    check(read_record(file, variable="run"))
+    check(read_record(file, time="scope.time", input="run.u", output="scope.signals.values"))
+    with pytest.raises(OptionError, match=r"2 columns that could be time.*'run.t'.*'scope.time'"):
+        read_record(file)
+
+
+def test_dates_of_numpy_are_times(tmp_path):
+    stamps = np.datetime64("2026-03-01T00:00") + 250 * np.arange(N).astype("m8[ms]")
+    np.savez(tmp_path / "a.npz", timestamp=stamps, u=U, y=Y)
+    check(read_record(tmp_path / "a.npz"))
+
+
+def test_complex_signals_and_unequal_lengths_are_refused(tmp_path):
+    np.savez(tmp_path / "a.npz", t=T, u=U * 1j, y=Y)
+    with pytest.raises(DataError, match="column 'u' is complex"):
+        read_record(tmp_path / "a.npz")
+    np.savez(tmp_path / "a.npz", t=T, u=U[:-1], y=Y)
+    with pytest.raises(DataError, match=r"different lengths: column 'u' 39, column 'y' 40"):
+        read_record(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize(
+    ("constants", "match"), [({"dt": 0.0}, "dt=0.0"), ({"fs": 0}, "fs=0.0"), ({"Ts": -1}, "Ts=-1")]
+)
+def test_a_stored_sample_time_that_is_none_is_refused(tmp_path, constants, match):
+    np.savez(tmp_path / "a.npz", u=U, y=Y, **constants)
+    with pytest.raises(DataError, match=match):
+        read_record(tmp_path / "a.npz")
+
+
+class Boom:
+    """Something that would act if it were unpickled."""
+
+    def __reduce__(self):
+        return (sys.exit, ("a pickle was loaded",))
+
+
+def test_pickles_are_never_loaded(tmp_path):
+    bomb = np.array([Boom()], dtype=object)
+    np.savez(tmp_path / "a.npz", t=T, u=U, y=bomb)
+    np.save(tmp_path / "b.npy", bomb, allow_pickle=True)
+    (tmp_path / "c.npz").write_bytes(pickle.dumps(Boom()))
+    for name, match in [
+        ("a.npz", "Python objects"),
+        ("b.npy", "Python objects"),
+        ("c.npz", "pickle"),
+    ]:
+        with pytest.raises(FileFormatError, match=match):
+            read_record(tmp_path / name)
+
+
+def test_a_zip_bomb_is_refused_before_it_is_unpacked(tmp_path):
+    file = tmp_path / "a.npz"
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        archive.writestr("u.npy", bytes(80 * 2**20))
+    assert file.stat().st_size < 2**20
+    with pytest.raises(FileFormatError, match=r"unpacked, is 80 MiB, max_bytes="):
+        read_record(file, max_bytes=20 * 2**20)
+
+
+@pytest.mark.parametrize("shape", ["(4000000000000,)", "(40, 2000000000)", "(9999,)"])
+def test_a_size_that_is_only_announced_takes_no_memory(tmp_path, shape):
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    npy = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(80)
+    (tmp_path / "a.npy").write_bytes(npy)
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("u.npy", npy)
+    for name in ("a.npy", "a.npz"):
+        with pytest.raises(FileFormatError, match=r"max_bytes|cut off"):
+            read_record(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("header", "match"),
+    [
+        (b"{'descr': '|O', 'fortran_order': False, 'shape': (3,)}", "Python objects"),
+        (b"{'descr': '<f8', 'fortran_order': False, 'shape': (-3,)}", "damaged|cut off"),
+        (b"{'descr': '<f8', 'shape': (3,)}", "damaged"),
+        (b"__import__('os').system('true')", "damaged"),
+        (b"[" * 5000, "damaged"),
+        (b"\xff\xfe\xfd", "damaged"),
+    ],
+)
+def test_npy_headers_that_are_wrong_are_refused(tmp_path, header, match):
+    content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(24)
+    (tmp_path / "a.npy").write_bytes(content)
+    with pytest.raises(FileFormatError, match=match):
+        read_record(tmp_path / "a.npy")
+
+
+def test_a_matlab_bomb_is_refused_before_it_is_unpacked(tmp_path):
+    file = tmp_path / "a.mat"
+    scipy.io.savemat(file, {"t": T}, do_compression=True)
+    packed = zlib.compress(struct.pack("<II", 14, 80 * 2**20) + bytes(80 * 2**20), 9)
+    file.write_bytes(file.read_bytes() + struct.pack("<II", 15, len(packed)) + packed)
+    with pytest.raises(FileFormatError, match=r"unpacked, is .* max_bytes="):
+        read_record(file, max_bytes=20 * 2**20)
+
+
+def test_hdf5_is_named_with_the_way_out(tmp_path):
+    # a v7.3 file begins with a line of text, the HDF5 part comes behind it
+    text = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + b"\x00\x02IM"
+    (tmp_path / "a.mat").write_bytes(text.ljust(512, b"\0") + b"\x89HDF\r\n\x1a\n" + bytes(100))
+    (tmp_path / "b.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    for name in ("a.mat", "b.h5"):
+        with pytest.raises(FileFormatError, match=r"HDF5.*-v7"):
+            read_record(tmp_path / name)
+
+
+@pytest.mark.parametrize("cut", [5, 20, 128, 135, 200, 400])
+def test_damaged_mat_files_are_refused(tmp_path, cut):
+    file = tmp_path / "a.mat"
+    for packed in (False, True):
+        scipy.io.savemat(file, {"t": T, "u": U, "y": Y}, do_compression=packed)
+        whole = file.read_bytes()
+        file.write_bytes(whole[:cut])
+        with pytest.raises((FileFormatError, OptionError)):
+            read_record(file)
+        damaged = whole[: cut + 130] + b"\xff" * 8 + whole[cut + 138 :]
+        file.write_bytes(damaged)
+        with pytest.raises((FileFormatError, OptionError, DataError)):
+            read_record(file)
+
+
+@pytest.mark.parametrize("kind", ["csv", "zip", "mat", "parquet"])
+def test_files_without_a_record_say_what_they_have(tmp_path, kind):
+    file = tmp_path / f"a.{kind}"
+    if kind == "csv":
+        file.write_text("only\nwords\nhere\n")
+    elif kind == "zip":
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("readme.txt", "hello")
+    elif kind == "mat":
+        scipy.io.savemat(file, {"title": "nothing but words"})
+    else:
+        file.write_bytes(b"PAR1" + bytes(100) + b"PAR1")
+    with pytest.raises(FileFormatError, match=r"no columns of numbers|without arrays|damaged"):
+        read_record(file)
+
+
+def test_parquet_files_are_read(tmp_path):
+    pytest.importorskip("pyarrow")
+    frame = pd.DataFrame({"time_ms": 1000 * T, "u": U, "y": Y, "who": ["me"] * N})
+    frame.to_parquet(tmp_path / "a.parquet")
+    check(read_record(tmp_path / "a.parquet"))
+    frame["time_ms"] = pd.Timestamp("2026-03-01") + pd.to_timedelta(T, unit="s")
+    frame.to_parquet(tmp_path / "b.parquet")
+    check(read_record(tmp_path / "b.parquet", time="time_ms"))
+
+
+def test_a_parquet_bomb_is_refused_before_it_is_unpacked(tmp_path):
+    pytest.importorskip("pyarrow")
+    pd.DataFrame({"u": np.zeros(2_000_000), "y": np.zeros(2_000_000)}).to_parquet(tmp_path / "a")
+    assert (tmp_path / "a").stat().st_size < 1e5
+    with pytest.raises(FileFormatError, match=r"unpacked, is 30\.5"):
+        read_record(tmp_path / "a", max_bytes=2**20)
+
+
+def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "a.parquet").write_bytes(b"PAR1" + bytes(100))
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(FileFormatError, match="pip install pyarrow"):
+        read_record(tmp_path / "a.parquet")
+
+
+def test_an_excel_workbook_is_named(tmp_path):
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("xl/workbook.xml", "<xml/>")
+    (tmp_path / "a.xlsx").write_bytes(buffer.getvalue())
+    with pytest.raises(FileFormatError, match=r"an Excel workbook .* save the data as CSV"):
+        read_record(tmp_path / "a.xlsx")

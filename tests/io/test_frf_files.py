@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.io
+from numpy.testing import assert_allclose
+
+from ctrl_realize.errors import DataError, DataWarning, FileFormatError, OptionError
+from ctrl_realize.io import read_frf
+
+F = np.array([0.5, 1.0, 2.0, 5.0, 10.0])
+G = np.array([1.0, 0.9 - 0.3j, 0.5 - 0.6j, -0.1 - 0.4j, -0.1 + 0.05j])
+PHASE = np.unwrap(np.angle(G))
+OMEGA = 2 * np.pi * F
+
+
+def written(header, *columns):
+    rows = zip(*columns, strict=True)
+    return header + "\n" + "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
+
+
+def check(frf, response=G):
+    # rounding of exp, log10 and the change of units
+    assert_allclose(frf.frequency_hz, F, rtol=1e-15)
+    assert_allclose(frf.frdata[0, 0], response, rtol=0, atol=4e-15)
+
+
+WRITTEN = {
+    "as in this project": written("frequency_hz,magnitude,phase_deg", F, abs(G), np.rad2deg(PHASE)),
+    "no units": written("f,gain,phase", F, abs(G), np.rad2deg(PHASE)),
+    "no header": written("", F, abs(G), np.rad2deg(PHASE)),
+    "radians": written("omega,mag,phase [rad]", OMEGA, abs(G), PHASE),
+    "omega in Hz": written("w [Hz],mag,phase [rad]", F, abs(G), PHASE),
+    "rad/s": written("frequency [rad/s],|G|,phase/deg", OMEGA, abs(G), np.rad2deg(PHASE)),
+    "kHz": written("Freq (kHz),Mag,Phase (Degrees)", F / 1e3, abs(G), np.rad2deg(PHASE)),
+    "decibels": written(
+        "f_hz,magnitude_db,phase_deg", F, 20 * np.log10(abs(G)), np.rad2deg(PHASE)
+    ),
+    "real and imaginary": written("frequency,real,imag", F, G.real, G.imag),
+    "both forms": written(
+        "f,re,im,gain,phase", F, G.real, G.imag, abs(G), np.rad2deg(PHASE)
+    ),
+    "turned round": written("phase_deg,f,mag", np.rad2deg(PHASE), F, abs(G)),
+    "downwards": written("f,re,im", F[::-1], G.real[::-1], G.imag[::-1]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", WRITTEN.values(), ids=WRITTEN.keys())
+def test_the_same_response_is_read_however_it_is_written(tmp_path, text):
+    file = tmp_path / "a.csv"
+    file.write_text(text)
+    check(read_frf(file))
+
+
+@pytest.mark.parametrize("name", ["G", "H", "frf", "response"])
+def test_complex_arrays_are_read(tmp_path, name):
+    np.savez(tmp_path / "a.npz", f=F, **{name: G})
+    scipy.io.savemat(tmp_path / "a.mat", {"meas": {"freq": F, name: G[:, None]}})
+    check(read_frf(tmp_path / "a.npz"))
+    check(read_frf(tmp_path / "a.mat"))
+
+
+def test_columns_and_units_are_chosen(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(written("a,b,c", OMEGA, 20 * np.log10(abs(G)), PHASE))
+    frf = read_frf(
+        file, frequency="a", magnitude=1, phase="c",
+        frequency_unit="rad/s", magnitude_unit="dB", phase_unit="rad", name="bench",
+    )  # fmt: skip
+    check(frf)
+    assert frf.name == "bench"
+
+
+def test_the_choice_of_a_form_counts_before_the_names(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(written("f,re,im,gain,phase_rad", F, F, F, abs(G), PHASE))
+    check(read_frf(file, magnitude="gain"))
+
+
+def test_coherence_and_std_come_along(tmp_path):
+    file = tmp_path / "two.parts.csv"
+    coherence, std = np.linspace(1, 0.2, 5), np.linspace(0.01, 0.1, 5)
+    file.write_text(written("f,re,im,coherence,std", F[::-1], G.real, G.imag, coherence, std))
+    frf = read_frf(file)
+    assert_allclose(frf.coherence, coherence[::-1], rtol=0)
+    assert_allclose(frf.std, std[::-1], rtol=0)
+    assert frf.name == "two_parts"
+    assert frf.trusted(0.9).frequency_hz[0] == F[4]
+
+
+@pytest.mark.parametrize(
+    ("text", "kwargs", "error", "match"),
+    [
+        (written("f,gain,phase", F, abs(G), PHASE), {}, OptionError, "in degrees or in radians"),
+        (written("f,gain,phase_deg", F, -F, F), {}, OptionError, "negative values; is it in dB"),
+        (written("f,gain_dB,phase_deg", F, 1e3 * F, PHASE), {}, DataError, "10000 dB"),
+        (written("f,gain,phase [turns]", F, F, F), {}, OptionError, "in 'turns'; say phase_unit"),
+        (written("f [rpm],re,im", F, F, F), {}, OptionError, "in 'rpm'; say frequency_unit"),
+        (written("a,re,im", F, F, F), {}, OptionError, "which column is the frequency"),
+        (written("f,re,b", F, F, F), {}, OptionError, "which column is the response.*2 'b'"),
+        (written("f,re,im,re", F, F, F, F), {}, OptionError, "2 columns that could be real"),
+        (written("f,re,im", -F, F, F), {}, DataError, "needed is >= 0"),
+        (written("f,re,im,coh", F, F, F, F), {}, DataError, "a.csv: coherence runs from"),
+        (written("f,re,im", F, F, F * np.nan), {}, DataError, "line 2: 'nan': a value is missing"),
+        (written("f,re,im", F, F, F), {"phase_unit": "turns"}, OptionError, "phase_unit='turns'"),
+        (written("f,re,im", F, F, F), {"magnitude_unit": "V"}, OptionError, "'abs', 'db'"),
+        (written("f,re,im", F, F, F), {"frequency": "w"}, OptionError, "frequency='w'"),
+        ("hello\n", {}, FileFormatError, "no columns of numbers"),
+    ],
+)  # fmt: skip
+def test_what_is_not_clear_is_asked(tmp_path, text, kwargs, error, match):
+    file = tmp_path / "a.csv"
+    file.write_text(text)
+    with pytest.raises(error, match=match):
+        read_frf(file, **kwargs)
+
+
+def test_a_cut_last_line_is_left_out(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(written("f,re,im", F, G.real, G.imag) + "20.0,0.")
+    with pytest.warns(DataWarning, match="has 2 of 3 cells"):
+        check(read_frf(file))
