@@ -34,8 +34,8 @@ ABOVE_NOISE = 1.2
 third-order valves this finds 3 at 0.02 and 0.1 % noise and 2 at 0.5 and 1 %, where the third
 drowns. The largest gap falls to 2 and 1; the Gavish-Donoho threshold says 200 and more."""
 
-GAP = 1e3
-"""Without known noise: a ratio of neighbouring singular values that ends the plant."""
+AS_GOOD = 1.1
+"""Without known noise: a misfit of up to 1.1 times the least one is as good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +62,7 @@ class OrderScan(Result):
     order : int
         Suggested order: the largest of `orders` whose last singular value,
         at its own delay, is above 1.2 times the noise floor. Without a known
-        noise: the last one before singular values fall by a factor of 1000,
-        else the one of least misfit.
+        noise: the smallest one whose misfit is within 10 % of the least.
     samples : int
         Markov parameters behind each delay used.
     impulse : ImpulseResponse
@@ -220,7 +219,7 @@ def scan_orders(
     delays = tuple(best_delay(row, rounding) for row in iae)
     floor = noise_floor(data, hankel_size(samples, padded=padded))
     last = [float(models.singular_values[d, k - 1]) for d, k in zip(delays, tried, strict=True)]
-    chosen = _suggest(tried, np.array(last), iae.min(axis=1), floor)
+    chosen = _suggest(tried, np.array(last), iae.min(axis=1), floor, rounding)
     i = tried.index(chosen)
     return OrderScan(
         orders=tried,
@@ -250,13 +249,14 @@ def _orders(orders: int | Iterable[int]) -> tuple[int, ...]:
 
 
 def _suggest(
-    orders: tuple[int, ...], last: FloatArray, misfits: FloatArray, floor: float | None
+    orders: tuple[int, ...],
+    last: FloatArray,
+    misfits: FloatArray,
+    floor: float | None,
+    rounding: float,
 ) -> int:
     """Choose the order whose singular values stand out."""
     if floor:
         above = np.flatnonzero(last > ABOVE_NOISE * floor)
         return orders[int(above[-1])] if above.size else orders[0]
-    falls = np.flatnonzero(last[1:] * GAP < last[:-1])
-    if falls.size:
-        return orders[int(falls[0])]
-    return orders[int(np.argmin(misfits))]
+    return orders[int(np.flatnonzero(misfits <= AS_GOOD * misfits.min() + rounding)[0])]
