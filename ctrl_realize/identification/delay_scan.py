@@ -216,9 +216,9 @@ def estimate_delay(
 
     Notes
     -----
-    With a direct term, exact data of a strictly proper plant are fitted
-    equally well by its delay and by one more sample; the smaller is returned.
-    MATLAB's ``nk`` of a strictly proper model is one more.
+    With a direct term, exact data of a sampled strictly proper plant are
+    fitted equally well by its delay and by one more sample; the smaller is
+    returned. MATLAB's ``nk`` of a strictly proper model is one more.
 
     The class of models has free B, C and D, and in it the delay is only
     weakly determined: `interval` is wide even at low noise. What is left in

@@ -195,7 +195,7 @@ def scan_orders(
     >>> import numpy as np
     >>> import ctrl_realize as cr
     >>> k = np.arange(300)
-    >>> pulse = np.r_[np.zeros(21), 0.9**k - 0.8**k]   # 21 samples, then two lags
+    >>> pulse = np.r_[np.zeros(22), 0.9**k + 0.8**k]   # 21 samples, then two lags
     >>> scan = cr.scan_orders(pulse, 4, max_delay=40, dt=0.01)
     >>> scan.order, scan.delay
     (2, 21)
