@@ -1,0 +1,324 @@
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import (
+    FileFormatError,
+    MissingFileError,
+    OptionError,
+    UnsuitableSystemError,
+)
+from ctrl_realize.io import FitSummary, load_model, save_model
+from ctrl_realize.results import Flag, Result
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False, width=64)
+# python-control keeps dots in names for itself
+NAMES = st.text(st.characters(codec="utf-8", exclude_characters="."), min_size=1, max_size=12)
+
+
+@st.composite
+def models(draw):
+    """Models of all shapes: static, SISO and MIMO, any delays, any finite numbers."""
+    n, m, p = draw(st.integers(0, 4)), draw(st.integers(1, 3)), draw(st.integers(1, 3))
+    core = [
+        np.array(draw(st.lists(FINITE, min_size=a * b, max_size=a * b))).reshape(a, b)
+        for a, b in ((n, n), (n, m), (p, n), (p, m))
+    ]
+    delays = st.integers(0, 40)
+    return cr.DelayedStateSpace(
+        ct.StateSpace(*core, draw(st.floats(1e-9, 1e9)), remove_useless_states=False),
+        draw(st.lists(delays, min_size=m, max_size=m)),
+        output_delay=draw(st.lists(delays, min_size=p, max_size=p)),
+        name=draw(NAMES),
+        inputs=draw(st.lists(NAMES, min_size=m, max_size=m, unique=True)),
+        outputs=draw(st.lists(NAMES, min_size=p, max_size=p, unique=True)),
+    )
+
+
+def assert_same(loaded, model):
+    assert type(loaded) is cr.DelayedStateSpace
+    for letter in "ABCD":
+        assert_array_equal(getattr(loaded, letter), getattr(model, letter), strict=True)
+        ours, theirs = (np.signbit(getattr(s.delay_free, letter)) for s in (loaded, model))
+        assert_array_equal(ours, theirs)
+    for attribute in (
+        "dt", "name", "input_labels", "output_labels", "state_labels",
+        "input_delays", "output_delays",
+    ):  # fmt: skip
+        assert getattr(loaded, attribute) == getattr(model, attribute)
+
+
+@given(models())
+def test_save_and_load_is_the_identity(tmp_path_factory, model):
+    file = tmp_path_factory.mktemp("model") / "model.json"
+    save_model(file, model)
+    loaded = load_model(file)
+    assert_same(loaded, model)
+    assert loaded.fit is None
+    again = file.with_name("again.json")
+    save_model(again, loaded)
+    assert again.read_bytes() == file.read_bytes()
+
+
+@pytest.fixture
+def model():
+    core = ct.ss([[0.9, 0.1], [0.0, 0.5]], [[0.0], [1 / 3]], [[1.0, 0.0]], [[0.0]], 1 / 1280)
+    return cr.delayed_ss(core, 37, name="valve", inputs="current", outputs="position")
+
+
+@pytest.fixture
+def file(tmp_path, model):
+    path = tmp_path / "valve.json"
+    save_model(path, model, settings={"order": 3, "window": [0.1, 2]}, note="a bench")
+    return path
+
+
+class Fit(Result):
+    """A result with numbers of all kinds."""
+
+    delay = np.int64(37)
+    dead_time = 0.0289
+    std = np.float64(1e-4)
+    interval = np.array([0.0287, np.inf])
+    method = "scan"
+    flags = (Flag("delay_at_bound", "the best delay is max_delay=100; try a larger one"),)
+
+    def _title(self):
+        return "Delay scan"
+
+    def _rows(self):
+        return [("delay", "37 samples"), ("IAE", "0.1")]
+
+
+def test_the_main_numbers_of_a_fit_its_report_and_its_flags_stay(tmp_path, model):
+    fit = Fit()
+    save_model(tmp_path / "a.json", model.replace(fit=fit))
+    summary = load_model(tmp_path / "a.json").fit
+    assert isinstance(summary, FitSummary)
+    assert summary.report() == fit.report()
+    assert summary.flags == fit.flags
+    assert (summary["delay"], summary["std"], summary["method"]) == (37, 1e-4, "scan")
+    # JSON has no infinity
+    assert summary["interval"] == (0.0287, "inf")
+    assert repr(summary) == "<FitSummary of a Fit>"
+    assert pickle.loads(pickle.dumps(summary)).report() == fit.report()
+    with pytest.raises(KeyError):
+        summary["onset"]
+
+
+def test_a_summary_is_saved_again_as_it_was(tmp_path, model):
+    save_model(tmp_path / "a.json", model.replace(fit=Fit()))
+    save_model(tmp_path / "b.json", load_model(tmp_path / "a.json"))
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_a_fit_that_is_no_result_leaves_its_kind(tmp_path, model):
+    save_model(tmp_path / "a.json", model.replace(fit={"anything": object()}))
+    assert load_model(tmp_path / "a.json").fit.kind == "dict"
+
+
+def test_a_plain_system_comes_back_with_delay_zero(tmp_path):
+    plain = ct.ss([[0.5]], [[1.0]], [[2.0]], [[0.25]], 0.1, name="plain", inputs="a", outputs="b")
+    save_model(tmp_path / "a.json", plain)
+    loaded = load_model(tmp_path / "a.json")
+    assert_same(loaded, cr.DelayedStateSpace(plain, 0, name="plain"))
+    assert loaded.delay == 0
+
+
+@pytest.mark.parametrize(
+    "system", [ct.ss(-1, 1, 1, 0), ct.ss(0.5, 1, 1, 0, True), ct.tf([1], [1, 0.5], 0.1), "model"]
+)
+def test_what_is_no_discrete_state_space_model_is_refused(tmp_path, system):
+    with pytest.raises(UnsuitableSystemError):
+        save_model(tmp_path / "a.json", system)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "match"),
+    [
+        ({"settings": {"tool": object()}}, "not JSON serializable"),
+        ({"settings": {"bound": float("nan")}}, "not JSON compliant"),
+        ({"settings": {1: 2, "1": 3}}, "cannot be stored|twice|not supported"),
+        ({"note": b"bytes"}, "not JSON serializable"),
+    ],
+)
+def test_settings_must_be_plain(tmp_path, model, kwargs, match):
+    with pytest.raises(OptionError, match=match):
+        save_model(tmp_path / "a.json", model, **kwargs)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_matrices_that_are_not_finite_are_not_saved(tmp_path):
+    core = ct.StateSpace([[0.5]], [[np.inf]], [[1.0]], [[0.0]], 0.1)
+    with pytest.raises((OptionError, UnsuitableSystemError)):
+        save_model(tmp_path / "a.json", core)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_save_leaves_the_old_model(file, model):
+    before = file.read_bytes()
+    with pytest.raises(OptionError):
+        save_model(file, model, settings={"bad": {1, 2}})
+    assert file.read_bytes() == before
+    with pytest.raises(FileNotFoundError):
+        save_model(file.parent / "nowhere" / "a.json", model)
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def test_provenance_is_in_the_file(file):
+    provenance = json.loads(file.read_text())["provenance"]
+    assert set(provenance["versions"]) == {"python", "ctrl-realize", "control", "numpy", "scipy"}
+    assert provenance["versions"]["numpy"] == np.__version__
+    assert provenance["settings"] == {"order": 3, "window": [0.1, 2]}
+    assert provenance["created"] is None
+
+
+def test_the_sample_time_keeps_all_its_bits(file):
+    assert load_model(file).dt == 1 / 1280
+
+
+# -- files that are not what they should be ------------------------------------------------------
+
+
+def test_a_file_cut_anywhere_is_refused(file):
+    whole = file.read_bytes()
+    # the last byte is the line end, which carries nothing
+    for size in [*range(0, len(whole) - 2, 37), len(whole) - 2]:
+        file.write_bytes(whole[:size])
+        with pytest.raises(FileFormatError, match=r"cut off|empty"):
+            load_model(file)
+
+
+def test_every_changed_byte_is_noticed_or_without_meaning(file, model):
+    whole = bytearray(file.read_bytes())
+    rng = np.random.default_rng(1)
+    for place in rng.integers(0, len(whole), 300):
+        damaged = copy.copy(whole)
+        damaged[place] ^= 1 << int(rng.integers(0, 8))
+        file.write_bytes(damaged)
+        try:
+            loaded = load_model(file)
+        except FileFormatError:
+            continue
+        assert_same(loaded, model)
+
+
+def signed(content):
+    """A file whose checksum fits, as somebody who knows how could make it."""
+    content.pop("sha256", None)
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return json.dumps({**content, "sha256": hashlib.sha256(canonical.encode()).hexdigest()})
+
+
+def test_the_checksum_is_sha_256_of_the_canonical_content(file, model):
+    file.write_text(signed(json.loads(file.read_text())))
+    assert_same(load_model(file), model)
+
+
+EDITS = {
+    "another format": ({"format": "pickle"}, "not a model file of ctrl_realize"),
+    "a later schema": ({"schema": 2}, "later version: schema 2, this one reads up to 1"),
+    "a schema of words": ({"schema": "1"}, "schema '1' is not known"),
+    "schema zero": ({"schema": 0}, "schema 0 is not known"),
+    "schema true": ({"schema": True}, "schema True is not known"),
+    "no model": ({"model": None}, "'model' is missing"),
+    "a fit of words": ({"fit": "good"}, "'fit'"),
+    "a fit with rows of words": (
+        {"fit": {"kind": "", "title": "", "rows": ["ab"], "values": {}, "flags": []}},
+        "'rows'",
+    ),
+    "a fit with code": (
+        {"fit": {"kind": "", "title": "", "rows": [], "values": {"a": {"b": 1}}, "flags": []}},
+        "'values'",
+    ),
+    "A too small": ({"model.A": [[1.0]]}, "'A' must be 2 rows of 2"),
+    "A ragged": ({"model.A": [[1.0, 2.0], [3.0]]}, "'A' must be"),
+    "A of words": ({"model.A": [["1", "2"], ["3", "4"]]}, "'A' must be"),
+    "A with true": ({"model.A": [[True, 0.0], [0.0, 0.0]]}, "'A' must be"),
+    "B beyond doubles": ({"model.B": [[10**400], [0]]}, "'B' must be"),
+    "B deep": ({"model.B": [[[1.0]], [[1.0]]]}, "'B' must be"),
+    "order negative": ({"model.order": -1}, "negative order"),
+    "order true": ({"model.order": True}, "'order' is true or false"),
+    "order huge": ({"model.order": 10**9}, "'A' must be"),
+    "delay negative": ({"model.input_delays": [-1]}, "'input_delays' must hold 1 whole"),
+    "delay broken": ({"model.input_delays": [1.5]}, "'input_delays' must hold 1 whole"),
+    "delay for two": ({"model.input_delays": [1, 2]}, "'input_delays' must hold 1 whole"),
+    "delay huge": ({"model.input_delays": [10**12]}, "states, delays included; max_states=5000"),
+    "dt zero": ({"model.dt": 0}, "dt=0.0 is no sample time"),
+    "dt true": ({"model.dt": True}, "'dt' is true or false"),
+    "dt beyond doubles": ({"model.dt": 10**400}, "too large"),
+    "no inputs": ({"model.inputs": []}, "no inputs or outputs"),
+    "inputs of numbers": ({"model.inputs": [1]}, "not text"),
+    "a name twice": ({"model.inputs": ["u", "u"]}, "a name twice"),
+    "half a character": ({"model.name": "\ud800"}, "'name' is missing"),
+    "an endless name": ({"model.name": "x" * 5000}, "'name' is missing"),
+    "a name with a dot": ({"model.name": "a.b"}, "valve.json"),
+}
+
+
+@pytest.mark.parametrize(("changes", "match"), EDITS.values(), ids=EDITS.keys())
+def test_content_that_makes_no_sense_is_refused_even_with_a_right_checksum(file, changes, match):
+    content = json.loads(file.read_text())
+    for key, value in changes.items():
+        *parents, last = key.split(".")
+        part = content
+        for parent in parents:
+            part = part[parent]
+        part[last] = value
+    file.write_text(signed(content))
+    with pytest.raises(FileFormatError, match=match):
+        load_model(file)
+
+
+def test_an_edit_is_noticed(file):
+    content = json.loads(file.read_text())
+    content["model"]["dt"] *= 2
+    file.write_text(json.dumps(content))
+    with pytest.raises(FileFormatError, match="checksum does not fit"):
+        load_model(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("[" * 100_000, "no model file"),
+        ('{"a":' * 100_000, "no model file"),
+        ("9" * 100_000, "no model file"),
+        ('{"format": NaN}', "NaN is no finite number"),
+        ('{"schema": 1, "schema": 1}', "a key is there twice"),
+        ("[]", "not a model file"),
+        ("null", "not a model file"),
+        ("time,u,y\n0,1,2\n", "no model file"),
+        ("\x80\x04\x95", "no model file"),
+    ],
+)
+def test_other_files_are_refused(tmp_path, text, match):
+    (tmp_path / "a.json").write_text(text, encoding="latin-1")
+    with pytest.raises(FileFormatError, match=match):
+        load_model(tmp_path / "a.json")
+
+
+def test_missing_files_and_folders_are_refused(tmp_path):
+    with pytest.raises(MissingFileError):
+        load_model(tmp_path / "no.json")
+    with pytest.raises(FileFormatError, match="is a folder"):
+        load_model(tmp_path)
+
+
+def test_a_large_model_needs_a_large_limit(tmp_path, model):
+    save_model(tmp_path / "a.json", model.replace(delay=100))
+    with pytest.raises(FileFormatError, match="102 states, delays included; max_states=50"):
+        load_model(tmp_path / "a.json", max_states=50)
+    assert load_model(tmp_path / "a.json", max_states=102).delay == 100
