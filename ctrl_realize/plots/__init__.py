@@ -14,11 +14,17 @@ from .impulses import impulse_plot as impulse_plot
 from .records import onset_plot as onset_plot
 from .records import record_plot as record_plot
 from .records import step_plot as step_plot
+from .scans import delay_plot as delay_plot
+from .scans import order_plot as order_plot
+from .scans import singular_value_plot as singular_value_plot
 
 _DRAWN_BY = {
+    "DelayScan": "scans:delay_plot",
     "FRFComparison": "frequencies:comparison_plot",
     "ImpulseResponse": "impulses:impulse_plot",
     "MeasuredFRF": "frequencies:frf_plot",
+    "OrderScan": "scans:order_plot",
+    "Realization": "scans:singular_value_plot",
     "Record": "records:record_plot",
     "StepResponse": "records:step_plot",
 }

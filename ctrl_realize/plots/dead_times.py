@@ -6,16 +6,18 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..delayed import DelayedStateSpace
+from ..identification.delay_scan import DelayScan
 from . import style
 
 
 def interval_of(system: DelayedStateSpace) -> tuple[float, float] | None:
     """Return the interval of a model's dead time in s, None where its fit knows none."""
-    fit = system.fit
-    interval = getattr(fit, "interval", None)
+    interval = getattr(system.fit, "interval", None)
     if interval is None:
         return None
-    low, high = (float(bound) for bound in interval)
+    # The scan counts in samples, and so says its interval; the fit is continuous.
+    unit = float(system.dt) if isinstance(system.fit, DelayScan) else 1.0
+    low, high = (unit * float(bound) for bound in interval)
     return low, high
 
 

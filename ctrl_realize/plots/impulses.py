@@ -117,8 +117,9 @@ def _model(
 
 
 def _settled(density: FloatArray) -> int:
-    """Find the sample after which less than 1 % of the area is left, and a third more."""
+    """Find the time in which 95 % of the area has passed, and add a third."""
     area = np.cumsum(np.abs(density).sum(axis=0))
     if area[-1] <= 0:
-        return density.shape[1]
-    return int(1.33 * int(np.searchsorted(area, 0.95 * area[-1]))) + 1
+        return int(density.shape[1])
+    enough = int(np.searchsorted(area, 0.95 * float(area[-1])))
+    return int(1.33 * enough) + 1

@@ -55,7 +55,7 @@ def record_plot(
         measured = _signals(upper, time, record.output, record.output_labels, **kwargs)
         driven = _signals(lower, time, record.input, record.input_labels, color=style.INPUT)
         upper.set_ylabel(_axis_label(record.output_labels, "output"))
-        lower.set_ylabel(_axis_label(record.input_labels, "input"))
+        lower.set_ylabel(_axis_label(record.input_labels, "input", 16))
         lower.set_xlabel(f"time [{unit}]")
         return style.finished(
             axes,
@@ -238,7 +238,7 @@ def _until(step: StepResponse, end: float) -> StepResponse:
 
 def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
     """Show three dead times, or up to a quarter of the way where the response is slower."""
-    final = float(np.median(step.output[-max(step.n_samples // 20, 1) :]))
+    final = float(np.nanmedian(step.output[-max(step.n_samples // 20, 1) :]))
     reached = np.flatnonzero(np.abs(step.output) >= 0.25 * abs(final))
     rise = step.dt * (int(reached[0]) if reached.size else step.n_samples // 4)
     wait = 0.0 if system is None else float(np.max(system.dead_time))
@@ -250,8 +250,8 @@ def _plain(label: str) -> str:
     return label.replace("$", r"\$").lstrip("_") or "signal"
 
 
-def _axis_label(labels: Sequence[str], kind: str) -> str:
+def _axis_label(labels: Sequence[str], kind: str, width: int = 26) -> str:
     if len(labels) > 1:
         return f"{kind}s"
     default = {"output": "y", "input": "u"}[kind]
-    return kind if labels[0] == default else "\n".join(wrap(_plain(labels[0]), 26)[:3])
+    return kind if labels[0] == default else "\n".join(wrap(_plain(labels[0]), width)[:3])

@@ -1,0 +1,230 @@
+"""Plots of what a realization and a delay scan saw: singular values, misfit over delay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from ..delayed import DelayedStateSpace
+from ..errors import OptionError
+from ..identification.delay_scan import DelayScan
+from ..identification.orders import OrderScan
+from ..identification.realization import Realization
+from ..numerics.arrays import FloatArray
+from . import style
+
+
+def delay_plot(
+    scan: DelayScan | DelayedStateSpace,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the misfit against the delay, its minimum and all delays within 5 % of it (Fig. 6).
+
+    Parameters
+    ----------
+    scan : DelayScan, or model with one as its `fit`
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the curve.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Raises
+    ------
+    OptionError
+        A model that was not found by a delay scan.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]
+    >>> cplt = plots.delay_plot(cr.estimate_delay(pulse, 1, max_delay=60, dt=0.01))
+    >>> cplt.axes[0, 0].get_xlabel()
+    'delay [samples]'
+    """
+    result = scan.fit if isinstance(scan, DelayedStateSpace) else scan
+    if not isinstance(result, DelayScan):
+        raise OptionError(
+            f"got {scan!r}, which holds no delay scan; use estimate_delay or "
+            "identify(record, method='scan')"
+        )
+    looks = {"color": style.MODEL, "label": f"order {result.order}", **kwargs}
+    with style.context():
+        axes = style.axes_for(ax)
+        low, high = result.interval
+        axes[0].axvspan(
+            low - 0.5, high + 0.5, color=style.BAND, alpha=0.22, linewidth=0,
+            label=f"within 5 %: {low}...{high}",
+        )  # fmt: skip
+        lines = list(axes[0].plot(np.arange(result.iae.size), result.iae, **looks))
+        _mark_least(axes[0], result)
+        if result.impulse.filter is not None and result.impulse.filter.group_delay > 0:
+            lag = result.impulse.filter.group_delay
+            style.note(axes[0], f"the filter's delay of {lag:.1f} samples is in it", 0.08)
+        _misfit_axes(axes[0])
+        name = result.impulse.name if title is None else title
+        return style.finished(axes, [lines], title=name, own_figure=ax is None)
+
+
+def singular_value_plot(
+    fit: Realization | DelayScan | OrderScan | DelayedStateSpace,
+    *,
+    count: int = 30,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the singular values of the Hankel matrix, and the level of pure noise (Fig. 5).
+
+    Parameters
+    ----------
+    fit : Realization, DelayScan or OrderScan, or model with one of them as its `fit`
+    count : int, optional
+        How many to show; an `OrderScan` knows as many as its highest order.
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the values.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Raises
+    ------
+    OptionError
+        A model that was not found from singular values.
+    """
+    result = fit.fit if isinstance(fit, DelayedStateSpace) else fit
+    values, order, floor, name = _singular_values(result, count)
+    with style.context():
+        axes = style.axes_for(ax)
+        lines = _singular_values_on(axes[0], values, order, floor, **kwargs)
+        return style.finished(
+            axes,
+            [lines],
+            title=name if title is None else title,
+            own_figure=ax is None,
+            loc="upper right",
+        )
+
+
+def order_plot(
+    scan: OrderScan, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the misfit over the delay for every order, and the singular values against noise.
+
+    Parameters
+    ----------
+    scan : OrderScan
+    ax : sequence of two Axes, or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the misfit curves.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    with style.context():
+        axes = style.axes_for(ax, 2, size=(8.0, 7.0), heights=(1.5, 1.0), sharex=False)
+        lines: list[Line2D] = []
+        for position, (order, iae, delay) in enumerate(
+            zip(scan.orders, scan.iae, scan.delays, strict=True)
+        ):
+            chosen = order == scan.order
+            shade = 0.75 - 0.6 * position / max(len(scan.orders) - 1, 1)
+            looks = {
+                "color": style.MODEL if chosen else (shade, shade, shade),
+                "linewidth": 2.6 if chosen else 1.2,
+                "label": f"order {order}: {delay}",
+                "zorder": 3 if chosen else 2,
+                **kwargs,
+            }
+            lines += axes[0].plot(np.arange(iae.size), np.where(np.isfinite(iae), iae, np.nan),
+                                  **looks)  # fmt: skip
+            axes[0].plot([delay], [iae[delay]], "o", color=looks["color"], zorder=4)
+        axes[0].legend(title="best delay", loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=10)
+        _misfit_axes(axes[0])
+        values = np.array([scan.last_singular_value(order) for order in scan.orders])
+        points = _singular_values_on(
+            axes[1], values, scan.order, scan.noise_floor, at=np.array(scan.orders)
+        )
+        axes[1].set_ylabel("singular value\nat the best delay")
+        name = scan.impulse.name if title is None else title
+        return style.finished(
+            axes, [lines, points], title=name, own_figure=ax is None, legends=(1,), loc="best"
+        )
+
+
+def _mark_least(axes: Axes, result: DelayScan) -> None:
+    least = float(result.iae[result.delay])
+    axes.plot([result.delay], [least], "o", color=style.MODEL, markersize=8, zorder=4)
+    right = result.delay > 0.62 * result.max_delay
+    axes.annotate(
+        f"{result.delay} samples = {style.in_time(result.delay * result.dt)}",
+        (result.delay, least),
+        (-8 if right else 8, -14),
+        textcoords="offset points",
+        ha="right" if right else "left",
+        color=style.INK,
+    )
+
+
+def _misfit_axes(axes: Axes) -> None:
+    axes.set_xlabel("delay [samples]")
+    axes.set_ylabel("IAE [output / input]")
+    axes.set_ylim(bottom=0.0)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _singular_values(result: Any, count: int) -> tuple[FloatArray, int, float | None, str]:
+    if isinstance(result, DelayScan):
+        values = result.realization.leading_singular_values(count)
+        return values, result.order, result.noise_floor, result.impulse.name
+    if isinstance(result, Realization):
+        return result.leading_singular_values(count), result.order, None, result.impulse.name
+    if isinstance(result, OrderScan):
+        values = result.singular_values[result.delay][:count]
+        return values, result.order, result.noise_floor, result.impulse.name
+    raise OptionError(
+        f"got a {type(result).__name__}, which holds no singular values; realize, "
+        "estimate_delay and scan_orders give some"
+    )
+
+
+def _singular_values_on(
+    axes: Axes,
+    values: FloatArray,
+    order: int,
+    floor: float | None,
+    at: Any = None,
+    **kwargs: Any,
+) -> list[Line2D]:
+    positions = np.arange(1, values.size + 1) if at is None else at
+    positive = np.where(values > 0, values, np.nan)
+    looks = {"color": style.MEASURED, "linestyle": "none", "marker": "o", "markersize": 7, **kwargs}
+    inside = positions <= order
+    lines = list(axes.plot(positions[inside], positive[inside], label=f"order {order}", **looks))
+    rest = {**looks, "markerfacecolor": "none"}
+    lines += axes.plot(positions[~inside], positive[~inside], **rest)
+    if floor is not None and floor > 0:
+        axes.axhline(floor, color=style.NOISE, linestyle="--", label="largest of pure noise")
+    axes.set_yscale("log")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("number" if at is None else "order")
+    axes.set_ylabel("singular value")
+    return lines
