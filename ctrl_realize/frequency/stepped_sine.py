@@ -213,9 +213,9 @@ def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
     half = squares.shape[2] // 2
     # Rounding is a misfit, too: without noise nothing but the exact sine would be steady.
     floor = (1e-6 * np.abs(late.phasor[..., None])) ** 2
-    level = np.maximum(squares[..., half:].mean(axis=2, keepdims=True), floor)
-    # The largest of half the blocks reaches beyond its mean by chance; so may an early one.
-    bound = np.maximum(_STEADY_RATIO * level, squares[..., half:].max(axis=2, keepdims=True))
+    # The largest of the late blocks, and more: an early one may be as large by chance.
+    late_most = squares[..., half:].max(axis=2, keepdims=True)
+    bound = _STEADY_RATIO * np.maximum(late_most, floor)
     moving = np.any(squares > bound, axis=1)
     moving[:, half:] = False
     start = edges[np.where(moving.any(axis=1), half - np.argmax(moving[:, half - 1 :: -1], 1), 0)]

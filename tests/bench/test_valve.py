@@ -1,0 +1,237 @@
+"""The simulated valve, against independent simulations of the same equations."""
+
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import signal
+from scipy.linalg import expm
+
+import ctrl_realize as cr
+from ctrl_realize import bench, paper
+
+CLEAN = {"noise": 0, "input_noise": 0, "spikes": 0, "bits": None}
+DT = 1 / 1280
+GAIN = 0.125
+
+
+def continuous_step(truth, times):
+    """Unit-step response by the matrix exponential at each time, dead time by shifting it."""
+    A, B, C, _ = truth.matrices
+    grown = np.block([[A, B], [np.zeros((1, A.shape[0] + 1))]])
+    start = np.append(np.zeros(A.shape[0]), 1.0)
+    late = times - truth.dead_time
+    return np.array(
+        [(C @ (expm(grown * t) @ start)[:-1])[0] if t > 0 else 0.0 for t in late.tolist()]
+    )
+
+
+@pytest.mark.parametrize("samples", [37.0, 0.0, 36.4, 0.25])
+def test_clean_step_is_the_continuous_step_at_the_samples(samples):
+    valve = bench.valve(dead_time=samples * DT, rest=0.05, hold=0.5, **CLEAN)
+    record = valve.step_record(8)
+    start = round(0.05 / DT)
+    picked = np.arange(start, record.n_samples, 23)
+    expected = 0.27 + 8 * continuous_step(valve.truth, (picked - start) * DT)
+    assert_allclose(record.output[picked], expected, atol=1e-12)  # exact sampling, rounding only
+    assert_allclose(record.output[:start], 0.27, atol=1e-13)
+
+
+def test_default_truth_is_a_valve_of_2_2_hz_behind_37_samples():
+    truth = bench.valve(lvdt_hz=None).truth
+    magnitude = np.abs(truth.response(2 * np.pi * np.array([1e-6, 2.20])))
+    assert magnitude[0] == pytest.approx(GAIN, rel=1e-9)
+    assert 20 * np.log10(magnitude[1] / magnitude[0]) == pytest.approx(-3.0, abs=0.05)
+    assert truth.delay == pytest.approx(37, abs=1e-12)
+    # Rig R3 of a real pole and a pair: 37 + 92.6 + 35.7 samples of lag in all.
+    expected = 37 * DT + 1 / (2 * np.pi * 2.2) + 1.4 / (2 * np.pi * 8) + 1 / (2 * np.pi * 1e4)
+    assert truth.total_delay == pytest.approx(expected, rel=1e-9)
+
+
+def test_sampled_truth_simulates_the_record():
+    valve = bench.valve(**CLEAN)
+    current = 8 + 4 * np.repeat(np.random.default_rng(0).integers(0, 2, 40), 50).astype(float)
+    current[:100] = 8.0
+    record = valve.record(current)
+    _, y = ct.forced_response(
+        valve.truth.sampled, DT * np.arange(current.size), current - current[0]
+    )
+    assert_allclose(record.output - record.output[0], y, atol=1e-12)
+    assert isinstance(valve.truth.sampled, cr.DelayedStateSpace)
+    assert valve.truth.sampled.delay == 37
+
+
+def test_truth_response_is_core_times_dead_time():
+    truth = bench.valve(dead_time=0.0123).truth
+    omega = np.array([0.1, 3.0, 300.0])
+    expected = truth.core(1j * omega) * np.exp(-1j * omega * 0.0123)
+    assert_allclose(truth.response(omega), expected, rtol=1e-12)
+    assert_allclose(truth.frf(omega / (2 * np.pi)).complex, expected, rtol=1e-12)
+
+
+def test_analog_anti_aliasing_adds_1_06_samples_to_the_truth():
+    plain, analog = (bench.valve(anti_aliasing=kind).truth for kind in ("linear-phase", "analog"))
+    # Fourth-order Butterworth: group delay at DC 2.6131 / w_c, w_c = 2 pi 500 Hz.
+    extra = 2.6131259 / (2 * np.pi * 500)
+    assert analog.total_delay - plain.total_delay == pytest.approx(extra, rel=1e-6)
+    poles = np.linalg.eigvals(analog.matrices[0])
+    _, expected, _ = signal.butter(4, 2 * np.pi * 500, analog=True, output="zpk")
+    for pole in expected:
+        assert np.abs(poles - pole).min() < 1e-6 * abs(pole)
+
+
+def test_noise_is_limited_to_the_alias_free_band_and_has_the_stated_size():
+    valve = bench.valve(**{**CLEAN, "noise": 1e-3})
+    noise = valve.record(np.full(2**17, 4.0), rng=0).output - 0.27
+    assert noise.std() == pytest.approx(2e-3, rel=0.02)
+    f, power = signal.welch(noise, 1280, nperseg=512)
+    inside, outside = power[(f > 5) & (f < 480)].mean(), power[f > 560].max()
+    assert outside < 1e-3 * inside
+    white = bench.valve(**{**CLEAN, "noise": 1e-3}, anti_aliasing=None)
+    noise = white.record(np.full(2**17, 4.0), rng=0).output
+    f, power = signal.welch(noise, 1280, nperseg=512)
+    assert power[f > 560].mean() == pytest.approx(power[(f > 5) & (f < 480)].mean(), rel=0.1)
+
+
+def test_same_seed_gives_the_same_records_and_another_one_does_not():
+    first, again, other = (bench.valve().step_record(16, rng=seed) for seed in (1, 1, 2))
+    assert np.array_equal(first.output, again.output)
+    assert np.array_equal(first.input, again.input)
+    assert not np.array_equal(first.output, other.output)
+
+
+def test_campaign_is_the_papers():
+    records = bench.valve(rest=0.2, hold=0.3).step_campaign(rng=0)
+    assert len(records) == 40
+    assert records[0].name == "valve_16mA_01"
+    assert records[39].name == "valve_4mA_10"
+    assert records[0].dt == paper.SETTINGS.sample_time
+    sizes = [np.median(r.input[-100:]) - np.median(r.input[:100]) for r in records]
+    assert_allclose(sizes, np.repeat([16, 12, 8, 4], 10), atol=0.01)
+    assert not np.array_equal(records[0].output, records[1].output)
+
+
+def test_default_step_comes_after_3_seconds_of_rest():
+    record = bench.valve(**CLEAN).step_record(16)
+    assert record.time[np.argmax(record.input > 4)] == pytest.approx(3.0, abs=1e-9)
+
+
+def test_every_record_says_that_it_is_simulated():
+    record = bench.valve().step_record(16, rng=0)
+    assert "simulated" in record.input_labels[0]
+    assert "simulated" in record.output_labels[0]
+    assert "simulated" in repr(bench.valve())
+    assert "Simulated" in bench.valve().truth.report()
+    assert "simulated" in bench.valve().truth.frf([1.0, 2.0]).name
+
+
+def test_spikes_are_short_and_do_not_move_the_valve():
+    quiet = bench.valve(**CLEAN).step_record(16, rng=3)
+    spiky = bench.valve(**{**CLEAN, "spikes": 8}).step_record(16, rng=3)
+    hit = spiky.input != quiet.input
+    assert 0 < hit.sum() <= 60
+    runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], hit.astype(int), [0]]))))[::2]
+    assert runs.max() <= 4  # at most two that touch
+    assert np.array_equal(quiet.output, spiky.output)
+
+
+def test_outputs_lie_on_the_steps_of_the_converter():
+    record = bench.valve(bits=8).step_record(16, rng=0)
+    step = 20 / 2**8 * 0.39
+    assert_allclose(record.output / step, np.round(record.output / step), atol=1e-9)
+    assert record.output.max() <= 2.54
+
+
+def test_lvdt_saturates_at_its_range():
+    assert bench.valve(drift=1.0, **CLEAN).step_record(16).output.max() == pytest.approx(2.54)
+
+
+def test_slew_limit_bounds_the_speed_and_a_lax_one_changes_nothing():
+    limited = bench.valve(slew_limit=3.0, lvdt_hz=None, **CLEAN).step_record(16)
+    assert np.abs(np.diff(limited.output)).max() <= 3.0 * 2.0 * DT * (1 + 1e-6)
+    lax = bench.valve(slew_limit=1e3, **CLEAN).step_record(16)
+    exact = bench.valve(**CLEAN).step_record(16)
+    # Straight lines between points 1/10240 s apart: second-order error of the LVDT alone.
+    assert_allclose(lax.output, exact.output, atol=2e-5)
+
+
+def test_play_loses_half_its_width_on_a_step_from_its_middle():
+    loose = bench.valve(hysteresis=0.1, **CLEAN).step_record(8)
+    exact = bench.valve(**CLEAN).step_record(8)
+    assert exact.output[-1] - loose.output[-1] == pytest.approx(0.1 * 2.0 / 2, abs=1e-6)
+
+
+def test_hum_is_a_line_at_50_hz():
+    record = bench.valve(hum=0.01, **CLEAN).record(np.full(1280, 4.0), rng=0)
+    spectrum = np.abs(np.fft.rfft(record.output - record.output.mean())) / 640
+    assert spectrum[50] == pytest.approx(0.02, rel=1e-9)
+    assert np.delete(spectrum, 50).max() < 1e-12
+
+
+def test_sine_records_start_from_rest_and_settle_to_the_truth():
+    valve = bench.valve(**CLEAN)
+    (record,) = valve.stepped_sine(0, points=1, repeats=1, band_hz=(3.0, 3.0))[0]
+    # The same by sampling the input finely and holding it: error of the hold, second order.
+    fine = 32
+    dt = record.dt / fine
+    t = dt * np.arange(record.n_samples * fine)
+    frequency = cr.stepped_sine_frf([record]).frequency_hz[0]
+    held = 2 * np.sin(2 * np.pi * frequency * (t + dt / 2))
+    model = cr.delayed_ss(valve.truth.core, dead_time=valve.truth.dead_time, dt=dt)
+    _, y = ct.forced_response(model, t, held)
+    expected = 0.27 + 8 * GAIN + y[::fine]
+    assert_allclose(record.output, expected, atol=2e-6)
+
+
+def test_frequencies_of_the_sweep_are_off_by_at_most_a_tenth_of_a_hertz():
+    sweep = bench.valve(**CLEAN).stepped_sine(5, points=60, repeats=1)
+    found = cr.stepped_sine_frf(sweep).frequency_hz
+    nominal = np.geomspace(0.1, 50, 60)
+    error = np.abs(found - nominal)
+    assert error.max() <= 0.1 + 1e-6
+    assert error[nominal > 10].max() > 0.05
+    assert np.all(error <= 0.01 * nominal + 1e-6)
+
+
+def test_valve_and_truth_pickle():
+    valve = pickle.loads(pickle.dumps(bench.valve()))
+    assert np.array_equal(valve.step_record(4, 1).output, bench.valve().step_record(4, 1).output)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "match"),
+    [
+        ({"dead_time": -1e-3}, "dead_time"),
+        ({"noise": -1.0}, "noise"),
+        ({"noise": float("nan")}, "noise"),
+        ({"bits": 1}, "bits"),
+        ({"dt": 0.0}, "dt"),
+        ({"anti_aliasing": "none"}, "linear-phase"),
+        ({"slew_limit": 0.0}, "slew_limit"),
+        ({"damping": 0}, "damping"),
+    ],
+)
+def test_set_ups_that_make_no_sense_are_refused(arguments, match):
+    with pytest.raises(cr.CtrlRealizeError, match=match):
+        bench.valve(**arguments)
+
+
+@pytest.mark.parametrize("amplitude", [0.0, -4, 17, "4", float("inf")])
+def test_steps_outside_the_range_are_refused(amplitude):
+    with pytest.raises(ValueError, match="amplitude"):
+        bench.valve().step_record(amplitude)
+
+
+@pytest.mark.parametrize("current", [[1.0, 2.0], [4.0, np.nan, 4.0], [4.0, 30.0, 4.0], "abc"])
+def test_currents_that_cannot_be_driven_are_refused(current):
+    with pytest.raises(ValueError, match="current"):
+        bench.valve().record(current)
+
+
+def test_stepped_sine_of_a_valve_with_friction_is_refused():
+    with pytest.raises(ValueError, match="linear valve"):
+        bench.valve(hysteresis=0.1).stepped_sine(0)

@@ -1,0 +1,203 @@
+"""Model against measured frequency response."""
+
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+
+DT = 1 / 1280
+F = np.geomspace(0.1, 50, 60)
+# Relative degree 3: aliases of the sampled plant are below 1e-6 to 50 Hz.
+PLANT = ct.tf([1], [1 / 13.8, 1]) * ct.tf([2500], [1, 70, 2500])
+
+
+def measured(tau=0.0, f=F, **given):
+    s = 2j * np.pi * f
+    return cr.MeasuredFRF(PLANT(s) * np.exp(-s * tau), f, **given)
+
+
+def zoh_model(tau=0.0):
+    return cr.delayed_ss(ct.ss(PLANT), dead_time=tau, dt=DT)
+
+
+def test_exact_model_has_no_error_with_the_hold_taken_out():
+    comparison = cr.compare_frf(zoh_model(37 * DT), measured(37 * DT))
+    assert comparison.hold == "zoh"
+    assert comparison.max_relative_error < 1e-5  # aliases, (f / 1280 Hz)^4 at 50 Hz
+    assert np.abs(comparison.phase_error_deg).max() < 1e-3
+    assert np.abs(comparison.gain_error_db).max() < 1e-4
+
+
+def test_step_invariant_model_lags_1_83_degrees_at_13_hz_behind_the_plant():
+    frf = measured(f=np.array([2.0, 13.0]))
+    comparison = cr.compare_frf(zoh_model(), frf, hold=None)
+    assert_allclose(comparison.phase_error_deg, [-0.28125, -1.828125], atol=1e-3)
+
+
+def test_impulse_invariant_samples_need_no_hold():
+    A, B, C, _ = ct.ssdata(ct.ss(PLANT))
+    sampled = ct.sample_system(ct.ss(A, B, C, 0), DT, "zoh")
+    # Markov parameters dt h(k dt): A_d = exp(A dt), B_d = exp(A dt) B dt, D = 0 (h(0) = 0).
+    model = ct.ss(sampled.A, sampled.A @ B * DT, C, 0, DT)
+    comparison = cr.compare_frf(model, measured(), hold=None)
+    assert np.abs(comparison.phase_error_deg).max() < 1e-3
+    held = cr.compare_frf(model, measured(f=np.array([13.0, 14.0])))
+    assert held.phase_error_deg[0] == pytest.approx(1.828, abs=1e-3)
+
+
+@given(st.integers(0, 2000), st.integers(6, 40))
+def test_phases_are_right_at_any_delay_and_on_coarse_grids(delay, points):
+    f = np.geomspace(0.1, 50, points)
+    comparison = cr.compare_frf(zoh_model(delay * DT), measured(delay * DT, f))
+    exact = -np.degrees(2 * np.pi * f * delay * DT) + np.degrees(
+        -np.arctan(2 * np.pi * f / 13.8) - np.angle(2500 - (2 * np.pi * f) ** 2 + 140j * np.pi * f)
+    )
+    assert_allclose(comparison.model_phase_deg, exact, atol=0.01)  # aliases: 1e-3
+    assert_allclose(comparison.measured_phase_deg, exact, atol=0.01)
+    assert np.abs(comparison.phase_error_deg).max() < 0.01
+
+
+def test_wrong_delay_shows_as_a_phase_error_that_grows_with_frequency():
+    comparison = cr.compare_frf(zoh_model(30 * DT), measured(37 * DT))
+    assert_allclose(comparison.phase_error_deg, 360 * F * 7 * DT, atol=0.01)
+    assert_allclose(comparison.gain_error_db, 0, atol=1e-4)
+
+
+def test_errors_are_those_of_the_ratio():
+    scaled = cr.MeasuredFRF(PLANT(2j * np.pi * F) / (1.1 * np.exp(0.2j)), F)
+    comparison = cr.compare_frf(PLANT, scaled)
+    assert_allclose(comparison.gain_error_db, 20 * np.log10(1.1), rtol=1e-9)
+    assert_allclose(comparison.phase_error_deg, np.degrees(0.2), rtol=1e-9)
+    assert_allclose(comparison.relative_error, abs(1.1 * np.exp(0.2j) - 1), rtol=1e-9)
+    assert comparison.rms_relative_error == pytest.approx(comparison.relative_error[0])
+    assert comparison.hold is None
+
+
+def test_band_ends_where_the_coherence_falls_and_not_at_one_bad_point():
+    coherence = np.where(F < 13, 0.99, 0.5)
+    coherence[10] = 0.1
+    comparison = cr.compare_frf(PLANT, measured(coherence=coherence))
+    assert comparison.band_from == "coherence"
+    assert comparison.band_hz == (F[0], F[F < 13][-1])
+    assert comparison.trusted.sum() == (F < 13).sum()
+
+
+def test_band_need_not_begin_at_the_lowest_frequency():
+    coherence = np.where((F > 1) & (F < 20), 0.99, 0.3)
+    low, high = cr.compare_frf(PLANT, measured(coherence=coherence)).band_hz
+    assert 1 < low < 1.2
+    assert 18 < high < 20
+
+
+def test_points_outside_the_band_do_not_enter_the_summary():
+    values = PLANT(2j * np.pi * F).copy()
+    values[F > 13] *= 5
+    frf = cr.MeasuredFRF(values, F, coherence=np.where(F < 13, 1.0, 0.0))
+    assert cr.compare_frf(PLANT, frf).max_relative_error < 1e-12
+    assert cr.compare_frf(PLANT, frf, min_coherence=0).max_relative_error > 0.5
+
+
+def test_without_coherence_the_band_comes_from_the_deviation_or_is_everything():
+    exact = np.abs(PLANT(2j * np.pi * F))
+    comparison = cr.compare_frf(PLANT, measured(std=np.where(F < 5, 0.01, 0.5) * exact))
+    assert comparison.band_from == "std"
+    assert comparison.band_hz[1] == F[F < 5][-1]
+    assert comparison.relative_noise == pytest.approx(0.01)
+    everything = cr.compare_frf(PLANT, measured())
+    assert everything.band_from == "all"
+    assert everything.trusted.all()
+
+
+def test_stated_band_is_used():
+    assert cr.compare_frf(PLANT, measured(), band_hz=(1, 10)).band_hz == (
+        F[F >= 1][0],
+        F[F <= 10][-1],
+    )
+
+
+def test_points_beyond_nyquist_are_left_out_and_said():
+    slow = ct.sample_system(ct.ss(PLANT), 0.02, "zoh")
+    comparison = cr.compare_frf(slow, measured())
+    assert comparison.frequency_hz.max() < 25
+    assert comparison.flags[0].code == "beyond_nyquist"
+    assert "25 Hz" in comparison.report()
+
+
+def test_any_kind_of_system_gives_the_same_answer():
+    reference = cr.compare_frf(PLANT, measured(0.01))
+    state_space = cr.compare_frf(ct.ss(PLANT), measured(0.01))
+    assert_allclose(state_space.gain_error_db, reference.gain_error_db, atol=1e-9)
+    control_frd = ct.frd(measured(0.01).complex, 2 * np.pi * F)
+    assert_allclose(
+        cr.compare_frf(PLANT, control_frd).phase_error_deg, reference.phase_error_deg, atol=1e-9
+    )
+
+
+def test_table_holds_every_point():
+    frf = measured(coherence=np.full(F.size, 0.99), std=np.full(F.size, 0.001))
+    comparison = cr.compare_frf(1.1 * PLANT, frf)
+    table = comparison.table()
+    assert len(table) == F.size
+    assert table["trusted"].all()
+    difference = table["model_gain_db"] - table["measured_gain_db"]
+    assert_allclose(difference, table["gain_error_db"], atol=1e-12)
+    difference = table["model_phase_deg"] - table["measured_phase_deg"]
+    assert_allclose(difference, table["phase_error_deg"], atol=1e-9)
+    assert {"coherence", "std"} <= set(table.columns)
+
+
+def test_simulated_valve_agrees_with_its_measured_frf_down_to_the_noise():
+    valve = cr.bench.valve()
+    frf = cr.stepped_sine_frf(valve.stepped_sine(1, points=150))
+    comparison = cr.compare_frf(valve.truth.sampled, frf)
+    assert 12 < comparison.band_hz[1] < 15
+    assert comparison.relative_noise < 0.004
+    # Error of a model that is exact is the noise. Some 20 points below 13 Hz make most of it,
+    # with five repeats each: 16 % of scatter; three of them.
+    assert comparison.rms_relative_error == pytest.approx(comparison.relative_noise, rel=0.5)
+    # Half a sample too much or too little is five times that.
+    wrong = cr.compare_frf(valve.truth.sampled, frf, hold=None)
+    assert wrong.rms_relative_error > 4 * comparison.rms_relative_error
+
+
+def test_comparison_is_read_only_and_pickles():
+    comparison = cr.compare_frf(PLANT, measured())
+    with pytest.raises(ValueError, match="read-only"):
+        comparison.model[0] = 0
+    copy = pickle.loads(pickle.dumps(comparison))
+    assert np.array_equal(copy.model, comparison.model)
+    assert "\n" not in repr(comparison)
+    assert "half a sample" in cr.compare_frf(zoh_model(), measured()).report()
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda: cr.compare_frf(3.0, measured()), "float"),
+        (lambda: cr.compare_frf(PLANT, PLANT), "MeasuredFRF"),
+        (
+            lambda: cr.compare_frf(ct.ss(-np.eye(2), np.eye(2), np.eye(2), 0), measured()),
+            "2 inputs",
+        ),
+        (lambda: cr.compare_frf(PLANT, measured(), min_coherence=0.9), "no coherence"),
+        (lambda: cr.compare_frf(PLANT, measured(coherence=0.5 + 0 * F)), "no trusted band"),
+        (lambda: cr.compare_frf(PLANT, measured(coherence=1 + 0 * F), min_coherence=2), "0...1"),
+        (lambda: cr.compare_frf(PLANT, measured(), band_hz=(60, 70)), "no point"),
+        (lambda: cr.compare_frf(PLANT, measured(), hold="zoh"), "continuous"),
+        (lambda: cr.compare_frf(zoh_model(), measured(), hold="foh"), "'zoh'"),
+        (lambda: cr.compare_frf(ct.ss([[0.5]], [[1]], [[1]], 0, True), measured()), "dt=True"),
+        (lambda: cr.compare_frf(ct.ss([[0.5]], [[1]], [[1]], 0, 10.0), measured()), "Nyquist"),
+        (lambda: cr.compare_frf(ct.tf([0], [1, 1]), measured()), "zero"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(call, match):
+    with pytest.raises(cr.CtrlRealizeError, match=match):
+        call()

@@ -1,0 +1,190 @@
+"""Frequency responses from noise and periodic records."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import signal
+
+import ctrl_realize as cr
+
+DT = 0.01
+PLANT = ct.sample_system(ct.tf([400], [1, 8, 400]), DT, "zoh")
+
+
+def noise_record(n=40_000, *, delay=0, noise=0.0, input_noise=0.0, seed=0):
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal(n)
+    _, y = ct.forced_response(PLANT, DT * np.arange(n), u)
+    y = np.concatenate([np.zeros(delay), y[: n - delay]])
+    y = y + noise * rng.standard_normal(n)
+    return cr.Record(DT * np.arange(n), u + input_noise * rng.standard_normal(n), y)
+
+
+def exact(frf, delay=0):
+    z = np.exp(2j * np.pi * frf.frequency_hz * DT)
+    return PLANT(z) * z**-delay
+
+
+def multisine_record(periods=6, length=500, *, noise=0.0, seed=0):
+    rng = np.random.default_rng(seed)
+    lines = np.arange(3, 120, 2)
+    t = np.arange(length)
+    one = sum(np.cos(2 * np.pi * k * t / length + rng.uniform(0, 6.28)) for k in lines)
+    u = np.tile(one, periods)
+    _, y = ct.forced_response(PLANT, DT * np.arange(u.size), u)
+    y = y + noise * rng.standard_normal(u.size)
+    return cr.Record(DT * np.arange(u.size), u, y), lines
+
+
+def test_welch_estimates_are_scipys():
+    record = noise_record(noise=0.3)
+    frf = cr.spectral_frf(record, segment=512)
+    f, yu = signal.csd(record.input, record.output, 1 / DT, nperseg=512)
+    _, uu = signal.welch(record.input, 1 / DT, nperseg=512)
+    _, coherence = signal.coherence(record.input, record.output, 1 / DT, nperseg=512)
+    assert_allclose(frf.frequency_hz, f[1:-1])
+    assert_allclose(frf.complex, (yu / uu)[1:-1], rtol=1e-9)
+    assert_allclose(frf.coherence, coherence[1:-1], rtol=1e-9)
+
+
+def test_errors_scatter_as_the_stated_deviation_says():
+    errors, stated = [], []
+    for seed in range(12):
+        frf = cr.spectral_frf(noise_record(noise=1.0, seed=seed), segment=512).between_hz(6, 30)
+        errors.append(frf.complex - exact(frf))
+        stated.append(frf.std)
+    # 12 x 120 lines, neighbours under a Hann window are correlated: 4 % of scatter.
+    ratio = np.sqrt(np.mean(np.abs(errors) ** 2 / np.square(stated)))
+    assert ratio == pytest.approx(1.0, abs=0.12)
+
+
+def test_h1_is_unmoved_by_output_noise_and_h2_by_input_noise():
+    out = noise_record(noise=0.7, n=200_000)
+    into = noise_record(input_noise=0.7, n=200_000)
+    band = {
+        (name, method): np.mean(np.abs(f.complex / exact(f)))
+        for name, record in (("out", out), ("in", into))
+        for method in ("H1", "H2", "Hv")
+        for f in [cr.spectral_frf(record, method=method, segment=1024).between_hz(0.5, 2.5)]
+    }
+    # Gain there is about 1: noise power .49 beside it.
+    assert band["out", "H1"] == pytest.approx(1.0, abs=0.01)
+    assert band["in", "H2"] == pytest.approx(1.0, abs=0.01)
+    assert band["in", "H1"] == pytest.approx(1 / 1.49, rel=0.02)
+    assert band["out", "H2"] > 1.3
+    assert band["out", "Hv"] ** 2 == pytest.approx(band["out", "H1"] * band["out", "H2"], rel=0.02)
+
+
+def test_known_delay_taken_out_removes_its_bias():
+    record = noise_record(delay=100)
+    blind = cr.spectral_frf(record, segment=512).between_hz(5, 25)
+    aligned = cr.spectral_frf(record, segment=512, delay=100).between_hz(5, 25)
+    biased = np.median(np.abs(blind.complex / exact(blind, 100)))
+    # Hann windows that overlap by 412 of 512 samples share 0.91 of their product.
+    window = signal.get_window("hann", 512)
+    shared = window[100:] @ window[:-100] / (window @ window)
+    assert biased == pytest.approx(shared, abs=0.02)
+    # What is left is leakage of the plant's own decay, 0.25 s in segments of 5 s.
+    assert_allclose(aligned.complex, exact(aligned, 100), rtol=0.06)
+    assert np.median(aligned.coherence) > 0.99
+
+
+def test_a_stream_of_records_gives_what_one_long_record_gives():
+    record = noise_record(n=8 * 4096, noise=0.1)
+    pieces = (
+        cr.Record(
+            record.time[k : k + 4096], record.input[k : k + 4096], record.output[k : k + 4096]
+        )
+        for k in range(0, 8 * 4096, 4096)
+    )
+    streamed = cr.spectral_frf(pieces, segment=1024, overlap=0)
+    whole = cr.spectral_frf(record, segment=1024, overlap=0)
+    assert_allclose(streamed.complex, whole.complex, rtol=1e-9)
+    assert_allclose(streamed.std, whole.std, rtol=1e-7)
+
+
+def test_whole_periods_have_no_leakage():
+    record, lines = multisine_record()
+    frf = cr.spectral_frf(record, period=500, skip_periods=2)
+    assert_allclose(frf.frequency_hz, lines / (500 * DT), rtol=1e-12)
+    # The transient is exp(-4 s^-1 * 10 s) = 4e-18 after two periods.
+    assert_allclose(frf.complex, exact(frf), rtol=1e-9)
+    assert_allclose(frf.coherence, 1, atol=1e-12)
+
+
+def test_transient_in_the_first_period_would_show():
+    record, _ = multisine_record(periods=3)
+    frf = cr.spectral_frf(record, period=500, skip_periods=0)
+    assert np.abs(frf.complex / exact(frf) - 1).max() > 1e-3
+
+
+def test_deviation_of_periodic_estimates_is_that_of_their_scatter():
+    errors, stated = [], []
+    for seed in range(40):
+        record, _ = multisine_record(periods=9, noise=1.0, seed=seed)
+        frf = cr.spectral_frf(record, period=500)
+        errors.append(frf.complex - exact(frf))
+        stated.append(frf.std)
+    # 40 x 59 lines; variances from 8 periods each: 2 %.
+    ratio = np.sqrt(np.mean(np.abs(errors) ** 2) / np.mean(np.square(stated)))
+    assert ratio == pytest.approx(1.0, abs=0.07)
+
+
+def test_two_mass_set_up_is_coherent_from_4_to_80_hz_with_its_resonance_at_58(shared_data):
+    data = np.load(shared_data / "tue_load_500k.npz")
+    dt = float(data["dt"])
+    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
+    frf = cr.spectral_frf(record).between_hz(4, 80)
+    assert np.mean(frf.coherence > 0.85) > 0.9
+    near = frf.between_hz(40, 80)
+    # Half a Hz from line to line.
+    assert near.frequency_hz[np.argmax(np.abs(near.complex))] == pytest.approx(58, abs=0.5)
+
+
+def test_motor_bench_resonates_at_77_hz_and_is_still_at_53(shared_data):
+    data = np.load(shared_data / "motor_bench_multisine.npz")
+    dt = float(data["dt"])
+    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
+    frf = cr.spectral_frf(record, period=int(data["period"]))
+    assert frf.frequency_hz.tolist() == pytest.approx(list(range(11, 251)))
+    near = frf.between_hz(30, 120)
+    assert near.frequency_hz[np.argmax(np.abs(near.complex))] == pytest.approx(77)
+    assert near.frequency_hz[np.argmin(np.abs(near.complex))] == pytest.approx(53)
+    assert np.all(frf.std < 0.02 * np.abs(frf.complex).max())
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"method": "H3"}, "'H1'"),
+        ({"segment": 4}, "segment"),
+        ({"segment": 4096}, "two"),
+        ({"overlap": 1.0}, "overlap"),
+        ({"window": "no such"}, "window"),
+        ({"delay": -1}, "delay"),
+        ({"delay": 5000}, "nothing"),
+        ({"period": 300, "segment": 64}, "period alone"),
+        ({"period": 600}, "at least two"),
+        ({"period": 100, "skip_periods": -1}, "skip_periods"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, match):
+    with pytest.raises(cr.CtrlRealizeError, match=match):
+        cr.spectral_frf(noise_record(n=1000), **options)
+
+
+def test_records_without_excitation_or_of_two_rates_are_refused():
+    record = noise_record(n=1000)
+    with pytest.raises(ValueError, match="does not excite"):
+        cr.spectral_frf(cr.Record(record.time, np.ones(1000), record.output))
+    with pytest.raises(ValueError, match="does not excite"):
+        cr.spectral_frf(cr.Record(record.time, np.ones(1000), record.output), period=100)
+    with pytest.raises(ValueError, match="output is constant"):
+        cr.spectral_frf(cr.Record(record.time, record.input, np.ones(1000)))
+    with pytest.raises(ValueError, match="sample times"):
+        cr.spectral_frf([record, cr.Record(2 * record.time, record.input, record.output)])
+    with pytest.raises(ValueError, match="no records"):
+        cr.spectral_frf([])

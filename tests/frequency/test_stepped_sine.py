@@ -1,0 +1,144 @@
+"""Frequency response from stepped sines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+
+CLEAN = {"noise": 0, "input_noise": 0, "bits": None}
+
+
+def sine_record(f, response, *, n=400, dt=0.01, noise=0.0, rng=None, offset=0.3):
+    t = dt * np.arange(n)
+    u = 2 * np.sin(2 * np.pi * f * t) + offset
+    y = (response * -2j * np.exp(2j * np.pi * f * t)).real - offset
+    if noise:
+        y = y + noise * rng.standard_normal(n)
+    return cr.Record(t, u, y)
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    return cr.bench.valve().stepped_sine(7, points=120)
+
+
+def test_clean_sines_give_the_exact_response_at_the_measured_frequencies():
+    f = np.array([0.61, 3.3, 7.77, 20.0])
+    H = np.array([1.0, 0.5 - 0.5j, -0.1j, -0.01 + 0.002j])
+    frf = cr.stepped_sine_frf([sine_record(*pair) for pair in zip(f, H, strict=True)])
+    assert_allclose(frf.frequency_hz, f, rtol=1e-9)
+    assert_allclose(frf.complex, H, rtol=1e-8)
+    assert_allclose(frf.coherence, 1, atol=1e-12)
+
+
+def test_frequencies_may_come_in_any_order():
+    f = [7.0, 0.9, 3.0]
+    frf = cr.stepped_sine_frf([sine_record(x, x) for x in f])
+    assert_allclose(frf.frequency_hz, sorted(f), rtol=1e-9)
+    assert_allclose(frf.complex, sorted(f), rtol=1e-8)
+
+
+def test_simulated_valve_is_measured_within_its_stated_deviation(sweep):
+    valve = cr.bench.valve()
+    frf = cr.stepped_sine_frf(sweep)
+    error = np.abs(frf.complex - valve.truth.frf(frf.frequency_hz).complex)
+    # Mean of chi-square/2 over 120 points, std from 5 repeats each: 1 +- 0.13; three of them.
+    assert np.sum(error**2) / np.sum(frf.std**2) == pytest.approx(1.0, abs=0.4)
+    assert np.median(error / frf.std) < 1.2
+    assert np.max(error / frf.std) < 6  # five repeats: heavy tails of a complex t
+
+
+def test_transients_in_the_records_do_not_reach_the_response():
+    valve = cr.bench.valve(**CLEAN)
+    frf = cr.stepped_sine_frf(valve.stepped_sine(3, points=40, repeats=1))
+    exact = valve.truth.frf(frf.frequency_hz).complex
+    # At 50 Hz, exp(-2 pi 2.2 Hz 0.75 s) = 3e-5 of a transient that is as large as the sine.
+    assert_allclose(frf.complex, exact, rtol=1e-4)
+    assert_allclose(frf.complex[:25], exact[:25], rtol=1e-6)  # below 5 Hz records are longer
+
+
+def test_coherence_is_the_signal_part_of_the_outputs_power():
+    rng = np.random.default_rng(1)
+    noise = 0.4
+    repeats = [sine_record(3.3, 0.5, noise=noise, rng=rng, n=4000) for _ in range(10)]
+    frf = cr.stepped_sine_frf([repeats])
+    # Output sine of amplitude 1: power 1/2; 40 000 samples make 1 % of scatter at most.
+    assert frf.coherence[0] == pytest.approx(0.5 / (0.5 + noise**2), rel=0.01)
+
+
+def test_coherence_falls_when_repeats_disagree():
+    repeats = [sine_record(3.3, np.exp(1j * angle)) for angle in (0.0, 1.0, -1.0)]
+    frf = cr.stepped_sine_frf([repeats])
+    assert frf.coherence[0] == pytest.approx((1 + 2 * np.cos(1.0)) ** 2 / 9, rel=1e-9)
+
+
+def test_valve_is_trusted_to_13_hz_as_in_the_paper():
+    frf = cr.stepped_sine_frf(cr.bench.valve().stepped_sine(1, points=250, repeats=3))
+    assert frf.frequency_hz.size == 250
+    trusted = frf.trusted(0.95).frequency_hz
+    # Our noise is chosen so; the paper says that coherence starts to drop at 13 Hz.
+    assert 12.5 < np.percentile(trusted, 99) < 14.5
+
+
+def test_std_of_single_records_agrees_with_the_scatter_of_many():
+    rng = np.random.default_rng(2)
+    records = [sine_record(3.3, 0.5, noise=0.1, rng=rng) for _ in range(300)]
+    single = [cr.stepped_sine_frf([record]) for record in records[:40]]
+    many = cr.stepped_sine_frf([records])
+    scatter = many.std[0] * np.sqrt(300)
+    # sigma sqrt(4 / N) / amplitude of u, by hand
+    assert scatter == pytest.approx(0.1 * np.sqrt(4 / 400) / 2, rel=0.12)
+    assert np.mean([frf.std[0] for frf in single]) == pytest.approx(scatter, rel=0.1)
+
+
+def test_given_frequencies_start_the_fit_or_are_kept():
+    records = [sine_record(3.3, 0.5)]
+    free = cr.stepped_sine_frf(records, frequency_hz=[3.25])
+    kept = cr.stepped_sine_frf(records, frequency_hz=[3.25], free_frequency=False)
+    assert free.frequency_hz[0] == pytest.approx(3.3, rel=1e-9)
+    assert kept.frequency_hz[0] == pytest.approx(3.25, rel=1e-12)
+
+
+def test_stated_settling_is_left_out():
+    record = sine_record(3.3, 0.5)
+    spoilt = record.output.copy()
+    spoilt[:100] += 5.0
+    frf = cr.stepped_sine_frf([cr.Record(record.time, record.input, spoilt)], settle=1.0)
+    assert frf.complex[0] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_drift_is_taken_out_on_request():
+    record = sine_record(0.9, 0.5)
+    drifting = cr.Record(record.time, record.input, record.output + 0.7 * record.time)
+    frf = cr.stepped_sine_frf([drifting], drift=True)
+    assert frf.complex[0] == pytest.approx(0.5, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda r: cr.stepped_sine_frf([]), "no records"),
+        (lambda r: cr.stepped_sine_frf([[]]), "no records"),
+        (lambda r: cr.stepped_sine_frf([3.0]), "float"),
+        (lambda r: cr.stepped_sine_frf([r], frequency_hz=[1.0, 2.0]), "1 frequencies"),
+        (lambda r: cr.stepped_sine_frf([r], frequency_hz=[-1.0]), "above 0"),
+        (lambda r: cr.stepped_sine_frf([r], settle=-1.0), "settle"),
+        (lambda r: cr.stepped_sine_frf([r], settle=3.99), "leaves"),
+        (lambda r: cr.stepped_sine_frf([r], frequency_hz=[0.1], free_frequency=False), "period"),
+        (lambda r: cr.stepped_sine_frf([r.between(0, 0.05)]), "too short"),
+        (
+            lambda r: cr.stepped_sine_frf([cr.Record(r.time, 0 * r.input, r.output)]),
+            "constant",
+        ),
+        (
+            lambda r: cr.stepped_sine_frf([cr.Record(r.time, [r.input, r.input], r.output)]),
+            "several signals",
+        ),
+    ],
+)
+def test_what_cannot_be_used_is_refused(call, match):
+    with pytest.raises((cr.CtrlRealizeError, TypeError), match=match):
+        call(sine_record(3.3, 0.5))
