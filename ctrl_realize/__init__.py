@@ -6,6 +6,7 @@ ct.bode_plot([sys, cr.read_frf("frf.csv")])
 """
 
 from . import bench as bench
+from . import design as design
 from . import paper as paper
 from .delayed import DelayedStateSpace as DelayedStateSpace
 from .delayed import delayed_ss as delayed_ss
@@ -15,8 +16,14 @@ from .frequency import FRFComparison as FRFComparison
 from .frequency import compare_frf as compare_frf
 from .frequency import spectral_frf as spectral_frf
 from .frequency import stepped_sine_frf as stepped_sine_frf
+from .identification.campaign import Campaign as Campaign
+from .identification.campaign import CampaignRow as CampaignRow
+from .identification.campaign import identify_campaign as identify_campaign
 from .identification.delay_scan import DelayScan as DelayScan
 from .identification.delay_scan import estimate_delay as estimate_delay
+from .identification.from_io import ImpulseEstimate as ImpulseEstimate
+from .identification.from_io import impulse_from_io as impulse_from_io
+from .identification.identify import identify as identify
 from .identification.orders import OrderScan as OrderScan
 from .identification.orders import scan_orders as scan_orders
 from .identification.realization import Realization as Realization

@@ -1,7 +1,8 @@
 """What all results have in common: a card in a notebook, the same card as text, a plot.
 
 A result is a frozen dataclass. It names itself (`_title`), lists its numbers with their units
-(`_rows`), and may carry `flags`, the things that one should know before trusting it.
+(`_rows`), and may carry `choices`, what was chosen for the caller and why, and `flags`, the
+things that one should know before trusting it.
 """
 
 from __future__ import annotations
@@ -41,16 +42,20 @@ class Result:
     def _rows(self) -> list[tuple[str, str]]:
         raise AssertionError(f"{type(self).__name__} does not list its numbers")
 
+    def _choices(self) -> list[str]:
+        choices: tuple[str, ...] = getattr(self, "choices", ())
+        return list(choices)
+
     def _notes(self) -> list[str]:
         flags: tuple[Flag, ...] = getattr(self, "flags", ())
         return [str(flag) for flag in flags]
 
     def report(self) -> str:
-        """Tell the result as plain text, flags included."""
-        return text_card(self._title(), self._rows(), self._notes())
+        """Tell the result as plain text, choices and flags included."""
+        return text_card(self._title(), self._rows(), self._choices(), self._notes())
 
     def _repr_html_(self) -> str:
-        return html_card(self._title(), self._rows(), self._notes())
+        return html_card(self._title(), self._rows(), self._choices(), self._notes())
 
     def plot(self, **kwargs: Any) -> Any:
         """Draw the result; returns a `control.ControlPlot`.
@@ -63,13 +68,18 @@ class Result:
         return import_module("ctrl_realize.plots").draw(self, **kwargs)
 
 
-def text_card(title: str, rows: Sequence[tuple[str, str]], notes: Sequence[str] = ()) -> str:
-    """Lay out label-value rows as text, notes below them.
+def text_card(
+    title: str,
+    rows: Sequence[tuple[str, str]],
+    choices: Sequence[str] = (),
+    flags: Sequence[str] = (),
+) -> str:
+    """Lay out label-value rows as text, choices and flags below them.
 
     Examples
     --------
     >>> from ctrl_realize.results import text_card
-    >>> print(text_card("Delay", [("delay", "37 samples"), ("order", "3")], ["look twice"]))
+    >>> print(text_card("Delay", [("delay", "37 samples"), ("order", "3")], (), ["look twice"]))
     Delay
       delay  37 samples
       order  3
@@ -78,11 +88,17 @@ def text_card(title: str, rows: Sequence[tuple[str, str]], notes: Sequence[str] 
     width = max((len(label) for label, _ in rows), default=0)
     lines = [title]
     lines += [f"  {label:<{width}}  {value}" for label, value in rows]
-    lines += [f"  ! {note}" for note in notes]
+    lines += [f"  - {choice}" for choice in choices]
+    lines += [f"  ! {flag}" for flag in flags]
     return "\n".join(lines)
 
 
-def html_card(title: str, rows: Sequence[tuple[str, str]], notes: Sequence[str] = ()) -> str:
+def html_card(
+    title: str,
+    rows: Sequence[tuple[str, str]],
+    choices: Sequence[str] = (),
+    flags: Sequence[str] = (),
+) -> str:
     """Lay out label-value rows as a small HTML table; everything is escaped."""
     body = "".join(
         f"<tr><th style='text-align:left;font-weight:500;padding:2px 16px 2px 0'>"
@@ -90,10 +106,11 @@ def html_card(title: str, rows: Sequence[tuple[str, str]], notes: Sequence[str] 
         f"<td style='text-align:left;padding:2px 0'>{html.escape(value)}</td></tr>"
         for label, value in rows
     )
-    warnings = "".join(f"<div style='margin-top:4px'>⚠ {html.escape(note)}</div>" for note in notes)
+    lines = "".join(f"<div style='margin-top:4px'>{html.escape(text)}</div>" for text in choices)
+    lines += "".join(f"<div style='margin-top:4px'>⚠ {html.escape(text)}</div>" for text in flags)
     return (
         "<div style='display:inline-block;border:1px solid #8886;border-radius:6px;"
         "padding:8px 14px;max-width:46em'>"
         f"<div style='font-weight:600;margin-bottom:4px'>{html.escape(title)}</div>"
-        f"<table style='border-collapse:collapse;margin:0'>{body}</table>{warnings}</div>"
+        f"<table style='border-collapse:collapse;margin:0'>{body}</table>{lines}</div>"
     )

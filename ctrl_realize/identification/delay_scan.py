@@ -89,6 +89,8 @@ class DelayScan(Result):
         ``"delay_at_bound"``, ``"no_delay_resolved"``, ``"several_minima"``,
         ``"order_in_noise"``, ``"order_near_noise"``, and those of
         `realization`.
+    choices : tuple of str
+        What was chosen for the caller, and why (`identify`).
     """
 
     iae: FloatArray
@@ -102,6 +104,7 @@ class DelayScan(Result):
     candidates: Candidates = field(repr=False)
     realization: Realization = field(repr=False)
     flags: tuple[Flag, ...] = ()
+    choices: tuple[str, ...] = ()
 
     @property
     def impulse(self) -> ImpulseResponse:
@@ -112,6 +115,21 @@ class DelayScan(Result):
     def dt(self) -> float:
         """Sample time in s."""
         return self.impulse.dt
+
+    @property
+    def dead_time(self) -> float:
+        """Best delay in s."""
+        return self.delay * self.dt
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float]:
+        """`interval` in s."""
+        return (self.interval[0] * self.dt, self.interval[1] * self.dt)
+
+    @property
+    def misfit(self) -> float:
+        """Least integrated absolute error, in the unit of the output per input."""
+        return float(self.iae[self.delay])
 
     @property
     def max_delay(self) -> int:

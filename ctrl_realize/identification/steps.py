@@ -169,6 +169,7 @@ def unit_step(
         drift=slope / record.dt,
         edge=at,
         name=record.name,
+        record=record,
     )
 
 
@@ -244,6 +245,7 @@ def impulse_from_step(
         noise=noise,
         sampling="step-invariant" if difference == "backward" else "impulse-invariant",
         name=step.name,
+        step=step,
     )
 
 

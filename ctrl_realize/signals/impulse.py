@@ -13,6 +13,7 @@ from ..checks import positive
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.filters import butterworth, butterworth_group_delay
+from .step import StepResponse
 
 Sampling = Literal["step-invariant", "impulse-invariant"]
 
@@ -78,6 +79,8 @@ class ImpulseResponse:
         zero-order hold (backward difference, the default), or samples of the continuous impulse
         response (central difference), which come half a sample earlier.
     name : str, optional
+    step : StepResponse, optional
+        The step response that it was made of.
 
     Raises
     ------
@@ -98,6 +101,7 @@ class ImpulseResponse:
     noise: FloatArray | None = None
     sampling: Sampling = "step-invariant"
     name: str = ""
+    step: StepResponse | None = None
 
     def __init__(
         self,
@@ -108,6 +112,7 @@ class ImpulseResponse:
         noise: ArrayLike | None = None,
         sampling: Sampling = "step-invariant",
         name: str = "",
+        step: StepResponse | None = None,
     ) -> None:
         values = _finite(markov, "markov")
         if values.ndim not in (1, 3) or values.shape[-1] < 2 or values.size == 0:
@@ -115,18 +120,19 @@ class ImpulseResponse:
                 f"markov has shape {values.shape}; needed is (N,) or (outputs, inputs, N) "
                 "with N >= 2"
             )
-        step = positive(dt, "dt", "sample time in s")
+        seconds = positive(dt, "dt", "sample time in s")
         if sampling not in ("step-invariant", "impulse-invariant"):
             raise OptionError(
                 f"sampling={sampling!r}; choose 'step-invariant' or 'impulse-invariant'"
             )
         fix = object.__setattr__
         fix(self, "markov", read_only(values))
-        fix(self, "dt", step)
+        fix(self, "dt", seconds)
         fix(self, "filter", filter)
         fix(self, "noise", None if noise is None else read_only(_finite(noise, "noise")))
         fix(self, "sampling", sampling)
         fix(self, "name", str(name))
+        fix(self, "step", step)
 
     @property
     def n_samples(self) -> int:

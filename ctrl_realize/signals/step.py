@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..numerics.arrays import FloatArray, read_only
+from .record import Record
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ class StepResponse:
         Slope of the output before the edge that was removed, per s; 0 when none was significant.
     edge : StepEdge
     name : str
+    record : Record or None
+        What it was cut out of.
     """
 
     time: FloatArray
@@ -82,6 +85,7 @@ class StepResponse:
     drift: float
     edge: StepEdge
     name: str = ""
+    record: Record | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for what in ("time", "output", "input", "pre"):

@@ -1,0 +1,229 @@
+"""From a record to a model in one call: wiring of the steps, each choice an argument."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import control as ct
+import numpy as np
+
+from ..checks import one_of
+from ..delayed import DelayedStateSpace
+from ..errors import DelayRangeError, OptionError
+from ..numerics.arrays import FloatArray
+from ..signals import Record, StepResponse
+from .delay_scan import estimate_delay
+from .orders import scan_orders
+from .steps import impulse_from_step, unit_step
+
+Method = Literal["output_error", "scan", "paper"]
+
+METHODS: tuple[str, ...] = ("output_error", "scan", "paper")
+
+SCANNED_ORDERS = range(1, 6)
+"""Orders that the scan chooses from; above 5 the realization models noise, or the delay."""
+
+PAPER_ORDER, PAPER_SAMPLES, PAPER_MAX_DELAY, PAPER_CUTOFF_HZ = 3, 1000, 100, 50.0
+"""Section 3.2 of the paper (`ctrl_realize.paper.SETTINGS`, which stands above this layer)."""
+
+
+def identify(
+    record: Record,
+    *,
+    method: Method = "output_error",
+    order: int | None = None,
+    max_delay: int | None = None,
+    known: ct.LTI | None = None,
+    loss: Literal["huber", "least_squares"] = "huber",
+    structures: Sequence[tuple[int, int]] | None = None,
+    cutoff_hz: float | Literal["auto"] | None = "auto",
+    samples: int | None = None,
+    feedthrough: bool | None = None,
+) -> DelayedStateSpace:
+    """Identify a model with dead time from one record.
+
+    Parameters
+    ----------
+    record : Record
+        One input, one output. The scan and the paper's method need a step in the input.
+    method : {"output_error", "scan", "paper"}, optional
+        ``"output_error"``: fit of the raw record with a continuous delay; the most accurate, and
+        the only one whose interval is a confidence interval. ``"scan"``: the realization scan
+        with zero-phase filter and backward difference. ``"paper"``: the same method as printed:
+        central difference, causal filter at 50 Hz, order 3, 1000 samples, delays 0...100.
+    order : int, optional
+        Order of the model without delay. Default: chosen from the data (``"paper"``: 3).
+    max_delay : int, optional
+        Largest delay in samples. Default: ``"scan"`` where the step response has risen by half,
+        ``"paper"`` 100, ``"output_error"`` see `fit_delay`.
+    known, loss, structures : optional
+        For ``"output_error"``, see `fit_delay`.
+    cutoff_hz, samples, feedthrough : optional
+        For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
+
+    Returns
+    -------
+    DelayedStateSpace
+        Its `.fit` is a `DelayFit` or a `DelayScan`; `.fit.report()` says what was chosen and why.
+        The steps before it hang on the fit: ``.fit.impulse.step.record`` for the scans,
+        ``.fit.records`` for the fit.
+
+    Raises
+    ------
+    OptionError
+        An unknown method, or an argument that the method does not take.
+    NoStepError, DataError, OrderError, DelayRangeError
+        Data that the method cannot use.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(900)
+    >>> u = np.where(t < 1.0, 0.0, 2.0)
+    >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
+    >>> rng = np.random.default_rng(1)
+    >>> sys = cr.identify(cr.Record(t, u, y + 0.01 * rng.standard_normal(t.size)))
+    >>> isinstance(sys, ct.StateSpace), round(sys.fit.dead_time, 2)
+    (True, 0.12)
+    """
+    one_of(method, "method", METHODS)
+    scan_only = {"cutoff_hz": cutoff_hz != "auto", "samples": samples is not None}
+    scan_only["feedthrough"] = feedthrough is not None
+    fit_only = {"known": known is not None, "structures": structures is not None}
+    fit_only["loss"] = loss != "huber"
+    strange = [
+        name
+        for name, given in (scan_only if method == "output_error" else fit_only).items()
+        if given
+    ]
+    if strange:
+        raise OptionError(
+            f"{', '.join(strange)}: not for method={method!r}; see the documentation of identify "
+            "for the arguments of each method"
+        )
+    if method == "output_error":
+        if order is not None:
+            if structures is not None:
+                raise OptionError("give order or structures, not both")
+            structures = [(order, degree) for degree in range(1, order + 1)]
+        from .delay_fit import fit_delay
+
+        return fit_delay(record, structures=structures, max_delay=max_delay, known=known, loss=loss)
+    step = unit_step(record)
+    if method == "paper":
+        return _paper(step, order, max_delay, cutoff_hz, samples, feedthrough)
+    return _scan(step, order, max_delay, cutoff_hz, samples, feedthrough)
+
+
+def _scan(
+    step: StepResponse,
+    order: int | None,
+    max_delay: int | None,
+    cutoff_hz: float | Literal["auto"] | None,
+    samples: int | None,
+    feedthrough: bool | None,
+) -> DelayedStateSpace:
+    impulse = impulse_from_step(step, cutoff_hz=cutoff_hz)
+    choices = [
+        "backward difference: the model reproduces the sampled step response behind the hold"
+    ]
+    if impulse.filter is None:
+        choices.append("no filter: the record is coarse for its rise, or none was asked for")
+    else:
+        choices.append(f"filter: {impulse.filter} (13 times the bandwidth where automatic)")
+    reach = _half_risen(step) if max_delay is None else max_delay
+    if max_delay is None:
+        choices.append(
+            f"delays up to {reach} samples tried: by then the step response has risen by half"
+        )
+    if order is None:
+        # A Hankel matrix of few samples holds few orders.
+        room = (impulse.n_samples - 1 - reach) // 2
+        orders = scan_orders(
+            impulse,
+            [n for n in SCANNED_ORDERS if n <= room] or [1],
+            max_delay=reach,
+            samples=samples,
+            feedthrough=feedthrough,
+        )
+        order = orders.order
+        choices.append(f"order {order}: its last singular value is {_against_noise(orders)}")
+    system = estimate_delay(
+        impulse, order, max_delay=reach, samples=samples, feedthrough=feedthrough
+    )
+    return _named(system, choices, step)
+
+
+def _paper(
+    step: StepResponse,
+    order: int | None,
+    max_delay: int | None,
+    cutoff_hz: float | Literal["auto"] | None,
+    samples: int | None,
+    feedthrough: bool | None,
+) -> DelayedStateSpace:
+    reach = PAPER_MAX_DELAY if max_delay is None else max_delay
+    behind = PAPER_SAMPLES if samples is None else samples
+    if reach + behind + 1 > step.n_samples:
+        raise DelayRangeError(
+            f"the paper's settings need {reach + behind + 1} samples after the step (samples="
+            f"{behind}, max_delay={reach}), the record has {step.n_samples}; give samples= and "
+            "max_delay=, or use method='scan', which fits them to the record"
+        )
+    impulse = impulse_from_step(
+        step,
+        cutoff_hz=PAPER_CUTOFF_HZ if cutoff_hz == "auto" else cutoff_hz,
+        zero_phase=False,
+        difference="central",
+    )
+    system = estimate_delay(
+        impulse,
+        PAPER_ORDER if order is None else order,
+        max_delay=reach,
+        samples=behind,
+        feedthrough=True if feedthrough is None else feedthrough,
+    )
+    choices = [
+        "as printed: five-point central difference (half a sample early as a step), "
+        f"{impulse.filter or 'no filter'}, order {system.fit.order}, "
+        f"{behind} samples, delays 0...{reach}"
+    ]
+    return _named(system, choices, step)
+
+
+def _named(
+    system: DelayedStateSpace, choices: Sequence[str], step: StepResponse
+) -> DelayedStateSpace:
+    names: dict[str, Any] = {"fit": replace(system.fit, choices=tuple(choices))}
+    record = step.record
+    if record is not None:
+        names |= {"inputs": list(record.input_labels), "outputs": list(record.output_labels)}
+        if record.name:
+            names["name"] = system_name(record.name)
+    return system.replace(**names)
+
+
+def system_name(name: str) -> str:
+    """Make a name that python-control takes: it allows no dots."""
+    return name.replace(".", "_")
+
+
+def _half_risen(step: StepResponse) -> int:
+    """First sample at which the step response has made half its way: no delay lasts longer."""
+    final = float(np.median(step.output[-max(step.n_samples // 10, 3) :]))
+    risen: FloatArray = step.output / final if final else np.abs(step.output)
+    crossing = np.flatnonzero(risen >= 0.5 * (1.0 if final else float(risen.max()) or 1.0))
+    half = int(crossing[0]) if crossing.size else step.n_samples // 2
+    # Something must be left behind the largest delay to realize.
+    return max(1, min(half, step.n_samples - max(step.n_samples // 4, 12)))
+
+
+def _against_noise(orders: Any) -> str:
+    value = orders.last_singular_value(orders.order)
+    if orders.noise_floor:
+        return f"{value / orders.noise_floor:.1f} times that of the noise before the step"
+    return f"{value:.3g}, the last before the gap (the noise before the step is not known)"
