@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError
-from .sniff import MAX_COLUMNS
+from .sniff import MAX_COLUMNS, MAX_NAME
 from .tables import Column, Table
 from .units import split_unit
 
@@ -65,6 +65,7 @@ def table_of_arrays(path: Path, arrays: Mapping[str, AnyArray], variable: str | 
 
 
 def _columns(name: str, array: AnyArray, *, nameless: bool) -> list[Column]:
+    name = name[:MAX_NAME]
     unit = split_unit(name)[1]
     if array.ndim == 1:
         return [Column(name, unit, array)]

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..checks import one_of
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
 from ..signals import Record
@@ -62,6 +63,7 @@ def read_record(
     header: bool | Literal["auto"] = "auto",
     skip_rows: int = 0,
     variable: str | None = None,
+    missing: Literal["refuse", "keep"] = "refuse",
     resample: bool = False,
     name: str | None = None,
     max_bytes: float = MAX_BYTES,
@@ -95,6 +97,8 @@ def read_record(
         Lines of text to leave out at the start.
     variable : str, optional
         Matrix or struct of a ``.mat`` or ``.npz`` file to look into.
+    missing : {"refuse", "keep"}, optional
+        What to do with empty cells and ``NaN`` in input and output; see `Record`.
     resample : bool, optional
         Put samples that jitter onto a uniform time axis, see `Record.resampled`.
     name : str, optional
@@ -139,30 +143,33 @@ def read_record(
     options = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
     if dt is not None and not (_is_number(dt) and dt > 0 and math.isfinite(dt)):
         raise OptionError(f"dt={dt!r} must be a positive number of seconds")
+    keep = one_of(missing, "missing", ("refuse", "keep")) == "keep"
+    if keep and resample:
+        raise OptionError("missing='keep' and resample=True: over missing samples, which to keep?")
     table = read_table(path, options, variable=variable, max_bytes=max_bytes)
     parts = _parts(table, time, input, output, dt)
     used = [*parts.inputs, *parts.outputs] + ([] if parts.time is None else [parts.time])
     check_lengths(table, used)
-    signals = (_stacked(table, parts.inputs), _stacked(table, parts.outputs))
+    signals = (_stacked(table, parts.inputs, keep), _stacked(table, parts.outputs, keep))
     if parts.time is None:
         stamps = parts.dt * np.arange(signals[0].shape[-1])
     else:
         stamps = time_in_seconds(table, parts.time, time_unit, time_format)
-    labels = {
+    labels: dict[str, Any] = {
         "name": Path(path).stem if name is None else name,
         "input_labels": _labels(table, parts.inputs),
         "output_labels": _labels(table, parts.outputs),
     }
-    make: Any = Record.resampled if resample else Record
     try:
-        record: Record = make(stamps, *signals, **labels)
+        if resample:
+            return Record.resampled(stamps, *signals, **labels)
+        return Record(stamps, *signals, missing=missing, **labels)
     except TimeAxisError as error:
         row = re.search(r"row (\d+)", str(error))
         place = f" ({table.place(int(row[1]))})" if row else ""
         raise TimeAxisError(f"{table.path}{place}: {error}") from error
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from error
-    return record
 
 
 @dataclass(frozen=True)
@@ -240,8 +247,8 @@ def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, floa
     )
 
 
-def _stacked(table: Table, indices: list[int]) -> FloatArray:
-    rows = [table.numbers(k) for k in indices]
+def _stacked(table: Table, indices: list[int], keep_missing: bool) -> FloatArray:
+    rows = [table.numbers(k, keep_missing=keep_missing) for k in indices]
     return rows[0] if len(rows) == 1 else np.stack(rows)
 
 

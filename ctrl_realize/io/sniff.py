@@ -28,17 +28,18 @@ from .units import is_units_line, plain_unit, split_unit
 HEAD_BYTES = 1 << 18
 MAX_HEAD_LINES = 1000
 MAX_COLUMNS = 10_000
+MAX_NAME = 200
 _SAMPLE_LINES = 60
 
 DELIMITERS = ("\t", ";", "|", ",", " ")
 NUMBER = {
-    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(\d+|\d*,\d+)([eE][+-]?\d+)?"),
+    # one way only to match any text: two ways make the time grow with the square of its length
+    ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
 _TIME = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([ T].*|[.,]\d+)?|\d{1,2}:\d{2}([.,]\d+)?")
-MISSING = frozenset(
-    {"", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "+inf", "-inf", "-nan"}
-)
+MISSING = frozenset({"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "?"})
+_NOT_NAMES = MISSING | {"inf", "+inf", "-inf", "infinity", "-infinity"}
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF16_LE, "utf-16"),
@@ -140,6 +141,7 @@ def sniff(path: Path, options: TextOptions) -> TextLayout:
     head = _Head(path, lines, rows, cells, delimiter, decimal, comment, width)
     first = _first_data_row(head, options.header)
     names, units = ([""] * width,) * 2 if options.header is False else _names(head, first)
+    names = [name[:MAX_NAME] for name in names]
     return TextLayout(
         encoding, delimiter, decimal, comment, rows[first], width, tuple(names), tuple(units)
     )
@@ -205,7 +207,7 @@ def _comment(lines: list[str]) -> str | None:
 def _kind(cell: str, decimal: str) -> str:
     if NUMBER[decimal].fullmatch(cell):
         return "number"
-    if cell.lower() in MISSING:
+    if cell.lower() in _NOT_NAMES:
         return "missing"
     return "time" if _TIME.fullmatch(cell) else "text"
 
@@ -278,7 +280,7 @@ def _names(head: _Head, first: int) -> tuple[list[str], list[str]]:
         )
     else:
         names = _names_in_comments(head, head.rows[first])
-    return names, [split_unit(name)[1] for name in names]
+    return names, [split_unit(name[:MAX_NAME])[1] for name in names]
 
 
 def _header_cells(head: _Head, row: int, first: int) -> list[str] | None:

@@ -82,25 +82,25 @@ class Table:
         more = f", ... ({len(names)} in all)" if len(names) > 20 else ""
         return "columns " + ", ".join(names[:20]) + more
 
-    def numbers(self, index: int) -> FloatArray:
-        """Return a column as finite real numbers.
+    def numbers(self, index: int, *, keep_missing: bool = False) -> FloatArray:
+        """Return a column as finite real numbers; missing ones are refused, or kept as NaN.
 
         Raises
         ------
         DataError
             If a cell is not a finite number; the first one is named.
         """
-        values = self.values(index)
+        values = self.values(index, keep_missing=keep_missing)
         if np.iscomplexobj(values):
             raise DataError(f"{self.path}: {self.title(index)} is complex, real numbers are needed")
         return np.asarray(values, dtype=np.float64)
 
-    def values(self, index: int) -> np.ndarray[Any, np.dtype[Any]]:
+    def values(self, index: int, *, keep_missing: bool = False) -> np.ndarray[Any, np.dtype[Any]]:
         """Return a column as finite numbers, real or complex."""
         cells = self.columns[index].cells
         if cells.dtype.kind not in "biufc":
-            cells = self._parsed(index)
-        finite = np.isfinite(cells)
+            cells = self._parsed(index, keep_missing)
+        finite = ~np.isinf(cells) if keep_missing else np.isfinite(cells)
         if not finite.all():
             row = int(np.argmin(finite))
             raise DataError(
@@ -109,17 +109,23 @@ class Table:
             )
         return cells
 
-    def _parsed(self, index: int) -> FloatArray:
+    def _parsed(self, index: int, keep_missing: bool) -> FloatArray:
         pattern = NUMBER[self.decimal]
         values = np.empty(self.columns[index].cells.size)
         for row, cell in enumerate(self.columns[index].cells):
             text = str(cell).strip()
+            missing = text.lower() in MISSING
+            if missing and keep_missing:
+                values[row] = np.nan
+                continue
             if not pattern.fullmatch(text):
-                what = "a value is missing" if text.lower() in MISSING else "is not a number"
-                comma = "; decimal=',' or '.' may help" if "," in text or "." in text else ""
+                what = "a value is missing" if missing else "is not a number"
+                advice = "; decimal=',' or '.' may help" if "," in text or "." in text else ""
+                if missing:
+                    advice = "; missing='keep' keeps a gap in a record"
                 raise DataError(
                     f"{self.path}: {self.title(index)}, {self.place(row)}: {text[:60]!r}"
-                    f": {what}{comma}"
+                    f": {what}{advice}"
                 )
             values[row] = float(text.replace(",", "."))
         return values

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
 
@@ -33,8 +31,10 @@ _SPELLINGS = {
 
 _KNOWN = {*TIME_UNITS, "hz", "khz", "mhz", "rad/s", "deg", "rad", "db"}
 
-_IN_BRACKETS = re.compile(r"^(.*?)[\s_/]*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]$")
-_BEHIND = re.compile(r"^(.+?)[\s_/]+(rad[_/]s|rad/sec|\S+)$", re.IGNORECASE)
+_PER_SECOND = ("rad_s", "rad/s", "rad/sec")
+_SEPARATORS = " _/"
+_OPENING = "[({<"
+_CLOSING = "])}>"
 
 
 def plain_unit(text: str) -> str:
@@ -54,11 +54,18 @@ def split_unit(name: str) -> tuple[str, str]:
     (('time', 'ms'), ('Zeit', 's'), ('output_1', ''))
     """
     name = name.strip()
-    if match := _IN_BRACKETS.match(name):
-        return match[1].strip() or name, plain_unit(match[2])
-    match = _BEHIND.match(name)
-    if match and plain_unit(match[2]) in _KNOWN:
-        return match[1].strip(), plain_unit(match[2])
+    if name.endswith(tuple(_CLOSING)):
+        opening = max(name.rfind(bracket) for bracket in _OPENING)
+        if opening >= 0:
+            base = name[:opening].rstrip(_SEPARATORS)
+            return base or name, plain_unit(name[opening:])
+    tails = [tail for tail in _PER_SECOND if name.lower().endswith(tail)]
+    start = max(name.rfind(separator) for separator in _SEPARATORS) + 1
+    if tails:
+        start = len(name) - len(tails[0])
+    base = name[:start].rstrip(_SEPARATORS)
+    if base and start and name[start - 1] in _SEPARATORS and plain_unit(name[start:]) in _KNOWN:
+        return base, plain_unit(name[start:])
     return name, ""
 
 

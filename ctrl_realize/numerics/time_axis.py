@@ -13,6 +13,9 @@ Time stamps printed with few digits (0.000073 s steps of 73.24 us) stay well ins
 missed sample is twenty times as large.
 """
 
+EXTREME = 1e100
+"""Stamps beyond this (or steps below its inverse) are no time, and their squares overflow."""
+
 
 def sample_time(time: FloatArray) -> float:
     """Mean step of a time axis, freed of the rounding that a subtraction leaves.
@@ -37,8 +40,13 @@ def axis_fault(time: FloatArray) -> str | None:
     time : ndarray, shape (N,), N >= 2
         Finite time stamps in s.
     """
+    far = int(np.argmax(np.abs(time)))
+    if abs(time[far]) > EXTREME:
+        return f"time is {time[far]:g} s at row {far}"
     steps = np.diff(time)
     typical = float(np.median(steps))
+    if 0 < typical < 1 / EXTREME:
+        return f"time runs in steps of {typical:g} s"
     if typical < 0 and np.all(steps < 0):
         return f"time runs backwards: row 1 is at {time[1]:g} s, row 0 at {time[0]:g} s"
     back = np.flatnonzero(steps <= 0)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..checks import one_of, positive
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
-from ..numerics.time_axis import axis_fault, sample_time
+from ..numerics.time_axis import EXTREME, axis_fault, sample_time
 
 MIN_SAMPLES = 3
 MISSING = ("refuse", "keep")
@@ -102,6 +102,7 @@ class Record:
         _check_finite(stamps, "time")
         for what, values in signals.items():
             _check_finite(values, what, allow_nan=one_of(missing, "missing", MISSING) == "keep")
+            _check_size(values, what)
         fault = axis_fault(stamps)
         if fault is not None:
             raise TimeAxisError(
@@ -227,6 +228,7 @@ class Record:
         if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
             raise DataError(f"time has shape {stamps.shape}; needed is (N,), N >= {MIN_SAMPLES}")
         _check_finite(stamps, "time")
+        _check_size(stamps, "time")
         steps = np.diff(stamps)
         fault = axis_fault(stamps) if np.any(steps <= 0) else None
         if fault is not None:
@@ -340,6 +342,17 @@ def _check_finite(values: FloatArray, what: str, *, allow_nan: bool = False) -> 
         raise DataError(
             f"{what} has {count} non-finite sample{'s' if count > 1 else ''}, "
             f"the first at index {first}"
+        )
+
+
+def _check_size(values: FloatArray, what: str) -> None:
+    """Refuse numbers that no instrument shows and whose squares overflow."""
+    # NaN stands for a missing sample here, and is not larger than anything
+    large = np.abs(values) > EXTREME
+    if large.any():
+        first = int(np.flatnonzero(large.any(axis=0) if values.ndim == 2 else large)[0])
+        raise DataError(
+            f"{what} is beyond {EXTREME:g} at index {first}; is the file damaged, or a unit wrong?"
         )
 
 

@@ -1,0 +1,190 @@
+"""Files that nobody meant well: every one ends in one of our errors, soon and without memory."""
+
+from __future__ import annotations
+
+import os
+import socket
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from ctrl_realize.errors import (
+    CtrlRealizeError,
+    DataError,
+    FileFormatError,
+    MissingFileError,
+    OptionError,
+)
+from ctrl_realize.io import load_model, read_frf, read_record
+
+READERS = [read_record, read_frf, load_model]
+JUNK = np.random.default_rng(7).bytes(100_000)
+
+CONTENT = {
+    "nothing": b"",
+    "a line end": b"\n",
+    "blanks": b" \t \n \n",
+    "one zero": b"\0",
+    "zeros": bytes(100_000),
+    "junk": JUNK,
+    "junk without zeros": JUNK.replace(b"\0", b"x"),
+    "junk behind numbers": b"t,u,y\n0,1,2\n1,2,3\n" + JUNK,
+    "a picture": b"\x89PNG\r\n\x1a\n" + JUNK,
+    "a program": b"\x7fELF\x02\x01\x01" + JUNK,
+    "a web page": b"<!DOCTYPE html><html><body><p>404, not found</p></body></html>\n" * 20,
+    "a pickle": b"\x80\x04\x95" + JUNK,
+    "gzip": b"\x1f\x8b\x08\x00" + JUNK,
+    "HDF5": b"\x89HDF\r\n\x1a\n" + JUNK,
+    "half a mark": b"\xff\xfe\x00",
+    "a mark alone": b"\xff\xfe",
+    "utf-16 with half a character": "t,u,y\n0,1,2\n".encode("utf-16") + b"\x31",
+    "a zip that is none": b"PK\x03\x04" + JUNK,
+    "an npy that is none": b"\x93NUMPY\x01\x00" + JUNK,
+    "a mat that is none": b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + JUNK,
+    "a parquet that is none": b"PAR1" + JUNK + b"PAR1",
+    "words": b"hello world\nthis is not a table\n" * 50,
+    "one long line": b"1" * 1_000_000,
+    "ten million columns": b"," * 10_000_000,
+    "ten million numbers in a line": b"1," * 10_000_000,
+    "twenty thousand columns": (b"1," * 20_000 + b"1\n") * 5,
+    "ten million columns further down": b"t,u,y\n0,1,2\n1,2,3\n2,3,4\n" + b"1," * 10_000_000,
+    "a quote that never ends": b't,u,y\n0,1,2\n1,2,3\n2,"' + b"3" * 1_000_000,
+    "only quotes": b'"' * 100_000,
+    "only delimiters": b",,,,\n" * 1000,
+    "only a header": b"t,u,y\n",
+    "two rows": b"t,u,y\n0,1,2\n1,2,3\n",
+    "one column": b"1\n2\n3\n4\n",
+    "infinities": b"t,u,y\n" + b"inf,inf,inf\n" * 10,
+    "too large for doubles": b"t,u,y\n" + b"1e999,-1e999,1e99999999999\n" * 10,
+    "digits without end": b"t,u,y\n" + (b"9" * 5000 + b",1,2\n") * 5,
+    "the largest doubles": b"t,u,y\n-1.7e308,1,2\n0,1,2\n1.7e308,1,2\n",
+    "time that stands": b"t,u,y\n" + b"1,1,2\n" * 50,
+    "zero bytes in cells": b"t,u,y\n0,1\0,2\n1,2\0,3\n2,2\0,3\n3,3\0,3\n",
+    "form feeds": b"t,u,y\n0\f1\f2\n1\f2\f3\n",
+    "every byte": bytes(range(256)) * 20,
+    "control characters": bytes(range(1, 32)) * 100,
+    "comments alone": b"# 1,2,3\n" * 100,
+    "formulas": b"t,u,y\n" + b"=1+1,@SUM(A1),2\n" * 10,
+    "brackets": b"[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("content", CONTENT.values(), ids=CONTENT.keys())
+@pytest.mark.parametrize("ending", [".csv", ".mat"])
+def test_no_content_leads_to_anything_but_our_errors(tmp_path, content, ending):
+    file = tmp_path / f"a{ending}"
+    file.write_bytes(content)
+    for read in READERS:
+        with pytest.raises(CtrlRealizeError) as caught:
+            read(file)
+        assert str(file) in str(caught.value)
+        # a message is to be read, also when the file is one long line
+        assert len(str(caught.value)) < 2000
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_pipes_devices_sockets_and_folders_are_not_waited_for(tmp_path, read):
+    os.mkfifo(tmp_path / "pipe")
+    with socket.socket(socket.AF_UNIX) as server:
+        # the address of a socket may only be short
+        home = os.getcwd()
+        os.chdir(tmp_path)
+        server.bind("socket")
+        os.chdir(home)
+        for path in (tmp_path / "pipe", tmp_path / "socket", "/dev/zero"):
+            with pytest.raises(FileFormatError, match="device or a pipe"):
+                read(path)
+    with pytest.raises(FileFormatError, match="is a folder"):
+        read(tmp_path)
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("path", ["", "no/such/file", "a\0b", "x" * 5000, "a.csv/b.csv"])
+def test_paths_that_lead_nowhere_are_missing_files(tmp_path, monkeypatch, read, path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("1,2,3\n")
+    error = FileFormatError if path == "" else MissingFileError
+    with pytest.raises(error):
+        read(path)
+
+
+def test_links_in_a_circle_are_missing_files(tmp_path):
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises(MissingFileError):
+        read_record(tmp_path / "a")
+
+
+def test_a_file_without_permission_says_so(tmp_path, monkeypatch):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y\n0,1,2\n")
+    # root may read everything, so the answer of the system is put in by hand
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(MissingFileError, match="no permission"):
+        read_record(file)
+
+
+def test_a_huge_file_is_refused_by_its_size_alone(tmp_path):
+    file = tmp_path / "a.csv"
+    with file.open("wb") as sparse:
+        sparse.write(b"t,u,y\n0,1,2\n")
+        sparse.truncate(3 * 2**30)
+    with pytest.raises(FileFormatError, match=r"is 3072 MiB, max_bytes=2147483648 allows 2048 MiB"):
+        read_record(file)
+    with pytest.raises(FileFormatError, match="max_bytes"):
+        load_model(file)
+
+
+def test_a_line_of_ten_million_columns_is_not_split(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_bytes(b"1," * 10_000_000)
+    tracemalloc.start()
+    try:
+        with pytest.raises(FileFormatError, match=r"first line .* longer than 262144 bytes"):
+            read_record(file)
+        # a few copies of the head of the file
+        assert tracemalloc.get_traced_memory()[1] < 20 * 2**20
+    finally:
+        tracemalloc.stop()
+
+
+def test_names_in_a_file_are_only_names(tmp_path):
+    file = tmp_path / "a.csv"
+    script = "<script>alert(1)</script>"
+    file.write_text(f"t,u {script},y; rm -rf /\n0,1,2\n1,2,3\n2,3,4\n")
+    record = read_record(file, time=0, input=1, output=2)
+    assert record.input_labels == (f"u {script}",)
+
+
+def test_line_ends_in_quotes_do_not_shift_columns(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text('t,u,y,note\n0,1,2,"a\nb"\n1,2,3,"c"\n2,3,4,"d,e"\n')
+    assert read_record(file).input.tolist() == [1, 2, 3]
+
+
+def test_answers_do_not_depend_on_how_the_file_came(tmp_path):
+    whole = "t,u,y\n" + "".join(f"{k / 8},{k},{2 * k}\n" for k in range(20_000))
+    (tmp_path / "a.csv").write_text(whole)
+    (tmp_path / "b.csv").write_text(whole.replace("\n", "\r\n"))
+    (tmp_path / "c.csv").write_bytes(whole.encode("utf-16"))
+    records = [read_record(tmp_path / name) for name in ("a.csv", "b.csv", "c.csv")]
+    for record in records[1:]:
+        np.testing.assert_array_equal(record.output, records[0].output)
+
+
+def test_a_bad_cell_far_down_is_found(tmp_path):
+    file = tmp_path / "a.csv"
+    rows = [f"{k},{k},{k}" for k in range(50_000)]
+    rows[49_000] = "49000,49000,oops"
+    file.write_text("t,u,y\n" + "\n".join(rows) + "\n")
+    with pytest.raises(DataError, match="line 49002: 'oops'"):
+        read_record(file)
+
+
+def test_a_table_of_thousands_of_columns_is_listed_shortly(tmp_path):
+    file = tmp_path / "a.csv"
+    names = ",".join(f"channel{k}" for k in range(5000))
+    file.write_text(names + "\n" + (",".join("1" * 5000) + "\n") * 5)
+    with pytest.raises(OptionError, match=r"\(5000 in all\)"):
+        read_record(file)
