@@ -94,13 +94,18 @@ def leading_triplets(
         found = _arpack(H, count)
         rest = found[0][:, :0], np.zeros(0), found[2][:, :0]
     U, values, V = found
-    return Triplets(U, np.ldexp(values, exponent), V, np.ldexp(rest[1], exponent), False)
+    leading = np.ldexp(_without_rounding(values, shorter), exponent)
+    return Triplets(U, leading, V, np.ldexp(rest[1], exponent), False)
+
+
+def _without_rounding(values: FloatArray, size: int) -> FloatArray:
+    """Set singular values beyond the numerical rank to zero."""
+    return np.where(values > size * np.finfo(float).eps * values[0], values, 0.0)
 
 
 def _dense(h: FloatArray, rows: int, columns: int, count: int) -> Triplets:
     U, values, Vt = np.linalg.svd(hankel_matrix(h, rows, columns), full_matrices=False)
-    known = values > values.size * np.finfo(float).eps * values[0]
-    leading = np.where(known, values, 0.0)[:count]
+    leading = _without_rounding(values, values.size)[:count]
     return Triplets(U[:, :count], leading, Vt[:count].T, values[count:], True)
 
 
@@ -161,25 +166,27 @@ def _golub_kahan(H: BlockHankel, count: int, tol: float, locked: Triple | None) 
             V[at + 1] = v / (1.0 if exhausted else above[j])
         if not exhausted and (j + 1 < min(count + 2, steps) or (j + 1) % 4):
             continue
-        # An exhausted space has no row for a u that vanished.
-        used = j if diagonal[j] <= FLOOR * scale else j + 1
-        if used == 0:
+        # Where u has vanished, B has one column more than rows.
+        rows, columns = (j, j + 1) if diagonal[j] <= FLOOR * scale else (j + 1, j + 1)
+        if rows == 0:
             return np.zeros((height, count)), np.zeros(count), np.zeros((width, count))
-        B = np.diag(diagonal[:used]) + np.diag(above[: used - 1], 1)
-        left, values, right = np.linalg.svd(B)
-        residuals = above[j] * np.abs(left[used - 1, :count]) if not exhausted else np.zeros(1)
+        B = np.zeros((rows, columns))
+        np.fill_diagonal(B, diagonal[:rows])
+        np.fill_diagonal(B[:, 1:], above[:rows])
+        left, values, right = np.linalg.svd(B, full_matrices=False)
+        residuals = above[j] * np.abs(left[-1, :count]) if not exhausted else np.zeros(1)
         if residuals.max() <= max(tol * values[:count][-1], FLOOR * scale):
-            wanted = min(count, used)
-            triple = (
-                np.zeros((height, count)),
-                np.zeros(count),
-                np.zeros((width, count)),
+            return (
+                _columns(U[known : known + rows].T @ left[:, :count], count),
+                np.pad(values[:count], (0, max(0, count - rows))),
+                _columns(V[known : known + columns].T @ right[:count].T, count),
             )
-            triple[0][:, :wanted] = U[known : known + used].T @ left[:, :wanted]
-            triple[1][:wanted] = values[:wanted]
-            triple[2][:, :wanted] = V[known : known + used].T @ right[:wanted].T
-            return triple
     return None
+
+
+def _columns(vectors: FloatArray, count: int) -> FloatArray:
+    """Add zero columns up to the wanted count."""
+    return np.pad(vectors, ((0, 0), (0, count - vectors.shape[1])))
 
 
 def _unit(vector: FloatArray, known: FloatArray) -> FloatArray:
