@@ -11,11 +11,13 @@ started does not enter.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .arrays import FloatArray
+from .arrays import FloatArray, IntArray
 from .hankel import fft_length
 
 CHUNK = 4096
@@ -46,7 +48,7 @@ class NormalEquations:
             self.freedom + other.freedom,
         )
 
-    def take(self, columns: FloatArray | list[int]) -> NormalEquations:
+    def take(self, columns: Sequence[int]) -> NormalEquations:
         """Keep some of the regressors."""
         index = np.asarray(columns, dtype=np.int64)
         return NormalEquations(
@@ -54,7 +56,7 @@ class NormalEquations:
         )
 
 
-def complete_rows(signals: FloatArray, targets: FloatArray, lags: int) -> FloatArray:
+def complete_rows(signals: FloatArray, targets: FloatArray, lags: int) -> NDArray[np.bool_]:
     """Mark the rows lags-1 ... N-1 whose target and whole past are numbers, shape (N-lags+1,)."""
     gaps = np.concatenate([[0], np.cumsum(~np.isfinite(signals).all(axis=0))])
     whole = gaps[lags:] == gaps[:-lags]
@@ -84,7 +86,9 @@ def normal_equations(
     """
     keep = complete_rows(signals, targets, lags)
     # Means are taken out first: sums of large offsets would drown what is looked for.
-    z, y = (_centred(signals), _centred(targets)) if offset else (_zeroed(signals), _zeroed(targets))
+    z, y = (
+        (_centred(signals), _centred(targets)) if offset else (_zeroed(signals), _zeroed(targets))
+    )
     gram, sums = _gram(z, lags)
     cross = _correlation(y[:, lags - 1 :], z, lags).reshape(y.shape[0], -1).T
     tail = y[:, lags - 1 :]
@@ -123,7 +127,7 @@ def _zeroed(signals: FloatArray) -> FloatArray:
     return np.where(np.isfinite(signals), signals, 0.0)
 
 
-def _rows(z: FloatArray, lags: int, index: FloatArray) -> FloatArray:
+def _rows(z: FloatArray, lags: int, index: IntArray) -> FloatArray:
     windows = np.lib.stride_tricks.sliding_window_view(z, lags, axis=1)[:, index, ::-1]
     return windows.transpose(1, 0, 2).reshape(index.size, -1)
 
@@ -131,9 +135,7 @@ def _rows(z: FloatArray, lags: int, index: FloatArray) -> FloatArray:
 def _correlation(late: FloatArray, z: FloatArray, lags: int) -> FloatArray:
     """Sum ``late[a, k] z[b, k + lags - 1 - i]`` over k; shape (rows of late, s, lags)."""
     points = fft_length(z.shape[1])
-    product = (
-        np.conj(np.fft.rfft(late, n=points))[:, None] * np.fft.rfft(z, n=points)[None]
-    )
+    product = np.conj(np.fft.rfft(late, n=points))[:, None] * np.fft.rfft(z, n=points)[None]
     out: FloatArray = np.fft.irfft(product, n=points)[:, :, :lags][:, :, ::-1]
     return out
 

@@ -1,0 +1,267 @@
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, DataWarning, OptionError
+
+DT = 0.1
+PLANT = cr.DelayedStateSpace(
+    ct.ss([[0.8, 0.1], [0.0, 0.6]], [[0.0], [1.0]], [[0.5, 0.1]], [[0.0]], DT), 5
+)
+MIMO = cr.DelayedStateSpace(
+    ct.ss(
+        [[0.8, 0.0], [0.0, 0.5]],
+        [[1.0, 0.3], [0.2, 1.0]],
+        [[0.5, 0.2], [0.1, 0.6], [0.3, 0.3]],
+        np.zeros((3, 2)),
+        DT,
+    ),
+    (2, 4),
+)
+METHODS = [
+    {"method": "regularized", "kernel": "TC"},
+    {"method": "regularized", "kernel": "DC"},
+    {"method": "regularized", "kernel": "SS"},
+    {"method": "least_squares"},
+    {"method": "okid"},
+]
+
+
+def record(n=600, noise=0.05, seed=0, plant=PLANT, u0=0.0, y0=0.0, **options):
+    rng = np.random.default_rng(seed)
+    u = rng.choice([-1.0, 1.0], (n,) if plant.issiso() else (plant.ninputs, n))
+    y = plant.simulate(u)
+    y = y + noise * rng.standard_normal(y.shape)
+    return cr.Record(DT * np.arange(n), u + u0, y + y0, **options)
+
+
+@pytest.mark.parametrize("options", METHODS)
+def test_the_true_response_lies_in_the_band_of_the_estimate(options):
+    truth = PLANT.markov(50)
+    z = np.concatenate(
+        [
+            (g.markov - truth)[:30] / g.std[:30]
+            for g in (cr.impulse_from_io(record(seed=s), 50, **options) for s in range(8))
+        ]
+    )
+    # 240 values: white errors would give 1 -+ 0.05; neighbours are correlated, and a prior that
+    # is not the truth's moves the estimate within its band
+    assert 0.5 < np.sqrt(np.mean(z**2)) < 1.35
+    assert np.mean(np.abs(z) < 3) > 0.97
+
+
+def test_std_of_least_squares_is_the_cramer_rao_bound():
+    estimates = [
+        cr.impulse_from_io(record(n=300, seed=s), 30, method="least_squares") for s in range(150)
+    ]
+    scatter = np.std([g.markov for g in estimates], axis=0)
+    bound = np.mean([g.std for g in estimates], axis=0)
+    # 30 scatters of 150 draws each: 6 % per sigma, 3.5 sigma
+    assert_allclose(scatter / bound, 1.0, rtol=0, atol=0.2)
+    assert_allclose(np.mean(scatter / bound), 1.0, rtol=0, atol=0.03)
+
+
+def test_a_prior_of_decay_beats_least_squares():
+    truth = PLANT.markov(60)
+
+    def error(**options):
+        return np.mean(
+            [
+                np.sum(
+                    (cr.impulse_from_io(record(n=300, seed=s), 60, **options).markov - truth) ** 2
+                )
+                for s in range(10)
+            ]
+        )
+
+    free = error(method="least_squares")
+    assert error(kernel="TC") < free / 2
+    assert error(kernel="DC") < free / 2
+    assert error(kernel="SS") < free / 2
+
+
+@pytest.mark.parametrize("options", METHODS)
+def test_offsets_of_input_and_output_change_nothing(options):
+    plain = cr.impulse_from_io(record(), 40, **options)
+    moved = cr.impulse_from_io(record(u0=300.0, y0=-7000.0), 40, **options)
+    # 7000 in 16 digits
+    assert_allclose(moved.markov, plain.markov, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("options", METHODS)
+def test_other_units_scale_the_response_and_its_std(options):
+    one = record()
+    other = cr.Record(one.time, 10 * one.input, 1e-4 * one.output)
+    plain, scaled = (cr.impulse_from_io(r, 40, **options) for r in (one, other))
+    # the search for hyper-parameters ends within its tolerance, not at the same digits
+    assert_allclose(1e5 * scaled.markov, plain.markov, rtol=0, atol=0.02 * plain.std.max())
+    assert_allclose(1e5 * scaled.std, plain.std, rtol=0.05, atol=1e-3 * plain.std.max())
+    assert_allclose(1e4 * scaled.noise_std, plain.noise_std, rtol=0.01)
+
+
+def test_shifting_the_output_shifts_the_response():
+    one = record(noise=0.0)
+    late = cr.Record(one.time[7:], one.input[7:], one.output[:-7])
+    g, shifted = (cr.impulse_from_io(r, 120, method="least_squares") for r in (one, late))
+    # the response has decayed to 0.8^108 = 3e-11 at the end of the window
+    assert_allclose(shifted.markov[7:], g.markov[:-7], rtol=0, atol=1e-9)
+
+
+def test_exact_data_give_the_exact_response():
+    g = cr.impulse_from_io(record(noise=0.0, n=800), 120, method="least_squares")
+    # the response has decayed to 0.8^115 = 7e-12 at the end of the window
+    assert_allclose(g.markov, PLANT.markov(120), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("options", METHODS)
+def test_three_outputs_and_two_inputs_are_estimated_together(options):
+    g = cr.impulse_from_io(record(plant=MIMO, n=900), 40, **options)
+    assert g.markov.shape == g.std.shape == (3, 2, 40)
+    # 240 numbers: five sigma leaves room for the prior
+    assert np.all(np.abs(g.markov - MIMO.markov(40)) < 5 * g.std + 0.01)
+
+
+def test_several_records_tell_as_much_as_one_long_one():
+    parts = [record(n=300, seed=s, y0=10.0 * s) for s in range(4)]
+    joined = cr.impulse_from_io(parts, 40, method="least_squares")
+    single = cr.impulse_from_io(parts[0], 40, method="least_squares")
+    assert joined.rows == 4 * single.rows
+    assert_allclose(joined.std, single.std / 2, rtol=0.15)  # excitation differs a little
+    assert np.all(np.abs(joined.markov - PLANT.markov(40)) < 4.5 * joined.std)
+
+
+def test_missing_samples_take_out_the_equations_that_they_touch():
+    whole = record()
+    y = whole.output.copy()
+    y[[100, 250, 251]] = np.nan
+    u = whole.input.copy()
+    u[400] = np.nan
+    holes = cr.Record(whole.time, u, y, missing="keep")
+    g = cr.impulse_from_io(holes, 40, method="least_squares")
+    # rows 39...599, less 3 outputs, less the 40 rows that see u[400]
+    assert g.rows == 561 - 3 - 40
+    assert np.all(np.abs(g.markov - PLANT.markov(40)) < 4.5 * g.std)
+
+
+def test_a_record_with_missing_samples_is_refused_unless_asked_for():
+    y = np.r_[0.0, np.nan, 1.0, 2.0]
+    with pytest.raises(DataError, match="1 non-finite"):
+        cr.Record(np.arange(4.0), np.ones(4), y)
+    kept = cr.Record(np.arange(4.0), np.ones(4), y, missing="keep")
+    assert kept.n_missing == 1
+    assert pickle.loads(pickle.dumps(kept)).n_missing == 1
+    with pytest.raises(DataError, match="non-finite"):
+        cr.Record(np.arange(4.0), np.ones(4), np.r_[0.0, np.inf, 1.0, 2.0], missing="keep")
+
+
+def test_a_start_at_rest_uses_every_sample():
+    n = 60
+    u = np.zeros(n)
+    u[5:] = np.random.default_rng(0).normal(size=n - 5)
+    y = PLANT.simulate(u)
+    one = cr.Record(DT * np.arange(n), u + 3.0, y + 8.0)
+    with pytest.raises(DataError, match="start='rest'"):
+        cr.impulse_from_io(one, 40, method="least_squares")
+    g = cr.impulse_from_io(one, 40, method="least_squares", start="rest")
+    assert g.rows == n
+    # what lies beyond the window, 0.8^35 = 4e-4 of the response, ends up in the estimate
+    assert_allclose(g.markov, PLANT.markov(40), rtol=0, atol=5e-3)
+
+
+@pytest.mark.parametrize("options", METHODS)
+@pytest.mark.parametrize(
+    ("name", "u"),
+    [
+        ("constant", np.full(400, 2.0)),
+        ("sine", np.sin(0.2 * np.arange(400))),
+    ],
+)
+def test_an_input_that_does_not_excite_gets_no_answer(options, name, u):
+    rng = np.random.default_rng(0)
+    y = PLANT.simulate(u) + 0.1 * rng.standard_normal(400)
+    with pytest.raises(DataError, match="does not excite"):
+        cr.impulse_from_io(cr.Record(DT * np.arange(400), u, y), 30, **options)
+
+
+def test_a_prior_that_fills_in_says_so():
+    k = np.arange(400)
+    u = sum(np.sin(w * k + w**2) for w in (0.1, 0.35, 0.8, 1.3, 2.2))
+    y = PLANT.simulate(u) + 0.01 * np.random.default_rng(0).standard_normal(400)
+    one = cr.Record(DT * k, u, y)
+    with pytest.raises(DataError, match="does not excite 20 of the 30"):
+        cr.impulse_from_io(one, 30, method="least_squares")
+    with pytest.warns(DataWarning, match="excites 10 of 30"):
+        g = cr.impulse_from_io(one, 30)
+    assert [flag.code for flag in g.flags] == ["partly_excited"]
+
+
+@pytest.mark.parametrize("options", METHODS)
+def test_an_output_that_does_not_follow_is_flagged(options):
+    flagged = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        one = cr.Record(DT * np.arange(500), rng.normal(size=500), rng.normal(size=500))
+        g = cr.impulse_from_io(one, 30, **options)
+        flagged += "no_response" in [flag.code for flag in g.flags]
+    assert flagged >= 18  # a test at 1 %, with room for two alarms
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "match"),
+    [
+        ({"length": 1}, OptionError, "length"),
+        ({"length": 700}, DataError, "complete past"),
+        ({"method": "magic"}, OptionError, "'okid'"),
+        ({"kernel": "RBF"}, OptionError, "'SS'"),
+        ({"start": "0"}, OptionError, "'rest'"),
+        ({"arx_order": 4}, OptionError, "okid"),
+        ({"method": "okid", "arx_order": 400}, DataError, "complete past"),
+    ],
+)
+def test_unusable_choices_are_refused(change, error, match):
+    with pytest.raises(error, match=match):
+        cr.impulse_from_io(record(), **{"length": 40, **change})
+
+
+def test_records_that_do_not_belong_together_are_refused():
+    one = record()
+    slow = cr.Record(2 * one.time, one.input, one.output)
+    with pytest.raises(DataError, match=r"sample time 0\.2 s"):
+        cr.impulse_from_io([one, slow], 20)
+    with pytest.raises(DataError, match="2 inputs and 3 outputs"):
+        cr.impulse_from_io([one, record(plant=MIMO)], 20)
+    with pytest.raises(DataError, match="no Record"):
+        cr.impulse_from_io([], 20)
+    flat = cr.Record(one.time, one.input, np.full(600, 3.0))
+    with pytest.raises(DataError, match="constant"):
+        cr.impulse_from_io(flat, 20)
+
+
+def test_the_estimate_is_an_impulse_response_that_pickles_and_reports():
+    g = cr.impulse_from_io(record(), 40)
+    again = pickle.loads(pickle.dumps(g))
+    assert isinstance(g, cr.ImpulseResponse)
+    assert_allclose(again.std, g.std, rtol=0)
+    assert "TC kernel" in g.report()
+    assert repr(g) == "<ImpulseEstimate: 40 samples of 0.1 s>"
+    with pytest.raises(ValueError, match="read-only"):
+        g.std[0] = 1.0
+
+
+@pytest.mark.parametrize("options", METHODS)
+@pytest.mark.parametrize(
+    ("plant", "length", "delay"),
+    [("hairdryer", 60, 3), ("gas_furnace", 40, 3), ("exchanger", 250, 0)],
+)
+def test_measured_plants_have_the_delay_that_their_authors_state(
+    shared_data, options, plant, length, delay
+):
+    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
+    g = cr.impulse_from_io(cr.Record(*table.T), length, **options)
+    assert cr.estimate_delay(g, 2, max_delay=15).delay == delay
