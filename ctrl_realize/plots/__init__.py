@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 
 from ..errors import OptionError
+from .campaigns import campaign_plot as campaign_plot
 from .frequencies import comparison_plot as comparison_plot
 from .frequencies import frf_plot as frf_plot
 from .impulses import impulse_plot as impulse_plot
@@ -19,6 +20,7 @@ from .scans import order_plot as order_plot
 from .scans import singular_value_plot as singular_value_plot
 
 _DRAWN_BY = {
+    "Campaign": "campaigns:campaign_plot",
     "DelayScan": "scans:delay_plot",
     "FRFComparison": "frequencies:comparison_plot",
     "ImpulseResponse": "impulses:impulse_plot",

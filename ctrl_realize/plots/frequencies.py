@@ -275,11 +275,15 @@ def _draw(axes: Axes, curve: _Curve, values: FloatArray, looks: dict[str, Any]) 
         {"marker": "o", "markersize": 4} if curve.measured and values.size <= 60 else {}
     )
     if bool(curve.good.all()):
-        return list(axes.plot(curve.frequency_hz, values, label=curve.label, **looks, **dots))
+        return list(
+            axes.plot(curve.frequency_hz, values, label=style.plain(curve.label), **looks, **dots)
+        )
     pale = {**looks, "alpha": 0.35, "linewidth": 0.8}
     axes.plot(curve.frequency_hz, values, **pale)
     good = np.where(curve.good, values, np.nan)
-    return list(axes.plot(curve.frequency_hz, good, label=curve.label, **looks, **dots))
+    return list(
+        axes.plot(curve.frequency_hz, good, label=style.plain(curve.label), **looks, **dots)
+    )
 
 
 def _focus(axes: Axes, drawn: Sequence[tuple[_Curve, FloatArray]]) -> None:

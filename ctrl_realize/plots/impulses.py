@@ -111,7 +111,7 @@ def _model(
             markov / model.dt,
             color=style.model_colour(number),
             linestyle=style.DASHES[number % len(style.DASHES)],
-            label="model" if models == 1 else model.name,
+            label="model" if models == 1 else style.plain(model.name),
         )
     )
 

@@ -177,7 +177,7 @@ def _signals(
         looks = {
             "color": style.OTHERS[(index - 1) % len(style.OTHERS)],
             "linewidth": 1.5,
-            "label": _plain(label),
+            "label": style.plain(label),
             **first,
             **(kwargs if len(rows) == 1 else {k: v for k, v in kwargs.items() if k != "color"}),
         }
@@ -245,13 +245,8 @@ def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
     return float(min(max(3 * wait, 1.3 * rise, 12 * step.dt), step.time[-1]))
 
 
-def _plain(label: str) -> str:
-    """Keep matplotlib from reading a leading underscore or a dollar sign as an instruction."""
-    return label.replace("$", r"\$").lstrip("_") or "signal"
-
-
 def _axis_label(labels: Sequence[str], kind: str, width: int = 26) -> str:
     if len(labels) > 1:
         return f"{kind}s"
     default = {"output": "y", "input": "u"}[kind]
-    return kind if labels[0] == default else "\n".join(wrap(_plain(labels[0]), width)[:3])
+    return kind if labels[0] == default else "\n".join(wrap(style.plain(labels[0]), width)[:3])

@@ -66,6 +66,24 @@ AxesLike = Any
 """None, Axes, a sequence of Axes, or a Figure to make them in."""
 
 
+def plain(text: str, longest: int = 80) -> str:
+    r"""Make a name that came with the data safe to draw.
+
+    Dollar signs and a leading underscore are instructions to matplotlib; control characters
+    have no glyph.
+
+    Examples
+    --------
+    >>> from ctrl_realize.plots.style import plain
+    >>> print(plain("_price in $\n"))
+    price in \$?
+    """
+    shown = "".join(letter if letter.isprintable() else "?" for letter in text.lstrip("_"))
+    if len(shown) > longest:
+        shown = shown[: longest - 1] + "…"
+    return shown.replace("$", r"\$") or "signal"
+
+
 def model_colour(number: int) -> str:
     """Return the colour of the model with this number, the first being 0."""
     return ((MODEL, *OTHERS))[number % (1 + len(OTHERS))]
@@ -143,7 +161,7 @@ def finished(
         if labelled:
             axes[position].legend(loc=loc)
     if title and own_figure:
-        axes[0].set_title(title, loc="left")
+        axes[0].set_title(plain(title), loc="left")
     shape = (len(axes) // columns, columns)
     line_array = np.empty(len(axes), dtype=object)
     legend_array = np.empty(len(axes), dtype=object)

@@ -1,0 +1,132 @@
+"""The delays of many records in one picture."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ..errors import DataError
+from ..identification.campaign import Campaign, CampaignRow
+from . import style
+
+_MOST_NAMES = 24
+_MOST_GROUPS = 8
+
+
+def campaign_plot(
+    campaign: Campaign,
+    *,
+    trim: int | None = None,
+    truth: float | None = None,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the delay of every record with its interval, and their trimmed mean (Table 1).
+
+    Records are grouped by the height of their step where several share one; few or all different
+    ones are listed by name.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    trim : int, optional
+        Values left out at each end of the mean, see `Campaign.statistics`.
+    truth : float, optional
+        Known delay in samples, of a simulation.
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the points.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Raises
+    ------
+    DataError
+        No record was identified, or their sample times differ.
+    """
+    dt = campaign.dt
+    summary = campaign.statistics(trim)
+    groups = _groups(campaign)
+    looks = {"color": style.MEASURED, "marker": "o", "linestyle": "none", **kwargs}
+    with style.context():
+        listed = groups is None
+        tall = 0.34 * len(campaign.good) + 1.8
+        axes = style.axes_for(ax, size=(8.0, max(tall, 3.2) if listed else 4.8))[0]
+        if groups is None:
+            lines = _by_name(axes, campaign.good, dt, looks)
+        else:
+            lines = _by_amplitude(axes, groups, dt, looks)
+        along = axes.axvline if listed else axes.axhline
+        band = axes.axvspan if listed else axes.axhspan
+        if np.isfinite(summary.std_error):
+            band(*summary.interval, color=style.BAND, alpha=0.25, linewidth=0)
+        along(
+            summary.mean,
+            color=style.MODEL,
+            label=f"trimmed mean {summary.mean:.2f} = {style.in_time(summary.mean * dt)}",
+        )
+        if truth is not None:
+            along(truth, color=style.TRUTH, linestyle=":", label=f"truth {truth:.4g} (simulated)")
+        name = f"{len(campaign.good)} records, method {campaign.method}"
+        _legend_outside(axes)
+        return style.finished(
+            [axes], [lines], title=name if title is None else title, own_figure=ax is None,
+            legends=(),
+        )  # fmt: skip
+
+
+def _groups(campaign: Campaign) -> dict[float, list[CampaignRow]] | None:
+    """Group by step height; None where that shows less than the names do."""
+    if not campaign.good:
+        raise DataError("no record of the campaign was identified; there is nothing to draw")
+    groups: dict[float, list[CampaignRow]] = {}
+    for row in campaign.good:
+        groups.setdefault(float(f"{row.amplitude:.2g}"), []).append(row)
+    shared = len(groups) <= _MOST_GROUPS and len(campaign.good) >= 2 * len(groups)
+    if len(campaign.good) > _MOST_NAMES or (shared and len(campaign.good) > 12):
+        return dict(sorted(groups.items(), key=lambda item: abs(item[0]))[:_MOST_GROUPS])
+    return None
+
+
+def _by_amplitude(
+    axes: Axes, groups: dict[float, list[CampaignRow]], dt: float, looks: dict[str, Any]
+) -> list[Line2D]:
+    lines: list[Line2D] = []
+    for position, rows in enumerate(groups.values()):
+        spread = 0.6 * (np.arange(len(rows)) / max(len(rows) - 1, 1) - 0.5)
+        at = position + (spread if len(rows) > 1 else np.zeros(1))
+        for x, row in zip(at, rows, strict=True):
+            low, high = (bound / dt for bound in row.interval)
+            axes.plot([x, x], [low, high], color=looks["color"], linewidth=1.2, alpha=0.45)
+        lines += axes.plot(at, [row.delay for row in rows], **looks)
+    axes.set_xticks(range(len(groups)), [f"{height:g}" for height in groups])
+    axes.set_xlabel("height of the step [unit of the input]")
+    axes.set_ylabel("delay [samples]")
+    return lines
+
+
+def _by_name(
+    axes: Axes, rows: tuple[CampaignRow, ...], dt: float, looks: dict[str, Any]
+) -> list[Line2D]:
+    for position, row in enumerate(rows):
+        low, high = (bound / dt for bound in row.interval)
+        axes.plot(
+            [low, high], [position, position], color=looks["color"], linewidth=1.6, alpha=0.45
+        )
+    names = [style.plain(row.name, 34) for row in rows]
+    axes.set_yticks(range(len(rows)), names, fontsize=10)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_xlabel("delay [samples]")
+    return list(axes.plot([row.delay for row in rows], range(len(rows)), **looks))
+
+
+def _legend_outside(axes: Axes) -> None:
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)

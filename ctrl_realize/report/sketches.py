@@ -1,0 +1,236 @@
+"""The figures that go with a result, each with its words; for pages and for files."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from .. import plots
+from ..delayed import DelayedStateSpace
+from ..errors import DataError, NoStepError
+from ..frequency.comparison import FRFComparison
+from ..identification.campaign import Campaign
+from ..identification.steps import unit_step
+from ..io.atomic import replaced_when_complete
+from ..signals import Record, StepResponse
+from .page import PageFigure
+from .svg import drawn
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """A figure that can be drawn at any time.
+
+    Attributes
+    ----------
+    key : str
+        Short name, also that of its file.
+    title, caption : str
+    draw : callable
+        Draws into a matplotlib Figure.
+    size : tuple of float
+        In inches.
+    """
+
+    key: str
+    title: str
+    caption: str
+    draw: Callable[[Figure], Any]
+    size: tuple[float, float] = (6.2, 4.0)
+
+    def on_page(self) -> PageFigure:
+        """Draw it for a page."""
+        description = f"{self.title}. {self.caption}"
+        key = self.key.replace("_", "-")
+        return PageFigure(
+            key, self.title, self.caption, Markup(drawn(self.draw, key, self.size, description))
+        )
+
+    def save(self, path: str | os.PathLike[str], *, dpi: float = 150) -> None:
+        """Draw it to a file, whole or not at all; the ending tells the format."""
+        kind = os.path.splitext(path)[1].lstrip(".").lower() or "png"
+        figure = Figure(figsize=self.size, layout="constrained")
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message=r"Glyph .* missing", category=UserWarning)
+            self.draw(figure)
+            with replaced_when_complete(path) as temporary:
+                figure.savefig(temporary, format=kind, dpi=dpi, facecolor="white")
+
+
+def identification_sketches(
+    system: DelayedStateSpace,
+    record: Record,
+    *,
+    frf: ct.FrequencyResponseData | None = None,
+    comparison: FRFComparison | None = None,
+) -> list[Sketch]:
+    """List the figures of one identification, the most telling first."""
+    step = _step_of(record)
+    sketches = []
+    if step is not None:
+        sketches.append(
+            Sketch(
+                "onset",
+                "The first moments after the step",
+                "Dead time of the model (line) and its interval (band).",
+                lambda figure: plots.onset_plot(step, system, ax=figure),
+            )
+        )
+    sketches += fit_sketches(system, step)
+    sketches.append(
+        Sketch(
+            "record",
+            "The record",
+            "As it was measured: output above, input below.",
+            lambda figure: plots.record_plot(record, ax=figure),
+        )
+    )
+    return sketches + frf_sketches([system], frf, comparison)
+
+
+def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[Sketch]:
+    """List the figures of how a model was found."""
+    fit = system.fit
+    kind = type(fit).__name__
+    sketches = []
+    if kind == "DelayFit":
+        sketches.append(
+            Sketch(
+                "fit",
+                "Data, model and what is left",
+                "The residual should look like noise.",
+                lambda figure: plots.draw(fit, ax=figure),
+                (6.2, 5.0),
+            )
+        )
+    elif step is not None:
+        sketches.append(
+            Sketch(
+                "step",
+                "Response to a unit step",
+                "Measured, and the model's on top.",
+                lambda figure: plots.step_plot(step, system, ax=figure),
+            )
+        )
+    if kind == "DelayScan":
+        sketches += [
+            Sketch(
+                "delay",
+                "Misfit against the delay",
+                "One model for every delay; a flat valley means a delay that the data do not fix.",
+                lambda figure: plots.delay_plot(fit, ax=figure),
+            ),
+            Sketch(
+                "impulse",
+                "Impulse response",
+                "Differentiated data, and the realization.",
+                lambda figure: plots.impulse_plot(fit.impulse, system, ax=figure),
+            ),
+        ]
+    if kind in ("DelayScan", "Realization"):
+        sketches.append(
+            Sketch(
+                "singular_values",
+                "Singular values of the Hankel matrix",
+                "What stands above the noise can be modelled.",
+                lambda figure: plots.singular_value_plot(fit, ax=figure),
+            )
+        )
+    return sketches
+
+
+def frf_sketches(
+    systems: list[Any],
+    frf: ct.FrequencyResponseData | None,
+    comparison: FRFComparison | None = None,
+    caption: str = "Measured, and the model on top. It was not used to find the model.",
+) -> list[Sketch]:
+    """List the figures in frequency: the models alone, or beside a measurement."""
+    if frf is None:
+        return [
+            Sketch(
+                "frf",
+                "Frequency response of the model",
+                "Up to half the sample rate, dead time included.",
+                lambda figure: plots.frf_plot(systems, ax=figure),
+                (6.2, 4.8),
+            )
+        ]
+    tall = 5.4 if getattr(frf, "coherence", None) is not None else 4.8
+    sketches = [
+        Sketch(
+            "frf",
+            "Frequency response",
+            caption,
+            lambda figure: plots.frf_plot([frf, *systems], ax=figure),
+            (6.2, tall),
+        )
+    ]
+    if comparison is not None:
+        sketches.append(
+            Sketch(
+                "frf_error",
+                "Error of the model in frequency",
+                "Model against measurement; the band that can be trusted is shaded.",
+                lambda figure: plots.comparison_plot(comparison, ax=figure),
+                (6.2, 4.6),
+            )
+        )
+    return sketches
+
+
+def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list[Sketch]:
+    """List the figures of a campaign, the final model's and the best record's among them."""
+    count = len(campaign.good)
+    tall = min(max(0.27 * count + 1.6, 3.4), 8.0) if count <= 24 else 4.2
+    sketches = [
+        Sketch(
+            "delays",
+            "Delay of every record",
+            "Points: estimates; bars: their intervals; band: 95 % interval of the trimmed mean.",
+            lambda figure: plots.campaign_plot(campaign, truth=truth, ax=figure),
+            (6.2, tall),
+        )
+    ]
+    system = campaign.system
+    steps = [step for step in map(_step_of_row, campaign.good) if step is not None]
+    if steps:
+        sketches += [
+            Sketch(
+                "onset",
+                "The first moments after the step, all records",
+                "Dead time of the final model (line) and its interval (band).",
+                lambda figure: plots.onset_plot(steps, system, ax=figure),
+            ),
+            Sketch(
+                "step",
+                "Responses to a unit step, all records",
+                "Each divided by its own step; the final model on top.",
+                lambda figure: plots.step_plot(steps, system, ax=figure),
+            ),
+        ]
+    sketches += [one for one in fit_sketches(system, None) if one.key != "impulse"]
+    return sketches
+
+
+def _step_of(record: Record) -> StepResponse | None:
+    try:
+        return unit_step(record)
+    except (NoStepError, DataError):
+        return None
+
+
+def _step_of_row(row: Any) -> StepResponse | None:
+    fit = row.system.fit
+    records = getattr(fit, "records", None)
+    if records:
+        return _step_of(records[0])
+    step = getattr(getattr(fit, "impulse", None), "step", None)
+    return step if isinstance(step, StepResponse) else None

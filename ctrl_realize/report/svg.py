@@ -1,0 +1,147 @@
+"""Figures as SVG that becomes part of a page: light, and at home in its colours."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..numerics.arrays import FloatArray
+from ..plots import style
+
+POINTS = 1200
+"""Most points of a line that is drawn; more than a screen has columns is only weight."""
+
+_VARIABLES = {
+    style.INK: "var(--ink)",
+    style.GRID: "var(--grid)",
+    style.MEASURED: "var(--measured)",
+    style.MODEL: "var(--model)",
+    style.TRUTH: "var(--truth)",
+    style.INPUT: "var(--input)",
+    style.NOISE: "var(--noise)",
+    style.BAND: "var(--band)",
+}
+
+
+def drawn(
+    draw: Callable[[Figure], Any], key: str, size: tuple[float, float], description: str
+) -> str:
+    """Draw a figure and return it as inline SVG.
+
+    Parameters
+    ----------
+    draw : callable
+        Gets a new figure to draw in, which pyplot does not know.
+    key : str
+        Letters and digits, different for each figure of a page; keeps their ids apart.
+    size : tuple of float
+        Width and height in inches of 72 points.
+    description : str
+        Read out in place of the picture.
+
+    Returns
+    -------
+    str
+        An ``<svg>`` element. Its colours are variables of the page.
+    """
+    figure = Figure(figsize=size, layout="constrained")
+    with warnings.catch_warnings():
+        # A letter of a name that the font does not have is drawn as a box, and that is enough.
+        warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
+        draw(figure)
+        thin_lines(figure)
+        return inline_svg(figure, key, description)
+
+
+def thin_lines(figure: Figure, points: int = POINTS) -> None:
+    """Replace long lines of a figure by their envelope, which looks the same."""
+    for axes in figure.axes:
+        logarithmic = axes.get_xscale() == "log"
+        for line in axes.get_lines():
+            x = np.asarray(line.get_xdata(), dtype=np.float64)
+            y = np.asarray(line.get_ydata(), dtype=np.float64)
+            if x.size > points:
+                line.set_data(*envelope(x, y, points, logarithmic=logarithmic))
+
+
+def envelope(
+    x: FloatArray, y: FloatArray, points: int, *, logarithmic: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Keep the least and the largest value of each of points / 2 stretches of x.
+
+    Parameters
+    ----------
+    x : ndarray, shape (N,), rising
+    y : ndarray, shape (N,)
+        Gaps are NaN; a stretch of nothing else stays a gap.
+    points : int
+        About how many are left.
+    logarithmic : bool, default False
+        Stretches of equal ratio instead of equal length.
+
+    Returns
+    -------
+    x, y : ndarray
+        A selection of the given points, in their order.
+    """
+    scale = np.log(np.maximum(x, np.finfo(float).tiny)) if logarithmic else x
+    stretches = max(points // 2, 1)
+    edges = np.linspace(scale[0], scale[-1], stretches + 1)[1:-1]
+    starts = np.unique(np.concatenate([[0], np.searchsorted(scale, edges)]))
+    starts = starts[starts < x.size]
+    kept = []
+    for start, stop in zip(starts, [*starts[1:], x.size], strict=True):
+        values = y[start:stop]
+        if np.isnan(values).all():
+            kept.append(start)
+            continue
+        kept += sorted({start + int(np.nanargmin(values)), start + int(np.nanargmax(values))})
+    chosen = np.unique(np.concatenate([[0], kept, [x.size - 1]])).astype(int)
+    return x[chosen], y[chosen]
+
+
+def inline_svg(figure: Figure, key: str, description: str) -> str:
+    """Write a figure as an ``<svg>`` element whose ids begin with `key`."""
+    buffer = io.StringIO()
+    settings: Any = {"svg.fonttype": "none", "svg.hashsalt": key}
+    with mpl.rc_context(settings):
+        figure.savefig(
+            buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None}
+        )
+    return _at_home(buffer.getvalue(), key, description)
+
+
+def _at_home(document: str, key: str, description: str) -> str:
+    body = document[document.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, count=1, flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{key}-', body)
+    body = body.replace("url(#", f"url(#{key}-").replace('href="#', f'href="#{key}-')
+    body = re.sub(r"font-family: [^;\"]*", "font-family: inherit", body)
+    body = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 inherit", body)
+    for colour, variable in _VARIABLES.items():
+        body = body.replace(colour, variable)
+    # Hundredths of a point are finer than any printer.
+    body = re.sub(r'(?<= )(d|x|y|transform)="[^"]*"', _rounded, body)
+    body = re.sub(r"\s*\n\s*", " ", body)
+    head = f'<svg role="img" aria-label="{_attribute(description)}" class="plot" '
+    return re.sub(
+        r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" ', head, body, count=1
+    ).replace('xmlns="http://www.w3.org/2000/svg" ', "", 1)
+
+
+def _rounded(match: re.Match[str]) -> str:
+    return re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", match[0])
+
+
+def _attribute(text: str) -> str:
+    return (
+        text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;").replace(">", "&gt;")
+    )

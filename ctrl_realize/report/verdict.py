@@ -1,0 +1,148 @@
+"""What a report says first: the model, its dead time, and whether to trust it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ..delayed import DelayedStateSpace
+from ..identification.campaign import Campaign
+from ..plots.dead_times import estimate_of, interval_of
+from ..plots.style import in_time
+from ..results import Flag
+
+SEVERE = frozenset(
+    {
+        "delay_at_bound",
+        "no_delay_resolved",
+        "order_in_noise",
+        "unstable",
+    }
+)
+"""Flags after which the dead time should not be used as it stands."""
+
+Level = Literal["good", "caution", "poor"]
+
+_JUDGEMENTS: dict[Level, str] = {
+    "good": "No objection found: the data carry this model.",
+    "caution": "Use it with care: read the remarks below.",
+    "poor": "Do not trust the dead time as it stands: read why below.",
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Judgement, one sentence, the main numbers, and the reasons."""
+
+    level: Level
+    headline: str
+    facts: tuple[tuple[str, str], ...]
+    reasons: tuple[str, ...]
+
+    @property
+    def judgement(self) -> str:
+        """The level in words."""
+        return _JUDGEMENTS[self.level]
+
+
+def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Verdict:
+    """Judge a model by the flags of its fit."""
+    flags = (*getattr(system.fit, "flags", ()), *more_flags)
+    return Verdict(_level(flags), headline_of(system), facts_of(system), _reasons(flags))
+
+
+def campaign_verdict(campaign: Campaign) -> Verdict:
+    """Judge a campaign by its final model, its own flags and how many records carry flags."""
+    system = campaign.system
+    own = tuple(campaign.flags)
+    flags = (*own, *getattr(system.fit, "flags", ()))
+    facts = [
+        ("records", f"{len(campaign.good)} of {len(campaign.rows)} identified"),
+        *(row for row in campaign._rows() if row[0] != "identified"),
+        *facts_of(system),
+    ]
+    return Verdict(_level(flags), headline_of(system), tuple(facts), _reasons(flags))
+
+
+def headline_of(system: DelayedStateSpace) -> str:
+    """Say the model in one sentence."""
+    wait = estimate_of(system)
+    sentence = (
+        f"Dead time {in_time(wait, 4)} ({wait / system.dt:.4g} samples of {in_time(system.dt, 4)})"
+    )
+    interval = interval_of(system)
+    if interval is not None:
+        sentence += f", {interval_name(system)} {in_time(interval[0])} to {in_time(interval[1])}"
+    order = system.delay_free.nstates
+    return f"{sentence}; behind it a model of order {order} with a gain of {_gain(system)}."
+
+
+def interval_name(system: DelayedStateSpace) -> str:
+    """Name the interval for what it is."""
+    # A scan knows how flat its curve is, and no probability.
+    return "within 5 % of the least misfit" if hasattr(system.fit, "iae") else "95 % interval"
+
+
+def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
+    """List the main numbers of a model."""
+    facts = [("dead time", in_time(estimate_of(system), 4))]
+    interval = interval_of(system)
+    if interval is not None:
+        name = interval_name(system)
+        facts.append((name, f"{in_time(interval[0], 4)} to {in_time(interval[1], 4)}"))
+    for attribute, label in (
+        ("std", "standard error"),
+        ("onset", "visible onset"),
+        ("total_delay", "total delay of slow signals"),
+    ):
+        value = getattr(system.fit, attribute, None)
+        if isinstance(value, float) and np.isfinite(value):
+            facts.append((label, in_time(value, 4)))
+    facts.append(("order without the delay", str(system.delay_free.nstates)))
+    facts.append(("gain", _gain(system)))
+    facts.append(("poles", poles_of(system)))
+    facts.append(("sample time", in_time(system.dt, 6)))
+    return tuple(facts)
+
+
+def poles_of(system: DelayedStateSpace) -> str:
+    """Write the core's poles as corner frequencies, as a plant behind a hold would have them."""
+    poles = np.asarray(system.delay_free.poles())
+    shown = []
+    for pole in sorted(poles, key=lambda z: -abs(z)):
+        if pole.imag < -1e-12:
+            continue
+        if pole.imag > 1e-12:
+            s = np.log(pole) / system.dt
+            damping = -s.real / abs(s)
+            shown.append(f"{abs(s) / (2 * np.pi):.3g} Hz (damping {damping:.2g})")
+        elif pole.real <= 0:
+            shown.append(f"z = {pole.real:.3g}")
+        elif abs(pole.real - 1) < 1e-9:
+            shown.append("integrator")
+        else:
+            rate = -np.log(pole.real) / system.dt
+            shown.append(f"{rate / (2 * np.pi):.3g} Hz")
+    return ", ".join(shown) or "none"
+
+
+def _gain(system: DelayedStateSpace) -> str:
+    gain = float(np.real(np.ravel(system.delay_free.dcgain())[0]))
+    return f"{gain:.4g}" if np.isfinite(gain) else "infinite (integrating)"
+
+
+def _level(flags: Sequence[Any]) -> Level:
+    if any(flag.code in SEVERE for flag in flags):
+        return "poor"
+    return "caution" if flags else "good"
+
+
+def _reasons(flags: Sequence[Any]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_sentence(str(flag)) for flag in flags))
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
