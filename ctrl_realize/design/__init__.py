@@ -1,1 +1,9 @@
-"""design"""
+"""Controllers for plants with dead time, and what one must know before closing the loop.
+
+Systems in, `control` systems out. Everything works on core and delay apart, so it is exact at any
+delay.
+"""
+
+from .margins import Margins as Margins
+from .margins import margins as margins
+from .phase import unwrapped_phase as unwrapped_phase

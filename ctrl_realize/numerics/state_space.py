@@ -69,7 +69,7 @@ def frequency_response(
         if i + 1 < n:
             row += T[i, i + 1 :] @ states[i + 1 :]
         states[i] = (row.reshape(m, K) / (points - T[i, i])).ravel()
-    return (left @ states).reshape(-1, m, K) + D[:, :, None]
+    return (left @ states).reshape(left.shape[0], m, K) + D[:, :, None]
 
 
 def _observability_blocks(

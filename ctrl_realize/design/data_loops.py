@@ -1,0 +1,223 @@
+"""Open loops that are known at measured frequencies only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from ..checks import whole
+from ..errors import DataError, UnsuitableSystemError
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.crossovers import half_turns
+from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
+from ..results import Flag
+from .loops import open_loop
+
+TWO_SIGMA = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class DataLoop:
+    """Loop response on a grid, interpolated in log magnitude and delay-free phase.
+
+    ``log_gain`` and ``phase`` are monotone cubics over log omega, which pass through the points
+    and do not overshoot between them; ``phase`` is without ``dead_time``.
+    """
+
+    omega: FloatArray
+    values: ComplexArray
+    std: FloatArray | None
+    dead_time: float
+    log_gain: Any
+    phase: Any
+    unstable_poles: int
+    integrators: int
+
+    def __call__(self, omega: FloatArray) -> ComplexArray:
+        """Interpolated response."""
+        x = np.log(omega)
+        turn = self.phase(x) - omega * self.dead_time
+        return np.asarray(np.exp(self.log_gain(x) + 1j * turn), dtype=np.complex128)
+
+    def dense(self) -> tuple[FloatArray, ComplexArray]:
+        """Grid with 8 points between neighbours, and more where the delay turns fast."""
+        low, top = self.omega[0], self.omega[-1]
+        ratios = np.log(self.omega[1:] / self.omega[:-1])
+        share = np.arange(8) / 8
+        inner = (self.omega[:-1, None] * np.exp(ratios[:, None] * share)).ravel()
+        turns = int(16 * abs(self.dead_time) * top / (2 * np.pi)) + 2
+        grid = np.unique(np.concatenate([inner, self.omega, np.linspace(low, top, turns)]))
+        return grid, self(grid)
+
+    def closed_loop_count(self) -> tuple[int, bool]:
+        """Nyquist count between the first and the last point; see `flags` for what is assumed."""
+        grid, values = self.dense()
+        # An integrator would start the curve a quarter turn away from the real axis.
+        slow = 1j * grid / (1j * grid + 0.1 * grid[-1])
+        start = values[0] * slow[0] ** self.integrators + slow[0] ** self.integrators
+        curve = (1 + values) * slow**self.integrators
+        turns = half_turns(curve)
+        if abs(start) == 0 or not np.isfinite(turns):
+            return 0, True
+        # Beyond the last point the loop is taken to be small, and 1 + L to return to 1.
+        turns -= float(np.angle(1 + values[-1]) / np.pi) + float(
+            self.integrators * np.angle(slow[-1]) / np.pi
+        )
+        return max(0, self.unstable_poles - round(turns)), False
+
+    def flags(self) -> tuple[Flag, ...]:
+        """Warn of what lies outside the band."""
+        found = []
+        if abs(self.values[-1]) > 0.9:
+            found.append(
+                Flag(
+                    "band_ends_early",
+                    f"|L| is still {abs(self.values[-1]):.3g} at the last point "
+                    f"({self.omega[-1]:.4g} rad/s): crossovers above it are not seen, and "
+                    "stability cannot be told",
+                )
+            )
+        if self.integrators == 0 and abs(np.sin(np.angle(self.values[0]))) > 0.5:
+            found.append(
+                Flag(
+                    "band_starts_late",
+                    f"the phase at the first point ({self.omega[0]:.4g} rad/s) is "
+                    f"{np.degrees(np.angle(self.values[0])):.3g} deg, far from the real axis: "
+                    "the count assumes that it goes there directly",
+                )
+            )
+        return tuple(found)
+
+    def intervals(self, plain: Any) -> dict[str, tuple[float, float]]:
+        """95 % intervals of the margins, to first order in the standard deviation."""
+        found = {}
+        if plain.phase_margins.size:
+            w = plain.gain_crossover
+            shift = self._phase_deviation(w)
+            pm = plain.phase_margin
+            found["phase_margin"] = _around(pm, np.degrees(shift))
+        if plain.gain_margins.size:
+            w = plain.phase_crossover
+            spread = self._gain_deviation(w)
+            gm = plain.gain_margin
+            found["gain_margin"] = (
+                float(gm * np.exp(-TWO_SIGMA * spread)),
+                float(gm * np.exp(TWO_SIGMA * spread)),
+            )
+        found["modulus_margin"] = _around(
+            plain.modulus_margin, self._sigma(plain.modulus_crossover), 0.0
+        )
+        if plain.stable and np.isfinite(plain.delay_margin):
+            pm = np.radians(np.mod(plain.phase_margins, 360))
+            w = plain.gain_crossovers[np.argmin(pm / plain.gain_crossovers)]
+            found["delay_margin"] = _around(
+                plain.delay_margin, self._delay_deviation(w, plain.delay_margin), 0.0
+            )
+        return found
+
+    def _sigma(self, omega: float) -> float:
+        """Standard deviation of one component of L (of any direction in the plane)."""
+        assert self.std is not None
+        return float(np.interp(np.log(omega), np.log(self.omega), self.std) / np.sqrt(2))
+
+    def _slopes(self, omega: float) -> tuple[float, float]:
+        """Slope of log gain and of phase against omega."""
+        x = np.log(omega)
+        gain = float(self.log_gain(x, 1)) / omega
+        phase = float(self.phase(x, 1)) / omega - self.dead_time
+        return gain, phase
+
+    def _phase_deviation(self, omega: float) -> float:
+        # An error in gain moves the crossover by -e_g / slope, and the phase with it.
+        relative = self._sigma(omega) / abs(self(np.array([omega]))[0])
+        gain, phase = self._slopes(omega)
+        return float(relative * np.hypot(1.0, phase / gain if gain else 0.0))
+
+    def _gain_deviation(self, omega: float) -> float:
+        relative = self._sigma(omega) / abs(self(np.array([omega]))[0])
+        gain, phase = self._slopes(omega)
+        return float(relative * np.hypot(1.0, gain / phase if phase else 0.0))
+
+    def _delay_deviation(self, omega: float, wait: float) -> float:
+        # delay = (pi + phase) / omega: d delay = (e_p - (e_g/gain)(phase' - delay)) / omega
+        relative = self._sigma(omega) / abs(self(np.array([omega]))[0])
+        gain, phase = self._slopes(omega)
+        return float(relative * np.hypot(1.0, (phase - wait) / gain if gain else 0.0) / omega)
+
+
+def _around(value: float, sigma: float, floor: float | None = None) -> tuple[float, float]:
+    low, high = value - TWO_SIGMA * sigma, value + TWO_SIGMA * sigma
+    return float(low if floor is None else max(floor, low)), float(high)
+
+
+def data_loop(
+    plant: Any, controller: Any, unstable_poles: int, integrators: int | None
+) -> DataLoop:
+    """Make a `DataLoop` of measured or computed responses, with systems on their grid."""
+    first = plant if isinstance(plant, ct.FrequencyResponseData) else controller
+    other = controller if first is plant else plant
+    if not first.issiso():
+        raise UnsuitableSystemError(
+            f"{first.name!r} has {first.ninputs} inputs and {first.noutputs} outputs; margins are "
+            "for one input and one output"
+        )
+    omega = np.asarray(first.omega, dtype=np.float64)
+    order = np.argsort(omega)
+    order = order[omega[order] > 0]
+    omega = omega[order]
+    values = np.asarray(first.frdata[0, 0], dtype=np.complex128)[order]
+    if omega.size < 3 or np.any(np.diff(omega) <= 0):
+        raise DataError(
+            f"the response has {omega.size} points above 0 rad/s, needed are at least 3 distinct "
+            "ones; average repeated frequencies first"
+        )
+    if np.any(values == 0):
+        raise DataError("the response is 0 at some frequency; leave that point out")
+    std = getattr(first, "std", None)
+    std = None if std is None else np.asarray(std, dtype=np.float64).reshape(-1)[order]
+    known = 0.0
+    if isinstance(other, ct.FrequencyResponseData):
+        if not np.array_equal(np.sort(np.asarray(other.omega)[np.asarray(other.omega) > 0]), omega):
+            raise DataError("the two responses have different frequencies; interpolate one first")
+        beside = np.asarray(other.frdata[0, 0], dtype=np.complex128)
+        beside = beside[np.argsort(other.omega)][-omega.size :]
+        values, std = values * beside, None if std is None else std * np.abs(beside)
+    elif other is not None:
+        loop = open_loop(other)
+        beside = loop(omega)
+        values, std = values * beside, None if std is None else std * np.abs(beside)
+        known = loop.delay
+        if integrators is None and loop.integrators():
+            integrators = loop.integrators() + _read_integrators(values / beside)
+    wait = (
+        dead_time_from_phase(omega, values)
+        if known == 0
+        else known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
+    )
+    phase = unwrap_with_dead_time(omega, values, wait) + omega * wait
+    x = np.log(omega)
+    count = (
+        _read_integrators(values) if integrators is None else whole(integrators, "integrators", 0)
+    )
+    return DataLoop(
+        omega,
+        values,
+        std,
+        wait,
+        PchipInterpolator(x, np.log(np.abs(values))),
+        PchipInterpolator(x, phase),
+        whole(unstable_poles, "unstable_poles", 0),
+        count,
+    )
+
+
+def _read_integrators(values: ComplexArray) -> int:
+    """Read the number of integrators off a high gain with -90 deg each at the lowest points."""
+    start = values[: max(1, min(3, values.size))]
+    if np.median(np.abs(start)) < 3:
+        return 0
+    return int(np.mod(np.round(-np.median(np.angle(start)) / (np.pi / 2)), 4))

@@ -1,0 +1,164 @@
+"""Controllers that remember their own last outputs in a delay line.
+
+Smith predictors and predictor state feedback share one structure: a few inner states and the
+outputs u[k-1] ... u[k-d] that they have sent into the dead time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.state_space import frequency_response, schur_form
+
+CHUNK = 2048
+"""Frequencies that are evaluated together; bounds the memory of the powers z^-1 ... z^-d."""
+
+
+class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+    """Discrete controller with a line of its own past outputs; a `control.StateSpace`.
+
+    States ``[x; u[k-1] ... u[k-d]]``; with v the line::
+
+        x[k+1] = A x + B e + E v
+        u[k]   = C x + D e + h v
+
+    The frequency response is computed from this structure, so it stays exact and fast at any d.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n, 1), (1, n), (1, 1)
+    E, h : ndarray, shapes (n, d), (1, d)
+    dt : float
+        Sample time in s.
+    name : str
+    inputs, outputs : str
+    notes : dict
+        What the designing function wants to keep with the controller: read-only attributes.
+
+    Attributes
+    ----------
+    line_length : int
+        d.
+    inner_poles : ndarray, shape (n,)
+        Eigenvalues of A. They are not the controller's poles: the line closes a loop around them.
+    """
+
+    def __init__(
+        self,
+        A: FloatArray,
+        B: FloatArray,
+        C: FloatArray,
+        D: FloatArray,
+        E: FloatArray,
+        h: FloatArray,
+        dt: float,
+        *,
+        name: str,
+        inputs: str = "e",
+        outputs: str = "u",
+        notes: dict[str, Any] | None = None,
+    ) -> None:
+        n, d = E.shape
+        full_A = np.zeros((n + d, n + d))
+        full_A[:n, :n], full_A[:n, n:] = A, E
+        full_B, full_C = np.zeros((n + d, 1)), np.hstack([C, h])
+        full_B[:n] = B
+        if d:
+            full_A[n, :n], full_A[n, n:], full_B[n] = C[0], h[0], D[0]
+            full_A[np.arange(n + 1, n + d), np.arange(n, n + d - 1)] = 1.0
+        super().__init__(
+            full_A,
+            full_B,
+            full_C,
+            D,
+            float(dt),
+            name=name,
+            inputs=[inputs],
+            outputs=[outputs],
+            states=[f"x[{i}]" for i in range(n)] + [f"{outputs}[k-{i}]" for i in range(1, d + 1)],
+            remove_useless_states=False,
+        )
+        for M in (self.A, self.B, self.C, self.D):
+            M.flags.writeable = False
+        self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
+        self._form = schur_form(self._parts[0])
+        self.line_length = d
+        self.inner_poles: ComplexArray = np.diag(self._form[0]).copy()
+        self.notes: dict[str, Any] = dict(notes or {})
+
+    def __getattr__(self, attribute: str) -> Any:
+        notes = self.__dict__.get("notes", {})
+        if attribute in notes:
+            return notes[attribute]
+        raise AttributeError(f"{type(self).__name__} has no attribute {attribute!r}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (
+            _rebuild,
+            (
+                type(self),
+                self._parts,
+                self.dt,
+                self.name,
+                self.input_labels[0],
+                self.output_labels[0],
+                self.notes,
+            ),
+        )
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> DelayLineController:
+        build, arguments = self.__reduce__()
+        copy: DelayLineController = build(*arguments)
+        return copy
+
+    def paths(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Split the response into forward / back; the zeros of `back` are the controller's poles.
+
+        Returns
+        -------
+        forward, back : ndarray, shape (K,)
+        """
+        A, B, C, D, E, h = self._parts
+        d = self.line_length
+        n = A.shape[0]
+        forward = np.empty(z.size, dtype=np.complex128)
+        back = np.empty(z.size, dtype=np.complex128)
+        eye = np.eye(n)
+        for start in range(0, z.size, CHUNK):
+            part = slice(start, start + CHUNK)
+            points = z[part]
+            powers = points[None, :] ** -np.arange(1, d + 1)[:, None]
+            rows = frequency_response(
+                self._form, np.hstack([B, eye]), C, np.hstack([D, np.zeros((1, n))]), points
+            )[0]
+            forward[part] = rows[0]
+            into_states = E @ powers
+            back[part] = 1 - (h @ powers)[0] - np.sum(rows[1:] * into_states, axis=0)
+        return forward, back
+
+    def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
+        """Evaluate the controller at points of the z-plane, shape (1, 1, K)."""
+        points = np.atleast_1d(np.asarray(x, dtype=np.complex128))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            forward, back = self.paths(points)
+            out = forward / back
+        out[~np.isfinite(out)] = complex(np.inf, np.nan)
+        return np.asarray(out[None, None, :], dtype=np.complex128)
+
+
+def _rebuild(
+    kind: type[DelayLineController],
+    parts: tuple[FloatArray, ...],
+    dt: float,
+    name: str,
+    inputs: str,
+    outputs: str,
+    notes: dict[str, Any],
+) -> DelayLineController:
+    A, B, C, D, E, h = parts
+    return kind(A, B, C, D, E, h, dt, name=name, inputs=inputs, outputs=outputs, notes=notes)

@@ -1,0 +1,353 @@
+"""Stability margins that are right at any dead time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..checks import real
+from ..errors import OptionError
+from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.crossovers import (
+    follow,
+    half_turns,
+    negative_axis_crossings,
+    smallest_distance,
+    unit_crossings,
+)
+from ..results import Flag, Result
+from .data_loops import DataLoop, data_loop
+from .loops import Loop, open_loop
+
+MARGINAL = 1e-9
+"""Distance to -1 below which the closed loop counts as being on the border of stability."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Margins(Result):
+    """Stability margins of a loop with negative feedback.
+
+    With L the open loop: ``gain_margin = 1/|L|`` at a phase crossover, ``phase_margin = 180 deg +
+    arg L`` at a gain crossover, ``modulus_margin = min |1 + L|``, and ``delay_margin`` is the
+    least of ``(phase margin taken in 0...360 deg) / omega`` over all gain crossovers. Of several
+    gain or phase margins the one nearest to instability is given, as python-control does; all
+    crossovers are there.
+
+    Attributes
+    ----------
+    gain_margin : float
+        Ratio; below 1 where the gain must not be *reduced* further. inf without a phase crossover.
+    phase_margin : float
+        Degrees, -180...180. inf without a gain crossover.
+    modulus_margin : float
+        Smallest distance of L to -1; its inverse is the peak of the sensitivity, `ms`.
+    delay_margin : float
+        Dead time in s that may be added before the loop is unstable; nan if it already is.
+    delay_margin_samples : float
+        The same in samples; nan for a continuous loop.
+    stable : bool
+        Closed-loop stability, from a Nyquist count that sees every pole of the factors, hidden
+        ones and those on the unit circle included.
+    unstable_poles : int
+        Closed-loop poles on or outside the stable region.
+    gain_crossovers, phase_crossovers : ndarray
+        In rad/s, rising.
+    phase_margins, gain_margins : ndarray
+        One for each gain crossover in degrees, one for each phase crossover.
+    modulus_crossover : float
+        Where |1 + L| is smallest, rad/s.
+    dt : float
+        Sample time in s, 0 if continuous.
+    intervals : dict of str to (float, float)
+        For measured responses with a standard deviation: 95 % intervals of the four margins, to
+        first order. Otherwise empty.
+    flags : tuple of Flag
+    response : tuple of ndarray
+        (omega, L) as followed by the count, for drawing.
+    """
+
+    gain_margin: float
+    phase_margin: float
+    modulus_margin: float
+    delay_margin: float
+    stable: bool
+    unstable_poles: int
+    gain_crossovers: FloatArray
+    phase_crossovers: FloatArray
+    phase_margins: FloatArray
+    gain_margins: FloatArray
+    modulus_crossover: float
+    dt: float
+    response: tuple[FloatArray, ComplexArray]
+    intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
+    flags: tuple[Flag, ...] = ()
+
+    @property
+    def delay_margin_samples(self) -> float:
+        """Delay margin in samples."""
+        return self.delay_margin / self.dt if self.dt else float("nan")
+
+    @property
+    def ms(self) -> float:
+        """Peak of the sensitivity, 1 / modulus_margin."""
+        return float(1 / self.modulus_margin) if self.modulus_margin else float("inf")
+
+    @property
+    def gain_crossover(self) -> float:
+        """Gain crossover of the phase margin, rad/s; nan without one."""
+        if self.phase_margins.size == 0:
+            return float("nan")
+        return float(self.gain_crossovers[np.argmin(np.abs(self.phase_margins))])
+
+    @property
+    def phase_crossover(self) -> float:
+        """Phase crossover of the gain margin, rad/s; nan without one."""
+        if self.gain_margins.size == 0:
+            return float("nan")
+        return float(self.phase_crossovers[np.argmin(np.abs(np.log(self.gain_margins)))])
+
+    def _title(self) -> str:
+        return "Stability margins"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        verdict = "stable" if self.stable else f"UNSTABLE ({self.unstable_poles} poles)"
+        samples = "" if not self.dt else f" = {self.delay_margin_samples:.4g} samples"
+        rows = [
+            ("closed loop", verdict),
+            ("gain margin", f"{self.gain_margin:.4g} at {self.phase_crossover:.4g} rad/s"),
+            ("phase margin", f"{self.phase_margin:.4g} deg at {self.gain_crossover:.4g} rad/s"),
+            (
+                "modulus margin",
+                f"{self.modulus_margin:.4g} at {self.modulus_crossover:.4g} rad/s "
+                f"(Ms = {self.ms:.4g})",
+            ),
+            ("delay margin", f"{self.delay_margin:.4g} s{samples}"),
+        ]
+        for name, (low, high) in self.intervals.items():
+            rows.append((f"95 % {name.replace('_', ' ')}", f"{low:.4g} ... {high:.4g}"))
+        return rows
+
+    def __repr__(self) -> str:
+        state = "stable" if self.stable else "unstable"
+        return (
+            f"<Margins {state}: gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} deg, "
+            f"modulus {self.modulus_margin:.4g}, delay {self.delay_margin:.4g} s>"
+        )
+
+
+def margins(
+    loop: Any,
+    controller: Any = None,
+    *,
+    dead_time: float = 0.0,
+    unstable_poles: int = 0,
+    integrators: int | None = None,
+) -> Margins:
+    """Gain, phase, modulus and delay margin of a loop, exact at any dead time.
+
+    All crossovers are bracketed on the exact frequency response, core(z) z^-d, and found by root
+    finding. Stability is decided by a Nyquist count.
+
+    Parameters
+    ----------
+    loop : system or FrequencyResponseData
+        The open loop, or the plant if `controller` is given. Discrete systems with or without a
+        `DelayedStateSpace` among them, continuous systems, or a response from data.
+    controller : system or float, optional
+        Controller; the loop is then plant times controller with negative feedback. Giving both
+        apart is better than giving their product: poles that cancel are still counted.
+    dead_time : float, optional
+        Further dead time in s, for continuous systems, which cannot hold one.
+    unstable_poles : int, optional
+        For data only: unstable poles that the loop has.
+    integrators : int, optional
+        For data only: integrators in the loop; read off the phase at the lowest frequencies
+        when not given.
+
+    Returns
+    -------
+    Margins
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Several channels, mixed or missing time bases, an improper system.
+    OptionError
+        An option that does not belong to this kind of loop.
+
+    Notes
+    -----
+    python-control's ``stability_margins`` forms the polynomial of the augmented matrix first
+    and is silently wrong from d of about 37 on.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> valve = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.029, dt=0.001)
+    >>> pi = ct.ss(ct.tf([1, -0.99], [1, -1], 0.001))
+    >>> found = cr.design.margins(valve, pi)
+    >>> found.stable, round(found.gain_margin, 3), round(found.phase_margin, 2)
+    (True, 4.437, 77.4)
+    >>> round(1e3 * found.delay_margin, 1)
+    121.2
+    """
+    if isinstance(loop, ct.FrequencyResponseData) or isinstance(
+        controller, ct.FrequencyResponseData
+    ):
+        if dead_time:
+            raise OptionError(
+                "dead_time is for continuous systems; multiply the data by "
+                "exp(-j omega tau) instead"
+            )
+        return _from_data(data_loop(loop, controller, unstable_poles, integrators))
+    if unstable_poles or integrators is not None:
+        raise OptionError(
+            "unstable_poles and integrators are for measured responses; the poles of systems "
+            "are known"
+        )
+    wait = real(dead_time, "dead_time", "dead time in s, >= 0")
+    if wait < 0:
+        raise OptionError(f"dead_time={wait:g} s; needed is >= 0")
+    exact = open_loop(loop, controller, wait)
+    if wait and exact.dt:
+        raise OptionError(
+            f"dead_time={wait:g} s with a discrete loop; put the delay into the plant "
+            "(delayed_ss, or .replace(delay=...))"
+        )
+    return _from_loop(exact)
+
+
+def _from_loop(loop: Loop) -> Margins:
+    omega, values = follow(loop, loop.grid())
+    count, marginal = closed_loop_count(loop, omega)
+    gains, phases = _crossings(loop, omega, values)
+    if loop.dt:
+        phases = _with_ends(loop, phases)
+    distance, at = smallest_distance(lambda w: 1 + loop(w), omega)
+    start = abs(1 + loop(np.zeros(1))[0])
+    if start < distance:
+        distance, at = float(start), 0.0
+    flags = _stability_flags(count, marginal)
+    stable = count == 0 and not marginal and distance > MARGINAL
+    return _collect(
+        gains, loop(gains), phases, loop(phases), distance, at, stable, count, loop.dt, flags,
+        (omega, values), {},
+    )  # fmt: skip
+
+
+def _crossings(
+    loop: Loop, omega: FloatArray, values: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    return unit_crossings(loop, omega, values), negative_axis_crossings(loop, omega, values)
+
+
+def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
+    """Add omega = 0 and the Nyquist frequency where the real response there is negative."""
+    top = np.pi / loop.dt
+    start = loop(np.zeros(1))[0]
+    end = loop(np.array([top]))[0]
+    if np.isfinite(start) and start.real < 0:
+        phases = np.concatenate([[0.0], phases])
+    near = phases.size > 0 and abs(phases[-1] - top) < 1e-9 * top
+    if end.real < 0 and abs(end.imag) < 1e-6 * abs(end) and not near:
+        phases = np.concatenate([phases, [top]])
+    return phases
+
+
+def closed_loop_count(loop: Loop, omega: FloatArray) -> tuple[int, bool]:
+    """Count the closed-loop poles outside the stable region.
+
+    Returns
+    -------
+    count : int
+    marginal : bool
+        A closed-loop pole is so close to the border that no side can be told.
+    """
+    _, values = follow(loop.characteristic, omega)
+    if np.any(values == 0):
+        return 0, True
+    steps = np.abs(np.angle(values[1:] / values[:-1]))
+    turns = half_turns(values)
+    marginal = bool(np.any(steps > 2.0) or abs(turns - round(turns)) > 0.1)
+    return max(0, -round(turns)), marginal
+
+
+def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
+    if marginal:
+        return (
+            Flag(
+                "marginal",
+                "a closed-loop pole lies on the border of stability, as far as double precision "
+                "can tell",
+            ),
+        )
+    if count:
+        return (
+            Flag("unstable", f"the closed loop has {count} unstable poles; the margins say how "
+                 "far it is from being stable"),
+        )  # fmt: skip
+    return ()
+
+
+def _collect(
+    gains: FloatArray,
+    at_gains: ComplexArray,
+    phases: FloatArray,
+    at_phases: ComplexArray,
+    distance: float,
+    closest: float,
+    stable: bool,
+    count: int,
+    dt: float,
+    flags: tuple[Flag, ...],
+    response: tuple[FloatArray, ComplexArray],
+    intervals: dict[str, tuple[float, float]],
+) -> Margins:
+    # -1 is half a turn away: the angle of -L is the margin itself, in -180...180.
+    pm = np.degrees(np.angle(-at_gains))
+    gm = 1 / np.abs(at_phases)
+    waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / gains
+    omega, values = response
+    kept = np.array(values)
+    kept.flags.writeable = False
+    return Margins(
+        gain_margin=float(gm[np.argmin(np.abs(np.log(gm)))]) if gm.size else float("inf"),
+        phase_margin=float(pm[np.argmin(np.abs(pm))]) if pm.size else float("inf"),
+        modulus_margin=distance,
+        delay_margin=float(waits.min(initial=np.inf)) if stable else float("nan"),
+        stable=stable,
+        unstable_poles=count,
+        gain_crossovers=read_only(gains),
+        phase_crossovers=read_only(phases),
+        phase_margins=read_only(pm),
+        gain_margins=read_only(gm),
+        modulus_crossover=closest,
+        dt=dt,
+        response=(read_only(omega), kept),
+        intervals=intervals,
+        flags=flags,
+    )
+
+
+def _from_data(loop: DataLoop) -> Margins:
+    omega, values = loop.dense()
+    gains = unit_crossings(loop, omega, values)
+    phases = negative_axis_crossings(loop, omega, values)
+    distance, at = smallest_distance(lambda w: 1 + loop(w), omega)
+    count, marginal = loop.closed_loop_count()
+    stable = count == 0 and not marginal
+    flags = (*_stability_flags(count, marginal), *loop.flags())
+    plain = _collect(
+        gains, loop(gains), phases, loop(phases), distance, at, stable, count, 0.0, flags,
+        (omega, values), {},
+    )  # fmt: skip
+    if loop.std is None:
+        return plain
+    return _collect(
+        gains, loop(gains), phases, loop(phases), distance, at, stable, count, 0.0, flags,
+        (omega, values), loop.intervals(plain),
+    )  # fmt: skip

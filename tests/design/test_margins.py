@@ -1,0 +1,359 @@
+"""Margins against arbitrary precision, closed forms and brute-force closed loops."""
+
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+
+DT = 7.8125e-4
+DELAYS = (0, 37, 100, 300, 1000)
+
+
+def precise_loop(core, delay, gain, ti):
+    """L(omega) in 40 digits, from the same matrices, one linear solve a point."""
+    A, B, C, D = (mp.matrix(np.asarray(M).tolist()) for M in (core.A, core.B, core.C, core.D))
+
+    def loop(omega):
+        z = mp.e ** (mp.mpc(0, 1) * omega * mp.mpf(core.dt))
+        state = mp.lu_solve(z * mp.eye(A.rows) - A, B)
+        plant = (C * state)[0] + D[0]
+        pi = gain * (1 + mp.mpf(core.dt) / ti / (z - 1)) if ti else mp.mpf(gain)
+        return plant * pi * z ** (-delay)
+
+    return loop
+
+
+def brackets(core, delay, gain, ti):
+    """A grid in double precision, fine enough to see every crossing; independent of ours."""
+    omega = np.unique(
+        np.concatenate(
+            [np.geomspace(1e-4, np.pi, 4000), np.linspace(1e-4, np.pi, 40 * delay + 4000)]
+        )
+    )
+    omega = omega[:-1] / core.dt
+    z = np.exp(1j * omega * core.dt)
+    states = np.linalg.solve(z[:, None, None] * np.eye(core.nstates) - core.A, core.B)
+    plant = (core.C @ states)[:, 0, 0]
+    pi = gain * (1 + core.dt / ti / (z - 1)) if ti else gain
+    return omega, (plant + core.D[0, 0]) * pi * z**-delay
+
+
+def precise_margins(core, delay, gain, ti):
+    mp.mp.dps = 40
+    loop = precise_loop(core, delay, gain, ti)
+    omega, L = brackets(core, delay, gain, ti)
+
+    def refine(function, at):
+        found = []
+        for i in at:
+            pair = (mp.mpf(omega[i]), mp.mpf(omega[i + 1]))
+            found.append(mp.findroot(function, pair, solver="anderson", tol=1e-30))
+        return found
+
+    level = np.abs(L) > 1
+    gains = refine(lambda w: mp.log(abs(loop(w))), np.flatnonzero(level[1:] != level[:-1]))
+    lag = L.imag > 0
+    crossing = np.flatnonzero((lag[1:] != lag[:-1]) & (L.real[1:] < 0))
+    # the gain margin nearest to 1 is one of the few with the largest |log| proximity
+    near = crossing[np.argsort(np.abs(np.log(np.abs(L[crossing]))))[:2]]
+    phases = refine(lambda w: mp.im(loop(w)), near)
+    pms = [mp.degrees(mp.arg(-loop(w))) for w in gains]
+    gms = [1 / abs(loop(w)) for w in phases]
+    ends = []
+    for x in (1.0, -1.0):  # the real ends of the frequency axis
+        end = (
+            (core.C @ np.linalg.solve(x * np.eye(core.nstates) - core.A, core.B))
+            if x < 0 or not np.any(np.abs(np.linalg.eigvals(core.A) - 1) < 1e-9)
+            else None
+        )
+        if end is None or (x > 0 and ti):
+            continue
+        pi = gain * (1 + core.dt / ti / (x - 1)) if ti else gain
+        value = (end[0, 0] + core.D[0, 0]) * pi * x**-delay
+        ends.append(abs(1 + value))
+        if value < 0:
+            gms.append(mp.mpf(-1 / value))
+    closest = np.argmin(np.abs(1 + L))
+    low, high = omega[max(closest - 1, 0)], omega[min(closest + 1, omega.size - 1)]
+
+    def slope(w):
+        return mp.diff(lambda x: abs(1 + loop(x)) ** 2, w)
+
+    modulus = abs(1 + loop(mp.mpf(omega[closest])))
+    if slope(mp.mpf(low)) < 0 < slope(mp.mpf(high)):
+        at = mp.findroot(slope, (mp.mpf(low), mp.mpf(high)), solver="anderson", tol=1e-18)
+        modulus = abs(1 + loop(at))
+    waits = [mp.radians(pm if pm >= 0 else pm + 360) / w for pm, w in zip(pms, gains, strict=True)]
+    return (
+        float(min(gms, key=lambda g: abs(mp.log(g)))) if gms else np.inf,
+        float(min(pms, key=abs)) if pms else np.inf,
+        float(min([modulus, *ends])),
+        float(min(waits)) if waits else np.inf,
+        [float(w) for w in gains],
+    )
+
+
+LOOPS = [
+    ("valve", 0.5, 0.2),
+    ("stable", 8.0, 0.5),
+    ("integrating", 2.0, 3.0),
+    ("unstable", 1.0, 0.0),
+    ("resonant", 0.4, 0.4),
+    ("direct", 1.5, 0.3),
+]
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize(("kind", "gain", "ti"), LOOPS)
+def test_margins_equal_those_of_arbitrary_precision(
+    valve, cores, pi_controller, kind, gain, ti, delay
+):
+    core = valve(0).delay_free if kind == "valve" else cores[kind]
+    controller = pi_controller(gain, ti) if ti else gain
+    found = cr.design.margins(cr.delayed_ss(core, delay), controller)
+    gm, pm, modulus, wait, crossovers = precise_margins(core, delay, gain, ti)
+    # 1e-6 is what is promised; the curve itself is exact to about 1e-12.
+    np.testing.assert_allclose(found.gain_crossovers, crossovers, rtol=1e-9)
+    np.testing.assert_allclose(found.phase_margin, pm, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.gain_margin, gm, rtol=1e-6)
+    np.testing.assert_allclose(found.modulus_margin, modulus, rtol=1e-6)
+    if found.stable:
+        np.testing.assert_allclose(found.delay_margin, wait, rtol=1e-6)
+        assert found.delay_margin_samples == found.delay_margin / DT
+    else:
+        assert np.isnan(found.delay_margin)
+
+
+def test_the_loops_above_have_several_crossovers_and_both_verdicts(valve, cores, pi_controller):
+    found = [
+        cr.design.margins(
+            cr.delayed_ss(valve(0).delay_free if kind == "valve" else cores[kind], delay),
+            pi_controller(gain, ti) if ti else gain,
+        )
+        for kind, gain, ti in LOOPS
+        for delay in DELAYS
+    ]
+    assert max(m.gain_crossovers.size for m in found) >= 3
+    assert {m.stable for m in found} == {True, False}
+
+
+@pytest.mark.parametrize(
+    ("delay", "gm", "pm"),
+    [
+        (37, 4.956, 95.97),
+        (50, 4.354, 94.34),
+        (70, 3.749, 91.84),
+        (100, 3.191, 88.09),
+        (300, 1.925, 63.07),
+    ],
+)
+def test_margins_are_those_measured_with_brentq_on_the_core(valve, pi_controller, delay, gm, pm):
+    found = cr.design.margins(valve(delay), pi_controller(0.5, 0.2))
+    assert found.gain_margin == pytest.approx(gm, abs=6e-4)  # printed digits
+    assert found.phase_margin == pytest.approx(pm, abs=6e-3)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(data=st.data())
+def test_the_count_is_the_number_of_unstable_eigenvalues_of_the_closed_loop(data):
+    n = data.draw(st.integers(1, 4))
+    poles = data.draw(
+        st.lists(
+            st.one_of(st.floats(-0.95, 0.9), st.just(1.0), st.floats(1.001, 1.2)),
+            min_size=n,
+            max_size=n,
+        )
+    )
+    rng = np.random.default_rng(data.draw(st.integers(0, 2**31)))
+    A = np.diag(poles) + 0.1 * np.triu(rng.standard_normal((n, n)), 1)
+    core = ct.ss(A, rng.standard_normal((n, 1)), rng.standard_normal((1, n)), 0.0, 0.1)
+    gain = 10 ** data.draw(st.floats(-3, 0.5))
+    plant = cr.delayed_ss(core, data.draw(st.integers(0, 20)))
+    controller = ct.ss([[1.0]], [[1.0]], [[0.1 * gain]], [[gain]], 0.1)
+    loop = ct.ss(plant) * controller
+    radius = np.abs(np.linalg.eigvals(loop.A - loop.B @ loop.C / (1 + loop.D[0, 0])))
+    found = cr.design.margins(plant, controller)
+    # An eigenvalue next to the circle is beyond what either side can tell.
+    if np.min(np.abs(radius - 1)) > 1e-6:
+        assert found.unstable_poles == np.sum(radius > 1)
+        assert found.stable == (not np.any(radius > 1))
+
+
+def test_a_cancelled_unstable_pole_is_seen_when_plant_and_controller_are_given_apart():
+    plant = ct.tf([1.0], [1, -1.2], 0.1)
+    cancelling = ct.tf([0.1, -0.12], [1, -0.5], 0.1)
+    found = cr.design.margins(plant, cancelling)
+    assert not found.stable
+    assert found.unstable_poles == 1
+
+
+def test_a_pole_on_the_circle_that_stays_there_is_not_stable():
+    plant = ct.tf([1.0, -1.0], [1, -0.5], 0.1)
+    integrator = ct.tf([0.1], [1, -1.0], 0.1)
+    found = cr.design.margins(plant, integrator)
+    assert not found.stable
+
+
+def test_a_loop_at_its_own_gain_margin_is_on_the_border(valve, pi_controller):
+    plant = valve(37)
+    found = cr.design.margins(plant, pi_controller(0.5, 0.2))
+    inside = cr.design.margins(plant, pi_controller(0.5 * 0.9999 * found.gain_margin, 0.2))
+    outside = cr.design.margins(plant, pi_controller(0.5 * 1.0001 * found.gain_margin, 0.2))
+    assert inside.stable
+    assert not outside.stable
+    assert outside.unstable_poles == 2
+
+
+@pytest.mark.parametrize("kind", ["valve", "integrating", "unstable", "resonant"])
+def test_the_delay_margin_is_where_stability_is_lost(valve, cores, pi_controller, kind):
+    core = valve(0).delay_free if kind == "valve" else cores[kind]
+    gain, ti = {name: pair for name, *pair in LOOPS}[kind]
+    controller = pi_controller(gain, ti) if ti else gain
+    found = cr.design.margins(cr.delayed_ss(core, 7), controller)
+    assert found.stable
+    room = int(np.floor(found.delay_margin_samples))
+    assert cr.design.margins(cr.delayed_ss(core, 7 + room), controller).stable
+    assert not cr.design.margins(cr.delayed_ss(core, 8 + room), controller).stable
+
+
+def test_continuous_first_order_with_dead_time_has_its_closed_form():
+    # L = 2 exp(-0.3 s) / (s + 1): |L| = 1 at sqrt(3), phase there -atan(sqrt 3) - 0.3 sqrt 3.
+    found = cr.design.margins(ct.tf([2.0], [1, 1]), dead_time=0.3)
+    expected = 180 - 60 - np.degrees(0.3 * np.sqrt(3))
+    assert found.phase_margin == pytest.approx(expected, rel=1e-10)
+    assert found.delay_margin == pytest.approx(np.radians(expected) / np.sqrt(3), rel=1e-10)
+    assert found.stable
+    assert np.isnan(found.delay_margin_samples)
+    assert not cr.design.margins(
+        ct.tf([2.0], [1, 1]), dead_time=0.3 + 1.001 * found.delay_margin
+    ).stable
+
+
+@pytest.mark.parametrize("gain", [0.5, 5.0])
+def test_continuous_verdict_is_that_of_the_closed_loop_poles(gain):
+    loop = ct.tf([gain], [1, 3, 3, 0.1])  # third order: 9 - 0.1 is the largest stable gain
+    found = cr.design.margins(loop)
+    poles = np.roots([1, 3, 3, 0.1 + gain])
+    assert found.stable == bool(np.all(poles.real < 0))
+    assert found.gain_margin == pytest.approx(8.9 / gain, rel=1e-9)
+
+
+def test_product_and_pair_agree(valve, pi_controller):
+    plant, pi = valve(100), pi_controller(0.5, 0.2)
+    apart, joined = cr.design.margins(plant, pi), cr.design.margins(plant * pi)
+    assert apart.gain_margin == pytest.approx(joined.gain_margin, rel=1e-10)
+    assert apart.delay_margin == pytest.approx(joined.delay_margin, rel=1e-10)
+    assert apart.stable
+    assert joined.stable
+
+
+def test_scaling_the_plant_scales_the_gain_margin_and_leaves_phase_crossovers(valve, pi_controller):
+    one = cr.design.margins(valve(37), pi_controller(0.5, 0.2))
+    two = cr.design.margins(2 * valve(37), pi_controller(0.5, 0.2))
+    assert two.gain_margin == pytest.approx(one.gain_margin / 2, rel=1e-10)
+    np.testing.assert_allclose(two.phase_crossovers, one.phase_crossovers, rtol=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0, 37, 300])
+def test_margins_of_response_data_are_those_of_the_system(valve, pi_controller, delay):
+    plant, pi = valve(delay), pi_controller(0.5, 0.2)
+    omega = np.geomspace(0.05, 0.99 * np.pi / DT, 500)
+    data = cr.MeasuredFRF(plant(np.exp(1j * omega * DT)), omega / (2 * np.pi))
+    exact, found = cr.design.margins(plant, pi), cr.design.margins(data, pi)
+    # Interpolation between 500 points: h^3 of a smooth curve.
+    assert found.gain_margin == pytest.approx(exact.gain_margin, rel=1e-4)
+    assert found.phase_margin == pytest.approx(exact.phase_margin, rel=1e-4)
+    assert found.modulus_margin == pytest.approx(exact.modulus_margin, rel=1e-3)
+    assert found.delay_margin == pytest.approx(exact.delay_margin, rel=1e-4)
+    assert found.stable
+    plain = cr.design.margins(ct.frd(np.asarray(data.frdata[0, 0]), omega, name="plain"), pi)
+    assert plain.gain_margin == pytest.approx(found.gain_margin, rel=1e-12)  # Hz -> rad/s rounds
+
+
+def test_response_data_of_an_unstable_loop_are_called_unstable(valve, pi_controller):
+    plant = valve(37)
+    omega = np.geomspace(0.05, 0.99 * np.pi / DT, 500)
+    for gain, stable in ((0.5, True), (2.4, True), (2.6, False)):
+        pi = pi_controller(gain, 0.2)
+        assert cr.design.margins(plant, pi).stable == stable
+        loop = cr.MeasuredFRF((plant * pi)(np.exp(1j * omega * DT)), omega / (2 * np.pi))
+        assert cr.design.margins(loop).stable == stable
+
+
+def test_intervals_of_measured_margins_cover_the_truth_in_95_of_100(valve, pi_controller):
+    plant, pi = valve(37), pi_controller(0.5, 0.2)
+    truth = cr.design.margins(plant, pi)
+    omega = np.geomspace(1.0, 200.0, 60)
+    clean = plant(np.exp(1j * omega * DT))
+    rng = np.random.default_rng(3)
+    std = 0.01 * np.abs(clean)
+    names = ("gain_margin", "phase_margin", "delay_margin", "modulus_margin")
+    hits = dict.fromkeys(names, 0)
+    runs = 100
+    for _ in range(runs):
+        noise = rng.standard_normal((2, omega.size)) * std / np.sqrt(2)
+        data = cr.MeasuredFRF(clean + noise[0] + 1j * noise[1], omega / (2 * np.pi), std=std)
+        found = cr.design.margins(data, pi)
+        for name in names:
+            low, high = found.intervals[name]
+            hits[name] += low <= getattr(truth, name) <= high
+    # Binomial(100, 0.95) is below 89 once in 200. Interpolation between two noisy points averages
+    # a little, so coverage may be above 95.
+    for name in names[:3]:
+        assert hits[name] >= 89, (name, hits)
+    # The smallest of many noisy distances is biased low; its interval is a first-order one.
+    assert hits["modulus_margin"] >= 75, hits
+
+
+def test_a_band_that_ends_before_the_loop_is_small_is_flagged(valve):
+    omega = np.geomspace(0.05, 5.0, 50)
+    data = cr.MeasuredFRF(3 * valve(37)(np.exp(1j * omega * DT)), omega / (2 * np.pi))
+    assert "band_ends_early" in {flag.code for flag in cr.design.margins(data).flags}
+
+
+def test_result_prints_pickles_and_stays_as_it_is(valve, pi_controller):
+    found = cr.design.margins(valve(37), pi_controller(0.5, 0.2))
+    again = pickle.loads(pickle.dumps(found))
+    assert again.gain_margin == found.gain_margin
+    assert "samples" in found.report()
+    assert "\n" not in repr(found)
+    with pytest.raises(ValueError, match="read-only"):
+        found.gain_crossovers[0] = 1
+
+
+def test_systems_are_not_changed(valve, pi_controller):
+    plant, pi = valve(37), pi_controller(0.5, 0.2)
+    before = [np.array(M) for s in (plant, pi) for M in (s.A, s.B, s.C, s.D)]
+    names = (plant.name, pi.name, pi.input_labels)
+    cr.design.margins(plant, pi)
+    after = [M for s in (plant, pi) for M in (s.A, s.B, s.C, s.D)]
+    assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+    assert names == (plant.name, pi.name, pi.input_labels)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "match"),
+    [
+        ((ct.ss(np.eye(2) * 0.5, np.eye(2), np.eye(2), 0, 0.1),), {}, UnsuitableSystemError, "2 inputs"),
+        ((ct.tf([1], [1, 1]), ct.tf([1], [1, -0.5], 0.1)), {}, UnsuitableSystemError, "time bases"),
+        ((ct.tf([1], [1, 0.5], True),), {}, UnsuitableSystemError, "dt=True"),
+        ((ct.tf([1, 1, 1], [1, 1]),), {}, UnsuitableSystemError, "improper"),
+        (("loop",), {}, UnsuitableSystemError, "str"),
+        ((ct.tf([1], [1, -0.5], 0.1),), {"dead_time": 0.3}, OptionError, "discrete"),
+        ((ct.tf([1], [1, 1]),), {"dead_time": -1.0}, OptionError, ">= 0"),
+        ((ct.tf([1], [1, 1]),), {"unstable_poles": 1}, OptionError, "measured"),
+        ((cr.MeasuredFRF([1.0, 0.5], [1, 2]),), {}, DataError, "2 points"),
+    ],
+)  # fmt: skip
+def test_unsuitable_loops_are_refused(arguments, options, error, match):
+    with pytest.raises(error, match=match):
+        cr.design.margins(*arguments, **options)
