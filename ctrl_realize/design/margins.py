@@ -272,7 +272,9 @@ def closed_loop_count(loop: Loop, omega: FloatArray) -> tuple[int, bool]:
         return 0, True
     steps = np.abs(np.angle(values[1:] / values[:-1]))
     turns = half_turns(values)
-    marginal = bool(np.any(steps > 2.0) or abs(turns - round(turns)) > 0.1)
+    # A real system starts on the real axis, unless a closed-loop pole sits at frequency 0.
+    start = abs(float(np.sin(np.angle(values[0]))))
+    marginal = bool(np.any(steps > 2.0) or abs(turns - round(turns)) > 0.1 or start > 0.5)
     return max(0, -round(turns)), marginal
 
 

@@ -343,7 +343,7 @@ def test_systems_are_not_changed(valve, pi_controller):
 @pytest.mark.parametrize(
     ("arguments", "options", "error", "match"),
     [
-        ((ct.ss(np.eye(2) * 0.5, np.eye(2), np.eye(2), 0, 0.1),), {}, UnsuitableSystemError, "2 inputs"),
+        ((ct.ss([], [], [], np.eye(2), 0.1),), {}, UnsuitableSystemError, "2 inputs"),
         ((ct.tf([1], [1, 1]), ct.tf([1], [1, -0.5], 0.1)), {}, UnsuitableSystemError, "time bases"),
         ((ct.tf([1], [1, 0.5], True),), {}, UnsuitableSystemError, "dt=True"),
         ((ct.tf([1, 1, 1], [1, 1]),), {}, UnsuitableSystemError, "improper"),
