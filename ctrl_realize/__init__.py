@@ -17,8 +17,8 @@ from .frequency import compare_frf as compare_frf
 from .frequency import spectral_frf as spectral_frf
 from .frequency import stepped_sine_frf as stepped_sine_frf
 from .identification.campaign import Campaign as Campaign
-from .identification.campaign import CampaignRow as CampaignRow
-from .identification.campaign import identify_campaign as identify_campaign
+from .identification.campaign_row import CampaignRow as CampaignRow
+from .identification.campaign_run import identify_campaign as identify_campaign
 from .identification.delay_scan import DelayScan as DelayScan
 from .identification.delay_scan import estimate_delay as estimate_delay
 from .identification.from_io import ImpulseEstimate as ImpulseEstimate
@@ -31,6 +31,10 @@ from .identification.realization import realize as realize
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step
+from .identification.tracker import DelayTrack as DelayTrack
+from .identification.tracker import DelayTracker as DelayTracker
+from .identification.tracker import TrackedDelay as TrackedDelay
+from .io import CampaignStore as CampaignStore
 from .io import load_model as load_model
 from .io import read_frf as read_frf
 from .io import read_record as read_record
