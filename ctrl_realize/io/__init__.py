@@ -1,5 +1,6 @@
 """Files in and out: records, frequency responses, models."""
 
+from .campaign_store import CampaignStore as CampaignStore
 from .fit_summary import FitSummary as FitSummary
 from .frf import read_frf as read_frf
 from .model_files import load_model as load_model

@@ -76,29 +76,7 @@ def save_model(
     ...     cr.load_model(Path(folder) / "valve.json")
     <DelayedStateSpace 'valve': u -> y, order 1, z^-37 (0.37 s), dt = 0.01 s>
     """
-    model = system
-    if not isinstance(system, DelayedStateSpace):
-        model = DelayedStateSpace(system, name=getattr(system, "name", None))
-    content = {
-        "format": FORMAT,
-        "schema": SCHEMA,
-        "model": _model_content(model),
-        "fit": summary_to_json(summary_of(model.fit)),
-        "provenance": {
-            "versions": _versions(),
-            "created": created,
-            "note": note,
-            "settings": dict(settings or {}),
-        },
-    }
-    try:
-        content["sha256"] = _checksum(content)
-        text = json.dumps(content, indent=1, allow_nan=False)
-        # nothing is written that could not be read again
-        _model_from(json.loads(text), max_states=model.nstates)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise OptionError(f"the model cannot be stored as JSON: {error}") from error
-    write_text(path, text + "\n")
+    write_text(path, model_to_text(system, created=created, settings=settings, note=note))
 
 
 def load_model(
@@ -131,19 +109,62 @@ def load_model(
     """
     file = usable_file(path, MAX_MODEL_BYTES)
     try:
-        content = json.loads(
-            file.read_bytes().decode("utf-8"),
-            parse_constant=_refuse_constant,
-            object_pairs_hook=_unique_keys,
-        )
+        text = file.read_bytes().decode("utf-8")
+    except ValueError as error:
+        raise FileFormatError(f"{file}: no model file: {error}") from error
+    try:
+        return model_from_text(text, max_states=max_states)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error
+
+
+def model_to_text(
+    system: ct.StateSpace,
+    *,
+    created: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    note: str = "",
+) -> str:
+    """Lay out a model as the text that `save_model` writes."""
+    model = system
+    if not isinstance(system, DelayedStateSpace):
+        model = DelayedStateSpace(system, name=getattr(system, "name", None))
+    content = {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "model": _model_content(model),
+        "fit": summary_to_json(summary_of(model.fit)),
+        "provenance": {
+            "versions": _versions(),
+            "created": created,
+            "note": note,
+            "settings": dict(settings or {}),
+        },
+    }
+    try:
+        content["sha256"] = _checksum(content)
+        text = json.dumps(content, indent=1, allow_nan=False)
+        # nothing is written that could not be read again
+        _model_from(json.loads(text), max_states=model.nstates)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise OptionError(f"the model cannot be stored as JSON: {error}") from error
+    return text + "\n"
+
+
+def model_from_text(text: str, *, max_states: int = MAX_LOADED_STATES) -> DelayedStateSpace:
+    """Build a model from the text that `save_model` wrote; see `load_model`."""
+    try:
+        content = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"{file} is no model file, or is cut off: {error}") from error
+        raise FileFormatError(f"no model file, or cut off: {error}") from error
     try:
         _check_origin(content)
         return _model_from(content, max_states=max_states)
+    except FileFormatError:
+        raise
     # TypeError, KeyError, ...: what python-control says to names and shapes that make no sense
     except (CtrlRealizeError, ValueError, TypeError, OverflowError, RecursionError) as error:
-        raise FileFormatError(f"{file}: {error}") from error
+        raise FileFormatError(str(error)) from error
 
 
 def _model_content(model: DelayedStateSpace) -> dict[str, Any]:

@@ -73,8 +73,11 @@ class TextOptions:
             raise OptionError(f"skip_rows={self.skip_rows} must not be negative")
         if self.encoding != "auto":
             try:
-                codecs.lookup(self.encoding)
-            except (LookupError, ValueError) as error:
+                # also refuses the codecs of Python that are no encodings of text: zlib, rot13
+                b"1".decode(self.encoding)
+            except UnicodeError:
+                pass
+            except (LookupError, ValueError, TypeError) as error:
                 raise OptionError(f"encoding={self.encoding!r} is not known") from error
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DataError
+from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from .columns import holds_numbers
 from .tables import Table
@@ -65,9 +65,12 @@ def _parsed_dates(table: Table, index: int, time_format: str | None) -> np.ndarr
         cells = [cell.replace(",", ".") for cell in cells]
         if all(re.fullmatch(r"\d{1,3}:\d{2}(:\d{2}(\.\d*)?)?", cell) for cell in cells[:3]):
             return _parsed_times_of_day(table, index, cells)
-    stamps = pd.to_datetime(
-        pd.Series(cells), format=time_format or "ISO8601", utc=True, errors="coerce"
-    )
+    try:
+        stamps = pd.to_datetime(
+            pd.Series(cells), format=time_format or "ISO8601", utc=True, errors="coerce"
+        )
+    except ValueError as error:
+        raise OptionError(f"time_format={time_format!r} is no format of time: {error}") from error
     bad = stamps.isna().to_numpy()
     if bad.any():
         row = int(np.argmax(bad))

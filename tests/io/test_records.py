@@ -111,8 +111,10 @@ def test_the_encoding_can_be_said(tmp_path):
     file = tmp_path / "a.csv"
     file.write_bytes(table(header="t,u,y").encode("utf-32"))
     check(read_record(file, encoding="utf-32"))
-    with pytest.raises(OptionError, match="'klingon'"):
-        read_record(file, encoding="klingon")
+    # Python has codecs that are no encodings of text
+    for encoding in ("klingon", "rot13", "zlib", "a\0b", 8):
+        with pytest.raises(OptionError, match="is not known"):
+            read_record(file, encoding=encoding)
 
 
 def test_names_of_columns_become_labels(tmp_path):
@@ -190,6 +192,8 @@ def test_other_dates_need_their_format(tmp_path):
     file.write_text("\n".join(["date time,u,y", *rows]) + "\n")
     with pytest.raises(DataError, match=r"line 2: '03\.02\.2026 10:00:00'.*time_format="):
         read_record(file)
+    with pytest.raises(OptionError, match="time_format='%' is no format"):
+        read_record(file, time_format="%")
     assert_array_equal(read_record(file, time_format="%d.%m.%Y %H:%M:%S").time, np.arange(4.0))
 
 

@@ -1,0 +1,117 @@
+"""Finished rows of a campaign in a folder, so that a stopped run can go on."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileFormatError, OptionError
+from ..identification.campaign_row import CampaignRow
+from ..results import Flag
+from .atomic import write_text
+from .fit_summary import summary_of
+from .json_content import field
+from .model_files import MAX_MODEL_BYTES, model_from_text, model_to_text
+
+FORMAT = "ctrl_realize campaign row"
+SCHEMA = 1
+_NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain")
+
+
+class CampaignStore:
+    """Folder that keeps the result of each record of a campaign as it is finished.
+
+    Each row is one JSON file, written whole or not at all, named by the SHA-256 of the record's
+    samples and of the settings; processes and machines that share the folder can write to it at
+    once. A file that is damaged is made anew. Only this package's files are ever read, and none
+    is deleted.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made if it is not there.
+
+    Raises
+    ------
+    OptionError
+        The path is a file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import ctrl_realize as cr
+    >>> records = [cr.bench.valve().step_record(16.0, seed) for seed in range(2)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     store = cr.CampaignStore(folder)
+    ...     first = cr.identify_campaign(records, method="paper", store=store)
+    ...     again = cr.identify_campaign(records, method="paper", store=store)
+    ...     print(len(store), bool((first.delays == again.delays).all()))
+    2 True
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.folder = Path(folder)
+        if self.folder.exists() and not self.folder.is_dir():
+            raise OptionError(f"{self.folder} is a file; a campaign store needs a folder")
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self.folder.glob("row-*.json"))
+
+    def __repr__(self) -> str:
+        return f"<CampaignStore {str(self.folder)!r}: {len(self)} rows>"
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"row-{key}.json"
+
+    def load(self, key: str) -> CampaignRow | None:
+        """Return the row kept under `key`; None if there is none, or its file is damaged."""
+        path = self._path(key)
+        try:
+            if path.stat().st_size > 2 * MAX_MODEL_BYTES:
+                return None
+            return _row_from(json.loads(path.read_text(encoding="utf-8")), key)
+        except (OSError, ValueError, RecursionError):
+            # FileFormatError is a ValueError: whatever is wrong, the record is identified anew.
+            return None
+
+    def save(self, key: str, row: CampaignRow) -> CampaignRow:
+        """Keep a row that has a model; return it as `load` will, with a summary for its fit."""
+        assert row.system is not None
+        content = {
+            "format": FORMAT,
+            "schema": SCHEMA,
+            "key": key,
+            "name": row.name,
+            # Infinity and NaN have no place in JSON; their text has.
+            "numbers": {name: repr(float(getattr(row, name))) for name in _NUMBERS},
+            "interval": [repr(float(end)) for end in row.interval],
+            "flags": [[flag.code, flag.message] for flag in row.flags],
+            "warnings": list(row.warnings),
+            "model": model_to_text(row.system.replace(fit=summary_of(row.system.fit))),
+        }
+        write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
+        return _row_from(content, key)
+
+
+def _row_from(content: Any, key: str) -> CampaignRow:
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise FileFormatError("not a row of a campaign")
+    if content.get("schema") != SCHEMA or content.get("key") != key:
+        raise FileFormatError("a row of another version, or under another name")
+    numbers: dict[str, Any] = {
+        name: float(text)
+        for name, text in field(content, "numbers", dict).items()
+        if name in _NUMBERS
+    }
+    low, high = (float(text) for text in field(content, "interval", list))
+    return CampaignRow(
+        name=field(content, "name", str),
+        **numbers,
+        interval=(low, high),
+        system=model_from_text(field(content, "model", str)),
+        flags=tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list)),
+        warnings=tuple(str(text) for text in field(content, "warnings", list)),
+    )
