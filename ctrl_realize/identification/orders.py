@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ABOVE_NOISE = 1.2
-"""Singular values above 1.2 times the largest of pure noise belong to the plant: on simulated
-third-order valves this finds 3 at 0.02 and 0.1 % noise and 2 at 0.5 and 1 %, where the third
-drowns. The largest gap falls to 2 and 1; the Gavish-Donoho threshold says 200 and more."""
+"""Singular values above 1.2 times the largest of pure noise belong to the plant. On 32 simulated
+third-order valves (zero-phase filter) this finds order 3 in 31 cases at 0.02 and 0.1 % noise, and
+order 2 in 28 and 21 cases at 0.5 and 1 %, where the third drowns. The largest gap falls to 2 and 1
+much earlier, the Gavish-Donoho threshold says 200 and more."""
 
 AS_GOOD = 1.1
 """Without known noise: a misfit of up to 1.1 times the least one is as good."""

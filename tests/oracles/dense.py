@@ -9,13 +9,12 @@ import numpy as np
 
 
 def hankel(h: np.ndarray, rows: int, columns: int) -> np.ndarray:
-    """Block Hankel matrix, entry by entry; h has the shape (p, m, N), zeros follow it."""
+    """Block Hankel matrix, block row by block row; h has the shape (p, m, N), zeros follow it."""
     p, m, length = h.shape
     H = np.zeros((rows * p, columns * m))
     for i in range(rows):
-        for j in range(columns):
-            if i + j < length:
-                H[i * p : (i + 1) * p, j * m : (j + 1) * m] = h[:, :, i + j]
+        for j in range(min(columns, max(0, length - i))):
+            H[i * p : (i + 1) * p, j * m : (j + 1) * m] = h[:, :, i + j]
     return H
 
 

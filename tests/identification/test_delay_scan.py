@@ -1,0 +1,263 @@
+"""estimate_delay: the dense answers, the conventions and the flags."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DelayRangeError, OptionError, OrderError
+from ctrl_realize.identification.scan_curve import (
+    best_delay,
+    curve_flags,
+    flat_set,
+    local_minima,
+    noise_flags,
+)
+from ctrl_realize.numerics.state_space import markov
+from tests.oracles import dense
+from tests.oracles.plants import modal, valve_pulse
+from tests.rigs import TS
+
+KINDS = ["clean", "zero-phase", "causal", "unfiltered"]
+
+
+def codes(fit) -> set[str]:
+    return {flag.code for flag in fit.flags}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("seed", "noise"), [(1, 2e-3), (2, 2e-2)])
+def test_truncated_scan_is_the_dense_scan(kind, seed, noise):
+    pulse = valve_pulse(kind, seed=seed, noise=noise, n=361)
+    delays = np.arange(0, 61, 10)
+    scan = cr.estimate_delay(pulse, 3, max_delay=60, samples=300, dt=TS).fit
+    misfit, values = dense.scan(pulse, delays, 300, [3], 361)
+    allowed = 1e-11 * np.abs(pulse).sum() + 1e-9 * misfit[0]  # the promise of the docstring
+    assert np.all(np.abs(scan.iae[delays] - misfit[0]) <= allowed)
+    assert_allclose(scan.singular_values[delays], values, rtol=0, atol=1e-10 * values[:, :1].max())
+
+
+@pytest.mark.parametrize("hankel", ["square", "padded"])
+def test_curve_is_the_misfit_of_the_candidates_over_one_window(hankel):
+    pulse = valve_pulse("causal", n=461)
+    scan = cr.estimate_delay(pulse, 3, max_delay=60, samples=400, hankel=hankel, dt=TS).fit
+    assert len(scan.candidates) == 61
+    for d in (0, 17, scan.delay, 60):
+        candidate = scan.candidates[d]
+        assert candidate.delay == d
+        assert np.abs(pulse - candidate.markov(461)).sum() == pytest.approx(scan.iae[d], rel=1e-12)
+    assert scan.iae[scan.delay] == scan.iae.min()
+
+
+def test_returned_model_is_the_realization_at_the_best_delay():
+    pulse = valve_pulse("zero-phase")
+    sys = cr.estimate_delay(pulse, 3, max_delay=100, samples=1000, dt=TS)
+    again = cr.realize(pulse, 3, delay=sys.fit.delay, samples=1000, dt=TS)
+    assert sys.delay == sys.fit.delay
+    assert np.array_equal(sys.delay_free.A, again.delay_free.A)
+    assert np.array_equal(sys.delay_free.C, again.delay_free.C)
+    assert sys.fit.realization.iae == again.fit.iae
+    assert_allclose(sys.delay_free.A, sys.fit.candidates[sys.delay].delay_free.A, atol=1e-7)
+
+
+@settings(max_examples=15)
+@given(delay=st.integers(0, 40), seed=st.integers(0, 1000), order=st.integers(1, 4))
+def test_a_delay_of_d_samples_is_found_as_d(delay, seed, order):
+    A, B, C, D = modal(np.random.default_rng(seed), order)
+    pulse = np.r_[np.zeros(delay), markov(A, B, C, D, 300)[0, 0]]  # D is not zero: one answer
+    sys = cr.estimate_delay(pulse, order, max_delay=50, dt=0.1)
+    assert sys.delay == delay
+    assert sys.dead_time == delay * 0.1
+
+
+@pytest.mark.parametrize("delay", [0, 1, 37])
+def test_of_the_two_exact_delays_of_a_strictly_proper_plant_the_smaller_is_found(delay):
+    sys = cr.estimate_delay(valve_pulse("clean", delay=float(delay)), 3, max_delay=50, dt=TS)
+    assert sys.delay == delay
+    assert sys.fit.interval == (delay, delay + 1)
+
+
+def test_paper_order_three_on_the_clean_valve_with_a_fractional_delay_rounds_up():
+    # 36.4 samples: the first sample that moves is 37, which is the direct term behind 37
+    sys = cr.estimate_delay(valve_pulse("clean", delay=36.4), 3, max_delay=60, dt=TS)
+    assert sys.delay == 37
+
+
+@given(scale=st.floats(1e-6, 1e6))
+@settings(max_examples=10)
+def test_scaled_data_scale_the_curve_and_keep_the_delay(scale):
+    pulse = valve_pulse("zero-phase", n=360)
+    one = cr.estimate_delay(pulse, 3, max_delay=60, samples=250, dt=TS).fit
+    other = cr.estimate_delay(scale * pulse, 3, max_delay=60, samples=250, dt=TS).fit
+    assert other.delay == one.delay
+    assert other.interval == one.interval
+    assert_allclose(other.iae, scale * one.iae, rtol=1e-8)
+
+
+def test_strictly_proper_candidates_have_no_direct_term():
+    pulse = valve_pulse("zero-phase", n=360)
+    scan = cr.estimate_delay(pulse, 3, max_delay=40, samples=300, feedthrough=False, dt=TS).fit
+    assert not scan.feedthrough
+    assert scan.candidates[30].delay_free.D == 0
+    assert np.abs(pulse[:341] - scan.candidates[30].markov(341)).sum() == pytest.approx(
+        scan.iae[30], rel=1e-12
+    )
+
+
+def test_channels_share_one_delay():
+    rng = np.random.default_rng(2)
+    system = modal(rng, 3, 2, 2)
+    pulse = np.concatenate([np.zeros((2, 2, 11)), markov(*system, 200)], axis=2)
+    pulse += 1e-4 * rng.standard_normal(pulse.shape)
+    sys = cr.estimate_delay(pulse, 3, max_delay=20, samples=120, dt=0.01)
+    assert sys.delay == 11
+    window = pulse[:, :, :141]
+    model = sys.fit.candidates[11].markov(141)
+    assert np.abs(window - model).sum() == pytest.approx(sys.fit.iae[11], rel=1e-12)
+
+
+def test_default_samples_cover_the_settling_and_no_more():
+    sys = cr.estimate_delay(valve_pulse("zero-phase", n=6000), 3, max_delay=100, dt=TS)
+    # R3 settles to 2 % after 266 samples (R3: 2.2 Hz) and the delay
+    assert 3 * 300 < sys.fit.samples < 3 * 500
+    short = cr.estimate_delay(valve_pulse("zero-phase", n=300), 3, max_delay=100, dt=TS)
+    assert short.fit.samples == 199
+
+
+def test_result_reports_itself_and_pickles():
+    fit = cr.estimate_delay(valve_pulse("zero-phase"), 3, max_delay=100, dt=TS).fit
+    twin = pickle.loads(pickle.dumps(fit))
+    assert np.array_equal(twin.iae, fit.iae)
+    assert twin.candidates[fit.delay].delay == fit.delay
+    assert f"best {fit.delay}" in repr(fit)
+    assert "\n" not in repr(fit)
+    assert f"{fit.interval[0]}...{fit.interval[1]} samples" in fit.report()
+    assert not fit.iae.flags.writeable
+    assert len(list(fit.candidates)) == 101
+    assert [c.delay for c in fit.candidates[3:5]] == [3, 4]
+    with pytest.raises(IndexError):
+        fit.candidates[101]
+
+
+# -- what the scan says about itself ---------------------------------------------------------
+
+
+def test_minimum_at_the_end_is_flagged():
+    fit = cr.estimate_delay(valve_pulse("clean", delay=80.0), 3, max_delay=50, dt=TS).fit
+    assert fit.delay == 50
+    assert "delay_at_bound" in codes(fit)
+    assert "max_delay=50" in fit.report()
+
+
+def test_no_delay_is_flagged_as_not_resolvable():
+    fit = cr.estimate_delay(valve_pulse("zero-phase", delay=0.0), 3, max_delay=50, dt=TS).fit
+    assert fit.contrast < 1.3
+    assert "no_delay_resolved" in codes(fit)
+
+
+@pytest.mark.parametrize(
+    ("noise", "code"), [(1e-4, None), (2e-3, "order_near_noise"), (3e-2, "order_in_noise")]
+)
+def test_last_singular_value_is_compared_with_that_of_the_noise(noise, code):
+    # the same processing of samples at rest
+    pulse = valve_pulse("zero-phase", noise=noise)
+    quiet = valve_pulse("zero-phase", noise=noise, delay=5000.0, seed=9, n=3000)
+    fit = cr.estimate_delay(
+        cr.ImpulseResponse(pulse, TS, noise=quiet), 3, max_delay=100, samples=1000
+    ).fit
+    assert codes(fit) & {"order_near_noise", "order_in_noise"} == ({code} if code else set())
+    assert fit.noise_ratio == pytest.approx(fit.singular_values[fit.delay, 2] / fit.noise_floor)
+
+
+def test_noise_floor_is_the_norm_of_the_noise_hankel():
+    noise = np.random.default_rng(0).standard_normal(999)
+    impulse = cr.ImpulseResponse(valve_pulse("clean"), TS, noise=noise)
+    floor = cr.estimate_delay(impulse, 3, max_delay=100, samples=1000).fit.noise_floor
+    H = dense.hankel(noise[np.newaxis, np.newaxis], 500, 500)
+    assert floor == pytest.approx(np.linalg.norm(H, 2), rel=1e-3)
+    short = cr.ImpulseResponse(valve_pulse("clean"), TS, noise=noise[:200])
+    scaled = cr.estimate_delay(short, 3, max_delay=100, samples=1000).fit.noise_floor
+    assert scaled == pytest.approx(floor, rel=0.3)  # one fifth of the data
+    silent = cr.ImpulseResponse(valve_pulse("clean"), TS, noise=noise[:10])
+    assert cr.estimate_delay(silent, 3, max_delay=100, samples=1000).fit.noise_floor is None
+
+
+def test_a_causal_filter_is_named_with_its_delay():
+    causal = cr.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
+    fit = cr.estimate_delay(
+        cr.ImpulseResponse(valve_pulse("causal"), TS, filter=causal), 3, max_delay=100
+    ).fit
+    assert "filter_delay" in codes(fit)
+    assert "13.1 samples" in fit.report()
+
+
+def test_curve_functions_read_a_curve_by_hand():
+    curve = np.array([9.0, 5.0, 2.0, 2.05, 4.0, 2.09, 2.2, 7.0])
+    assert best_delay(curve, 0.0) == 2
+    assert best_delay(curve - 2.0 + 1e-15 * np.arange(8), 1e-12) == 2
+    assert flat_set(curve, 2, 0.0) == (2, 5)
+    assert local_minima(curve, 2, 0.0) == 2
+    assert {flag.code for flag in curve_flags(curve, 2, 0.0)} == {"several_minima"}
+    assert {flag.code for flag in curve_flags(curve[:3], 2, 0.0)} == {"delay_at_bound"}
+    assert {flag.code for flag in curve_flags(np.array([2.2, 2.0, 3.0]), 1, 0.0)} == {
+        "no_delay_resolved"
+    }
+    assert noise_flags(1.0, None, 3) == noise_flags(1.0, 0.0, 3) == noise_flags(3.1, 1.0, 3) == ()
+    assert noise_flags(2.9, 1.0, 3)[0].code == "order_near_noise"
+    assert noise_flags(1.2, 1.0, 3)[0].code == "order_in_noise"
+
+
+# -- input that cannot be used ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("order", "kwargs", "error", "match"),
+    [
+        (3, {"max_delay": 5000}, DelayRangeError, "max_delay=5000 needs more than 5001 samples"),
+        (3, {"max_delay": 100, "samples": 1001}, DelayRangeError, "need 1102 samples.*1101"),
+        (3, {"max_delay": -1}, OptionError, "max_delay=-1"),
+        (3, {"max_delay": 2.5}, OptionError, "max_delay=2.5"),
+        (0, {"max_delay": 10}, OptionError, "order=0"),
+        (600, {"max_delay": 10}, OrderError, "order=600"),
+        (3, {"max_delay": 10, "samples": 4}, OrderError, "1 <= order <= 2"),
+        (3, {"max_delay": 10, "hankel": "x"}, OptionError, "hankel='x'"),
+    ],
+)
+def test_unusable_choices_are_refused(order, kwargs, error, match):
+    with pytest.raises(error, match=match):
+        cr.estimate_delay(valve_pulse("clean"), order, dt=TS, **kwargs)
+
+
+@pytest.mark.parametrize(
+    ("pulse", "order", "rank"),
+    [(np.zeros(300), 1, 0), (np.ones(300), 2, 1), (np.r_[1.0, np.zeros(299)], 1, 0)],
+)
+def test_degenerate_data_name_their_rank(pulse, order, rank):
+    with pytest.raises(OrderError, match=f"rank {rank}"):
+        cr.estimate_delay(pulse, order, max_delay=20, dt=1.0)
+
+
+def test_a_single_spike_is_a_delay():
+    pulse = np.eye(300)[12]
+    sys = cr.estimate_delay(pulse, 1, max_delay=40, dt=1.0)
+    assert sys.delay == 11  # eleven samples and one state
+    assert_allclose(sys.markov(300), pulse, atol=1e-15)
+
+
+def test_no_range_at_all_is_a_realization():
+    sys = cr.estimate_delay(valve_pulse("clean", delay=0.0), 3, max_delay=0, dt=TS)
+    assert sys.delay == 0
+    assert sys.fit.iae.shape == (1,)
+
+
+def test_the_data_of_the_caller_stay_as_they_are():
+    pulse = valve_pulse("causal")
+    before = pulse.copy()
+    cr.estimate_delay(pulse, 3, max_delay=50, dt=TS)
+    assert np.array_equal(pulse, before)
