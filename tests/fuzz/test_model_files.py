@@ -1,0 +1,117 @@
+"""Model files with bytes changed, and with values changed by somebody who can sign them."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import event, given
+from hypothesis import strategies as st
+
+import ctrl_realize as cr
+from ctrl_realize.io import load_model, save_model
+from ctrl_realize.results import Flag, Result
+from tests.fuzz.lane import fuzz, good_end
+from tests.fuzz.test_binary_files import damages
+
+
+class Fit(Result):
+    """Something to be summarised."""
+
+    delay = 3
+    interval = (2.5, 3.5)
+    flags = (Flag("a", "b"),)
+
+    def _title(self):
+        return "fit"
+
+    def _rows(self):
+        return [("delay", "3")]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    core = ct.ss([[0.9, 0.1], [0, 0.5]], [[0], [1]], [[1, 0]], 0, 0.1)
+    path = tmp_path_factory.mktemp("models") / "model.json"
+    save_model(path, cr.delayed_ss(core, 3, name="m", fit=Fit()))
+    return path
+
+
+def signed(content: dict) -> str:
+    content.pop("sha256", None)
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return json.dumps({**content, "sha256": hashlib.sha256(canonical.encode()).hexdigest()})
+
+
+VALUES = st.recursive(
+    st.one_of(
+        st.none(),
+        st.booleans(),
+        st.integers(-3, 50),
+        st.sampled_from([10**9, -(10**400), 10**400, 5e-324, 1.7e308, -0.0, "", "a.b", "\ud800"]),
+        st.floats(allow_nan=False, allow_infinity=False),
+        st.text(max_size=5),
+    ),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4), st.dictionaries(st.text(max_size=4), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+def places(content, path=()):
+    """All positions in a tree of JSON."""
+    yield path
+    if isinstance(content, dict | list):
+        for key in content if isinstance(content, dict) else range(len(content)):
+            yield from places(content[key], (*path, key))
+
+
+@fuzz(150)
+@given(st.data())
+def test_signed_nonsense_is_refused_or_makes_a_model_that_saves_to_itself(file, data):
+    content = json.loads(file.read_text())
+    del content["sha256"]
+    for _ in range(data.draw(st.integers(1, 3))):
+        path = data.draw(st.sampled_from([p for p in places(content) if p]))
+        part = content
+        for key in path[:-1]:
+            part = part[key]
+        if data.draw(st.booleans()):
+            part[path[-1]] = data.draw(VALUES)
+        elif isinstance(part, list):
+            part.insert(path[-1], copy.deepcopy(part[path[-1]]))
+        else:
+            del part[path[-1]]
+    other = file.with_name("signed.json")
+    try:
+        other.write_text(signed(content))
+    except ValueError:
+        # too many digits for Python to write
+        return
+    with good_end() as models:
+        models.append(load_model(other))
+    for model in models:
+        event("loaded")
+        again = file.with_name("again.json")
+        save_model(again, model)
+        second = load_model(again)
+        np.testing.assert_array_equal(second.A, model.A)
+        assert (second.name, second.dt) == (model.name, model.dt)
+        assert np.isfinite(model.A).all()
+
+
+@fuzz(150)
+@given(st.data())
+def test_damaged_model_files_are_refused_or_the_same_model(file, data):
+    other = file.with_name("damaged.json")
+    other.write_bytes(data.draw(damages(file.read_bytes())))
+    with good_end() as models:
+        models.append(load_model(other))
+    for model in models:
+        event("loaded")
+        np.testing.assert_array_equal(model.A, load_model(file).A)
