@@ -21,7 +21,7 @@ from tests.rigs import R3, TS, exact_step
 
 @pytest.fixture(scope="module")
 def valve():
-    """R3 behind 37 samples, sampled exactly: matrices and 3000 Markov parameters (down to 1e-18)."""
+    """R3 behind 37 samples, sampled exactly: matrices and 3000 Markov parameters."""
     plant = ct.ss(ct.c2d(ct.ss(R3), TS, "zoh"))
     return plant, valve_pulse("clean", n=3000)
 
