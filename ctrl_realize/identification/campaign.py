@@ -7,82 +7,25 @@ together, since averaging estimates keeps their common bias.
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
-from ..checks import one_of, whole
+from ..checks import whole
 from ..delayed import DelayedStateSpace
-from ..errors import CtrlRealizeError, DataError, OptionError
+from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ..results import Flag, Result
 from ..signals import Record
-from .identify import METHODS, Method, identify
+from .campaign_row import CampaignRow, RecordSource
+from .identify import Method, identify
 from .realization import realize
-from .steps import detect_step
 
 if TYPE_CHECKING:
     import pandas as pd
-
-RecordSource = Record | Callable[[], Record]
-
-
-@dataclass(frozen=True, eq=False)
-class CampaignRow:
-    """What one record gave: a model, or the error that stopped it.
-
-    Exactly one of `system` and `error` is None.
-
-    Attributes
-    ----------
-    name : str
-    amplitude : float
-        Height of the input step; NaN where there is none.
-    system : DelayedStateSpace or None
-    error : str or None
-        What stopped this record, in one line.
-    warnings : tuple of str
-        What was warned of on the way.
-    """
-
-    name: str
-    amplitude: float = float("nan")
-    system: DelayedStateSpace | None = None
-    error: str | None = None
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def delay(self) -> float:
-        """Estimated delay in samples; NaN for a failed record."""
-        return float("nan") if self.system is None else float(self.system.fit.delay)
-
-    @property
-    def dead_time(self) -> float:
-        """Estimated dead time in s; NaN for a failed record."""
-        return float("nan") if self.system is None else self.delay * float(self.system.dt)
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Interval of the dead time in s; NaN for a failed record."""
-        if self.system is None:
-            return (float("nan"), float("nan"))
-        low, high = self.system.fit.dead_time_interval
-        return (float(low), float(high))
-
-    @property
-    def misfit(self) -> float:
-        """Misfit of the model, scaled to a unit step, so that records can be compared."""
-        return float("nan") if self.system is None else float(self.system.fit.misfit)
-
-    def __repr__(self) -> str:
-        what = self.error if self.system is None else f"delay {self.delay:.4g} samples"
-        return f"<CampaignRow {self.name!r}: {what}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,13 +39,18 @@ class Campaign(Result):
     ----------
     rows : tuple of CampaignRow
         One for each record, in the order given; a record that failed is a row with its error.
+    sources : tuple
+        The records, or the functions that read them.
     method : str
         How the records were identified.
+    options : dict
+        Further arguments of `identify`.
     """
 
     rows: tuple[CampaignRow, ...]
-    method: str
-    loss: str = field(default="huber", repr=False)
+    sources: tuple[RecordSource, ...] = field(repr=False)
+    method: Method
+    options: dict[str, Any]
 
     @cached_property
     def good(self) -> tuple[CampaignRow, ...]:
@@ -123,7 +71,7 @@ class Campaign(Result):
         DataError
             No record was identified, or the sample times differ.
         """
-        times = {float(row.system.dt) for row in self.good if row.system is not None}
+        times = {row.system.dt for row in self.good if row.system is not None}
         if not times:
             raise DataError(
                 f"none of the {len(self.rows)} records could be identified; "
@@ -134,7 +82,7 @@ class Campaign(Result):
                 f"the records have sample times from {min(times):g} s to {max(times):g} s; delays "
                 "in samples and one common model need the same for all"
             )
-        return min(times)
+        return float(min(times))
 
     @property
     def delays(self) -> FloatArray:
@@ -179,12 +127,11 @@ class Campaign(Result):
         """
         _ = self.dt
         if self.method == "output_error":
-            records = [record for row in self.good for record in _records_of(row)]
             from .delay_fit import fit_delay
 
-            return fit_delay(records, loss=self.loss)
-        chosen = self.best.system
-        assert chosen is not None
+            known = {k: v for k, v in self.options.items() if k not in ("order", "max_delay")}
+            return fit_delay([self._record(row) for row in self.good], **known)
+        chosen = self._identified(self.best)
         scan = chosen.fit
         final = realize(
             scan.impulse,
@@ -197,6 +144,17 @@ class Campaign(Result):
         return final.replace(
             name=chosen.name, inputs=chosen.input_labels, outputs=chosen.output_labels
         )
+
+    def _record(self, row: CampaignRow) -> Record:
+        source = self.sources[self.rows.index(row)]
+        return source if isinstance(source, Record) else source()
+
+    def _identified(self, row: CampaignRow) -> DelayedStateSpace:
+        """The row's model with its whole fit, which a store keeps only in summary."""
+        assert row.system is not None
+        if hasattr(row.system.fit, "impulse"):
+            return row.system
+        return identify(self._record(row), method=self.method, **self.options)
 
     def table(self) -> pd.DataFrame:
         """One row for each record, in the order given.
@@ -219,9 +177,7 @@ class Campaign(Result):
                 "high": row.interval[1],
                 "order": np.nan if row.system is None else row.system.delay_free.nstates,
                 "misfit": row.misfit,
-                "flags": ""
-                if row.system is None
-                else ", ".join(flag.code for flag in row.system.fit.flags),
+                "flags": ", ".join(flag.code for flag in row.flags),
                 "error": row.error or "",
             }
             for row in self.rows
@@ -248,7 +204,7 @@ class Campaign(Result):
         for amplitude in sorted(groups, key=lambda a: (np.isnan(a), a)):
             members = groups[amplitude]
             delays = np.array([row.delay for row in members])
-            gains = np.array([_gain(row) for row in members])
+            gains = np.array([row.gain for row in members])
             many = len(members) > 1
             rows.append(
                 {
@@ -308,128 +264,9 @@ class Campaign(Result):
         return f"<Campaign: {len(self.rows)} records{failed}, method {self.method!r}>"
 
 
-def identify_campaign(
-    records: Iterable[RecordSource],
-    *,
-    n_jobs: int = 1,
-    method: Method = "output_error",
-    progress: bool | None = None,
-    **options: Any,
-) -> Campaign:
-    """Identify every record of a campaign; one bad record never stops the rest.
-
-    Parameters
-    ----------
-    records : iterable of Record, or of functions that return one
-        A function, such as ``functools.partial(cr.read_record, path)``, is called where the
-        record is identified, so that files are read by the workers, one at a time, and a file
-        that cannot be read is a row with its error.
-    n_jobs : int, optional
-        Processes to use (joblib; -1 for all cores). The result does not depend on it. Inside
-        ``joblib.parallel_config(backend="dask")`` the work goes to a Dask cluster.
-    method : {"output_error", "scan", "paper"}, optional
-    progress : bool, optional
-        Show a progress bar; default: where somebody can see it.
-    **options
-        Further arguments of `identify`, the same for all records.
-
-    Returns
-    -------
-    Campaign
-
-    Raises
-    ------
-    DataError
-        `records` is empty.
-    OptionError
-        An argument that `identify` does not take.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> valve = cr.bench.valve()
-    >>> records = [valve.step_record(16.0, seed) for seed in range(3)]
-    >>> campaign = cr.identify_campaign(records, method="paper")
-    >>> campaign
-    <Campaign: 3 records, method 'paper'>
-    >>> bool(30 < campaign.statistics().mean < 70)
-    True
-    """
-    one_of(method, "method", METHODS)
-    _check_options(options)
-    if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or n_jobs == 0:
-        raise OptionError(f"n_jobs={n_jobs!r}; needed is a number of processes, or -1 for all")
-    sources = list(records)
-    if not sources:
-        raise DataError("there are no records to identify")
-    for position, source in enumerate(sources):
-        if not isinstance(source, Record) and not callable(source):
-            raise DataError(
-                f"records[{position}] is a {type(source).__name__}; needed is a Record, or a "
-                "function that returns one (functools.partial(read_record, path))"
-            )
-    tasks = (
-        delayed(_identify_one)(source, position, method, options)
-        for position, source in enumerate(sources)
-    )
-    rows = Parallel(n_jobs=n_jobs, return_as="generator")(tasks)
-    return Campaign(
-        tuple(_with_bar(rows, len(sources), progress)), method, options.get("loss", "huber")
-    )
-
-
-def _identify_one(
-    source: RecordSource, position: int, method: Method, options: dict[str, Any]
-) -> CampaignRow:
-    name = _source_name(source, position)
-    amplitude = float("nan")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            record = source if isinstance(source, Record) else source()
-            name = record.name or name
-            amplitude = _amplitude(record)
-            system = identify(record, method=method, **options)
-        except (CtrlRealizeError, OSError, ArithmeticError, np.linalg.LinAlgError) as error:
-            return CampaignRow(name, amplitude, error=_one_line(error), warnings=_messages(caught))
-    return CampaignRow(name, amplitude, system, warnings=_messages(caught))
-
-
-def _source_name(source: RecordSource, position: int) -> str:
-    if isinstance(source, Record):
-        return source.name or f"record {position}"
-    arguments = getattr(source, "args", ())
-    return str(arguments[0]) if arguments else f"record {position}"
-
-
-def _amplitude(record: Record) -> float:
-    try:
-        return detect_step(record).amplitude
-    except CtrlRealizeError:
-        return float("nan")
-
-
-def _one_line(error: Exception) -> str:
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
-
-
-def _messages(caught: list[warnings.WarningMessage]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(str(entry.message) for entry in caught))
-
-
-def _records_of(row: CampaignRow) -> tuple[Record, ...]:
-    assert row.system is not None
-    return tuple(row.system.fit.records)
-
-
-def _gain(row: CampaignRow) -> float:
-    assert row.system is not None
-    return float(np.real(row.system.dcgain()))
-
-
 def _amplitude_trend(rows: tuple[CampaignRow, ...]) -> Flag | None:
     """Test whether the delay depends on the height of the step, by the rank correlation."""
-    from scipy.stats import spearmanr
+    from scipy.stats import spearmanr  # scipy.stats takes a while to import
 
     heights = np.array([abs(row.amplitude) for row in rows])
     delays = np.array([row.delay for row in rows])
@@ -448,24 +285,3 @@ def _amplitude_trend(rows: tuple[CampaignRow, ...]) -> Flag | None:
         f"{chance:.1g}): friction, a slew limit or another nonlinearity; one linear model cannot "
         "hold for all amplitudes",
     )
-
-
-def _check_options(options: dict[str, Any]) -> None:
-    from inspect import signature
-
-    known = set(signature(identify).parameters) - {"record", "method"}
-    strange = sorted(set(options) - known)
-    if strange:
-        raise OptionError(f"{', '.join(strange)}: identify takes {', '.join(sorted(known))}")
-
-
-def _with_bar(
-    rows: Iterable[CampaignRow], total: int, progress: bool | None
-) -> Iterator[CampaignRow]:
-    with warnings.catch_warnings():
-        # In a notebook without ipywidgets tqdm warns, and falls back to text by itself.
-        warnings.filterwarnings("ignore", message="IProgress not found")
-        from tqdm.auto import tqdm
-    # disable=None: no bar where the output is not a terminal.
-    disable = None if progress is None else not progress
-    yield from tqdm(rows, total=total, desc="identify", unit="record", disable=disable)

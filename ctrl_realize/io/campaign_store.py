@@ -11,7 +11,6 @@ from ..errors import FileFormatError, OptionError
 from ..identification.campaign_row import CampaignRow
 from ..results import Flag
 from .atomic import write_text
-from .fit_summary import summary_of
 from .json_content import field
 from .model_files import MAX_MODEL_BYTES, model_from_text, model_to_text
 
@@ -90,7 +89,7 @@ class CampaignStore:
             "interval": [repr(float(end)) for end in row.interval],
             "flags": [[flag.code, flag.message] for flag in row.flags],
             "warnings": list(row.warnings),
-            "model": model_to_text(row.system.replace(fit=summary_of(row.system.fit))),
+            "model": json.loads(model_to_text(row.system)),
         }
         write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
         return _row_from(content, key)
@@ -111,7 +110,7 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         name=field(content, "name", str),
         **numbers,
         interval=(low, high),
-        system=model_from_text(field(content, "model", str)),
+        system=model_from_text(json.dumps(field(content, "model", dict))),
         flags=tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list)),
         warnings=tuple(str(text) for text in field(content, "warnings", list)),
     )

@@ -1,0 +1,152 @@
+"""One record of a campaign: its model in numbers, or the error that stopped it."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..delayed import DelayedStateSpace
+from ..errors import CtrlRealizeError
+from ..results import Flag
+from ..signals import Record
+from .identify import Method, identify
+from .steps import detect_step
+
+RecordSource = Record | Callable[[], Record]
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignRow:
+    """What one record gave.
+
+    Exactly one of `system` and `error` is None; without a system all numbers are NaN.
+
+    Attributes
+    ----------
+    name : str
+    amplitude : float
+        Height of the input step; NaN where there is none.
+    delay : float
+        Estimated delay in samples.
+    dead_time : float
+        ``delay * dt`` in s.
+    interval : tuple of float
+        Interval of the dead time in s.
+    misfit : float
+        Misfit of the model for a unit step, so that records can be compared.
+    gain : float
+        Gain of the model at zero frequency.
+    system : DelayedStateSpace or None
+    error : str or None
+        What stopped this record, in one line.
+    flags : tuple of Flag
+    warnings : tuple of str
+        What was warned of on the way.
+    """
+
+    name: str
+    amplitude: float = float("nan")
+    delay: float = float("nan")
+    dead_time: float = float("nan")
+    interval: tuple[float, float] = (float("nan"), float("nan"))
+    misfit: float = float("nan")
+    gain: float = float("nan")
+    system: DelayedStateSpace | None = field(default=None, repr=False)
+    error: str | None = None
+    flags: tuple[Flag, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        what = self.error if self.system is None else f"delay {self.delay:.4g} samples"
+        return f"<CampaignRow {self.name!r}: {what}>"
+
+
+class RowStore(Protocol):
+    """Keeps finished rows, so that a run that was stopped can go on (see `CampaignStore`)."""
+
+    def load(self, key: str) -> CampaignRow | None:
+        """Return the row kept under `key`, None if there is none."""
+        ...
+
+    def save(self, key: str, row: CampaignRow) -> CampaignRow:
+        """Keep a row; return it as `load` will."""
+        ...
+
+
+def identify_row(
+    source: RecordSource,
+    position: int,
+    method: Method,
+    options: dict[str, Any],
+    store: RowStore | None,
+) -> CampaignRow:
+    """Identify one record; what stops it becomes the row's error."""
+    row = CampaignRow(_source_name(source, position))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            record = source if isinstance(source, Record) else source()
+            row = replace(row, name=record.name or row.name, amplitude=_amplitude(record))
+            key = fingerprint(record, method, options)
+            kept = store.load(key) if store is not None else None
+            if kept is not None:
+                return replace(kept, name=row.name)
+            row = _with_model(row, identify(record, method=method, **options))
+        except (CtrlRealizeError, OSError, ArithmeticError, np.linalg.LinAlgError) as error:
+            # A failure is cheap and may be mended by then, so it is tried again on resuming.
+            row = replace(row, error=f"{type(error).__name__}: {' '.join(str(error).split())}")
+    row = replace(row, warnings=tuple(dict.fromkeys(str(entry.message) for entry in caught)))
+    return row if store is None or row.system is None else store.save(key, row)
+
+
+def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:
+    """SHA-256 of a record's samples and of what is done with them."""
+    digest = hashlib.sha256()
+    for values in (record.time, record.input, record.output):
+        digest.update(str(values.shape).encode())
+        digest.update(np.ascontiguousarray(values).tobytes())
+    settings = sorted((name, repr(value)) for name, value in options.items())
+    digest.update(repr((method, settings, record.input_labels, record.output_labels)).encode())
+    return digest.hexdigest()
+
+
+def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
+    fit = system.fit
+    low, high = fit.dead_time_interval
+    return replace(
+        row,
+        delay=float(fit.delay),
+        dead_time=float(fit.dead_time),
+        interval=(float(low), float(high)),
+        misfit=float(fit.misfit),
+        gain=_gain(system),
+        system=system,
+        flags=tuple(fit.flags),
+    )
+
+
+def _gain(system: DelayedStateSpace) -> float:
+    with warnings.catch_warnings():
+        # An integrating plant has no gain; python-control would warn of the division by zero.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        gain = complex(system(1.0, warn_infinite=False))
+    return gain.real if np.isfinite(gain) else float("inf")
+
+
+def _source_name(source: RecordSource, position: int) -> str:
+    if isinstance(source, Record):
+        return source.name or f"record {position}"
+    arguments = getattr(source, "args", ())
+    return str(arguments[0]) if arguments else f"record {position}"
+
+
+def _amplitude(record: Record) -> float:
+    try:
+        return detect_step(record).amplitude
+    except CtrlRealizeError:
+        return float("nan")

@@ -1,0 +1,109 @@
+"""Identify the records of a campaign, in parallel if asked, each on its own."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator
+from inspect import signature
+from typing import Any
+
+from joblib import Parallel, delayed
+
+from ..checks import one_of
+from ..errors import DataError, OptionError
+from ..signals import Record
+from .campaign import Campaign
+from .campaign_row import CampaignRow, RecordSource, RowStore, identify_row
+from .identify import METHODS, Method, identify
+
+
+def identify_campaign(
+    records: Iterable[RecordSource],
+    *,
+    n_jobs: int = 1,
+    method: Method = "output_error",
+    progress: bool | None = None,
+    store: RowStore | None = None,
+    **options: Any,
+) -> Campaign:
+    """Identify every record of a campaign; one bad record never stops the rest.
+
+    Parameters
+    ----------
+    records : iterable of Record, or of functions that return one
+        A function, such as ``functools.partial(cr.read_record, path)``, is called where the
+        record is identified, so that files are read by the workers, one at a time, and a file
+        that cannot be read is a row with its error.
+    n_jobs : int, optional
+        Processes to use (joblib; -1 for all cores). The result does not depend on it. Inside
+        ``joblib.parallel_config(backend="dask")`` the work goes to a Dask cluster.
+    method : {"output_error", "scan", "paper"}, optional
+    progress : bool, optional
+        Show a progress bar; default: where somebody can see it.
+    store : CampaignStore, optional
+        Folder that keeps each record's result as it is finished, for thousands of records: a run
+        that was stopped goes on where it was when it is called again with the same store, and
+        memory stays flat, because of each fit only a summary is kept.
+    **options
+        Further arguments of `identify`, the same for all records.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    DataError
+        `records` is empty.
+    OptionError
+        An argument that `identify` does not take.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.bench.valve()
+    >>> records = [valve.step_record(16.0, seed) for seed in range(3)]
+    >>> campaign = cr.identify_campaign(records, method="paper")
+    >>> campaign
+    <Campaign: 3 records, method 'paper'>
+    >>> bool(30 < campaign.statistics().mean < 70)
+    True
+    """
+    one_of(method, "method", METHODS)
+    _check_options(options)
+    if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or n_jobs == 0:
+        raise OptionError(f"n_jobs={n_jobs!r}; needed is a number of processes, or -1 for all")
+    sources = list(records)
+    if not sources:
+        raise DataError("there are no records to identify")
+    for position, source in enumerate(sources):
+        if not isinstance(source, Record) and not callable(source):
+            raise DataError(
+                f"records[{position}] is a {type(source).__name__}; needed is a Record, or a "
+                "function that returns one (functools.partial(read_record, path))"
+            )
+    tasks = (
+        delayed(identify_row)(source, position, method, options, store)
+        for position, source in enumerate(sources)
+    )
+    rows = Parallel(n_jobs=n_jobs, return_as="generator")(tasks)
+    return Campaign(tuple(_with_bar(rows, len(sources), progress)), tuple(sources), method, options)
+
+
+def _check_options(options: dict[str, Any]) -> None:
+    known = set(signature(identify).parameters) - {"record", "method"}
+    strange = sorted(set(options) - known)
+    if strange:
+        raise OptionError(f"{', '.join(strange)}: identify takes {', '.join(sorted(known))}")
+
+
+def _with_bar(
+    rows: Iterable[CampaignRow], total: int, progress: bool | None
+) -> Iterator[CampaignRow]:
+    with warnings.catch_warnings():
+        # In a notebook without ipywidgets tqdm warns, and falls back to text by itself.
+        warnings.filterwarnings("ignore", message="IProgress not found")
+        from tqdm.auto import tqdm
+    # disable=None: no bar where the output is not a terminal.
+    disable = None if progress is None else not progress
+    yield from tqdm(rows, total=total, desc="identify", unit="record", disable=disable)

@@ -1,0 +1,158 @@
+"""A campaign that is stopped goes on where it was."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import OptionError
+from tests.rigs import step_record
+
+
+def record(seed: int) -> cr.Record:
+    # Short: what is tested is the keeping, not the estimate.
+    made = step_record(noise=1e-3, seed=seed, before=400, after=1300)
+    return cr.Record(made.time, made.input, made.output, name=f"r{seed}")
+
+
+@pytest.fixture(scope="module")
+def records() -> list[cr.Record]:
+    return [record(seed) for seed in range(4)]
+
+
+def assert_same_results(one: cr.Campaign, other: cr.Campaign) -> None:
+    assert one.table().equals(other.table())
+    for a, b in zip(one.good, other.good, strict=True):
+        for letter in "ABCD":
+            assert_array_equal(getattr(a.system, letter), getattr(b.system, letter))
+
+
+def test_a_store_changes_no_number(records, tmp_path):
+    plain = cr.identify_campaign(records, method="paper")
+    kept = cr.identify_campaign(records, method="paper", store=cr.CampaignStore(tmp_path))
+    assert_same_results(plain, kept)
+    assert kept.system.delay == plain.system.delay
+    assert_array_equal(kept.system.A, plain.system.A)
+
+
+def test_a_second_run_reads_what_the_first_has_done(records, tmp_path, monkeypatch):
+    store = cr.CampaignStore(tmp_path)
+    first = cr.identify_campaign(records[:2], method="paper", store=store)
+    assert len(store) == 2
+    stamps = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    whole = cr.identify_campaign(records, method="paper", store=store)
+    assert len(store) == 4
+    assert all(path.stat().st_mtime_ns == stamp for path, stamp in stamps.items())
+    assert list(whole.delays[:2]) == list(first.delays)
+
+
+def test_other_settings_are_other_rows(records, tmp_path):
+    store = cr.CampaignStore(tmp_path)
+    cr.identify_campaign(records[:1], method="paper", store=store)
+    cr.identify_campaign(records[:1], method="paper", order=2, store=store)
+    cr.identify_campaign(records[:1], method="scan", order=2, store=store)
+    assert len(store) == 3
+
+
+def test_failures_are_not_kept(records, tmp_path):
+    store = cr.CampaignStore(tmp_path)
+    missing = functools.partial(cr.read_record, tmp_path / "later.csv")
+    broken = cr.identify_campaign([missing, records[0]], method="paper", store=store)
+    assert (len(broken.failed), len(store)) == (1, 1)
+    rows = np.column_stack([records[1].time, records[1].input, records[1].output])
+    np.savetxt(
+        tmp_path / "later.csv", rows, delimiter=",", fmt="%.17g", header="t,u,y", comments=""
+    )
+    assert cr.identify_campaign([missing, records[0]], method="paper", store=store).failed == ()
+
+
+@pytest.mark.parametrize("damage", ["truncated", "edited", "empty", "binary", "renamed"])
+def test_a_damaged_row_is_made_anew(records, tmp_path, damage):
+    store = cr.CampaignStore(tmp_path)
+    first = cr.identify_campaign(records[:1], method="paper", store=store)
+    (path,) = tmp_path.glob("row-*.json")
+    text = path.read_text()
+    if damage == "truncated":
+        path.write_text(text[: len(text) // 2])
+    elif damage == "edited":
+        content = json.loads(text)
+        content["model"]["model"]["D"][0][0] += 1.0
+        path.write_text(json.dumps(content))
+    elif damage == "empty":
+        path.write_text("")
+    elif damage == "binary":
+        path.write_bytes(bytes(range(256)))
+    else:
+        other = cr.identify_campaign(records[1:2], method="paper", store=store)
+        assert other.delays.size == 1
+        mine, theirs = path, next(p for p in tmp_path.glob("row-*.json") if p != path)
+        theirs.replace(mine)
+    again = cr.identify_campaign(records[:1], method="paper", store=store)
+    assert_same_results(first, again)
+
+
+def test_workers_write_to_one_store(records, tmp_path):
+    store = cr.CampaignStore(tmp_path)
+    parallel = cr.identify_campaign(records, method="paper", store=store, n_jobs=2)
+    assert len(store) == 4
+    assert_same_results(parallel, cr.identify_campaign(records, method="paper"))
+
+
+def test_rows_of_a_store_hold_no_data(records, tmp_path):
+    kept = cr.identify_campaign(records[:1], method="paper", store=cr.CampaignStore(tmp_path))
+    assert not hasattr(kept.rows[0].system.fit, "impulse")
+    assert "misfit" in kept.rows[0].system.fit.report()
+
+
+def test_a_file_is_no_store(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OptionError, match="needs a folder"):
+        cr.CampaignStore(tmp_path / "file")
+
+
+SCRIPT = """
+import functools, sys, time
+import ctrl_realize as cr
+from tests.io.test_campaign_store import record
+
+def slowly(seed):
+    time.sleep(0.3 if seed else 0.0)
+    return record(seed)
+
+store = cr.CampaignStore(sys.argv[1])
+sources = [functools.partial(slowly, seed) for seed in range(40)]
+cr.identify_campaign(sources, method="paper", store=store)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are those of POSIX")
+@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGINT], ids=["killed", "ctrl-c"])
+def test_a_stopped_run_goes_on_with_the_same_results(tmp_path, blow):
+    run = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, str(tmp_path)],
+        stderr=subprocess.DEVNULL,
+        cwd=os.fspath(pytest.importorskip("tests").__path__[0] + "/.."),
+    )
+    store = cr.CampaignStore(tmp_path)
+    for _ in range(600):
+        if len(store) >= 2:
+            break
+        time.sleep(0.05)
+    run.send_signal(blow)
+    run.wait(timeout=30)
+    done = len(store)
+    assert 2 <= done < 40
+    sources = [functools.partial(record, seed) for seed in range(done + 1)]
+    resumed = cr.identify_campaign(sources, method="paper", store=store)
+    fresh = cr.identify_campaign(sources, method="paper")
+    assert_same_results(fresh, resumed)
