@@ -316,7 +316,10 @@ def _rebuild(
 
 
 def _numbers(values: ArrayLike, what: str) -> FloatArray:
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise DataError(f"{what} is no array: its rows have different lengths") from error
     if array.dtype.kind not in "biuf":
         raise DataError(
             f"{what} holds {array.dtype} values; needed are real numbers (a ragged list, text or "
