@@ -1,0 +1,67 @@
+"""Importing the package does nothing but import it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import ctrl_realize as cr
+
+PROBE = """
+import json, logging, sys, warnings
+import control, matplotlib, numpy as np
+
+def state():
+    return {
+        "numpy errors": np.geterr(),
+        "numpy printing": repr(np.get_printoptions()),
+        "random": int(np.random.get_state()[1][:10].sum()),
+        "matplotlib": repr(sorted(matplotlib.rcParams.items(), key=str)),
+        "backend": matplotlib.rcParams._get_backend_or_none(),
+        "control": repr(sorted(control.config.defaults.items(), key=str)),
+        "handlers": len(logging.getLogger().handlers),
+        "warnings": repr(warnings.filters),
+    }
+
+before = state()
+import ctrl_realize
+after = state()
+heavy = ["pandas", "scipy.stats", "joblib", "jinja2", "typer", "dask", "tqdm", "pyarrow",
+         "matplotlib.pyplot"]
+ours = set(sys.modules)
+print(json.dumps({
+    "changed": [key for key in before if before[key] != after[key]],
+    "heavy": [name for name in heavy if name in ours],
+}))
+"""
+
+
+def probe(code: str, cwd) -> dict[str, list[str]]:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, cwd=cwd
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_import_changes_no_state_and_writes_no_file(tmp_path):
+    assert probe(PROBE, tmp_path)["changed"] == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_import_leaves_heavy_parts_alone(tmp_path):
+    without = probe(PROBE.replace("import ctrl_realize\n", "\n"), tmp_path)["heavy"]
+    assert sorted(set(probe(PROBE, tmp_path)["heavy"]) - set(without)) == []
+
+
+def test_every_public_name_is_there_and_documented():
+    public = [name for name in dir(cr) if not name.startswith("_")]
+    promised = """Record ImpulseResponse MeasuredFRF StepResponse read_record read_frf detect_step
+        unit_step impulse_from_step impulse_from_io impulse_from_frf fit_frf realize estimate_delay
+        fit_delay scan_orders identify Campaign identify_campaign DelayedStateSpace delayed_ss
+        save_model load_model stepped_sine_frf spectral_frf compare_frf design plots bench
+        paper""".split()
+    assert sorted(set(promised) - set(public)) == []
+    undocumented = [name for name in public if not getattr(cr, name).__doc__]
+    assert undocumented == []
