@@ -1,0 +1,204 @@
+"""What an output-error fit found, and how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..results import Flag, Result
+from ..signals import Record
+
+
+@dataclass(frozen=True)
+class StructureRow:
+    """One structure that was fitted: `order` poles, ``order - relative_degree`` zeros.
+
+    `excess` is its information criterion above that of the best structure; up to 10 the data do
+    not rule it out, and `interval` (s) is the 95 % profile-likelihood interval of its dead time
+    (None where the structure is ruled out).
+    """
+
+    order: int
+    relative_degree: int
+    dead_time: float
+    total_delay: float
+    excess: float
+    interval: tuple[float, float] | None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DelayFit(Result):
+    """Dead time and model from an output-error fit of raw records.
+
+    ``interval[0] <= dead_time <= interval[1]`` and
+    ``total_delay == dead_time + sum of the model's lags - sum of its leads``. The total is
+    firm in every model; how it splits into dead time and lags is not, and `interval` says how
+    far. The model is ``gain exp(-s dead_time)`` times a transfer function of unit gain with
+    `poles` and `zeros`.
+
+    Attributes
+    ----------
+    dead_time, std : float
+        Transport delay of the model and its standard error, in s.
+    interval : tuple of float
+        95 % interval of the dead time in s: of all structures that the data cannot rule out
+        where the residual is noise, of the views where it is not.
+    onset : float
+        First motion of the output after the input has moved, in s (NaN when it is no step).
+    total_delay : float
+        Delay at zero frequency in s; integrators are left out.
+    order, relative_degree : int
+        Of the model that was chosen.
+    at_noise_level : bool
+        The residual is as small as the noise before the step.
+    misfit : float
+        Residual over noise, in means over bins of samples.
+    noise, residual : float
+        Standard deviations in the unit of the output.
+    correlation : float
+        Samples of the residual that one independent sample is worth.
+    views : dict of str to float
+        Dead time in s as seen in five ways; empty where one model explains everything.
+    structures : tuple of StructureRow
+        Everything that was fitted, best first.
+    profile_delay, profile_excess : ndarray
+        Profile of the chosen structure: delay in s, chi-square above the minimum.
+    time, measured, fitted : ndarray, shape (N,)
+        The record that was fitted (the mean, for several) and the model's response to it.
+    records : tuple of Record
+        What was given.
+    dt : float
+        Sample time in s.
+    choices : tuple of str
+        What was chosen, and why.
+    flags : tuple of Flag
+        What one should know before trusting the result.
+    """
+
+    dead_time: float
+    std: float
+    interval: tuple[float, float]
+    onset: float
+    total_delay: float
+    order: int
+    relative_degree: int
+    poles: ComplexArray
+    zeros: ComplexArray
+    gain: float
+    at_noise_level: bool
+    misfit: float
+    noise: float
+    residual: float
+    correlation: float
+    views: dict[str, float]
+    structures: tuple[StructureRow, ...]
+    profile_delay: FloatArray
+    profile_excess: FloatArray
+    time: FloatArray
+    measured: FloatArray
+    fitted: FloatArray
+    dt: float
+    records: tuple[Record, ...] = ()
+    repeatability: Repeatability | None = None
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = field(default=())
+
+    @property
+    def delay(self) -> float:
+        """Dead time in samples, not rounded."""
+        return self.dead_time / self.dt
+
+    @property
+    def delay_interval(self) -> tuple[float, float]:
+        """Interval of the dead time in samples."""
+        return self.interval[0] / self.dt, self.interval[1] / self.dt
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float]:
+        """Interval of the dead time in s, the same as `interval`."""
+        return self.interval
+
+    @property
+    def structure(self) -> tuple[int, int]:
+        """Order and relative degree."""
+        return self.order, self.relative_degree
+
+    def __repr__(self) -> str:
+        low, high = self.interval
+        level = "noise" if self.at_noise_level else f"{self.misfit:.2g} x noise"
+        return (
+            f"<DelayFit {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, order {self.order}, "
+            f"relative degree {self.relative_degree}, residual {level}>"
+        )
+
+    def _title(self) -> str:
+        return f"Output-error fit: dead time {self.dead_time:.4g} s"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        low, high = self.interval
+        rows = [
+            ("dead time", f"{self.dead_time:.6g} s = {self.delay:.4g} samples"),
+            ("95 % interval", f"{low:.6g} ... {high:.6g} s"),
+            ("first motion", f"{self.onset:.6g} s"),
+            ("total delay", f"{self.total_delay:.6g} s (dead time and lags: the firm number)"),
+            ("model", f"order {self.order}, relative degree {self.relative_degree}"),
+            ("gain", f"{self.gain:.6g}"),
+            ("residual", f"{self.residual:.3g}, noise {self.noise:.3g} (misfit {self.misfit:.3g})"),
+        ]
+        rows += [(f"view: {name}", f"{value:.6g} s") for name, value in self.views.items()]
+        if self.repeatability is not None:
+            rows += self.repeatability.rows()
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Repeatability:
+    """How much records of one plant differ, beyond the noise inside each.
+
+    ``chi_square`` is the sum over the records of ((delay - weighted mean) / standard error)^2
+    and `p_value` the chance of a larger one when records differ by noise alone.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the records.
+    amplitudes : ndarray, shape (R,)
+        Height of the step of each.
+    delays, errors : ndarray, shape (R,)
+        Delay of each against the common model, and its standard error from the noise, in s.
+    gains : ndarray, shape (R,)
+        Gain of each, over the common one.
+    trend, trend_error : float
+        Slope of the delays over the amplitudes, in s per unit of input.
+    outlying : tuple of str
+        Records that lie apart from the rest; they are not in the mean.
+    """
+
+    names: tuple[str, ...]
+    amplitudes: FloatArray
+    delays: FloatArray
+    errors: FloatArray
+    gains: FloatArray
+    chi_square: float
+    p_value: float
+    trend: float
+    trend_error: float
+    gain_spread: float
+    outlying: tuple[str, ...]
+
+    def rows(self) -> list[tuple[str, str]]:
+        """List the numbers for a report."""
+        scatter = float(self.delays.std(ddof=1)) if self.delays.size > 1 else 0.0
+        rows = [
+            ("records", f"{len(self.names)}, {len(self.outlying)} of them left out"),
+            ("scatter of delays", f"{scatter:.3g} s between records"),
+            (
+                "chi-square",
+                f"{self.chi_square:.3g} for {len(self.names) - 1} (p = {self.p_value:.2g})",
+            ),
+        ]
+        if self.trend_error > 0:
+            rows.append(
+                ("trend over amplitude", f"{self.trend:.2g} +- {self.trend_error:.2g} s per unit")
+            )
+        return rows

@@ -1,0 +1,154 @@
+"""Say what one should know before trusting an output-error fit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numerics.output_error import OutputErrorFit
+from ..numerics.step_problem import StepData
+from ..results import Flag
+
+_SAMPLES_BESIDE_NOTHING = 0.5
+
+
+def fit_flags(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> tuple[Flag, ...]:
+    """List the flags of a fit of one (mean) step record."""
+    found = [
+        _bound(data, fit, max_delay),
+        _misfit(fit),
+        _disagreement(data, fit),
+        _nothing(data, fit),
+        _integrating(data, fit),
+        _unsettled(data, fit),
+        _inverse(data, fit),
+        *_disturbances(data, fit),
+    ]
+    return tuple(flag for flag in found if flag is not None)
+
+
+def _bound(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> Flag | None:
+    if max_delay is None or fit.latest < max_delay * data.dt * (1 - 1e-9):
+        return None
+    if fit.high < 0.98 * fit.latest:
+        return None
+    return Flag(
+        "delay_at_bound",
+        f"the dead time may be larger than max_delay={max_delay:g} samples; try a larger one",
+    )
+
+
+def _misfit(fit: OutputErrorFit) -> Flag | None:
+    if fit.adequate:
+        return None
+    return Flag(
+        "structured_misfit",
+        f"no model leaves only noise (residual {fit.misfit:.2g} times the noise in means over "
+        "bins): the plant is not linear or has more dynamics than the model; "
+        + (
+            "the dead time is the median of five views and the interval spans them"
+            if fit.views
+            else "the interval holds only if the structures given are right"
+        ),
+    )
+
+
+def _disagreement(data: StepData, fit: OutputErrorFit) -> Flag | None:
+    ms = 1.0
+    if fit.views:
+        width = fit.high - fit.low
+        if width <= 0.3 * max(fit.delay, data.dt):
+            return None
+        apart = [f"{name} {delay * ms:.4g} s" for name, delay in fit.views if not _near(fit, delay)]
+        return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
+    own = next(line for line in fit.structures if line.structure == fit.structure)
+    if not fit.high - fit.low > 3 * (own.high - own.low):
+        return None
+    return Flag(
+        "structures_disagree",
+        f"the chosen structure puts the dead time in {own.low:.4g} ... {own.high:.4g} s, others "
+        f"that the data cannot rule out in {fit.low:.4g} ... {fit.high:.4g} s: dead time and "
+        "fast lags look alike; only the total delay is firm",
+    )
+
+
+def _near(fit: OutputErrorFit, delay: float) -> bool:
+    return abs(delay - fit.delay) <= 0.15 * fit.delay
+
+
+def _nothing(data: StepData, fit: OutputErrorFit) -> Flag | None:
+    if fit.low > _SAMPLES_BESIDE_NOTHING * data.dt:
+        return None
+    return Flag(
+        "no_delay_resolved", f"a model without dead time fits as well (up to {fit.high:.4g} s)"
+    )
+
+
+def _integrating(data: StepData, fit: OutputErrorFit) -> Flag | None:
+    length = (data.output.size - data.edge) * data.dt
+    if not np.any(np.abs(fit.poles) < INTEGRATOR / length):
+        return None
+    return Flag(
+        "integrating",
+        "the output goes on with a constant slope: a pole is taken as an integrator, the total "
+        "delay is that of the other lags",
+    )
+
+
+INTEGRATOR = 5e-3
+"""Poles slower than this, times the length of the record, cannot be told from integrators."""
+
+
+def _unsettled(data: StepData, fit: OutputErrorFit) -> Flag | None:
+    length = (data.output.size - data.edge) * data.dt
+    slow = float(np.abs(fit.poles).min())
+    if slow * length >= 2.0 or slow * length < INTEGRATOR:
+        return None
+    return Flag(
+        "not_settled",
+        f"the record ends {slow * length:.2g} of the slowest time constant after the step: gain "
+        "and slowest lag are extrapolated",
+    )
+
+
+def _inverse(data: StepData, fit: OutputErrorFit) -> Flag | None:
+    zeros = np.roots(fit.numerator[::-1]) if fit.numerator.size > 1 else np.empty(0)
+    right = zeros[zeros.real > 0]
+    if not right.size or np.abs(right).min() > 3 * np.abs(fit.poles).max():
+        return None
+    return Flag(
+        "inverse_response",
+        f"the model starts in the wrong direction (zero at {right[np.argmin(abs(right))]:.3g} "
+        "rad/s): its dead time ends where that begins",
+    )
+
+
+def _disturbances(data: StepData, fit: OutputErrorFit) -> list[Flag | None]:
+    flags: list[Flag | None] = []
+    if data.edge < 8:
+        flags.append(
+            Flag(
+                "no_rest",
+                f"{data.edge} samples before the step: the noise is taken from differences of "
+                "neighbours, slow disturbances are not seen in it",
+            )
+        )
+    if data.drift:
+        flags.append(Flag("drift", f"a drift of {data.drift / data.dt:.3g} per s was fitted along"))
+    if data.hum:
+        lines = ", ".join(f"{f / data.dt:.4g} Hz" for f in data.hum)
+        flags.append(Flag("hum", f"a line at {lines} was fitted along"))
+    if data.coarse:
+        flags.append(
+            Flag(
+                "coarse_quantisation",
+                f"the output moves in steps of {data.quantum:.3g}, more than its noise: "
+                "averaging does not remove the rounding",
+            )
+        )
+    error = data.output - fit.fitted
+    wild = float(np.mean(np.abs(error) > 5 * max(fit.residual, data.sigma)))
+    if fit.adequate and wild > 0.002:
+        flags.append(
+            Flag("outliers", f"{100 * wild:.2g} % of the samples lie 5 sigma or more off the model")
+        )
+    return flags

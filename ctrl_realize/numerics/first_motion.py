@@ -1,0 +1,95 @@
+"""When a measured output first moves after its input has moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class FirstMotion:
+    """Where an output leaves its rest level, in samples after the input's edge.
+
+    `crossing` is the first sample of a lasting excursion beyond 5 sigma (1.5 quantisation
+    steps, 0.5 % of the whole excursion); `onset` extrapolates the rise from there back to the
+    rest level, not further than to the last sample that is still inside one sigma.
+    """
+
+    crossing: int
+    onset: float
+    rest: float
+    sign: float
+    span: float
+
+
+def first_motion(
+    output: FloatArray, edge: int, sigma: float, quantum: float, drift: float
+) -> FirstMotion | None:
+    """Find the first motion of a record; None if the output stays where it is.
+
+    Parameters
+    ----------
+    output : ndarray, shape (N,)
+    edge : int
+        Sample at which the input has moved.
+    sigma, quantum : float
+        Noise level and quantisation step of the output.
+    drift : float
+        Slope before the step, per sample. It is continued for as long as it was seen.
+    """
+    n = output.size
+    index = np.arange(n) - edge
+    if edge >= 8:
+        level = output - drift * np.clip(index, -edge, edge)
+        rest = float(np.median(level[max(edge - 200, 0) : edge]))
+    else:
+        level = output
+        rest = float(np.median(output[: edge + 5]))
+    moved = level - rest
+    end = max(5, (n - edge) // 50)
+    span = max(abs(float(np.median(moved[-end:]))), float(np.percentile(np.abs(moved[edge:]), 80)))
+    threshold = max(5 * sigma, 1.5 * quantum, 0.005 * span)
+    crossing = _lasting_excursion(moved[edge:], threshold)
+    if crossing is None:
+        return None
+    stretch = moved[edge + crossing : edge + crossing + _lasting(crossing)]
+    sign = float(np.sign(np.mean(stretch)))
+    rise = moved * sign
+    width = max(1, round(0.03 * crossing))
+    if width > 1:
+        rise = np.convolve(rise, np.ones(width) / width, "same")
+    inside = max(sigma, 0.5 * quantum) / np.sqrt(width)
+    still = np.flatnonzero(rise[edge : edge + crossing + 1] <= inside)
+    last = float(still[-1]) if still.size else 0.0
+    return FirstMotion(
+        crossing, max(_extrapolate(rise[edge:], crossing, threshold), last), rest, sign, span
+    )
+
+
+def _lasting(crossing: int) -> int:
+    """How long an excursion must last: a quarter of the time that it took to come."""
+    return max(3, int(np.ceil(0.25 * crossing)))
+
+
+def _lasting_excursion(moved: FloatArray, threshold: float) -> int | None:
+    for k in np.flatnonzero(np.abs(moved) > threshold):
+        stretch = moved[k : k + _lasting(int(k))]
+        outside = np.mean(np.abs(stretch) > 0.6 * threshold) >= 0.8
+        if outside and abs(np.mean(np.sign(stretch))) > 0.7:
+            return int(k)
+    return None
+
+
+def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:
+    """Continue the line through one and three thresholds back to the rest level."""
+    higher = np.flatnonzero(rise[crossing:] > 3 * threshold)
+    if not higher.size:
+        return float(crossing)
+    second = crossing + max(int(higher[0]), 1)
+    low, high = float(rise[crossing]), float(rise[second])
+    if high <= low:
+        return float(crossing)
+    return crossing - low * (second - crossing) / (high - low)

@@ -1,0 +1,158 @@
+"""How large the noise of a measured signal is, how coarse, how coloured, and whether it hums."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import FloatArray
+
+_FEW = 8  # samples at rest below which the whole record must tell the noise
+
+
+def quantisation_step(values: FloatArray) -> float:
+    """Step of the quantiser, 0 where none shows.
+
+    The step is the smallest difference between two values; it is believed when the other
+    differences are multiples of it.
+    """
+    levels = np.unique(values)
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)]
+    if gaps.size < 4:
+        return 0.0
+    step = float(gaps.min())
+    multiples = gaps / step
+    whole = np.abs(multiples - np.round(multiples)) < 0.05
+    return step if np.mean(whole) > 0.9 and np.median(multiples) < 50 else 0.0
+
+
+def mad_sigma(values: FloatArray) -> float:
+    """Standard deviation of Gaussian noise from the median absolute deviation."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def winsorised_sigma(values: FloatArray, quantum: float, lost: int = 0) -> float:
+    """Standard deviation with values beyond two median absolute deviations moved to that limit.
+
+    `lost` degrees of freedom are counted off. The limit is at least half a quantisation step,
+    else a signal that mostly rests on one level would have no noise at all.
+    """
+    limit = 2 * max(mad_sigma(values), 0.5 * quantum)
+    clipped = np.clip(values - np.median(values), -limit, limit)
+    # Two-sigma clipping leaves 0.921 of a Gaussian's variance.
+    return float(np.sqrt(np.sum(clipped**2) / max(values.size - lost, 1))) / 0.96
+
+
+def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[float, float]:
+    """Noise level and significant drift of an output at rest.
+
+    Parameters
+    ----------
+    before : ndarray, shape (P,)
+        Samples before the step. With fewer than 8 the third differences of the record tell the
+        noise: they are blind to anything smooth.
+    record : ndarray, shape (N,)
+        The whole record.
+    quantum : float
+        Quantisation step; the noise is never taken below ``quantum / sqrt(12)``.
+
+    Returns
+    -------
+    sigma : float
+    drift : float
+        Slope per sample, 0 unless it is five standard errors. A slope seen over less than a
+        twentieth of the record is not extrapolated over the rest of it.
+    """
+    floor = quantum / np.sqrt(12)
+    if before.size < _FEW:
+        third = np.diff(record, 3) / np.sqrt(20)
+        return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0
+    index = np.arange(before.size) - before.size
+    slope, level = np.polyfit(index, before, 1)
+    sigma = max(winsorised_sigma(before - level - slope * index, quantum, lost=2), floor)
+    error = sigma * np.sqrt(12 / before.size**3)
+    known = before.size > 0.05 * (record.size - before.size)
+    return sigma, float(slope) if known and abs(slope) > 5 * error else 0.0
+
+
+def correlation_time(residual: FloatArray) -> float:
+    """Samples that one independent sample is worth: 1 + 2 x the sum of the autocorrelation.
+
+    The sum ends where a pair of neighbouring terms turns negative (Geyer's initial positive
+    sequence); what white noise scatters to, 1.3, counts as 1.
+    """
+    n = residual.size
+    centred = residual - residual.mean()
+    energy = float(centred @ centred)
+    if n < 8 or energy == 0:
+        return 1.0
+    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[: n // 2] / energy
+    pairs = correlation[: 2 * (correlation.size // 2)].reshape(-1, 2).sum(axis=1)
+    negative = np.flatnonzero(pairs <= 0)
+    last = int(negative[0]) if negative.size else pairs.size
+    time = 2 * float(pairs[:last].sum()) - 1.0
+    return time if time > 1.3 else 1.0
+
+
+def colouring(rest: FloatArray, sigma: float) -> float:
+    """How much larger means of 4 and 16 samples at rest are than white noise would leave them.
+
+    1 for white noise and where there are too few samples to tell.
+    """
+    worst = 1.0
+    for width in (4, 16):
+        count = rest.size // width
+        if count >= 12 and sigma > 0:
+            means = rest[: count * width].reshape(count, width).mean(axis=1)
+            worst = max(worst, float(means.std()) * np.sqrt(width) / sigma)
+    return worst if worst > 1.4 else 1.0
+
+
+def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
+    """Frequencies, in cycles per sample, of the lines in a signal at rest.
+
+    A line carries at least a third of the variance and stands 20 times above its neighbours in
+    the spectrum, over four periods or more.
+    """
+    found: list[float] = []
+    left = rest - rest.mean()
+    n = left.size
+    while n >= 64 and len(found) < most:
+        power = np.abs(np.fft.rfft(left * np.hanning(n))) ** 2
+        power[:4] = 0
+        peak = int(np.argmax(power[:-2]))
+        low, high = max(peak - 12, 4), peak + 13
+        around = np.delete(power[low:high], np.s_[max(peak - 2 - low, 0) : peak + 3 - low])
+        if peak < 4 or around.size < 6 or power[peak] < 20 * np.median(around) / np.log(2):
+            break
+        frequency = _refine(left, peak / n)
+        wave = sine_pair(np.arange(n), frequency)
+        fitted = wave @ np.linalg.lstsq(wave, left, rcond=None)[0]
+        if float(fitted @ fitted) < float(left @ left) / 3:
+            break
+        found.append(frequency)
+        left = left - fitted
+    return found
+
+
+def sine_pair(index: FloatArray, frequency: float) -> FloatArray:
+    """Cosine and sine, shape (N, 2), at a frequency in cycles per sample."""
+    phase = 2 * np.pi * frequency * index
+    return np.stack([np.cos(phase), np.sin(phase)], axis=1)
+
+
+def _refine(values: FloatArray, frequency: float) -> float:
+    """Improve the frequency of a line by golden steps on its least-squares power."""
+    index = np.arange(values.size, dtype=np.float64)
+
+    def power(f: float) -> float:
+        phase = np.exp(-2j * np.pi * f * index)
+        return float(np.abs(phase @ values))
+
+    width = 1.0 / values.size
+    for _ in range(14):
+        trials = frequency + width * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+        frequency = float(trials[np.argmax([power(f) for f in trials])])
+        width /= 2
+    return frequency

@@ -1,0 +1,83 @@
+"""Profile-likelihood interval of the delay of one structure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import FloatArray
+from .separable_fit import Problem, evaluate, fit_batch
+from .structure_search import Candidate, Scales, parameter_bounds
+
+_NEAR = np.array([-4, -2.4, -1.6, -1.2, -1, -0.8, 0.8, 1, 1.2, 1.6, 2.4, 4])
+_FAR = 13
+
+
+def delay_profile(
+    problem: Problem, candidate: Candidate, variance: float, scales: Scales
+) -> tuple[FloatArray, FloatArray]:
+    """Misfit of the best model with each of a range of fixed delays.
+
+    Parameters
+    ----------
+    problem : Problem
+    candidate : Candidate
+        The optimum of a structure.
+    variance : float
+        Of the noise.
+    scales : Scales
+        The profile covers ``scales.earliest`` ... ``scales.latest``, densest where the local
+        curvature puts the ends of the interval.
+
+    Returns
+    -------
+    delay : ndarray, shape (G,)
+        Sorted, in s.
+    excess : ndarray, shape (G,)
+        Cost above the minimum, over the variance: chi-square of one degree of freedom.
+    """
+    half = np.sqrt(3.84) * delay_error(problem, candidate, variance)
+    low, high = scales.earliest, scales.latest
+    grid = np.concatenate([candidate.delay + half * _NEAR, np.linspace(low, high, _FAR)])
+    grid = np.unique(np.clip(grid, low, high))
+    starts = np.tile(candidate.parameters, (grid.size, 1))
+    starts[:, 0] = grid
+    bounds = parameter_bounds(candidate.structure.order, scales)
+    _, cost = fit_batch(
+        problem, candidate.structure, starts, bounds, delay_fixed=True, most_iterations=12
+    )
+    delay = np.append(grid, candidate.delay)
+    excess = np.append(cost, candidate.cost)
+    order = np.argsort(delay)
+    return delay[order], (excess[order] - excess.min()) / variance
+
+
+def delay_error(problem: Problem, candidate: Candidate, variance: float) -> float:
+    """Standard error of the delay from the local curvature (infinite if there is none), in s."""
+    jacobian = evaluate(problem, candidate.structure, candidate.parameters[None]).jacobian[0]
+    size = np.sqrt((jacobian**2).sum(axis=0))
+    if size[0] == 0:
+        return float("inf")
+    moving = size > 1e-9 * size.max()
+    columns: FloatArray = (jacobian / np.where(moving, size, 1.0))[:, moving]
+    # The delay comes last, so that the corner is what the others leave of it.
+    triangle = np.linalg.qr(columns[:, ::-1])[1]
+    corner = float(np.abs(triangle[-1, -1])) * float(size[0])
+    return float(np.sqrt(variance)) / corner if corner > 1e-12 * float(size[0]) else float("inf")
+
+
+def profile_limits(
+    delay: FloatArray, excess: FloatArray, threshold: float = 3.84
+) -> tuple[float, float]:
+    """Ends of the set of delays with an excess below the threshold (95 %: 3.84)."""
+    inside = np.flatnonzero(excess <= threshold)
+    first, last = int(inside[0]), int(inside[-1])
+    # The root of the excess is linear in the delay where the misfit is.
+    root = np.sqrt(np.maximum(excess, 0.0))
+    edge = float(np.sqrt(threshold))
+    low = float(delay[0])
+    if first > 0:
+        low = float(np.interp(edge, root[[first, first - 1]], delay[[first, first - 1]]))
+    high = float(delay[-1])
+    if last < delay.size - 1:
+        high = float(np.interp(edge, root[[last, last + 1]], delay[[last, last + 1]]))
+    return low, high

@@ -1,0 +1,165 @@
+"""Turn the record of a step experiment into separable least-squares problems."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import FloatArray, IntArray
+from .delayed_modes import HeldInput, MoveTrain
+from .first_motion import FirstMotion, first_motion
+from .input_moves import input_moves
+from .noise_level import (
+    colouring,
+    hum_frequencies,
+    quantisation_step,
+    rest_noise,
+    sine_pair,
+)
+from .response_bins import Bins, response_bins
+from .separable_fit import KnownFactor, Problem
+
+
+@dataclass(frozen=True, eq=False)
+class StepData:
+    """A record of one or several steps, and what its samples at rest tell.
+
+    Attributes
+    ----------
+    output, input : ndarray, shape (N,)
+    dt : float
+        Sample time in s.
+    edges : list of (index, samples)
+        Where the input moves, and for how many samples.
+    sigma, quantum : float
+        Noise level and quantisation step of the output.
+    drift : float
+        Significant slope before the step, per sample.
+    colour : float
+        How much larger than white noise the noise is in means of samples.
+    hum : list of float
+        Lines in the noise, in cycles per sample.
+    motion : FirstMotion or None
+        None when the output stays at rest.
+    """
+
+    output: FloatArray
+    input: FloatArray
+    dt: float
+    edges: list[tuple[int, int]]
+    sigma: float
+    quantum: float
+    drift: float
+    colour: float
+    hum: list[float]
+    motion: FirstMotion | None
+
+    @property
+    def edge(self) -> int:
+        """First sample at which the input has moved."""
+        return self.edges[0][0]
+
+    @property
+    def coarse(self) -> bool:
+        """Quantised so coarsely that averaging does not remove the rounding."""
+        return self.quantum > 0 and self.sigma < 0.4 * self.quantum
+
+
+def step_data(
+    output: FloatArray, signal: FloatArray, dt: float, edges: list[tuple[int, int]]
+) -> StepData:
+    """Measure noise, drift, hum and first motion of a step record."""
+    edge = edges[0][0]
+    quantum = quantisation_step(output)
+    sigma, drift = rest_noise(output[:edge], output, quantum)
+    hum: list[float] = []
+    colour, quiet = 1.0, output
+    if edge >= 8:
+        index = np.arange(output.size) - edge
+        columns = np.stack([np.ones(output.size), index / edge], axis=1)
+        line = columns[:edge] @ np.linalg.lstsq(columns[:edge], output[:edge], rcond=None)[0]
+        hum = hum_frequencies(output[:edge] - line)
+        if hum:
+            columns = np.concatenate([columns, _hum_columns(output.size, hum)], axis=1)
+            weights = np.linalg.lstsq(columns[:edge], output[:edge], rcond=None)[0]
+            quiet = output - columns[:, 2:] @ weights[2:]
+            line = columns[:edge] @ weights
+            sigma, drift = rest_noise(quiet[:edge], quiet, 0.0)
+            sigma = max(sigma, quantum / np.sqrt(12))
+        colour = colouring(output[:edge] - line, sigma)
+    span = float(np.ptp(output))
+    sigma = max(sigma, 1e-4 * span)
+    motion = first_motion(quiet, edge, sigma, quantum, drift)
+    return StepData(output, signal, dt, edges, sigma, quantum, drift, colour, hum, motion)
+
+
+def stop_at(data: StepData, part: float) -> int:
+    """Sample at which the response has first made `part` of its excursion (1: the end)."""
+    n = data.output.size
+    if part >= 1 or data.motion is None:
+        return n
+    motion, edge = data.motion, data.edge
+    width = int(np.clip(0.02 * (n - edge), 1, 9))
+    moved = np.convolve(data.output - motion.rest, np.ones(width) / width, "same")
+    reached = np.flatnonzero(moved[edge:] * motion.sign > part * motion.span)
+    if not reached.size:
+        reached = np.flatnonzero(np.abs(moved[edge:]) > part * motion.span)
+    first = int(reached[0]) if reached.size else n - edge
+    return min(n, edge + max(first, int(motion.onset) + 10, motion.crossing + 3))
+
+
+def bins_until(data: StepData, stop: int) -> Bins:
+    """Bins over the samples up to `stop`."""
+    crossing = data.motion.crossing if data.motion else 0
+    edges = [i for i, _ in data.edges if i < stop]
+    return response_bins(stop, edges, crossing, float(stop))
+
+
+def bin_weights(data: StepData, bins: Bins) -> FloatArray:
+    """Inverse variance of every mean, that of a single sample being 1."""
+    count = bins.width.astype(np.float64)
+    # Means of undithered samples stay wrong by the rounding, however many there are.
+    return count / (1 + count) * 2 if data.coarse else count
+
+
+def problem_until(
+    data: StepData, values: FloatArray, bins: Bins, stop: int, known: KnownFactor
+) -> Problem:
+    """Set up the fit of values (N,) on the bins."""
+    time = data.dt * bins.centre()
+    index, size = input_moves(data.input, data.edges, stop)
+    drive = MoveTrain(time, data.dt * bins.spread(), _at(index, data.dt), size)
+    return Problem(
+        bins.average(values[:stop]),
+        np.sqrt(bin_weights(data, bins)),
+        drive,
+        bins.average(fixed_regressors(data)[:stop]),
+        known,
+    )
+
+
+def sample_drive(data: StepData, stop: int) -> HeldInput:
+    """Drive that gives the response at every sample."""
+    index, size = input_moves(data.input, data.edges, stop)
+    return MoveTrain(_at(np.arange(stop), data.dt), np.zeros(stop), _at(index, data.dt), size)
+
+
+def fixed_regressors(data: StepData) -> FloatArray:
+    """Offset, drift if there is one, and hum, shape (N, q)."""
+    n = data.output.size
+    columns = [np.ones((n, 1))]
+    if data.drift:
+        columns.append(((np.arange(n) - data.edge) / n)[:, None])
+    if data.hum:
+        columns.append(_hum_columns(n, data.hum))
+    return np.concatenate(columns, axis=1)
+
+
+def _at(index: IntArray, dt: float) -> FloatArray:
+    return np.asarray(dt * index.astype(np.float64))
+
+
+def _hum_columns(n: int, frequencies: list[float]) -> FloatArray:
+    index = np.arange(n, dtype=np.float64)
+    return np.concatenate([sine_pair(index, f) for f in frequencies], axis=1)

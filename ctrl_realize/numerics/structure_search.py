@@ -1,0 +1,181 @@
+"""Fit many structures to one record: where to start each, what to keep, how to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import ComplexArray, FloatArray
+from .pole_factors import parameters_from_poles, poles_from_parameters
+from .separable_fit import Bounds, Problem, Structure, fit_batch
+
+ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
+SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)
+NEEDLESS = 4.0
+"""Charged for a zero, and for a pole beyond the third, on top of the information criterion."""
+
+PLAUSIBLE = 10.0
+"""A structure is not ruled out while its criterion is within this of the best."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What is roughly known of a response before it is fitted, in s.
+
+    `onset` is when it starts to move, `rise` the time from there to 63 % of its excursion,
+    `length` the time that was recorded after the input moved, `dt` the sample time. `latest`
+    and `earliest` bound the delay; `ringing` is an angular frequency seen in it, or 0.
+    """
+
+    onset: float
+    rise: float
+    length: float
+    dt: float
+    latest: float
+    earliest: float = 0.0
+    ringing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Best fit of one structure: ``cost`` at ``parameters`` = [tau, pole parameters...]."""
+
+    structure: Structure
+    parameters: FloatArray
+    cost: float
+
+    @property
+    def delay(self) -> float:
+        """Delay in s."""
+        return float(self.parameters[0])
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles in 1/s."""
+        return np.asarray(poles_from_parameters(self.parameters[None, 1:])[0][0])
+
+
+def search(
+    problem: Problem, structures: Iterable[Structure], scales: Scales
+) -> dict[Structure, Candidate]:
+    """Find the best fit of every structure.
+
+    Each is started from two delays for every one of up to five patterns of poles, and from the
+    optima of the structures next to it (one zero less, one pole less).
+
+    Parameters
+    ----------
+    problem : Problem
+    structures : iterable of Structure
+        Smaller orders and larger relative degrees are fitted first.
+    scales : Scales
+    """
+    found: dict[Structure, Candidate] = {}
+    for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
+        starts = _neighbour_starts(structure, scales, found)
+        # A rich structure differs little from the optima next to it: they suffice.
+        if not starts or structure.zeros == 0 or structure.order <= 3:
+            starts += _pattern_starts(structure, scales)
+        parameters, cost = fit_batch(
+            problem, structure, np.array(starts), parameter_bounds(structure.order, scales)
+        )
+        best = int(np.argmin(cost))
+        found[structure] = Candidate(structure, parameters[best], float(cost[best]))
+    return found
+
+
+def refine(
+    problem: Problem, candidates: dict[Structure, Candidate], scales: Scales
+) -> dict[Structure, Candidate]:
+    """Fit again from the optima of slightly different data."""
+    again: dict[Structure, Candidate] = {}
+    for structure, old in candidates.items():
+        parameters, cost = fit_batch(
+            problem,
+            structure,
+            old.parameters[None],
+            parameter_bounds(structure.order, scales),
+            most_iterations=12,
+        )
+        again[structure] = Candidate(structure, parameters[0], float(cost[0]))
+    return again
+
+
+def parameter_bounds(order: int, scales: Scales) -> Bounds:
+    """Box for delay and poles: time constants from half a sample to (nearly) an integrator."""
+    fast = np.log(2.0 / scales.dt)
+    low, high = [scales.earliest], [scales.latest]
+    if order % 2:
+        low.append(np.log(1e-4 / scales.length))
+        high.append(fast)
+    for _ in range(order // 2):
+        low += [np.log(1e-2 / scales.length), np.log(0.005)]
+        high += [fast, np.log(20.0)]
+    return Bounds(np.array(low), np.array(high))
+
+
+def criteria(
+    candidates: dict[Structure, Candidate], variance: float, samples: float
+) -> dict[Structure, float]:
+    """Information criterion of every structure: cost / variance + parameters x log(samples).
+
+    `variance` is that of the noise, colour included; `samples` how many independent ones there
+    are.
+    """
+    penalty = np.log(max(samples, 3.0))
+    return {s: c.cost / variance + (s.order + s.zeros + 2) * penalty for s, c in candidates.items()}
+
+
+def choose(criterion: dict[Structure, float]) -> Structure:
+    """Structure of the lowest criterion, where zeros and a fourth pole must be worth it."""
+    return min(
+        criterion,
+        key=lambda s: criterion[s] + NEEDLESS * (s.zeros + max(s.order - 3, 0)),
+    )
+
+
+def _pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
+    patterns = _pole_patterns(structure.order, scales)
+    # With zeros, the optimum without them is a start as well: fewer patterns do.
+    delays = (0.4, 1.0) if structure.zeros == 0 else (0.7,)
+    return [
+        np.concatenate([[part * scales.onset], parameters_from_poles(poles)])
+        for part in delays
+        for poles in patterns
+    ]
+
+
+def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
+    """Equal lags; one slow; one very slow; a ringing pair; a pair at the frequency seen."""
+    rise = 1.0 / scales.rise
+    patterns = [
+        -np.linspace(0.8, 1.2, order) * order * rise,
+        -np.concatenate([[1.2], np.geomspace(5, 8, order - 1)])[:order] * rise,
+        -np.concatenate([[0.1], np.geomspace(1.2, 6, order - 1)])[:order] * rise,
+    ]
+    found = [pattern.astype(np.complex128) for pattern in patterns]
+    if order >= 2:
+        rest = -np.geomspace(3, 5, order - 2) * rise
+        pair = 1.3 * rise * np.array([-0.2 + 0.98j, -0.2 - 0.98j])
+        found.append(np.concatenate([pair, rest]))
+        if scales.ringing > 0:
+            pair = scales.ringing * np.array([-0.1 + 0.995j, -0.1 - 0.995j])
+            found.append(np.concatenate([pair, rest]))
+    return found
+
+
+def _neighbour_starts(
+    structure: Structure, scales: Scales, found: dict[Structure, Candidate]
+) -> list[FloatArray]:
+    n, r = structure.order, structure.relative_degree
+    starts = []
+    if Structure(n, r + 1) in found:
+        starts.append(found[Structure(n, r + 1)].parameters)
+    for smaller in (Structure(n - 1, r - 1), Structure(n - 1, r)):
+        if smaller in found:
+            old = found[smaller]
+            poles = np.append(old.poles, -10.0 / scales.rise)
+            starts.append(np.concatenate([[old.delay], parameters_from_poles(poles)]))
+    return starts
