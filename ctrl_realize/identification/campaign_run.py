@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator
 from inspect import signature
 from typing import Any
 
-from joblib import Parallel, delayed
-
 from ..checks import one_of
 from ..errors import DataError, OptionError
 from ..signals import Record
@@ -69,6 +67,8 @@ def identify_campaign(
     >>> bool(30 < campaign.statistics().mean < 70)
     True
     """
+    from joblib import Parallel, delayed  # not needed by who identifies one record
+
     one_of(method, "method", METHODS)
     _check_options(options)
     if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or n_jobs == 0:
