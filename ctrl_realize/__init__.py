@@ -19,6 +19,8 @@ from .frequency import stepped_sine_frf as stepped_sine_frf
 from .identification.campaign import Campaign as Campaign
 from .identification.campaign_row import CampaignRow as CampaignRow
 from .identification.campaign_run import identify_campaign as identify_campaign
+from .identification.delay_fit import fit_delay as fit_delay
+from .identification.delay_fit_result import DelayFit as DelayFit
 from .identification.delay_scan import DelayScan as DelayScan
 from .identification.delay_scan import estimate_delay as estimate_delay
 from .identification.from_io import ImpulseEstimate as ImpulseEstimate
