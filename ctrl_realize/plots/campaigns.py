@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from ..errors import DataError
-from ..identification.campaign import Campaign, CampaignRow
+from ..identification.campaign import Campaign
+from ..identification.campaign_row import CampaignRow
 from . import style
 
 _MOST_NAMES = 24

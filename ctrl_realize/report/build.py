@@ -18,7 +18,7 @@ from ..signals import Record
 from .page import Column, Page, Row, Table, pairs, write_page
 from .provenance import file_sha256, own_version, record_sha256, versions
 from .sketches import Sketch, campaign_sketches, frf_sketches, identification_sketches
-from .verdict import campaign_verdict, verdict_of
+from .verdict import campaign_verdict, comparison_verdict, verdict_of
 
 Paths = Sequence[str | os.PathLike[str]]
 
@@ -169,6 +169,56 @@ def write_campaign(
         version=own_version(),
         figures=[sketch.on_page() for sketch in [*sketches, *more_sketches]],
         tables=tables,
+        calls=calls,
+        simulated=simulated,
+    )
+    return write_page(path, page)
+
+
+def write_comparison(
+    path: str | os.PathLike[str],
+    system: DelayedStateSpace,
+    frf: ct.FrequencyResponseData,
+    comparison: FRFComparison,
+    *,
+    files: Paths = (),
+    calls: Sequence[tuple[str, str]] = (),
+    simulated: bool = False,
+) -> Path:
+    """Write the report of a model beside a measured frequency response: one HTML file.
+
+    Parameters
+    ----------
+    path : path-like
+    system : DelayedStateSpace
+    frf : FrequencyResponseData
+        Measured.
+    comparison : FRFComparison
+        Of `system` with `frf`.
+    files, calls, simulated
+        As for `write_identification`.
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    OSError
+        The folder is missing or cannot be written.
+    """
+    page = Page(
+        title=f"{system.name} beside {frf.name}",
+        subtitle="a model and a measured frequency response",
+        verdict=comparison_verdict(system, comparison),
+        version=own_version(),
+        figures=[one.on_page() for one in frf_sketches([system], frf, comparison)],
+        tables=[
+            pairs("Against the measured frequency response", comparison._rows()),
+            _model_table(system),
+            *([_data_table([], files)] if files else []),
+            pairs("Versions", versions()),
+        ],
         calls=calls,
         simulated=simulated,
     )

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..delayed import DelayedStateSpace
+from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..plots.dead_times import estimate_of, interval_of
 from ..plots.style import in_time
@@ -23,6 +24,9 @@ SEVERE = frozenset(
     }
 )
 """Flags after which the dead time should not be used as it stands."""
+
+CLOSE, FAR = 0.05, 0.2
+"""Relative errors (rms, in the trusted band) under which a model is close, over which it is off."""
 
 Level = Literal["good", "caution", "poor"]
 
@@ -41,17 +45,16 @@ class Verdict:
     headline: str
     facts: tuple[tuple[str, str], ...]
     reasons: tuple[str, ...]
-
-    @property
-    def judgement(self) -> str:
-        """The level in words."""
-        return _JUDGEMENTS[self.level]
+    judgement: str
 
 
 def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Verdict:
     """Judge a model by the flags of its fit."""
     flags = (*getattr(system.fit, "flags", ()), *more_flags)
-    return Verdict(_level(flags), headline_of(system), facts_of(system), _reasons(flags))
+    level = _level(flags)
+    return Verdict(
+        level, headline_of(system), facts_of(system), _reasons(flags), _JUDGEMENTS[level]
+    )
 
 
 def campaign_verdict(campaign: Campaign) -> Verdict:
@@ -64,7 +67,29 @@ def campaign_verdict(campaign: Campaign) -> Verdict:
         *(row for row in campaign._rows() if row[0] != "identified"),
         *facts_of(system),
     ]
-    return Verdict(_level(flags), headline_of(system), tuple(facts), _reasons(flags))
+    level = _level(flags)
+    judgement = _JUDGEMENTS[level]
+    return Verdict(level, headline_of(system), tuple(facts), _reasons(flags), judgement)
+
+
+def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> Verdict:
+    """Judge a model by its error in the trusted band."""
+    error = comparison.rms_relative_error
+    low, high = comparison.band_hz
+    headline = (
+        f"The model is within {100 * error:.3g} % (rms) of the measurement from {low:.4g} Hz to "
+        f"{high:.4g} Hz."
+    )
+    flags = (*comparison.flags, *getattr(system.fit, "flags", ()))
+    level: Level = "good" if error < CLOSE else "caution" if error < FAR else "poor"
+    if level == "good" and flags:
+        level = "caution"
+    judgement = {
+        "good": f"A close model: less than {100 * CLOSE:.0f} % off.",
+        "caution": "Use it with care: read errors and remarks below.",
+        "poor": f"More than {100 * FAR:.0f} % off: model and measurement disagree.",
+    }[level]
+    return Verdict(level, headline, facts_of(system), _reasons(flags), judgement)
 
 
 def headline_of(system: DelayedStateSpace) -> str:

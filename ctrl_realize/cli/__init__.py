@@ -1,0 +1,85 @@
+"""The command line: ``ctrl-realize identify``, ``compare`` and ``demo``."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import typer
+from typer.main import get_command
+
+from ..errors import CtrlRealizeError
+from .compare import compare
+from .demo import demo
+from .identify import identify
+from .terminal import EXIT_CODES, complain, one_line, plain_warning
+
+app = typer.Typer(
+    name="ctrl-realize",
+    help="Models with dead time from measured responses, as python-control state-space systems.",
+    epilog=EXIT_CODES,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command(epilog=EXIT_CODES, no_args_is_help=True)(identify)
+app.command(epilog=EXIT_CODES, no_args_is_help=True)(compare)
+app.command(epilog=EXIT_CODES)(demo)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib import metadata
+
+        typer.echo(f"ctrl-realize {metadata.version('ctrl-realize')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Say the version and stop."
+    ),
+) -> None:
+    """Models with dead time from measured responses, as python-control state-space systems."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        0: done. 1: done, but some records failed. 2: wrong usage or unusable input; nothing was
+        written. 130: interrupted.
+    """
+    command = get_command(app)
+    with warnings.catch_warnings():
+        warnings.showwarning = plain_warning
+        try:
+            code = command.main(
+                None if arguments is None else list(arguments),
+                prog_name="ctrl-realize",
+                standalone_mode=False,
+            )
+        except (KeyboardInterrupt, typer.Abort):
+            complain("interrupted; nothing was written")
+            return 130
+        except BrokenPipeError:
+            return 1
+        except (CtrlRealizeError, OSError) as error:
+            complain(one_line(error))
+            return 2
+        except Exception as error:
+            # Typer's errors of usage: which package they come from depends on its version.
+            if not hasattr(error, "format_message"):
+                raise
+            complain(one_line(error.format_message()) + " (see --help)")
+            return 2
+    return code if isinstance(code, int) else 0

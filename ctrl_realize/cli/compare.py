@@ -1,0 +1,89 @@
+"""``ctrl-realize compare``: a model beside a measured frequency response."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..frequency import compare_frf
+from ..io import load_model, read_frf
+from ..io.atomic import write_text
+from ..report import write_comparison
+from ..report.sketches import frf_sketches
+from .inputs import check_files, typed_call
+from .results import save_figures
+from .staging import appearing
+from .terminal import printable, say
+
+_OPTION = typer.Option
+
+
+class Hold(str, Enum):  # noqa: UP042  # typer shows the values of a plain str Enum
+    """What becomes of the model's zero-order hold."""
+
+    auto = "auto"
+    zoh = "zoh"
+    none = "none"
+
+
+def compare(
+    model: Annotated[Path, typer.Argument(help="Model, as identify writes it: model.json.")],
+    frf: Annotated[Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")],
+    output: Annotated[
+        Path | None, _OPTION("--output", "-o", help="Folder for table, report and figures.")
+    ] = None,
+    min_coherence: Annotated[
+        float | None, _OPTION(help="Coherence from which a point is trusted. Default: 0.95.")
+    ] = None,
+    band: Annotated[
+        tuple[float, float] | None, _OPTION(metavar="LOW HIGH", help="Compare in this band, in Hz.")
+    ] = None,
+    hold: Annotated[
+        Hold, _OPTION(help="zoh takes the hold out of the model; auto does where it is in.")
+    ] = Hold.auto,
+) -> int:
+    """Compare a model with a measured frequency response.
+
+    Gain and phase errors are those in the band that can be trusted: by coherence, by standard
+    deviation, or as given.
+
+    \b
+    Examples:
+      ctrl-realize compare results/model.json frf.csv
+      ctrl-realize compare results/model.json frf.csv -o frf --band 0.1 13
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    check_files([model, frf])
+    system, measured = load_model(model), read_frf(frf)
+    options: dict[str, Any] = {"min_coherence": min_coherence, "band_hz": band}
+    if hold is not Hold.auto:
+        options["hold"] = None if hold is Hold.none else hold.value
+    given = {key: value for key, value in options.items() if value is not None or key == "hold"}
+    comparison = compare_frf(system, measured, **given)
+    if output is not None:
+        words = [str(model), str(frf), "--output", str(output)]
+        if min_coherence is not None:
+            words += ["--min-coherence", f"{min_coherence:g}"]
+        if band is not None:
+            words += ["--band", *(f"{edge:.12g}" for edge in band)]
+        if hold is not Hold.auto:
+            words += ["--hold", hold.value]
+        with appearing(output) as folder:
+            write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
+            save_figures(folder, frf_sketches([system], measured, comparison))
+            write_comparison(
+                folder / "report.html",
+                system,
+                measured,
+                comparison,
+                files=[model, frf],
+                calls=[("In a terminal", typed_call("compare", words))],
+            )
+    say(printable(f"{model}: {system!r}"))
+    say(comparison.report())
+    if output is not None:
+        written = "frf_comparison.csv, report.html, figures/"
+        say(f"\nwritten to {printable(str(output))}: {written}")
+    return 0

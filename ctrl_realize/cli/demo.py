@@ -1,0 +1,6 @@
+"""demo"""
+
+
+def demo() -> int:
+    """Run."""
+    return 0

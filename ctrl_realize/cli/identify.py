@@ -1,0 +1,267 @@
+"""``ctrl-realize identify``: models of measured records."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import CtrlRealizeError, DataError, OptionError
+from ..frequency import compare_frf
+from ..identification.campaign import Campaign
+from ..identification.campaign_run import identify_campaign
+from ..identification.identify import identify as identify_record
+from ..io import read_frf
+from ..signals import MeasuredFRF
+from .inputs import Reading, check_files, python_keywords, reading, typed_call
+from .results import campaign_table, write_campaign_files, write_record_files
+from .staging import appearing
+from .terminal import complain, one_line, printable, progress, say
+
+_MANY = 12
+_OPTION = typer.Option
+
+
+class Method(str, Enum):  # noqa: UP042  # typer shows the values of a plain str Enum
+    """Ways to find a model."""
+
+    output_error = "output_error"
+    scan = "scan"
+    paper = "paper"
+
+
+def identify(
+    files: Annotated[list[Path], typer.Argument(help="Records: CSV, TSV, .mat, .npz, Parquet.")],
+    output: Annotated[Path, _OPTION("--output", "-o", help="Folder for the results.")],
+    method: Annotated[
+        Method, _OPTION(help="output_error fits the raw record; scan and paper realize.")
+    ] = Method.output_error,
+    order: Annotated[
+        int | None, _OPTION(help="Order without the delay. Default: from the data.")
+    ] = None,
+    max_delay: Annotated[int | None, _OPTION(help="Largest delay to consider, in samples.")] = None,
+    frf: Annotated[
+        Path | None, _OPTION(help="Measured frequency response to hold the model against.")
+    ] = None,
+    separate: Annotated[
+        bool, _OPTION("--separate", help="Records of different plants: a folder for each.")
+    ] = False,
+    time: Annotated[str | None, _OPTION(help="Time column, name or number from 0.")] = None,
+    input_column: Annotated[
+        str | None, _OPTION("--input", help="Input column, name or number from 0.")
+    ] = None,
+    output_column: Annotated[
+        str | None, _OPTION("--response", help="Output column, name or number from 0.")
+    ] = None,
+    dt: Annotated[
+        float | None, _OPTION(help="Sample time in s, where there is no time column.")
+    ] = None,
+    time_unit: Annotated[str | None, _OPTION(help="s, ms, us, ns, min or h.")] = None,
+    delimiter: Annotated[
+        str | None, _OPTION(help="Between columns: ',' ';' tab. Default: found out.")
+    ] = None,
+    decimal: Annotated[str | None, _OPTION(help="'.' or ','. Default: found out.")] = None,
+    skip_rows: Annotated[int, _OPTION(min=0, help="Lines to leave out at the start.")] = 0,
+    resample: Annotated[
+        bool, _OPTION("--resample", help="Put samples that jitter onto a uniform time axis.")
+    ] = False,
+    jobs: Annotated[
+        int | None, _OPTION(help="Processes; -1: all cores. Default: all from 12 records on.")
+    ] = None,
+) -> int:
+    """Identify a model with dead time from one record, or from many of one plant.
+
+    One record gives model.json, report.html and figures/. Several records of one plant make a
+    campaign: a table of their delays as well (records.csv), a model for each (models/) and a
+    final one. A record that fails is a row of the table with its error.
+
+    \b
+    Examples:
+      ctrl-realize identify step.csv -o results
+      ctrl-realize identify valve_*.csv -o valve --method scan --jobs 2
+      ctrl-realize identify log.txt -o out --time 0 --input current --response position
+      ctrl-realize identify step.csv -o out --frf frf.csv
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    check_files([*files, *([frf] if frf else [])])
+    options = {"order": order, "max_delay": max_delay}
+    settings = {"method": method.value, **{k: v for k, v in options.items() if v is not None}}
+    how = reading(
+        time=time,
+        input=input_column,
+        output=output_column,
+        dt=dt,
+        time_unit=time_unit,
+        delimiter=delimiter,
+        decimal=decimal,
+        skip_rows=skip_rows,
+        resample=resample,
+    )
+    measured = None if frf is None else read_frf(frf)
+    words = _words(files, output, settings, how, frf, separate)
+    calls = _calls(files, settings, how, words)
+    if separate and len(files) > 1:
+        return _each_alone(files, output, settings, how, measured, words)
+    with appearing(output) as folder:
+        if len(files) == 1:
+            _one(files[0], folder, settings, how, measured, calls)
+            failed = False
+        else:
+            failed = _many(files, folder, settings, how, measured, calls, jobs)
+    say(f"\nwritten to {printable(str(output))}: model.json, report.html, figures/")
+    return 1 if failed else 0
+
+
+def _one(
+    file: Path,
+    folder: Path,
+    settings: dict[str, Any],
+    how: Reading,
+    frf: MeasuredFRF | None,
+    calls: list[tuple[str, str]],
+) -> None:
+    record = how.source(file)()
+    system = identify_record(record, **settings)
+    comparison = None if frf is None else compare_frf(system, frf)
+    write_record_files(
+        folder, system, record, file,
+        frf=frf, comparison=comparison, settings=settings, calls=calls,
+    )  # fmt: skip
+    say(printable(f"{file}: {record!r}"))
+    say(system.fit.report())
+    if comparison is not None:
+        say()
+        say(comparison.report())
+
+
+def _many(
+    files: list[Path],
+    folder: Path,
+    settings: dict[str, Any],
+    how: Reading,
+    frf: MeasuredFRF | None,
+    calls: list[tuple[str, str]],
+    jobs: int | None,
+) -> bool:
+    n_jobs = jobs if jobs is not None else -1 if len(files) >= _MANY else 1
+    campaign = identify_campaign([how.source(file) for file in files], n_jobs=n_jobs, **settings)
+    _refuse_useless(campaign)
+    comparison = None if frf is None else compare_frf(campaign.system, frf)
+    write_campaign_files(
+        folder, campaign, files,
+        frf=frf, comparison=comparison, settings=settings, calls=calls,
+    )  # fmt: skip
+    say(campaign_table(campaign))
+    say()
+    say(campaign.report())
+    say()
+    say("Final model")
+    say(campaign.system.fit.report())
+    if comparison is not None:
+        say()
+        say(comparison.report())
+    return bool(campaign.failed)
+
+
+def _refuse_useless(campaign: Campaign) -> None:
+    """Stop where nothing common can be said of the records."""
+    if not campaign.good:
+        for row in campaign.rows:
+            complain(printable(f"{row.name}: {row.error}"))
+        raise DataError(f"none of the {len(campaign.rows)} records could be identified")
+    try:
+        _ = campaign.dt
+    except DataError as error:
+        raise DataError(f"{error}; --separate identifies each by itself") from error
+
+
+def _each_alone(
+    files: list[Path],
+    output: Path,
+    settings: dict[str, Any],
+    how: Reading,
+    frf: MeasuredFRF | None,
+    words: list[str],
+) -> int:
+    """Identify each file into a folder of its own; failures do not stop the rest."""
+    failed = 0
+    names = unique_names([file.stem for file in files])
+    with appearing(output) as folder:
+        for file, name in progress(zip(files, names, strict=True), len(files), "identify"):
+            alone = folder / name
+            alone.mkdir()
+            calls = _calls([file], settings, how, words)
+            try:
+                _one(file, alone, settings, how, frf, calls)
+            except (CtrlRealizeError, OSError) as error:
+                failed += 1
+                alone.rmdir()
+                complain(f"{printable(str(file))}: {one_line(error)}")
+            say()
+        if failed == len(files):
+            raise DataError(f"none of the {len(files)} records could be identified")
+    say(f"written to {printable(str(output))}: a folder for each record")
+    return 1 if failed else 0
+
+
+def unique_names(names: list[str]) -> list[str]:
+    """Number names that come twice."""
+    seen: dict[str, int] = {}
+    out = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 else f"{name}_{seen[name]}")
+    if len(set(out)) != len(out):
+        raise OptionError(f"the files have names that cannot be told apart: {', '.join(names)}")
+    return out
+
+
+def _words(
+    files: list[Path],
+    output: Path,
+    settings: dict[str, Any],
+    how: Reading,
+    frf: Path | None,
+    separate: bool,
+) -> list[str]:
+    """Write down the command line that does the same again."""
+    words = [*map(str, files), "--output", str(output)]
+    for name, value in settings.items():
+        words += [f"--{name.replace('_', '-')}", str(value)]
+    if frf is not None:
+        words += ["--frf", str(frf)]
+    if separate:
+        words.append("--separate")
+    names = {"output": "response", "delimiter": "delimiter"}
+    for name, value in how.keywords.items():
+        option = f"--{names.get(name, name).replace('_', '-')}"
+        if value is True:
+            words.append(option)
+        else:
+            words += [option, "tab" if value == "\t" else str(value)]
+    return words
+
+
+def _calls(
+    files: list[Path], settings: dict[str, Any], how: Reading, words: list[str]
+) -> list[tuple[str, str]]:
+    """Write down how to do it again, in a terminal and in Python."""
+    keywords = python_keywords(how.keywords)
+    chosen = python_keywords(settings)
+    if len(files) == 1:
+        python = (
+            "import ctrl_realize as cr\n"
+            f"record = cr.read_record({str(files[0])!r}{keywords})\n"
+            f"sys = cr.identify(record{chosen})"
+        )
+    else:
+        names = ",\n    ".join(repr(str(file)) for file in files)
+        python = (
+            "import ctrl_realize as cr\n"
+            f"files = [\n    {names},\n]\n"
+            f"records = [cr.read_record(file{keywords}) for file in files]\n"
+            f"campaign = cr.identify_campaign(records{chosen})\n"
+            "sys = campaign.system"
+        )
+    return [("In a terminal", typed_call("identify", words)), ("In Python", python)]

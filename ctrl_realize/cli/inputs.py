@@ -1,0 +1,85 @@
+"""Files that the commands read, and how their options say what is in them."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ..errors import MissingFileError, OptionError
+from ..io import read_record
+from ..signals import Record
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How to read records: the keywords of `read_record` that were asked for."""
+
+    keywords: dict[str, Any]
+
+    def source(self, path: Path) -> partial[Record]:
+        """Return a function that reads one file; it travels to other processes."""
+        return partial(read_record, path, **self.keywords)
+
+
+def reading(
+    *,
+    time: str | None,
+    input: str | None,
+    output: str | None,
+    dt: float | None,
+    time_unit: str | None,
+    delimiter: str | None,
+    decimal: str | None,
+    skip_rows: int,
+    resample: bool,
+) -> Reading:
+    """Turn options into keywords of `read_record`; what was not given stays at its default."""
+    given: dict[str, Any] = {
+        "time": selector(time),
+        "input": selector(input),
+        "output": selector(output),
+        "dt": dt,
+        "time_unit": time_unit,
+        "delimiter": {"tab": "\t", r"\t": "\t"}.get(delimiter or "", delimiter),
+        "decimal": decimal,
+        "skip_rows": skip_rows or None,
+        "resample": resample or None,
+    }
+    return Reading({key: value for key, value in given.items() if value is not None})
+
+
+def selector(text: str | None) -> str | int | None:
+    """Read a column as a number where it is one; ``=2`` names the column "2"."""
+    if text is None or text == "":
+        return None
+    if text.startswith("="):
+        return text[1:]
+    return int(text) if text.isdigit() else text
+
+
+def check_files(paths: Sequence[Path]) -> None:
+    """Refuse files that are not there before any work is done.
+
+    Raises
+    ------
+    MissingFileError, OptionError
+    """
+    for path in paths:
+        if not path.exists():
+            raise MissingFileError(f"{path}: there is no such file")
+        if path.is_dir():
+            raise OptionError(f"{path} is a folder; name the files in it")
+
+
+def typed_call(command: str, words: Sequence[str]) -> str:
+    """Write a command line that can be typed again."""
+    return shlex.join(["ctrl-realize", command, *words])
+
+
+def python_keywords(keywords: dict[str, Any]) -> str:
+    """Write keyword arguments as Python text."""
+    return "".join(f", {name}={value!r}" for name, value in keywords.items())

@@ -1,0 +1,140 @@
+"""The files that the commands write, and the tables that they show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from .. import report
+from ..delayed import DelayedStateSpace
+from ..frequency.comparison import FRFComparison
+from ..identification.campaign import Campaign
+from ..io import save_model
+from ..io.atomic import write_text
+from ..report.sketches import (
+    Sketch,
+    campaign_sketches,
+    frf_sketches,
+    identification_sketches,
+)
+from ..signals import Record
+from .terminal import printable, table
+
+
+def write_record_files(
+    folder: Path,
+    system: DelayedStateSpace,
+    record: Record,
+    file: Path,
+    *,
+    frf: ct.FrequencyResponseData | None,
+    comparison: FRFComparison | None,
+    settings: Mapping[str, Any],
+    calls: Sequence[tuple[str, str]],
+) -> None:
+    """Write model, report and figures of one record."""
+    save_model(folder / "model.json", system, settings=settings, note=f"from {file.name}")
+    report.write_identification(
+        folder / "report.html",
+        system,
+        record,
+        files=[file],
+        frf=frf,
+        comparison=comparison,
+        settings=settings,
+        calls=calls,
+    )
+    save_figures(folder, identification_sketches(system, record, frf=frf, comparison=comparison))
+    if comparison is not None:
+        write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
+
+
+def write_campaign_files(
+    folder: Path,
+    campaign: Campaign,
+    files: Sequence[Path],
+    *,
+    frf: ct.FrequencyResponseData | None,
+    comparison: FRFComparison | None,
+    settings: Mapping[str, Any],
+    calls: Sequence[tuple[str, str]],
+) -> None:
+    """Write table, models, report and figures of many records."""
+    system = campaign.system
+    note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
+    save_model(folder / "model.json", system, settings=settings, note=note)
+    write_text(folder / "records.csv", campaign.table().to_csv())
+    save_models(folder, campaign, settings)
+    report.write_campaign(
+        folder / "report.html",
+        campaign,
+        files=files,
+        frf=frf,
+        comparison=comparison,
+        settings=settings,
+        calls=calls,
+        title=f"Campaign of {len(campaign.rows)} records",
+    )
+    sketches = campaign_sketches(campaign)
+    if frf is not None:
+        sketches += frf_sketches([system], frf, comparison)
+    save_figures(folder, sketches)
+    if comparison is not None:
+        write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
+
+
+def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -> None:
+    """Write the model of every record that has one."""
+    models = folder / "models"
+    models.mkdir()
+    for number, row in enumerate(campaign.rows, start=1):
+        if row.system is not None:
+            name = f"{number:03d}_{file_name(row.name)}.json"
+            save_model(models / name, row.system, settings=settings, note=f"from {row.name}")
+
+
+def save_figures(folder: Path, sketches: Sequence[Sketch]) -> None:
+    """Write figures as PNG files, which any program shows."""
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    for sketch in sketches:
+        sketch.save(figures / f"{sketch.key}.png")
+
+
+def file_name(name: str) -> str:
+    """Make a name safe for a file of any system."""
+    safe = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)
+    return safe[:80] or "record"
+
+
+def campaign_table(campaign: Campaign) -> str:
+    """Lay out a campaign for the terminal: one line for each record."""
+    rows = []
+    for row in campaign.rows:
+        if row.system is None:
+            rows.append([printable(row.name), _number(row.amplitude), "", "", "", "",
+                         printable(row.error or "failed")])  # fmt: skip
+            continue
+        low, high = row.interval
+        remarks = ", ".join(flag.code for flag in row.system.fit.flags)
+        rows.append(
+            [
+                printable(row.name),
+                _number(row.amplitude),
+                f"{row.delay:.4g}",
+                f"{1e3 * row.dead_time:.4g}",
+                f"{1e3 * low:.4g} ... {1e3 * high:.4g}",
+                str(row.system.delay_free.nstates),
+                remarks,
+            ]
+        )
+    columns = ["record", "step", "delay", "dead time [ms]", "interval [ms]", "order", "remarks"]
+    return table(columns, rows, numbers=(1, 2, 3, 4, 5))
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else ""

@@ -1,0 +1,89 @@
+"""What the command line writes to the terminal: tables on stdout, everything else on stderr."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from typing import Any, TextIO
+
+import typer
+
+EXIT_CODES = (
+    "Exit codes: 0 done; 1 done, but some records failed; 2 wrong usage or unusable input, "
+    "nothing written; 130 interrupted."
+)
+
+
+def say(text: str = "") -> None:
+    """Write to stdout."""
+    typer.echo(text)
+
+
+def complain(text: str) -> None:
+    """Write one line to stderr."""
+    typer.echo(f"ctrl-realize: {text}", err=True)
+
+
+def one_line(problem: object) -> str:
+    """Put the message of a problem into one line."""
+    if isinstance(problem, OSError) and problem.strerror and not _is_ours(problem):
+        text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
+    else:
+        text = str(problem)
+    return " ".join(text.split())
+
+
+def _is_ours(problem: OSError) -> bool:
+    return type(problem).__module__.startswith("ctrl_realize")
+
+
+def plain_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Show a warning as one line on stderr; stands in for `warnings.showwarning`."""
+    complain(f"warning: {one_line(message)}")
+
+
+def progress(items: Iterable[Any], total: int, label: str) -> Iterable[Any]:
+    """Show a bar on stderr while items are gone through, where somebody can see it."""
+    from tqdm import tqdm
+
+    bar: Iterable[Any] = tqdm(items, total=total, desc=label, disable=None, file=sys.stderr)
+    return bar
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int]) -> str:
+    """Lay out a table; the columns in `numbers` are aligned to the right.
+
+    Examples
+    --------
+    >>> from ctrl_realize.cli.terminal import table
+    >>> print(table(["record", "delay"], [["a", "37"], ["bc", "4"]], numbers=[1]))
+    record  delay
+    ------  -----
+    a          37
+    bc          4
+    """
+    cells = [list(columns), *(list(row) for row in rows)]
+    widths = [max(len(line[k]) for line in cells) for k in range(len(columns))]
+    lines = [_aligned(line, widths, numbers) for line in cells]
+    lines.insert(1, "  ".join("-" * width for width in widths))
+    return "\n".join(lines)
+
+
+def _aligned(cells: Sequence[str], widths: Sequence[int], numbers: Sequence[int]) -> str:
+    placed = [
+        cell.rjust(width) if k in numbers else cell.ljust(width)
+        for k, (cell, width) in enumerate(zip(cells, widths, strict=True))
+    ]
+    return "  ".join(placed).rstrip()
+
+
+def printable(text: str) -> str:
+    """Keep names of files and records from steering the terminal."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
