@@ -33,9 +33,9 @@ from .identification.realization import realize as realize
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step
-from .identification.tracker import DelayTrack as DelayTrack
+from .identification.tracked import DelayTrack as DelayTrack
+from .identification.tracked import TrackedDelay as TrackedDelay
 from .identification.tracker import DelayTracker as DelayTracker
-from .identification.tracker import TrackedDelay as TrackedDelay
 from .io import CampaignStore as CampaignStore
 from .io import load_model as load_model
 from .io import read_frf as read_frf

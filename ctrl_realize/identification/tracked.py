@@ -1,0 +1,109 @@
+"""What a delay tracker says: at one moment, and over a record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..numerics.arrays import FloatArray
+from ..results import Result
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedDelay(Result):
+    """What the samples of the forgetting window say at one moment.
+
+    ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
+    ``interval`` (samples) where `tells` is true. Where it is false, `reason` says what is
+    missing and the numbers are the best guess without any claim.
+
+    Attributes
+    ----------
+    time : float
+        Time of the last sample in s, from the first one.
+    delay : int
+        Best delay in samples.
+    dead_time : float
+        Best dead time in s.
+    interval : tuple of int
+        Delays that hold 95 % of the probability, and the way that the delay has gone within the
+        last memory: the estimate is behind a moving delay by about that.
+    gain_ratio, gain_std : float
+        Gain relative to the starting model, and its standard deviation.
+    speed_ratios : tuple of float
+        How much faster each real pole and pole pair has become; 1 is unchanged.
+    noise_std : float
+        Standard deviation of the residual.
+    tells : bool
+    reason : str
+    """
+
+    time: float
+    delay: int
+    dead_time: float
+    interval: tuple[int, int]
+    gain_ratio: float
+    gain_std: float
+    speed_ratios: tuple[float, ...]
+    noise_std: float
+    tells: bool
+    reason: str = ""
+
+    def _title(self) -> str:
+        return f"Tracked delay at {self.time:.6g} s"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        low, high = self.interval
+        return [
+            ("delay", f"{self.delay} samples ({low} to {high}), {self.dead_time:.6g} s"),
+            ("gain", f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g} of the starting model's"),
+            ("speed of poles", ", ".join(f"{s:.3g}" for s in self.speed_ratios) or "kept"),
+            ("noise left", f"{self.noise_std:.3g}"),
+            ("the data tell", "yes" if self.tells else f"no: {self.reason}"),
+        ]
+
+    def __repr__(self) -> str:
+        told = "" if self.tells else f", cannot tell: {self.reason}"
+        return f"<TrackedDelay {self.delay} {self.interval} at {self.time:.6g} s{told}>"
+
+
+@dataclass(frozen=True, eq=False)
+class DelayTrack(Result):
+    """Course of a tracked delay: all arrays have one entry for each moment in `time`.
+
+    Where ``tells`` is false, nothing is claimed; `low` and `high` then only show what is left
+    open.
+    """
+
+    time: FloatArray
+    dead_time: FloatArray
+    low: FloatArray
+    high: FloatArray
+    gain_ratio: FloatArray
+    tells: FloatArray
+    dt: float
+
+    @property
+    def delay(self) -> FloatArray:
+        """Delay in samples, with its fraction."""
+        return self.dead_time / self.dt
+
+    def _title(self) -> str:
+        return "Tracked delay"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        told = np.flatnonzero(self.tells)
+        share = f"{told.size} of {self.time.size} moments"
+        if told.size == 0:
+            return [("told", share)]
+        first, last = told[0], told[-1]
+        return [
+            ("told", share),
+            ("first", f"{self.delay[first]:.2f} samples at {self.time[first]:.6g} s"),
+            ("last", f"{self.delay[last]:.2f} samples at {self.time[last]:.6g} s"),
+            ("gain", f"{self.gain_ratio[first]:.4g} to {self.gain_ratio[last]:.4g}"),
+        ]
+
+    def __repr__(self) -> str:
+        return f"<DelayTrack: {self.time.size} moments, told at {int(self.tells.sum())}>"

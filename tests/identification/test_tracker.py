@@ -1,0 +1,180 @@
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
+from tests.rigs import R3, TS, lag, pair
+
+
+def worn_valve(*, seconds=40.0, noise=0.005, seed=0, gain=1.0, last=60.0):
+    """Simulate a valve whose dead time wears from 37 samples to `last`; return record and truth.
+
+    Input: a new level every 0.4 s. Noise: part of the 16 mA span.
+    """
+    rng = np.random.default_rng(seed)
+    k = np.arange(int(seconds / TS))
+    u = 4 + 4 * np.repeat(rng.integers(0, 5, k.size // 512 + 1), 512)[: k.size]
+    worn = np.clip((k / k.size - 0.3) / 0.4, 0, 1)
+    delay = 37 + (last - 37) * worn
+    free = cr.delayed_ss(R3, delay=0, dt=TS).simulate(u - u[0])
+    y = np.interp(k - delay, k, free, left=0.0) * (1 + (gain - 1) * worn)
+    return cr.Record(k * TS, u, 0.3 + y + noise * 16 * rng.standard_normal(k.size)), delay
+
+
+def tracker(model=R3, **options):
+    settings = {"max_delay": 90, "memory": 2.5, **options}
+    return cr.DelayTracker(cr.delayed_ss(model, delay=37, dt=TS), **settings)
+
+
+@pytest.mark.parametrize(("dynamics", "error"), [(True, 1.0), (False, 0.7)])
+def test_a_dead_time_that_wears_from_37_to_60_samples_is_followed(dynamics, error):
+    record, truth = worn_valve(seconds=60)
+    track = tracker(dynamics=dynamics).run(record)
+    told = track.tells
+    assert np.mean(told) > 0.95
+    # The estimate is one memory behind: compared with the delay of then. Within a memory the
+    # delay wears by 2 samples, and averages over that are known to a third or so.
+    then = np.interp(track.time - 2.5, record.time, truth)
+    assert np.sqrt(np.mean((track.delay - then)[told] ** 2)) < error
+    now = np.interp(track.time, record.time, truth)
+    inside = (track.low - 0.5 <= now) & (now <= track.high + 0.5)
+    assert np.mean(inside[told]) > 0.9
+    assert abs(track.delay[-1] - 60) < 0.6
+
+
+def test_gain_is_followed_with_the_delay():
+    record, _ = worn_valve(gain=0.8)
+    bank = tracker()
+    track = bank.run(record)
+    assert abs(track.gain_ratio[20] - 1.0) < 0.02
+    last = bank.estimate()
+    assert abs(last.gain_ratio - 0.8) < max(4 * last.gain_std, 0.005)
+    assert abs(ct.dcgain(bank.model) - 0.8 * ct.dcgain(R3)) < 0.01
+    assert bank.model.delay == last.delay
+    assert bank.model.fit.delay == last.delay
+
+
+def test_poles_that_are_faster_than_the_model_are_seen():
+    record, _ = worn_valve(last=37.0, seconds=20)
+    bank = tracker(lag(2.0) * pair(8.0, 0.7))
+    bank.run(record)
+    last = bank.estimate()
+    # 2.2 Hz against 2.0 Hz, to first order
+    assert any(abs(ratio - 1.1) < 0.02 for ratio in last.speed_ratios)
+    assert abs(last.delay - 37) <= 1
+
+
+def test_an_input_that_rests_does_not_tell():
+    record, _ = worn_valve(seconds=12, last=37.0)
+    bank = tracker(memory=1.0)
+    bank.run(record)
+    assert bank.estimate().tells
+    rest_y = float(record.output[-400:].mean())
+    rng = np.random.default_rng(1)
+    for noise in 0.08 * rng.standard_normal(20 * 1280):
+        bank.update(record.input[-1], rest_y + noise)
+    last = bank.estimate()
+    assert not last.tells
+    assert "nothing moved" in last.reason
+    assert "no: nothing moved" in last.report()
+
+
+def test_an_output_that_is_stuck_does_not_tell():
+    record, _ = worn_valve(seconds=12)
+    rng = np.random.default_rng(1)
+    stuck = cr.Record(record.time, record.input, 0.3 + 0.08 * rng.standard_normal(record.n_samples))
+    bank = tracker()
+    track = bank.run(stuck)
+    assert np.mean(track.tells) < 0.05
+    assert not bank.estimate().tells
+
+
+def test_noise_that_hides_the_plant_does_not_tell_a_narrow_delay():
+    record, _ = worn_valve(seconds=12, noise=30.0)
+    track = tracker().run(record)
+    assert np.mean(track.tells) < 0.1
+
+
+def test_a_delay_beyond_the_candidates_is_not_claimed():
+    record, _ = worn_valve(seconds=12, last=37.0)
+    bank = tracker(max_delay=20, memory=1.5)
+    bank.run(record)
+    assert not bank.estimate().tells
+    fixed = tracker(max_delay=20, memory=1.5, dynamics=False)
+    fixed.run(record)
+    assert "max_delay=20" in fixed.estimate().reason
+
+
+def test_nothing_is_said_before_there_are_samples():
+    bank = tracker()
+    assert bank.estimate().reason == "no samples yet"
+    for _ in range(5):
+        bank.update(1.0, 2.0)
+    assert bank.estimate().reason == "only 5 samples yet"
+
+
+def test_offsets_and_units_do_not_matter():
+    record, _ = worn_valve(seconds=10, last=37.0)
+    moved = cr.Record(record.time, record.input + 1e4, 1e3 * record.output - 5e6)
+    plain, other = tracker(memory=2.0), tracker(1000 * R3, memory=2.0)
+    plain.run(record)
+    other.run(moved)
+    first, second = plain.estimate(), other.estimate()
+    assert second.delay == first.delay
+    assert second.interval == first.interval
+    assert abs(second.gain_ratio - first.gain_ratio) < 1e-6
+
+
+def test_streaming_and_running_give_the_same():
+    record, _ = worn_valve(seconds=6, last=37.0)
+    one, other = tracker(memory=1.0), tracker(memory=1.0)
+    track = one.run(record)
+    for sample in zip(record.input, record.output, strict=True):
+        other.update(*sample)
+    assert one.estimate().dead_time == other.estimate().dead_time
+    assert "DelayTrack" in repr(track)
+    assert "told" in track.report()
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_the_exchanger_keeps_its_delay_of_zero(shared_data, order):
+    table = np.loadtxt(shared_data / "exchanger" / "record.csv", delimiter=",", skiprows=1)
+    record = cr.Record(*table.T)
+    first = cr.impulse_from_io(record.between(0, 1500), 200)
+    model = cr.realize(first, order, feedthrough=True)
+    track = cr.DelayTracker(model, max_delay=20, memory=300.0).run(record)
+    assert np.mean(track.tells) > 0.8  # at times a pole of the third order moves too far
+    assert np.all(track.dead_time[track.tells] <= 1.0)  # s, one sample
+
+
+@pytest.mark.parametrize(
+    ("model", "options", "error", "match"),
+    [
+        (ct.ss([[1.1]], [[1.0]], [[1.0]], [[0.0]], TS), {}, UnsuitableSystemError, "unstable"),
+        (ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), {}, UnsuitableSystemError, "discrete"),
+        (ct.ss([[0.5]], [[1.0]], [[0.0]], [[0.0]], TS), {}, OptionError, "zero"),
+        (None, {"max_delay": 0}, DelayRangeError, "nothing to choose"),
+        (None, {"memory": 0.05}, DelayRangeError, "longer memory"),
+        (None, {"memory": -1.0}, OptionError, "memory"),
+        (None, {"min_delay": 1.5}, OptionError, "min_delay"),
+    ],
+)
+def test_unusable_choices_are_refused(model, options, error, match):
+    start = cr.delayed_ss(R3, delay=37, dt=TS) if model is None else model
+    with pytest.raises(error, match=match):
+        cr.DelayTracker(start, **{"max_delay": 90, "memory": 2.5, **options})
+
+
+def test_samples_that_are_no_numbers_and_records_that_do_not_fit_are_refused():
+    bank = tracker()
+    with pytest.raises(DataError, match="y=nan"):
+        bank.update(1.0, np.nan)
+    slow = cr.Record(np.arange(10.0), np.ones(10), np.ones(10))
+    with pytest.raises(DataError, match="sample time 1 s"):
+        bank.run(slow)
+    short = cr.Record(TS * np.arange(5), np.ones(5), np.ones(5))
+    with pytest.raises(DataError, match="5 samples"):
+        bank.run(short)
