@@ -92,8 +92,14 @@ def model_colour(number: int) -> str:
 @contextmanager
 def context() -> Iterator[None]:
     """Use the toolbox's style inside the block; nothing of it stays."""
-    with mpl.rc_context(_SETTINGS):
+    # Not rc_context: it restores all settings, "interactive" too, which a notebook's backend
+    # switches on when the first figure is made. No later figure would be shown.
+    before = {key: mpl.rcParams[key] for key in _SETTINGS}
+    mpl.rcParams.update(_SETTINGS)
+    try:
         yield
+    finally:
+        mpl.rcParams.update(before)
 
 
 def axes_for(
