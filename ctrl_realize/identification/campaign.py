@@ -21,7 +21,7 @@ from ..numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ..results import Flag, Result
 from ..signals import Record
 from .campaign_row import CampaignRow, RecordSource
-from .identify import Method, identify
+from .identify import Method, fit_records, identify
 from .realization import realize
 
 if TYPE_CHECKING:
@@ -127,10 +127,7 @@ class Campaign(Result):
         """
         _ = self.dt
         if self.method == "output_error":
-            from .delay_fit import fit_delay
-
-            known = {k: v for k, v in self.options.items() if k not in ("order", "max_delay")}
-            return fit_delay([self._record(row) for row in self.good], **known)
+            return fit_records([self._record(row) for row in self.good], **self.options)
         chosen = self._identified(self.best)
         scan = chosen.fit
         final = realize(

@@ -14,6 +14,8 @@ from ..delayed import DelayedStateSpace
 from ..errors import CtrlRealizeError
 from ..results import Flag
 from ..signals import Record
+from .delay_fit_result import DelayFit
+from .delay_scan import DelayScan
 from .identify import Method, identify
 from .steps import detect_step
 
@@ -123,11 +125,18 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
         delay=float(fit.delay),
         dead_time=float(fit.dead_time),
         interval=(float(low), float(high)),
-        misfit=float(fit.misfit),
+        misfit=_scaled_misfit(fit, row.amplitude),
         gain=_gain(system),
         system=system,
         flags=tuple(fit.flags),
     )
+
+
+def _scaled_misfit(fit: DelayFit | DelayScan, amplitude: float) -> float:
+    """Misfit for a unit step: a scan works on one, a fit on the raw record."""
+    if isinstance(fit, DelayScan):
+        return fit.misfit
+    return fit.residual / (abs(amplitude) if np.isfinite(amplitude) else 1.0)
 
 
 def _gain(system: DelayedStateSpace) -> float:

@@ -14,6 +14,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..signals import Record, StepResponse
+from .delay_fit import fit_delay
 from .delay_scan import estimate_delay
 from .orders import scan_orders
 from .steps import impulse_from_step, unit_step
@@ -106,17 +107,33 @@ def identify(
             "for the arguments of each method"
         )
     if method == "output_error":
-        if order is not None:
-            if structures is not None:
-                raise OptionError("give order or structures, not both")
-            structures = [(order, degree) for degree in range(1, order + 1)]
-        from .delay_fit import fit_delay
-
-        return fit_delay(record, structures=structures, max_delay=max_delay, known=known, loss=loss)
+        return fit_records(
+            record,
+            order=order,
+            max_delay=max_delay,
+            known=known,
+            loss=loss,
+            structures=structures,
+        )
     step = unit_step(record)
     if method == "paper":
         return _paper(step, order, max_delay, cutoff_hz, samples, feedthrough)
     return _scan(step, order, max_delay, cutoff_hz, samples, feedthrough)
+
+
+def fit_records(
+    records: Record | Sequence[Record],
+    *,
+    order: int | None = None,
+    structures: Sequence[tuple[int, int]] | None = None,
+    **options: Any,
+) -> DelayedStateSpace:
+    """Output-error fit with the arguments of `identify`; several records are fitted together."""
+    if order is not None:
+        if structures is not None:
+            raise OptionError("give order or structures, not both")
+        structures = [(order, degree) for degree in range(1, order + 1)]
+    return fit_delay(records, structures=structures, **options)
 
 
 def _scan(
