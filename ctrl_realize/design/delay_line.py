@@ -87,6 +87,7 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
             M.flags.writeable = False
         self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
         self._form = schur_form(self._parts[0])
+        self._line = _low_rank(np.vstack([E, h]))
         self.line_length = d
         self.inner_poles: ComplexArray = np.diag(self._form[0]).copy()
         self.notes: dict[str, Any] = dict(notes or {})
@@ -123,22 +124,23 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         -------
         forward, back : ndarray, shape (K,)
         """
-        A, B, C, D, E, h = self._parts
-        d = self.line_length
+        A, B, C, D, _, _ = self._parts
         n = A.shape[0]
+        mix, rows_of_line = self._line
         forward = np.empty(z.size, dtype=np.complex128)
         back = np.empty(z.size, dtype=np.complex128)
         eye = np.eye(n)
         for start in range(0, z.size, CHUNK):
             part = slice(start, start + CHUNK)
             points = z[part]
-            powers = points[None, :] ** -np.arange(1, d + 1)[:, None]
-            rows = frequency_response(
-                self._form, np.hstack([B, eye]), C, np.hstack([D, np.zeros((1, n))]), points
-            )[0]
-            forward[part] = rows[0]
-            into_states = E @ powers
-            back[part] = 1 - (h @ powers)[0] - np.sum(rows[1:] * into_states, axis=0)
+            line = mix @ _in_powers(rows_of_line, 1 / points)
+            # At an inner pole (z = 1 with a PI) both paths are infinite.
+            with np.errstate(divide="ignore", invalid="ignore"):
+                rows = frequency_response(
+                    self._form, np.hstack([B, eye]), C, np.hstack([D, np.zeros((1, n))]), points
+                )[0]
+                forward[part] = rows[0]
+                back[part] = 1 - line[-1] - np.sum(rows[1:] * line[:-1], axis=0)
         return forward, back
 
     def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
@@ -149,6 +151,24 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
             out = forward / back
         out[~np.isfinite(out)] = complex(np.inf, np.nan)
         return np.asarray(out[None, None, :], dtype=np.complex128)
+
+
+def _low_rank(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Write rows = mix @ few; all rows of a predictor come from one or two taps of its line."""
+    if rows.size == 0:
+        return np.zeros((rows.shape[0], 0)), np.zeros((0, rows.shape[1]))
+    U, s, V = np.linalg.svd(rows, full_matrices=False)
+    rank = int(np.sum(s > 1e-15 * s[0])) if s[0] > 0 else 0
+    return U[:, :rank] * s[:rank], V[:rank]
+
+
+def _in_powers(rows: FloatArray, x: ComplexArray) -> ComplexArray:
+    """Sum rows[:, i] x^(i+1) by Horner's rule, shape (rows, K)."""
+    total = np.zeros((rows.shape[0], x.size), dtype=np.complex128)
+    for column in rows.T[::-1]:
+        total += column[:, None]
+        total *= x
+    return total
 
 
 def _rebuild(

@@ -101,7 +101,8 @@ def _of_loop(loop: Loop, omega: FloatArray) -> FloatArray:
     nodes, values = follow(loop.delay_free, loop.grid())
     course = np.unwrap(np.angle(values))
     expected = -np.pi / 2 * loop.integrators()
-    course += 2 * np.pi * np.round((expected - course[0] - 1e-6) / (2 * np.pi))
+    # Within half a turn below to a quarter above: a negative gain starts 180 deg lower.
+    course += 2 * np.pi * np.floor((expected + np.pi / 2 - course[0]) / (2 * np.pi))
     near = np.interp(omega, nodes, course)
     direct = np.angle(loop.delay_free(np.maximum(omega, nodes[0] * 1e-3)))
     exact = direct + 2 * np.pi * np.round((near - direct) / (2 * np.pi))

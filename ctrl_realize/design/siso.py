@@ -1,0 +1,72 @@
+"""Checks of the systems that design functions take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..delayed import DelayedStateSpace
+from ..errors import UnsuitableSystemError
+
+
+def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedStateSpace:
+    """Return a discrete system as a `DelayedStateSpace`, or say why it cannot be one.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        No linear system, a continuous one, several channels where one is needed.
+    """
+    if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
+        raise UnsuitableSystemError(
+            f"{purpose} needs a discrete system; got a {type(system).__name__}"
+        )
+    if siso and not system.issiso():
+        raise UnsuitableSystemError(
+            f"{purpose} needs one input and one output; {system.name!r} has {system.ninputs} "
+            f"inputs and {system.noutputs} outputs"
+        )
+    if isinstance(system, DelayedStateSpace):
+        return system
+    if system.dt is None or system.dt is True or not system.dt > 0:
+        raise UnsuitableSystemError(
+            f"{purpose} needs a discrete system with a sample time; {system.name!r} has "
+            f"dt={system.dt!r}. Sample it with design.to_discrete(system, dead_time, dt)"
+        )
+    return DelayedStateSpace(proper_ss(system, purpose), 0, name=system.name)
+
+
+def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
+    """Convert to state space; an improper transfer function is refused in our words."""
+    if isinstance(system, ct.StateSpace):
+        return system
+    if isinstance(system, ct.TransferFunction):
+        for row_num, row_den in zip(system.num, system.den, strict=True):
+            for num, den in zip(row_num, row_den, strict=True):
+                if np.trim_zeros(num, "f").size > np.trim_zeros(den, "f").size:
+                    raise UnsuitableSystemError(
+                        f"{purpose} needs a proper system; {system.name!r} has more zeros than "
+                        "poles. Give its derivative a filter"
+                    )
+        return ct.ss(system)
+    raise UnsuitableSystemError(f"{purpose} needs a linear system; got a {type(system).__name__}")
+
+
+def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
+    """Return a discrete single-channel controller of the sample time `dt` in state space."""
+    if isinstance(controller, (int, float)):
+        return ct.ss([], [], [], float(controller), dt)
+    system = proper_ss(controller, purpose)
+    if not system.issiso():
+        raise UnsuitableSystemError(f"{purpose} needs a controller with one input and one output")
+    if system.dt is None:
+        return ct.StateSpace(system, dt) if system.nstates else ct.ss([], [], [], system.D, dt)
+    if system.dt is True or not np.isclose(system.dt, dt, rtol=1e-6, atol=0.0):
+        kind = "continuous" if system.dt == 0 else f"sampled with dt={system.dt!r}"
+        raise UnsuitableSystemError(
+            f"the controller {system.name!r} is {kind}, the plant has dt={dt:g} s; "
+            "give a controller of the same sample time (a PID has .discretised(dt))"
+        )
+    return system

@@ -1,0 +1,209 @@
+"""Smith predictors against feedback of the whole models, and in brute-force simulation."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
+
+DT = 7.8125e-4
+
+
+@dataclass(frozen=True)
+class FitWithInterval:
+    """Stands for any result of an identification."""
+
+    dead_time_interval: tuple[float, float]
+
+
+def stepped(system, count):
+    """Response to a unit step, by the recursion itself."""
+    A, B, C, D = (np.asarray(M) for M in (system.A, system.B, system.C, system.D))
+    x, out = np.zeros(A.shape[0]), np.empty(count)
+    for k in range(count):
+        out[k] = (C @ x)[0] + D[0, 0]
+        x = A @ x + B[:, 0]
+    return out
+
+
+def closed(plant, controller):
+    return ct.feedback(ct.ss(plant) * ct.ss(controller), 1)
+
+
+def loaded(plant, controller):
+    return ct.feedback(ct.ss(plant), ct.ss(controller))
+
+
+@pytest.mark.parametrize("delay", [1, 2, 37, 100])
+@pytest.mark.parametrize("kind", ["valve", "stable", "direct"])
+def test_the_set_point_response_is_that_of_the_core_alone_d_samples_later(
+    valve, cores, pi_controller, kind, delay
+):
+    core = valve(0).delay_free if kind == "valve" else cores[kind]
+    controller = pi_controller(1.5, 0.1)
+    predictor = cr.design.smith_predictor(cr.delayed_ss(core, delay), controller)
+    alone = stepped(ct.feedback(core * controller, 1), 600)
+    found = stepped(closed(cr.delayed_ss(core, delay), predictor), 600 + delay)
+    np.testing.assert_array_equal(found[:delay], 0)
+    np.testing.assert_allclose(found[delay:], alone, atol=1e-11)  # 600 steps of rounding
+
+
+@pytest.mark.parametrize("delay", [1, 37, 300])
+def test_the_controller_equals_feedback_of_the_difference_of_two_models(
+    valve, pi_controller, delay
+):
+    plant, controller = valve(delay), pi_controller(1.5, 0.1)
+    predictor = cr.design.smith_predictor(plant, controller)
+    z = np.exp(1j * np.geomspace(1e-3, 3, 40))
+    core, pi = plant.delay_free(z), controller(z)
+    expected = pi / (1 + pi * (core - core * z**-delay))
+    np.testing.assert_allclose(predictor(z), expected, rtol=1e-9)
+
+
+def test_matrices_and_structured_response_agree(valve, pi_controller):
+    predictor = cr.design.smith_predictor(valve(37), pi_controller(1.5, 0.1), filter_time=0.02)
+    plain = ct.ss(predictor)
+    for z in np.exp(1j * np.array([0.01, 0.3, 2.5])):
+        direct = plain.C @ np.linalg.solve(z * np.eye(plain.nstates) - plain.A, plain.B) + plain.D
+        assert predictor(z) == pytest.approx(direct[0, 0], rel=1e-10)
+
+
+def test_it_has_as_many_states_as_core_delay_and_controller(valve, pi_controller):
+    predictor = cr.design.smith_predictor(valve(37), pi_controller(1.5, 0.1))
+    assert predictor.nstates == 3 + 37 + 1
+    by_hand = ct.feedback(pi_controller(1.5, 0.1), valve(0).delay_free - ct.ss(valve(37)))
+    assert by_hand.nstates == 1 + 3 + 3 + 37
+
+
+def test_no_state_is_hidden(valve, pi_controller):
+    predictor = ct.ss(cr.design.smith_predictor(valve(4), pi_controller(1.5, 0.1)))
+    # Ranks at each pole (Popov, Belevitch, Hautus): 1e-9 is far above rounding at order 8.
+    for pole in np.linalg.eigvals(predictor.A):
+        shifted = predictor.A - pole * np.eye(predictor.nstates)
+        assert np.linalg.svd(np.hstack([shifted, predictor.B]))[1][-1] > 1e-9
+        assert np.linalg.svd(np.vstack([shifted, predictor.C]))[1][-1] > 1e-9
+
+
+def test_without_delay_it_is_the_controller(valve, pi_controller):
+    controller = pi_controller(1.5, 0.1)
+    predictor = cr.design.smith_predictor(valve(0), controller)
+    assert predictor.nstates == 1
+    assert predictor(0.9 + 0.3j) == pytest.approx(controller(0.9 + 0.3j))
+
+
+def test_margins_see_the_same_closed_loop_as_its_eigenvalues(valve, pi_controller):
+    for gain in (0.5, 1.5, 4.0, 12.0):
+        plant, controller = valve(20), pi_controller(gain, 0.1)
+        predictor = cr.design.smith_predictor(plant, controller)
+        radius = np.abs(closed(plant.replace(delay=30), predictor).poles())
+        found = cr.design.margins(plant.replace(delay=30), predictor)
+        assert found.unstable_poles == np.sum(radius > 1)
+
+
+@pytest.mark.parametrize("remove_slow", [False, True])
+def test_a_filtered_predictor_leaves_no_error_after_a_load(valve, pi_controller, remove_slow):
+    plant = valve(100)
+    predictor = cr.design.smith_predictor(
+        plant, pi_controller(1.5, 0.1), filter_time=0.05, remove_slow=remove_slow
+    )
+    assert cr.design.margins(plant, predictor).stable
+    assert abs(stepped(loaded(plant, predictor), 6000)[-1]) < 1e-6
+
+
+def test_removing_the_slow_pole_takes_it_out_of_the_load_response(cores):
+    slow = np.exp(-DT / 2.0)  # 2 s, against a dead time of 0.03 s
+    core = ct.ss([[slow]], [[1.0]], [[1 - slow]], [[0.0]], DT)
+    plant = cr.delayed_ss(core, 37)
+    controller = ct.ss([[1.0]], [[1.0]], [[20 * DT / 0.3]], [[20.0]], DT)
+    kept = cr.design.smith_predictor(plant, controller, filter_time=0.02)
+    taken = cr.design.smith_predictor(plant, controller, filter_time=0.02, remove_slow=True)
+    np.testing.assert_allclose(taken.removed_poles, [slow], rtol=1e-12)
+    areas = [np.abs(stepped(loaded(plant, c), 6000)).sum() for c in (kept, taken)]
+    assert areas[1] < 0.5 * areas[0]
+
+
+def test_an_integrating_core_needs_the_filter_and_then_rejects_loads(cores, pi_controller):
+    plant = cr.delayed_ss(cores["integrating"], 37)
+    with pytest.raises(UnsuitableSystemError, match=r"integrates.*filter_time"):
+        cr.design.smith_predictor(plant, pi_controller(2.0, 3.0))
+    predictor = cr.design.smith_predictor(plant, pi_controller(2.0, 3.0), filter_time=0.1)
+    found = cr.design.margins(plant, predictor)
+    assert found.stable
+    assert np.all(np.abs(closed(plant, predictor).poles()) < 1)  # no hidden integrator either
+    assert abs(stepped(loaded(plant, predictor), 40_000)[-1]) < 1e-5
+
+
+def test_a_filter_widens_the_range_of_dead_times(valve, pi_controller):
+    plant, controller = valve(37), pi_controller(3.0, 0.08)
+    reach = [
+        cr.design.delay_robustness(
+            plant, cr.design.smith_predictor(plant, controller, filter_time=time), (0.02, 0.04)
+        ).stable_to
+        for time in (None, 0.03)
+    ]
+    assert reach[1] > reach[0]
+
+
+def test_the_range_of_stable_dead_times_ends_where_it_says(valve, pi_controller):
+    plant = valve(37)
+    predictor = cr.design.smith_predictor(plant, pi_controller(3.0, 0.08))
+    checked = cr.design.delay_robustness(plant, predictor, (0.02, 0.03))
+    last = round(checked.stable_to / DT)
+    assert np.all(np.abs(closed(plant.replace(delay=last), predictor).poles()) < 1)
+    assert np.any(np.abs(closed(plant.replace(delay=last + 1), predictor).poles()) > 1)
+    assert checked.stable
+    assert checked.worst_modulus_margin == checked.table()["modulus_margin"].min()
+    assert "stable" in checked.report()
+
+
+def test_the_identified_interval_is_checked(valve, pi_controller):
+    sure = valve(37).replace(fit=FitWithInterval((0.028, 0.030)))
+    predictor = cr.design.smith_predictor(sure, pi_controller(3.0, 0.08))
+    assert predictor.robustness.stable
+    unsure = valve(37).replace(fit=FitWithInterval((0.01, 0.2)))
+    with pytest.warns(ModelWarning, match="unstable for some dead time"):
+        predictor = cr.design.smith_predictor(unsure, pi_controller(3.0, 0.08))
+    assert not predictor.robustness.stable
+
+
+def test_it_pickles_and_copies(valve, pi_controller):
+    predictor = cr.design.smith_predictor(valve(5), pi_controller(1.5, 0.1), filter_time=0.02)
+    for again in (pickle.loads(pickle.dumps(predictor)), copy.deepcopy(predictor)):
+        assert again.name == "smith"
+        assert again.filter_time == 0.02
+        np.testing.assert_array_equal(again.A, predictor.A)
+
+
+def test_the_plant_is_not_changed(valve, pi_controller):
+    plant, controller = valve(5), pi_controller(1.5, 0.1)
+    before = [np.array(M) for s in (plant, controller) for M in (s.A, s.B, s.C, s.D)]
+    cr.design.smith_predictor(plant, controller, filter_time=0.02, remove_slow=True)
+    after = [M for s in (plant, controller) for M in (s.A, s.B, s.C, s.D)]
+    assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+
+
+def test_unsuitable_systems_are_refused_with_the_reason(valve, cores, pi_controller):
+    pi = pi_controller(1.0, 0.1)
+    make = cr.design.smith_predictor
+    with pytest.raises(UnsuitableSystemError, match=r"unstable.*lqg"):
+        make(cr.delayed_ss(cores["unstable"], 5), pi)
+    double = ct.ss([[1.0, 1.0], [0, 1.0]], [[0.0], [1]], [[1.0, 0]], 0, DT)
+    with pytest.raises(UnsuitableSystemError, match="2 poles on the unit circle"):
+        make(cr.delayed_ss(double, 5), pi, filter_time=0.1)
+    with pytest.raises(UnsuitableSystemError, match="continuous"):
+        make(valve(5), ct.tf([1], [1, 1]))
+    with pytest.raises(UnsuitableSystemError, match="discrete system"):
+        make(ct.tf([1], [1, 1]), pi)
+    with pytest.raises(OptionError, match="needs filter_time"):
+        make(valve(5), pi, remove_slow=True)
+    with pytest.raises(OptionError, match="filter_time=-1"):
+        make(valve(5), pi, filter_time=-1.0)
+    with pytest.raises(OptionError, match="carries no interval"):
+        cr.design.delay_robustness(valve(5), pi)
