@@ -120,7 +120,7 @@ def campaign_table(campaign: Campaign) -> str:
                          printable(row.error or "failed")])  # fmt: skip
             continue
         low, high = row.interval
-        remarks = ", ".join(flag.code for flag in row.system.fit.flags)
+        remarks = ", ".join(flag.code for flag in row.flags)
         rows.append(
             [
                 printable(row.name),

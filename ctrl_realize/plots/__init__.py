@@ -9,9 +9,14 @@ import control as ct
 
 from ..errors import OptionError
 from .campaigns import campaign_plot as campaign_plot
+from .fits import dead_time_plot as dead_time_plot
+from .fits import fit_plot as fit_plot
 from .frequencies import comparison_plot as comparison_plot
 from .frequencies import frf_plot as frf_plot
 from .impulses import impulse_plot as impulse_plot
+from .others import frf_fit_plot as frf_fit_plot
+from .others import track_plot as track_plot
+from .others import truth_plot as truth_plot
 from .records import onset_plot as onset_plot
 from .records import record_plot as record_plot
 from .records import step_plot as step_plot
@@ -21,14 +26,18 @@ from .scans import singular_value_plot as singular_value_plot
 
 _DRAWN_BY = {
     "Campaign": "campaigns:campaign_plot",
+    "DelayFit": "fits:fit_plot",
     "DelayScan": "scans:delay_plot",
+    "DelayTrack": "others:track_plot",
     "FRFComparison": "frequencies:comparison_plot",
+    "FRFFit": "others:frf_fit_plot",
     "ImpulseResponse": "impulses:impulse_plot",
     "MeasuredFRF": "frequencies:frf_plot",
     "OrderScan": "scans:order_plot",
     "Realization": "scans:singular_value_plot",
     "Record": "records:record_plot",
     "StepResponse": "records:step_plot",
+    "ValveTruth": "others:truth_plot",
 }
 """Class of a result -> module of this package and function that draws it."""
 

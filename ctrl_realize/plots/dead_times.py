@@ -38,4 +38,5 @@ def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None
     axes.annotate(
         text, (factor * wait, 0.97), (6, 0), xycoords=("data", "axes fraction"),
         textcoords="offset points", va="top", color=style.INK,
+        bbox={"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
     )  # fmt: skip

@@ -45,6 +45,7 @@ def frf_plot(
     *,
     ax: style.AxesLike = None,
     frequency_hz: Sequence[float] | None = None,
+    dead_time: float | None = None,
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
@@ -63,6 +64,9 @@ def frf_plot(
         Two axes, or three where there is a coherence.
     frequency_hz : array_like, optional
         Frequencies for the models in Hz. Default: the span of the measurements.
+    dead_time : float, optional
+        Delay in s whose phase is taken out before unwrapping. Default: that of the first model
+        that has one.
     title : str, optional
     **kwargs
         Line properties of all curves.
@@ -87,7 +91,7 @@ def frf_plot(
     ['gain [dB]', 'phase [deg]']
     """
     items = list(sysdata) if isinstance(sysdata, list | tuple) else [sysdata]
-    curves = _curves(items, frequency_hz)
+    curves = _curves(items, frequency_hz, dead_time)
     coherent = any(curve.coherence is not None for curve in curves)
     with style.context():
         rows = 3 if coherent else 2
@@ -180,7 +184,9 @@ def comparison_plot(
         )
 
 
-def _curves(items: Sequence[Any], frequency_hz: Sequence[float] | None) -> list[_Curve]:
+def _curves(
+    items: Sequence[Any], frequency_hz: Sequence[float] | None, dead_time: float | None
+) -> list[_Curve]:
     for item in items:
         if not isinstance(item, ct.LTI):
             raise UnsuitableSystemError(
@@ -196,7 +202,7 @@ def _curves(items: Sequence[Any], frequency_hz: Sequence[float] | None) -> list[
     data = [item for item in items if isinstance(item, ct.FrequencyResponseData)]
     grid = _grid(items, data) if frequency_hz is None else np.asarray(frequency_hz, dtype=float)
     delays = [float(np.max(item.dead_time)) for item in items if hasattr(item, "dead_time")]
-    delay = delays[0] if delays else 0.0
+    delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
     curves = [_curve(item, grid, delay) for item in items]
     return _aligned(curves)
 

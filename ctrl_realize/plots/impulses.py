@@ -80,7 +80,7 @@ def impulse_plot(
             if index % columns == 0:
                 one.set_ylabel("impulse response [1/s]")
         if impulse.filter is not None:
-            style.note(axes[-1], f"in the data: {impulse.filter}")
+            axes[-1].set_xlabel(f"time [{unit}]\n(in the data: {impulse.filter})")
         name = impulse.name if title is None else title
         return style.finished(
             axes, lines, columns=columns, title=name, own_figure=ax is None, loc="upper right"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import wrap
 from typing import Any
 
 import control as ct
@@ -249,4 +248,4 @@ def _axis_label(labels: Sequence[str], kind: str, width: int = 26) -> str:
     if len(labels) > 1:
         return f"{kind}s"
     default = {"output": "y", "input": "u"}[kind]
-    return kind if labels[0] == default else "\n".join(wrap(style.plain(labels[0]), width)[:3])
+    return kind if labels[0] == default else style.wrapped(labels[0], width)

@@ -177,7 +177,7 @@ def _mark_least(axes: Axes, result: DelayScan) -> None:
     axes.annotate(
         f"{result.delay} samples = {style.in_time(result.delay * result.dt)}",
         (result.delay, least),
-        (-8 if right else 8, -14),
+        (-8 if right else 8, 10),
         textcoords="offset points",
         ha="right" if right else "left",
         color=style.INK,

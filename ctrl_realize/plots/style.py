@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from textwrap import wrap
 from typing import Any
 
 import control as ct
@@ -32,7 +33,8 @@ BAND = "#e69f00"
 OTHERS = ("#cc79a7", "#009e73", "#e69f00", "#56b4e9")
 INK = "#1f2328"
 GRID = "#d9dde2"
-"""INK and GRID are used for nothing else, so that a report can swap them in the dark."""
+PAPER = "#fefefe"
+"""INK, GRID and PAPER are used for nothing else, so that a report can swap them in the dark."""
 
 DASHES = ((0, (5, 1.6)), (0, (2, 1.2)), (0, (7, 1.5, 1.5, 1.5)), (0, (1, 1)), (0, (9, 2)))
 """Line styles of models, the first for the first model."""
@@ -82,6 +84,11 @@ def plain(text: str, longest: int = 80) -> str:
     if len(shown) > longest:
         shown = shown[: longest - 1] + "…"
     return shown.replace("$", r"\$") or "signal"
+
+
+def wrapped(text: str, width: int) -> str:
+    """Break a name into at most three short lines."""
+    return "\n".join(wrap(plain(text), width)[:3])
 
 
 def model_colour(number: int) -> str:
@@ -213,6 +220,8 @@ def in_time(seconds: float, digits: int = 3) -> str:
     >>> in_time(0.02890625), in_time(1.3)
     ('28.9 ms', '1.3 s')
     """
+    if seconds == 0:
+        return "0 s"
     factor, name = time_unit(abs(seconds))
     return f"{seconds * factor:.{digits}g} {name}"
 

@@ -317,7 +317,7 @@ def _campaign_table(campaign: Campaign) -> Table:
             rows.append(Row(cells, "failed"))
             continue
         low, high = row.interval
-        remarks = [flag.code.replace("_", " ") for flag in row.system.fit.flags]
+        remarks = [flag.code.replace("_", " ") for flag in row.flags]
         cells = (
             row.name,
             _number(row.amplitude),

@@ -23,6 +23,9 @@ from ..signals import Record, StepResponse
 from .page import PageFigure
 from .svg import drawn
 
+MOST_DRAWN = 60
+"""Most step responses in one picture."""
+
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
@@ -200,7 +203,7 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
         )
     ]
     system = campaign.system
-    steps = [step for step in map(_step_of_row, campaign.good) if step is not None]
+    steps = _steps_of(campaign)
     if steps:
         sketches += [
             Sketch(
@@ -227,10 +230,10 @@ def _step_of(record: Record) -> StepResponse | None:
         return None
 
 
-def _step_of_row(row: Any) -> StepResponse | None:
-    fit = row.system.fit
-    records = getattr(fit, "records", None)
-    if records:
-        return _step_of(records[0])
-    step = getattr(getattr(fit, "impulse", None), "step", None)
-    return step if isinstance(step, StepResponse) else None
+def _steps_of(campaign: Campaign) -> list[StepResponse]:
+    """Cut the step responses out of a campaign's records, at most as many as one can see."""
+    every = max(1, -(-len(campaign.good) // MOST_DRAWN))
+    pairs = zip(campaign.rows, campaign.sources, strict=True)
+    sources = [source for row, source in pairs if row.system is not None][::every]
+    steps = [_step_of(one if isinstance(one, Record) else one()) for one in sources]
+    return [step for step in steps if step is not None]

@@ -21,6 +21,7 @@ POINTS = 1200
 _VARIABLES = {
     style.INK: "var(--ink)",
     style.GRID: "var(--grid)",
+    style.PAPER: "var(--paper)",
     style.MEASURED: "var(--measured)",
     style.MODEL: "var(--model)",
     style.TRUTH: "var(--truth)",

@@ -1,0 +1,181 @@
+"""Plots of an output-error fit: data, model, what is left, and where the dead time can be."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ..delayed import DelayedStateSpace
+from ..errors import OptionError
+from ..identification.delay_fit_result import DelayFit
+from . import style
+
+_RULED_OUT = 10.0
+_MOST_STRUCTURES = 8
+
+
+def fit_plot(
+    fit: DelayFit | DelayedStateSpace,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the fitted record, the model, what is left, and where the dead time can be.
+
+    Parameters
+    ----------
+    fit : DelayFit, or model with one as its `fit`
+    ax : sequence of three Axes, or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the model's response.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Raises
+    ------
+    OptionError
+        A model that was not found by an output-error fit.
+    """
+    result = _delay_fit(fit)
+    with style.context():
+        axes = style.axes_for(ax, 3, size=(8.0, 7.6), heights=(2.0, 0.9, 1.5), sharex=False)
+        upper, middle, lower = axes
+        lines = _data_and_model(upper, middle, result, **kwargs)
+        drawn = _evidence(lower, result)
+        name = result.records[0].name if result.records else ""
+        return style.finished(
+            axes,
+            [*lines, drawn],
+            title=name if title is None else title,
+            own_figure=ax is None,
+            loc="best",
+        )
+
+
+def dead_time_plot(
+    fit: DelayFit | DelayedStateSpace,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw where the dead time can be, as every structure and view sees it.
+
+    Parameters
+    ----------
+    fit : DelayFit, or model with one as its `fit`
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the points.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Raises
+    ------
+    OptionError
+        A model that was not found by an output-error fit.
+    """
+    result = _delay_fit(fit)
+    with style.context():
+        axes = style.axes_for(ax, size=(8.0, 4.0))
+        drawn = _evidence(axes[0], result, **kwargs)
+        name = result.records[0].name if result.records else ""
+        return style.finished(
+            axes, [drawn], title=name if title is None else title, own_figure=ax is None,
+            legends=(),
+        )  # fmt: skip
+
+
+def _delay_fit(given: Any) -> DelayFit:
+    result = given.fit if isinstance(given, DelayedStateSpace) else given
+    if not isinstance(result, DelayFit):
+        raise OptionError(
+            f"got {given!r}, which holds no output-error fit; use fit_delay or identify(record)"
+        )
+    return result
+
+
+def _data_and_model(
+    upper: Axes, lower: Axes, result: DelayFit, **kwargs: Any
+) -> list[list[Line2D]]:
+    factor, unit = style.time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
+    time = factor * result.time
+    looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
+    several = len(result.records) > 1
+    label = f"mean of {len(result.records)} records" if several else "measured"
+    data = list(upper.plot(time, result.measured, color=style.MEASURED, lw=1.5, label=label))
+    data += upper.plot(time, result.fitted, **looks)
+    left = result.measured - result.fitted
+    lower.axhspan(
+        -2 * result.noise, 2 * result.noise, color=style.NOISE, alpha=0.3, linewidth=0,
+        label="noise (2 std)",
+    )  # fmt: skip
+    rest = list(lower.plot(time, left, color=style.MEASURED, linewidth=0.9))
+    lower.axhline(0.0, color=style.INK, linewidth=0.8)
+    lower.sharex(upper)
+    start = _first_motion(result)
+    upper.set_xlim(time[start], time[-1])
+    upper.tick_params(labelbottom=False)
+    lower.set_xlabel(f"time [{unit}]")
+    upper.set_ylabel(_output_label(result))
+    lower.set_ylabel("residual")
+    lower.legend(loc="upper right", fontsize=10)
+    return [data, rest]
+
+
+def _first_motion(result: DelayFit) -> int:
+    """Start the picture a little before the model moves."""
+    moved = np.abs(result.fitted - result.fitted[0]) > 0.01 * float(np.ptp(result.fitted))
+    first = int(np.argmax(moved)) if moved.any() else 0
+    return max(0, first - max((result.time.size - first) // 8, round(1.5 * result.delay)))
+
+
+def _output_label(result: DelayFit) -> str:
+    label = result.records[0].output_labels[0] if result.records else "y"
+    return "output" if label == "y" else style.wrapped(label, 26)
+
+
+def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
+    """Draw one row for each structure that is not ruled out, and one for each view."""
+    rows: list[tuple[str, float, tuple[float, float] | None, str]] = []
+    for line in result.structures:
+        if line.interval is None or line.excess > _RULED_OUT:
+            continue
+        name = f"order {line.order}, degree {line.relative_degree}"
+        rows.append((name, line.dead_time, line.interval, style.MODEL))
+    rows = rows[:_MOST_STRUCTURES]
+    rows += [(name, seen, None, style.MEASURED) for name, seen in result.views.items()]
+    if not rows:
+        rows = [("estimate", result.dead_time, None, style.MODEL)]
+    low, high = result.interval
+    farthest = max(high, *(seen for _, seen, _, _ in rows))
+    factor, unit = style.time_unit(farthest, axes)
+    axes.axvspan(factor * low, factor * high, color=style.BAND, alpha=0.22, linewidth=0)
+    axes.axvline(factor * result.dead_time, color=style.MODEL, linewidth=1.5)
+    points: list[Line2D] = []
+    for height, (_, seen, interval, colour) in enumerate(rows):
+        if interval is not None:
+            ends = [factor * bound for bound in interval]
+            axes.plot(ends, [height, height], color=colour, linewidth=2.5, alpha=0.5)
+        looks = {"color": colour, "marker": "o", "linestyle": "none", **kwargs}
+        points += axes.plot([factor * seen], [height], **looks)
+    axes.set_yticks(range(len(rows)), [style.plain(name, 40) for name, *_ in rows], fontsize=10)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.grid(visible=False, axis="y")
+    digits = 4
+    axes.set_xlabel(
+        f"dead time [{unit}]: {factor * result.dead_time:.{digits}g}, 95 % interval "
+        f"{factor * low:.{digits}g} to {factor * high:.{digits}g}"
+    )
+    return points
