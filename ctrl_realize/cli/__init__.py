@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 
 import typer
+from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
@@ -60,7 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         written. 130: interrupted.
     """
     command = get_command(app)
-    with warnings.catch_warnings():
+    # Our matrices are small: on a busy machine BLAS threads that wait for each other cost ten
+    # times what they save. Processes are what --jobs is for.
+    with threadpool_limits(limits=1), warnings.catch_warnings():
         warnings.showwarning = plain_warning
         try:
             code = command.main(
