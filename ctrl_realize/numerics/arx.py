@@ -46,7 +46,8 @@ class LeastSquares:
 
 def excited_directions(gram: FloatArray) -> int:
     """Count the directions of parameter space about which the data say something."""
-    scale = np.sqrt(np.diag(gram))
+    # rounding of the sums can leave a square just below zero
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     if not np.any(scale > 0):
         return 0
     scale = np.where(scale > 0, scale, np.inf)

@@ -201,7 +201,11 @@ def _search(
 
     def misfit(x: FloatArray) -> float:
         factor = _factor(x, m, lags, group, kernel)
-        return _likelihood(gram, cross, factor, power, freedom)[0]
+        try:
+            return _likelihood(gram, cross, factor, power, freedom)[0]
+        except np.linalg.LinAlgError:
+            # a prior so wide that the rounding of `gram` outweighs the identity: no better for it
+            return np.inf
 
     steps = np.tile([size] * shapes + [2 * size], m)
     inside = np.clip(start, low, high)

@@ -17,6 +17,9 @@ import numpy as np
 
 from .arrays import FloatArray
 
+SMALLEST = 1e-290
+"""Singular values up to here are zero: what is left of underflow, not of a system."""
+
 
 def realize_symmetric(
     values: FloatArray, vectors: FloatArray, last_row: FloatArray | None
@@ -47,7 +50,7 @@ def realize_symmetric(
     unique.
     """
     root = np.sqrt(np.abs(values))
-    inverse = np.divide(1.0, root, out=np.zeros_like(root), where=root > 0)
+    inverse = np.divide(1.0, root, out=np.zeros_like(root), where=np.abs(values) > SMALLEST)
     turn = np.where(vectors[:, :, 0] < 0, -1.0, 1.0)
     sign = np.where(values < 0, -1.0, 1.0)
     shifted = np.matmul(vectors[:, :, :-1], vectors[:, :, 1:].transpose(0, 2, 1))
@@ -87,7 +90,8 @@ def realize_block(
     """
     p, m = channels
     root = np.sqrt(singular_values)
-    inverse = np.divide(1.0, root, out=np.zeros_like(root), where=root > 0)
+    # values whose inverse overflows in the products below carry no state either
+    inverse = np.divide(1.0, root, out=np.zeros_like(root), where=singular_values > SMALLEST)
     largest = np.abs(V[:m]).argmax(axis=0)
     turn = np.where(V[largest, np.arange(V.shape[1])] < 0, -1.0, 1.0)
     shifted = (U[:-p].T @ U[p:]) * singular_values
