@@ -75,18 +75,23 @@ def integrated_absolute_error(
     """
     A, B, C, D = models
     window = markov.size
-    count = window - 1 - int(delays.min())
+    first, last = int(delays.min()), int(delays.max())
+    count = window - 1 - first
+    padded = np.zeros(window + last)
+    padded[:window] = markov
+    shifted = np.lib.stride_tricks.sliding_window_view(padded, count)
+    in_a_row = np.array_equal(delays, np.arange(first, last + 1))
+    data = shifted[first + 1 : last + 2] if in_a_row else shifted[delays + 1]
     with np.errstate(over="ignore", invalid="ignore"):
-        response = markov_stack(A, B, C, count)
-        padded = np.zeros(window + int(delays.max()))
-        padded[:window] = markov
-        data = np.lib.stride_tricks.sliding_window_view(padded, count)[delays + 1]
-        difference = np.abs(np.subtract(response, data, out=response))
-        after = np.arange(count) >= (window - 1 - delays)[:, np.newaxis]
-        difference[after] = 0.0
+        difference = markov_stack(A, B, C, count)
+        np.subtract(difference, data, out=difference)
+        np.abs(difference, out=difference)
+        # a model behind a long delay reaches beyond the window
+        end = window - 1 - last
+        beyond = np.arange(end, count) >= (window - 1 - delays)[:, np.newaxis]
+        difference[:, end:][beyond] = 0.0
         misfit: FloatArray = difference.sum(axis=1)
-    magnitude = np.abs(markov)
-    before = np.concatenate([[0.0], np.cumsum(magnitude)])[delays]
-    misfit += before + np.abs(markov[delays] - D)
+    misfit += np.concatenate([[0.0], np.cumsum(np.abs(markov))])[delays]
+    misfit += np.abs(markov[delays] - D)
     misfit[~np.isfinite(misfit)] = np.inf
     return misfit

@@ -36,14 +36,18 @@ MAX_STEPS = 320
 BASIS_BYTES = 96e6
 """Memory that the basis of one run may take; fewer steps are allowed where it is short."""
 
-CHUNK_BYTES = 6e6
+CHUNK_BYTES = 8e6
 """Size of 32 basis vectors for all members that run together."""
 
 PROBES = 5
 """Members that are looked at before all are."""
 
-CHECK_EVERY = 2
-"""Steps between two looks."""
+LEAST_WAIT = 2
+LONGEST_WAIT = 10
+"""Steps between two looks at the residuals."""
+
+LOSS_OVER_TOL = 1e-3
+"""Loss of orthogonality that is let pass, relative to the tolerance of the residuals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +160,19 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
     members = np.arange(h.shape[0])
     room = int(BASIS_BYTES // (8 * size * members.size))
     capacity = min(size - 1, MAX_STEPS, max(room, 2 * count + 6))
-    run = LanczosRecurrence(h, size, capacity)
+    run = LanczosRecurrence(h, size, capacity, LOSS_OVER_TOL * tol)
+    pace = _Pace(count + 2)
     while members.size and run.steps < capacity:
         run.advance()
         exhausted = run.exhausted_at <= run.steps
-        if not exhausted.all() and (run.steps < count + 2 or run.steps % CHECK_EVERY):
+        if run.steps < pace.next_look and not exhausted.all():
             continue
-        probes = np.unique(np.linspace(0, members.size - 1, PROBES).astype(np.intp))
-        if not all(_small(*run.ritz(int(i), count)[:2], tol) for i in probes):
+        for i in np.unique(np.linspace(0, members.size - 1, PROBES).astype(np.intp)):
+            excess = _excess(*run.ritz(int(i), count)[:2], tol)
+            if excess > 1:
+                break
+        pace.set(run.steps, excess)
+        if excess > 1:
             continue
         doubtful = exhausted & ~run.sees_everything() if exhausted.any() else exhausted
         left = []
@@ -171,7 +180,7 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
             values, residuals, coordinates, following = run.ritz(i, count)
             if doubtful[i]:
                 _fall_back(h[d], size, count, run.mixture(i, coordinates), result, d)
-            elif _small(values, residuals, tol):
+            elif _excess(values, residuals, tol) <= 1:
                 result.put(d, values, run.vectors(i, coordinates), following)
             else:
                 left.append(i)
@@ -184,9 +193,28 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
         _fall_back(h[d], size, count, start, result, d)
 
 
-def _small(values: FloatArray, residuals: FloatArray, tol: float) -> bool:
+def _excess(values: FloatArray, residuals: FloatArray, tol: float) -> float:
+    """Return the largest residual over the one that is asked for."""
     magnitude = np.abs(values)
-    return bool(residuals.max() <= max(tol * magnitude[-1], FLOOR * magnitude[0]))
+    asked = max(tol * float(magnitude[-1]), FLOOR * float(magnitude[0]))
+    largest = float(residuals.max())
+    return largest / asked if asked > 0 else float(largest > 0)
+
+
+class _Pace:
+    """Says when to look at the residuals again: they fall about geometrically."""
+
+    def __init__(self, first: int) -> None:
+        self.next_look = first
+        self._looked = 0
+        self._excess = np.inf
+
+    def set(self, steps: int, excess: float) -> None:
+        waited, wait = steps - self._looked, LEAST_WAIT
+        if 1 < excess < self._excess < np.inf:
+            needed = waited * np.log(excess) / np.log(self._excess / excess)
+            wait = int(np.clip(0.6 * needed, LEAST_WAIT, LONGEST_WAIT))
+        self.next_look, self._looked, self._excess = steps + wait, steps, excess
 
 
 def _fall_back(

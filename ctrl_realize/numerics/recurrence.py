@@ -13,6 +13,9 @@ FLOOR = 1e-14
 """Residual relative to the largest eigenvalue that counts as rounding."""
 
 
+EPSILON = float(np.finfo(float).eps)
+
+
 def start_vectors(h: FloatArray, size: int) -> FloatArray:
     """Return unit start vectors: first column plus a fixed random one."""
     random = np.random.default_rng(2005).standard_normal(size)
@@ -26,16 +29,32 @@ def start_vectors(h: FloatArray, size: int) -> FloatArray:
 
 
 class LanczosRecurrence:
-    """Three-term recurrence with full reorthogonalisation, all members in step.
+    """Three-term recurrence for many Hankel matrices, all members in step.
 
     After ``steps`` steps, ``H Q^T = Q^T T + beta[-1] q e^T`` for every
     member, with T from ``alpha`` and ``beta``. A member whose Krylov space
     is exhausted gets a zero vector and stands still.
+
+    The basis loses its orthogonality as Ritz values converge. Simon's
+    recurrence bounds the loss; before it reaches `loss`, two vectors in a row
+    are orthogonalised against all before.
+
+    Parameters
+    ----------
+    h : ndarray, shape (D, L)
+        One sequence a row.
+    size : int
+        Rows of every matrix.
+    capacity : int
+        Largest number of steps.
+    loss : float
+        Largest inner product of two basis vectors that is let pass.
     """
 
-    def __init__(self, h: FloatArray, size: int, capacity: int) -> None:
+    def __init__(self, h: FloatArray, size: int, capacity: int, loss: float) -> None:
         count = h.shape[0]
         self.stack = HankelStack(h, size)
+        self.loss = loss
         self.basis = np.empty((count, min(capacity, 48) + 1, size))
         self.basis[:, 0] = start_vectors(h, size)
         self.alpha = np.zeros((count, capacity))
@@ -43,6 +62,9 @@ class LanczosRecurrence:
         self.exhausted_at = np.full(count, capacity + 1)
         self.scale = np.zeros(count)
         self.steps = 0
+        # bounds of the inner products of the last two vectors with all before
+        self._overlap = np.full((2, count), EPSILON)
+        self._once_more = False
 
     def advance(self) -> None:
         """Do one step."""
@@ -52,16 +74,12 @@ class LanczosRecurrence:
             grown[:, : j + 1] = self.basis
             self.basis = grown
         w = self.stack(self.basis[:, j])
-        # First against the last two vectors (the recurrence proper), then against all.
-        recent = self.basis[:, max(0, j - 1) : j + 1]
-        inner = np.matmul(recent, w[:, :, np.newaxis])[:, :, 0]
-        w -= np.matmul(inner[:, np.newaxis, :], recent)[:, 0]
-        known = self.basis[:, : j + 1]
-        again = np.matmul(known, w[:, :, np.newaxis])[:, :, 0]
-        w -= np.matmul(again[:, np.newaxis, :], known)[:, 0]
-        self.alpha[:, j] = inner[:, -1] + again[:, -1]
-        norm = np.sqrt(np.einsum("ij,ij->i", w, w))
+        self.alpha[:, j] = _subtract_projection(w, self.basis[:, max(0, j - 1) : j + 1])
+        norm = _norms(w)
         self.scale = np.maximum(self.scale, np.abs(self.alpha[:, j]) + norm)
+        if self._loses_orthogonality(norm):
+            self.alpha[:, j] += _subtract_projection(w, self.basis[:, : j + 1])
+            norm = _norms(w)
         exhausted = norm <= FLOOR * self.scale
         if exhausted.any():
             norm[exhausted] = 0.0
@@ -70,6 +88,23 @@ class LanczosRecurrence:
         divisor = np.where(exhausted, np.inf, norm)
         np.divide(w, divisor[:, np.newaxis], out=self.basis[:, j + 1])
         self.steps = j + 1
+
+    def _loses_orthogonality(self, norm: FloatArray) -> bool:
+        """Bound the loss of the vector to come; tell whether to orthogonalise it against all."""
+        j = self.steps
+        before, last = self._overlap
+        into = self.scale + np.abs(self.alpha[:, j])
+        overlap = into * last + EPSILON * self.scale
+        if j:
+            overlap += self.beta[:, j - 1] * before
+        overlap = np.divide(overlap, norm, out=np.zeros_like(norm), where=norm > 0)
+        loses = bool((overlap > self.loss).any())
+        if loses or self._once_more:
+            self._once_more = loses and not self._once_more
+            overlap[:] = EPSILON
+            loses = True
+        self._overlap = np.stack([last, overlap])
+        return loses
 
     def ritz(self, i: int, count: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         """Return the leading Ritz pairs of member i.
@@ -130,6 +165,20 @@ class LanczosRecurrence:
         self.beta = self.beta[members]
         self.exhausted_at = self.exhausted_at[members]
         self.scale = self.scale[members]
+        self._overlap = self._overlap[:, members]
+
+
+def _subtract_projection(w: FloatArray, basis: FloatArray) -> FloatArray:
+    """Make vectors orthogonal to some basis vectors; return what was in the last of these."""
+    inner = np.matmul(basis, w[:, :, np.newaxis])
+    w -= np.matmul(inner.transpose(0, 2, 1), basis)[:, 0]
+    last: FloatArray = inner[:, -1, 0]
+    return last
+
+
+def _norms(w: FloatArray) -> FloatArray:
+    squares: FloatArray = np.einsum("ij,ij->i", w, w)
+    return np.sqrt(squares)
 
 
 def extreme_pairs(

@@ -1,0 +1,52 @@
+"""Responses of a model with delay against python-control on the augmented matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import control as ct
+import numpy as np
+
+import ctrl_realize as cr
+
+from .measure import Line, cpu_seconds, import_seconds, once, seconds
+from .rigs import TS, valve
+
+
+def lines() -> Iterator[Line]:
+    """Time frequency responses, step responses and the import."""
+    points = np.exp(1j * TS * np.geomspace(0.1, np.pi / TS, 500))
+    many = np.exp(1j * TS * np.geomspace(0.1, np.pi / TS, 100_000))
+    for delay, must, aim in ((37, "100", "190"), (300, "3000", "11000")):
+        model = cr.delayed_ss(valve(), delay, dt=TS)
+        plain = ct.ss(model.A, model.B, model.C, model.D, TS)
+        slow = once(lambda plain=plain: plain(points))
+        fast = cpu_seconds(lambda model=model: model(points))
+        yield Line(
+            f"frequency response, 500 points, d = {delay}", seconds(fast), seconds(slow),
+            slow / fast, must, aim, "python-control, augmented matrices",
+        )  # fmt: skip
+        fast = cpu_seconds(lambda model=model: model(many))
+        yield Line(
+            f"frequency response, 100 000 points, d = {delay}", seconds(fast),
+            seconds(200 * slow), 200 * slow / fast, "", "", "python-control, 500 points scaled",
+        )  # fmt: skip
+    model = cr.delayed_ss(valve(), 37, dt=TS)
+    plain = ct.ss(model.A, model.B, model.C, model.D, TS)
+    time = TS * np.arange(4000)
+    slow = cpu_seconds(lambda: ct.step_response(plain, time), runs=3)
+    fast = cpu_seconds(lambda: model.step(4000))
+    yield Line(
+        "step response, 4000 samples, d = 37", seconds(fast), seconds(slow), slow / fast,
+        "100", "390", "python-control, augmented matrices",
+    )  # fmt: skip
+    fast = cpu_seconds(lambda: model.step(1_000_000))
+    yield Line(
+        "step response, 1 000 000 samples, d = 37", seconds(fast), seconds(250 * slow),
+        250 * slow / fast, "", "", "python-control, 4000 samples scaled",
+    )  # fmt: skip
+    base, whole = import_seconds("control"), import_seconds("ctrl_realize")
+    yield Line(
+        f"import ctrl_realize: {100 * (whole / base - 1):+.0f} % of import control",
+        seconds(whole), seconds(base), None, "+10 %", "", "fresh processes, least of five",
+    )  # fmt: skip
