@@ -4,6 +4,10 @@ from .build import write_campaign as write_campaign
 from .build import write_comparison as write_comparison
 from .build import write_identification as write_identification
 from .page import Column as Column
+from .page import Page as Page
 from .page import Row as Row
 from .page import Table as Table
+from .page import pairs as pairs
+from .page import write_page as write_page
 from .sketches import Sketch as Sketch
+from .verdict import verdict_of as verdict_of

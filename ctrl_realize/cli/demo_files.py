@@ -1,0 +1,243 @@
+"""The files of the demo: figures, models, tables, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from .. import paper, plots
+from ..io import save_model
+from ..io.atomic import write_text
+from ..report import Column, Page, Row, Sketch, Table, pairs, verdict_of, write_page
+from ..report.provenance import own_version, record_sha256, versions
+from .demo_run import DemoResult, shown
+from .demo_tables import OUTCOME, outcome_rows, simulated_table, table_1_columns, table_1_rows
+from .inputs import typed_call
+from .results import save_figures
+
+_TITLE = "A control valve with dead time, identified"
+
+
+def write_demo_files(folder: Path, result: DemoResult) -> list[str]:
+    """Write everything and return the names, for people to find it."""
+    note = "simulated valve, not measured"
+    settings = {"seed": result.seed, "simulated": True}
+    save_model(folder / "model.json", result.fitted, settings=settings, note=note)
+    save_model(folder / "model_paper.json", result.printed, settings=settings, note=note)
+    _write_tables(folder, result)
+    sketches = demo_sketches(result)
+    save_figures(folder, sketches)
+    write_page(folder / "report.html", demo_page(result, sketches))
+    return [
+        "report.html",
+        "model.json",
+        "model_paper.json",
+        "table_1.csv",
+        "frf_simulated.csv",
+        "record_simulated.csv",
+        "figures/",
+    ]
+
+
+def _write_tables(folder: Path, result: DemoResult) -> None:
+    sizes = [f"{size:g}_mA" for size in paper.SETUP.step_sizes_ma]
+    delays = pd.DataFrame(simulated_table(result), columns=[f"simulated_{s}" for s in sizes])
+    printed = pd.DataFrame(paper.TABLE_1, columns=[f"printed_{s}" for s in sizes])
+    both = pd.concat([delays, printed], axis=1)
+    both.index = pd.RangeIndex(1, len(both) + 1, name="number")
+    write_text(folder / "table_1.csv", both.to_csv())
+    frf = result.frf
+    columns = {
+        "frequency_hz": frf.frequency_hz,
+        "real": frf.frdata[0, 0].real,
+        "imag": frf.frdata[0, 0].imag,
+        "coherence": frf.coherence,
+        "std": frf.std,
+    }
+    write_text(folder / "frf_simulated.csv", pd.DataFrame(columns).to_csv(index=False))
+    record = result.records[shown(result)]
+    signals = {"time_s": record.time, "input": record.input, "output": record.output}
+    write_text(folder / "record_simulated.csv", pd.DataFrame(signals).to_csv(index=False))
+
+
+def demo_sketches(result: DemoResult) -> list[Sketch]:
+    """List the paper's Figs. 2-8 on simulated data, and what goes beyond them."""
+    record = result.records[shown(result)]
+    row = result.campaign.rows[shown(result)].system
+    assert row is not None
+    scan = row.fit
+    truth = result.valve.truth.frf(result.frf.frequency_hz)
+    final = [result.frf, result.printed, result.fitted]
+    return [
+        Sketch(
+            "fit",
+            "All forty records, one model",
+            "Mean of the records and the output-error fit; below, where the dead time can be.",
+            lambda figure: plots.fit_plot(result.fitted, ax=figure),
+            (6.2, 5.6),
+        ),
+        Sketch(
+            "fig8_final_model",
+            "Fig. 8: stepped sine and models",
+            "The paper's model carries the lag of its causal filter; the fit of the raw records "
+            "does not.",
+            lambda figure: plots.frf_plot(final, ax=figure),
+            (6.2, 5.6),
+        ),
+        Sketch(
+            "fig8_error",
+            "Error of the fitted model",
+            "Against the stepped sine; shaded is the band of good coherence.",
+            lambda figure: plots.comparison_plot(result.comparisons["fitted"], ax=figure),
+            (6.2, 4.6),
+        ),
+        Sketch(
+            "table1_delays",
+            "Table 1 as a picture",
+            "The paper's method on every record. Its bias is common to all: averaging estimates "
+            "does not remove it.",
+            lambda figure: plots.campaign_plot(
+                result.campaign, truth=result.valve.truth.delay, trim=3, ax=figure
+            ),
+            (6.2, 4.2),
+        ),
+        Sketch(
+            "fig2_frf",
+            "Fig. 2: frequency response of the valve",
+            "Stepped sine, 500 points, mean of 5; dotted: truth.",
+            lambda figure: plots.frf_plot(
+                [result.frf, truth], dead_time=result.valve.truth.dead_time, ax=figure
+            ),
+            (6.2, 5.4),
+        ),
+        Sketch(
+            "fig3_record",
+            f"Fig. 3: record {record.name}",
+            "Displacement above, current below; the spikes come from the drive.",
+            lambda figure: plots.record_plot(record, ax=figure),
+        ),
+        Sketch(
+            "fig4_onset",
+            "Fig. 4: the first moments after the step",
+            "The same record, with the dead time of the fitted model.",
+            lambda figure: plots.onset_plot(record, result.fitted, ax=figure),
+        ),
+        Sketch(
+            "fig5_singular_values",
+            "Fig. 5: first 30 singular values of the Hankel matrix",
+            "With the level of nothing but noise, from the rest before the step.",
+            lambda figure: plots.singular_value_plot(
+                scan, count=paper.SETTINGS.singular_values_shown, ax=figure
+            ),
+        ),
+        Sketch(
+            "fig6_iae",
+            "Fig. 6: IAE against the delay",
+            "One realization for each delay.",
+            lambda figure: plots.delay_plot(scan, ax=figure),
+        ),
+        Sketch(
+            "fig7_impulse",
+            "Fig. 7: impulse response and realization",
+            "Differentiated and filtered data, and the model behind the best delay.",
+            lambda figure: plots.impulse_plot(scan.impulse, row, ax=figure),
+        ),
+    ]
+
+
+def demo_page(result: DemoResult, sketches: list[Sketch]) -> Page:
+    """Put the report together."""
+    verdict = verdict_of(result.fitted, result.comparisons["fitted"].flags)
+    return Page(
+        title=_TITLE,
+        subtitle=(
+            "Forty simulated steps and a simulated stepped sine: the method of van Helvoirt et "
+            "al. (IFAC 2005) and an output-error fit. The true dead time is "
+            f"{1e3 * result.valve.truth.dead_time:.4g} ms = {result.valve.truth.delay:.4g} samples."
+        ),
+        verdict=verdict,
+        version=own_version(),
+        figures=[sketch.on_page() for sketch in sketches],
+        tables=[
+            _outcome(result),
+            _table_1(result),
+            pairs("How the final model was found", [*result.fitted.fit._rows(), *_choices(result)]),
+            pairs("Final model and stepped sine", result.comparisons["fitted"]._rows()),
+            pairs("The paper's settings", _settings()),
+            pairs("The simulated valve", [*result.valve.truth._rows(), ("seed", str(result.seed))]),
+            _data(result),
+            pairs("Versions", versions()),
+        ],
+        calls=[
+            ("In a terminal", typed_call("demo", ["--output", "demo", "--seed", str(result.seed)])),
+            ("In Python", _python(result)),
+        ],
+        simulated=True,
+    )
+
+
+def _choices(result: DemoResult) -> list[tuple[str, str]]:
+    return [("choice", choice) for choice in result.fitted.fit.choices]
+
+
+def _outcome(result: DemoResult) -> Table:
+    columns = tuple(Column(name, "number" if name else "text") for name in OUTCOME)
+    return Table(
+        "What came out",
+        tuple(Row(row) for row in outcome_rows(result)),
+        columns,
+        note="Printed: measured on the real valve, whose dynamics are not known in full. "
+        "All else: simulated.",
+    )
+
+
+def _table_1(result: DemoResult) -> Table:
+    columns = tuple(Column(name, "number") for name in table_1_columns("printed "))
+    return Table(
+        "Table 1: delays in samples",
+        tuple(Row(tuple(row)) for row in table_1_rows(result)),
+        columns,
+        note="Left: the paper's method on the simulated valve. Right: as the paper prints it.",
+    )
+
+
+def _settings() -> list[tuple[str, str]]:
+    chosen = paper.SETTINGS
+    return [
+        ("difference", "five-point central"),
+        (
+            "filter",
+            f"causal Butterworth, order {chosen.filter_order}, {chosen.cutoff_hz:g} Hz",
+        ),
+        ("order", str(chosen.order)),
+        ("samples", str(chosen.samples)),
+        ("delays", f"0 to {chosen.max_delay} samples"),
+        ("sample time", f"{chosen.sample_time:.6g} s"),
+        ("left out at each end of Table 1", str(chosen.trim)),
+    ]
+
+
+def _data(result: DemoResult) -> Table:
+    columns = (Column("data (simulated)"), Column("SHA-256", "mono"))
+    rows = tuple(Row((record.name, record_sha256(record))) for record in result.records)
+    return Table(
+        "Data",
+        rows,
+        columns,
+        note="Checksums of time, input and output as little-endian float64.",
+    )
+
+
+def _python(result: DemoResult) -> str:
+    return (
+        "import numpy as np\n"
+        "import ctrl_realize as cr\n"
+        f"rng = np.random.default_rng({result.seed})\n"
+        "valve = cr.bench.valve()\n"
+        "records = valve.step_campaign(rng)\n"
+        "frf = cr.stepped_sine_frf(valve.stepped_sine(rng))\n"
+        'campaign = cr.identify_campaign(records, method="paper")\n'
+        "sys = cr.fit_delay(records)\n"
+        "print(cr.compare_frf(sys, frf).report())"
+    )

@@ -1,0 +1,109 @@
+"""The paper from end to end on the simulated valve: what the demo computes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+
+from .. import bench, paper
+from ..delayed import DelayedStateSpace
+from ..errors import DataError
+from ..frequency import FRFComparison, compare_frf, stepped_sine_frf
+from ..identification.campaign import Campaign
+from ..identification.campaign_run import identify_campaign
+from ..identification.delay_fit import fit_delay
+from ..signals import MeasuredFRF, Record
+from .terminal import progress
+
+
+@dataclass(frozen=True, eq=False)
+class DemoResult:
+    """Everything that the demo found; all data are simulated.
+
+    Attributes
+    ----------
+    valve : Valve
+        The simulated set-up, with its truth.
+    records : tuple of Record
+        Forty step records.
+    frf : MeasuredFRF
+        Stepped sine.
+    campaign : Campaign
+        The paper's method on every record.
+    printed : DelayedStateSpace
+        Final model as the paper makes it, the filter's lag in it.
+    unfiltered : FrequencyResponseData
+        The same model, the filter divided out of its frequency response.
+    fitted : DelayedStateSpace
+        Output-error fit of all records together.
+    comparisons : dict of str to FRFComparison
+        Of ``"printed"``, ``"unfiltered"`` and ``"fitted"`` with the stepped sine.
+    seconds : float
+        Time that simulation and identification took.
+    """
+
+    valve: bench.Valve
+    seed: int
+    records: tuple[Record, ...]
+    frf: MeasuredFRF
+    campaign: Campaign
+    printed: DelayedStateSpace
+    unfiltered: ct.FrequencyResponseData
+    fitted: DelayedStateSpace
+    comparisons: dict[str, FRFComparison]
+    seconds: float
+
+
+def run_demo(seed: int, jobs: int) -> DemoResult:
+    """Simulate and identify everything."""
+    steps = iter(progress(_stages(seed, jobs), 5, "demo"))
+    results = [result for result in steps if isinstance(result, DemoResult)]
+    return results[0]
+
+
+def _stages(seed: int, jobs: int) -> Iterator[DemoResult | None]:
+    """Yield after each stage, for the progress bar; the last one yields the result."""
+    start = time.perf_counter()
+    rng = np.random.default_rng(seed)
+    valve = bench.valve()
+    records = valve.step_campaign(rng)
+    yield None
+    frf = stepped_sine_frf(valve.stepped_sine(rng), name="stepped sine (simulated)")
+    yield None
+    campaign = identify_campaign(records, method="paper", n_jobs=jobs, progress=False)
+    if campaign.failed:
+        raise DataError(f"{campaign.failed[0].name}: {campaign.failed[0].error}")
+    printed = campaign.system.replace(name="as the paper makes it")
+    yield None
+    fitted = fit_delay(records).replace(name="output-error fit")
+    yield None
+    unfiltered = _without_filter(printed, frf)
+    comparisons = {
+        "printed": compare_frf(printed, frf),
+        "unfiltered": compare_frf(unfiltered, frf, hold=None),
+        "fitted": compare_frf(fitted, frf),
+    }
+    yield DemoResult(
+        valve, seed, records, frf, campaign, printed, unfiltered, fitted, comparisons,
+        time.perf_counter() - start,
+    )  # fmt: skip
+
+
+def _without_filter(system: DelayedStateSpace, frf: MeasuredFRF) -> ct.FrequencyResponseData:
+    """Divide the filter that is left in the data out of a model's frequency response."""
+    omega = 2 * np.pi * frf.frequency_hz
+    response = np.asarray(system(np.exp(1j * omega * system.dt)))
+    left = system.fit.impulse.filter
+    values = response if left is None else response / left.response(omega)
+    return ct.frd(values, omega, smooth=True, name="filter divided out")
+
+
+def shown(result: DemoResult) -> int:
+    """Return the position of the record that the paper shows in Figs. 5-7."""
+    amplitude, number = paper.SHOWN_RECORD
+    sizes = list(paper.SETUP.step_sizes_ma)
+    return sizes.index(amplitude) * paper.SETUP.records_per_size + number - 1

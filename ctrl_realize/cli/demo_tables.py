@@ -1,0 +1,82 @@
+"""The tables of the demo: simulated delays beside the printed ones, and what came out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import paper
+from ..numerics.arrays import FloatArray
+from .demo_run import DemoResult
+from .terminal import table
+
+OUTCOME = ("", "printed", "paper's way", "all records together", "truth (simulated)")
+
+
+def simulated_table(result: DemoResult) -> FloatArray:
+    """Return the delays in samples as the paper's Table 1 has them, record x step size."""
+    delays = np.array([row.delay for row in result.campaign.rows])
+    return delays.reshape(len(paper.SETUP.step_sizes_ma), -1).T
+
+
+def table_1_rows(result: DemoResult) -> list[list[str]]:
+    """List Table 1, simulated and printed."""
+    ours = simulated_table(result)
+    return [
+        [str(number), *(f"{value:g}" for value in mine), *(f"{value:g}" for value in theirs)]
+        for number, (mine, theirs) in enumerate(zip(ours, paper.TABLE_1, strict=True), start=1)
+    ]
+
+
+def table_1_columns(between: str = "") -> list[str]:
+    """Name the columns of Table 1."""
+    sizes = [f"{size:g} mA" for size in paper.SETUP.step_sizes_ma]
+    return ["No.", *sizes, *(f"{between}{size}" for size in sizes)]
+
+
+def table_1(result: DemoResult) -> str:
+    """Lay out Table 1 for the terminal."""
+    return table(table_1_columns("| "), table_1_rows(result), numbers=range(9))
+
+
+def outcome_rows(result: DemoResult) -> list[tuple[str, ...]]:
+    """List what came out: printed, the paper's way, the better way, truth."""
+    mine, theirs = result.campaign.statistics(paper.SETTINGS.trim), paper.table_1_statistics()
+    fit, truth = result.fitted.fit, result.valve.truth
+    lag = result.printed.fit.impulse.filter.group_delay
+    low, high = (bound / fit.dt for bound in fit.interval)
+    errors = {
+        name: f"{100 * one.rms_relative_error:.2g} %" for name, one in result.comparisons.items()
+    }
+    band = result.comparisons["fitted"].band_hz
+    return [
+        (
+            "delay [samples]",
+            f"{theirs.mean:.2f} -> {paper.DELAY}",
+            f"{mine.mean:.2f} -> {round(mine.mean)}",
+            f"{fit.delay:.2f}",
+            f"{truth.delay:.4g}",
+        ),
+        ("variance", f"{theirs.variance:.2f}", f"{mine.variance:.2f}", "", ""),
+        (
+            "95 % interval",
+            f"{theirs.interval[0]:.1f} to {theirs.interval[1]:.1f}",
+            f"{mine.interval[0]:.1f} to {mine.interval[1]:.1f}",
+            f"{low:.2f} to {high:.2f}",
+            "",
+        ),
+        ("less the filter's delay", "", f"{mine.mean - lag:.2f}", "", ""),
+        (
+            "total delay [ms]",
+            "",
+            "",
+            f"{1e3 * fit.total_delay:.4g}",
+            f"{1e3 * truth.total_delay:.4g}",
+        ),
+        (f"FRF error, {band[0]:.2g}-{band[1]:.3g} Hz", "", errors["printed"], errors["fitted"], ""),
+        ("  filter divided out", "", errors["unfiltered"], "", ""),
+    ]
+
+
+def outcome_table(result: DemoResult) -> str:
+    """Lay out what came out for the terminal."""
+    return table(OUTCOME, outcome_rows(result), numbers=range(1, 5))
