@@ -13,7 +13,9 @@ from .delayed import delayed_ss as delayed_ss
 from .errors import CtrlRealizeError as CtrlRealizeError
 from .errors import CtrlRealizeWarning as CtrlRealizeWarning
 from .frequency import FRFComparison as FRFComparison
+from .frequency import FRFFit as FRFFit
 from .frequency import compare_frf as compare_frf
+from .frequency import fit_frf as fit_frf
 from .frequency import spectral_frf as spectral_frf
 from .frequency import stepped_sine_frf as stepped_sine_frf
 from .identification.campaign import Campaign as Campaign
@@ -30,6 +32,11 @@ from .identification.orders import OrderScan as OrderScan
 from .identification.orders import scan_orders as scan_orders
 from .identification.realization import Realization as Realization
 from .identification.realization import realize as realize
+from .identification.residuals import Prediction as Prediction
+from .identification.residuals import ResidualCheck as ResidualCheck
+from .identification.residuals import check_residuals as check_residuals
+from .identification.residuals import cross_validate as cross_validate
+from .identification.residuals import predict as predict
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step

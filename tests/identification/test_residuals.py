@@ -1,0 +1,174 @@
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+
+DT = 0.1
+PLANT = cr.DelayedStateSpace(
+    ct.ss([[0.8, 0.1], [0.0, 0.6]], [[0.0], [1.0]], [[0.5, 0.1]], [[0.0]], DT), 5
+)
+MIMO = cr.DelayedStateSpace(
+    ct.ss(
+        [[0.8, 0.0], [0.0, 0.5]],
+        [[1.0, 0.3], [0.2, 1.0]],
+        [[0.5, 0.2], [0.1, 0.6], [0.3, 0.3]],
+        np.zeros((3, 2)),
+        DT,
+    ),
+    (2, 4),
+    output_delay=(0, 3, 1),
+)
+
+
+def record(plant=PLANT, n=1000, noise=0.05, seed=0, colour=0.0, skip=0, drive=0.0, label="rig"):
+    rng = np.random.default_rng(seed)
+    shape = (n + skip,) if plant.issiso() else (plant.ninputs, n + skip)
+    u = lfilter([1], [1, -drive], rng.standard_normal(shape))
+    y = plant.simulate(u)
+    e = lfilter([1], [1, -colour], noise * rng.standard_normal(y.shape))
+    return cr.Record(DT * np.arange(n), u[..., skip:], (7 + y + e)[..., skip:], name=label)
+
+
+@pytest.mark.parametrize("drive", [0.0, 0.9])
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_the_true_model_leaves_noise_and_raises_no_alarm(drive, colour):
+    alarms = []
+    for seed in range(25):
+        check = cr.check_residuals(
+            PLANT, record(seed=seed, colour=colour, drive=drive, skip=50), confidence=0.999
+        )
+        alarms.append(not check.independent or bool(check.flags))
+        assert check.white == (colour == 0)
+    assert sum(alarms) <= 1
+
+
+@pytest.mark.parametrize("plant", [PLANT, MIMO], ids=["siso", "mimo"])
+def test_a_record_cut_out_of_the_middle_of_an_experiment_is_explained_from_its_start(plant):
+    one = record(plant, noise=0.0, skip=137, n=400)
+    check = cr.check_residuals(plant, one)
+    # state, offset and what was inside the dead times are found from exact data
+    assert_allclose(check.residual, 0, atol=1e-9)
+    assert np.all(check.fit_percent > 100 - 1e-7)
+    rest = cr.check_residuals(plant, one, start="rest")
+    assert np.all(rest.fit_percent < 99.9)
+    assert np.abs(rest.residual).max() > 0.05
+
+
+def test_a_start_at_rest_is_taken_as_rest():
+    n = 300
+    u = np.r_[np.full(20, 2.0), np.random.default_rng(0).normal(size=n - 20)]
+    y = PLANT.simulate(u - 2.0) - 4
+    check = cr.check_residuals(PLANT, cr.Record(DT * np.arange(n), u, y), start="rest")
+    assert_allclose(check.residual, 0, atol=1e-12)
+
+
+def test_residual_and_simulation_add_up_to_the_record():
+    one = record(MIMO)
+    check = cr.check_residuals(MIMO, one)
+    assert_allclose(check.simulated + check.residual, one.output, rtol=0, atol=1e-12)
+    assert check.cross.shape == (3, 2, 51)
+    assert check.lags[[0, 25, 50]].tolist() == [-25, 0, 25]
+
+
+@pytest.mark.parametrize("delay", [4, 6])
+def test_a_delay_that_is_off_by_one_shows_in_the_cross_correlation(delay):
+    check = cr.check_residuals(PLANT.replace(delay=delay), record())
+    assert not check.independent
+    assert [flag.code for flag in check.flags] == ["input_in_residual"]
+    # the model's first response is missing, or comes too soon: G_1 = 0.1 at the sample after
+    # the shorter of the delays
+    assert np.abs(check.cross[0, 0, 25:]).argmax() in (5, 6, 7)
+
+
+def test_feedback_is_told_from_a_wrong_model():
+    rng = np.random.default_rng(0)
+    n = 2000
+    u, y, e = np.zeros(n), np.zeros(n), 0.3 * rng.standard_normal(n)
+    r = rng.standard_normal(n)
+    for k in range(1, n):
+        y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1] + (e[k] - 0.8 * e[k - 1])
+        u[k] = r[k] - 1.5 * y[k]
+    plant = ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], DT)
+    check = cr.check_residuals(plant, cr.Record(DT * np.arange(n), u, y))
+    assert "feedback" in [flag.code for flag in check.flags]
+
+
+def test_predictions_fall_from_the_noise_model_to_the_simulation():
+    one = record(noise=0.1, colour=0.95, n=2000)
+    simulated = cr.check_residuals(PLANT, one).fit_percent[0]
+    fits = [cr.predict(PLANT, one, k).fit_percent[0] for k in (1, 5, 20, 200)]
+    assert fits[0] > fits[1] > fits[2]
+    assert abs(fits[-1] - simulated) < 2.0
+    prediction = cr.predict(PLANT, one, 1)
+    # what is left one step ahead is the innovation, of 0.1
+    assert_allclose(np.std(one.output - prediction.output), 0.1, rtol=0.06)
+    assert prediction.noise_order == (1,)
+    assert "1 samples ahead" in prediction.report()
+
+
+def test_several_models_are_compared_on_records_that_they_have_not_seen():
+    others = [record(seed=1), record(plant=PLANT, seed=2, n=700, label="day 2")]
+    table = cr.cross_validate({"true": PLANT, "late": PLANT.replace(delay=9)}, others)
+    assert table.shape == (2, 2)
+    assert (table.loc["true"] > table.loc["late"] + 20).all()
+
+
+def test_results_pickle_report_and_show_in_one_line():
+    check = cr.check_residuals(PLANT, record())
+    again = pickle.loads(pickle.dumps(check))
+    assert_allclose(again.cross, check.cross, rtol=0)
+    assert "free of the input" in check.report()
+    assert "\n" not in repr(check)
+
+
+@pytest.mark.parametrize(
+    ("system", "options", "error", "match"),
+    [
+        (PLANT, {"lags": 0}, OptionError, "lags"),
+        (PLANT, {"lags": 400}, DataError, "1200 samples"),
+        (PLANT, {"confidence": 1.0}, OptionError, "confidence"),
+        (PLANT, {"start": "zero"}, OptionError, "'rest'"),
+        (MIMO, {}, DataError, "3"),
+        (ct.ss([[1.2]], [[1.0]], [[1.0]], [[0.0]], DT), {}, UnsuitableSystemError, "unstable"),
+        (ct.tf([1.0], [1.0, 1.0]), {}, UnsuitableSystemError, "not discrete"),
+        (ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], 2 * DT), {}, DataError, "sample time"),
+        ("plant", {}, UnsuitableSystemError, "str"),
+    ],
+)
+def test_unusable_choices_are_refused(system, options, error, match):
+    with pytest.raises(error, match=match):
+        cr.check_residuals(system, record(), **options)
+
+
+def test_missing_samples_and_empty_lists_are_refused():
+    y = record().output.copy()
+    y[4] = np.nan
+    holes = cr.Record(record().time, record().input, y, missing="keep")
+    with pytest.raises(DataError, match="1 of this record are missing"):
+        cr.check_residuals(PLANT, holes)
+    with pytest.raises(DataError, match="empty"):
+        cr.cross_validate({"a": PLANT}, [])
+
+
+@pytest.mark.parametrize(
+    ("plant", "length", "order", "least"),
+    [("hairdryer", 60, 2, 91.0), ("gas_furnace", 30, 2, 55.0), ("exchanger", 250, 3, 62.0)],
+)
+def test_measured_plants_are_predicted_on_the_half_that_was_not_used(
+    shared_data, plant, length, order, least
+):
+    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
+    whole = cr.Record(*table.T, name=plant)
+    middle = whole.time[whole.n_samples // 2]
+    first, second = whole.between(0, middle), whole.between(middle, np.inf)
+    model = cr.estimate_delay(cr.impulse_from_io(first, length), order, max_delay=10)
+    assert cr.check_residuals(model, second).fit_percent[0] > least
+    assert cr.predict(model, second, 1).fit_percent[0] > least + 3

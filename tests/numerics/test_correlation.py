@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+from ctrl_realize.numerics.correlation import (
+    autoregression,
+    correlation,
+    cross_bound,
+    fit_percent,
+    predict_ahead,
+    whiteness,
+)
+
+
+def test_correlation_by_fft_is_the_sum_over_pairs():
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(2, 57)) + 5
+    a, b = x - x.mean(), y - y.mean()
+    norm = np.linalg.norm(a) * np.linalg.norm(b)
+    expected = [a[i:] @ b[: 57 - i] / norm for i in range(11)]
+    assert_allclose(correlation(x, y, 10), expected, rtol=0, atol=1e-14)
+
+
+def test_a_constant_is_correlated_with_nothing():
+    assert not correlation(np.full(20, 3.0), np.arange(20.0), 5).any()
+
+
+def test_white_noise_fails_the_test_as_often_as_asked_for():
+    draws = np.random.default_rng(0).normal(size=(600, 400))
+    chance = np.array([whiteness(correlation(e, e, 20)[1:], 400) for e in draws])
+    # 600 draws: 5 -+ 0.9 %, and 50 -+ 2 %
+    assert abs(np.mean(chance < 0.05) - 0.05) < 0.03
+    assert abs(np.mean(chance < 0.5) - 0.5) < 0.07
+    coloured = lfilter([1], [1, -0.3], draws[0])
+    assert whiteness(correlation(coloured, coloured, 20)[1:], 400) < 1e-3
+
+
+def test_bound_of_cross_correlation_holds_for_coloured_signals():
+    rng = np.random.default_rng(0)
+    outside = []
+    for _ in range(300):
+        e, u = lfilter([1], [1, -0.8], rng.normal(size=(2, 500)))
+        limit = cross_bound(e, u, 25, 0.95)
+        outside.append(np.mean(np.abs(correlation(e, u, 25)) > limit))
+    # 5 % of lags; neighbours go together, so 300 records count for about 1000 free lags
+    assert abs(np.mean(outside) - 0.05) < 0.025
+
+
+def test_fit_percent_is_100_for_the_data_and_0_for_their_mean():
+    y = np.random.default_rng(0).normal(size=(1, 50)) + 9
+    assert fit_percent(y, y)[0] == 100
+    assert_allclose(fit_percent(y, np.full((1, 50), y.mean())), 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_order_and_coefficients_of_an_autoregression_are_found(seed):
+    e = lfilter([1], [1, -1.5, 0.8], np.random.default_rng(seed).normal(size=4000))
+    c = autoregression(e, 10)
+    assert 2 <= c.size <= 3  # BIC takes one more in about 1 % of cases
+    assert_allclose(c[:2], [1.5, -0.8], rtol=0, atol=0.05)  # sqrt((1 - .8^2) / 4000) = 0.01
+    assert autoregression(np.random.default_rng(seed).normal(size=4000), 10).size <= 1
+
+
+def test_a_sine_is_predicted_without_running_away():
+    e = np.sin(0.3 * np.arange(500))
+    c = autoregression(e, 4)
+    assert np.abs(np.roots(np.r_[1, -c])).max() <= 1 + 1e-9
+    ahead = predict_ahead(e, c, 5)
+    assert np.abs(ahead - e)[20:].max() < 0.05  # Burg's frequency bias on a short sine
+
+
+@pytest.mark.parametrize("steps", [1, 2, 7])
+def test_prediction_of_an_ar1_is_its_decay(steps):
+    e = np.random.default_rng(0).normal(size=30)
+    expected = np.concatenate([np.zeros(steps), 0.6**steps * e[:-steps]])
+    assert_allclose(predict_ahead(e, np.array([0.6]), steps), expected, rtol=0, atol=1e-14)
+
+
+def test_prediction_without_a_model_is_zero():
+    assert not predict_ahead(np.ones(5), np.zeros(0), 3).any()
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_predictions_do_not_look_into_the_future(steps):
+    e = np.random.default_rng(0).normal(size=80)
+    changed = np.concatenate([e[:50], np.full(30, 99.0)])
+    c = np.array([0.5, -0.3, 0.1])
+    before, after = predict_ahead(e, c, steps), predict_ahead(changed, c, steps)
+    last = 50 + steps  # e[50] is the first to differ, and is known `steps` samples later
+    assert np.array_equal(before[:last], after[:last])
+    assert before[last] != after[last]
+
+
+def test_a_ringing_autoregression_does_not_start_with_a_burst():
+    c = -np.poly(0.99 * np.exp(1j * np.array([0.1, -0.1, 0.2, -0.2, 0.3, -0.3])))[1:].real
+    e = lfilter([1], np.r_[1, -c], np.random.default_rng(0).normal(size=400))[200:]
+    assert np.abs(predict_ahead(e, c, 1)).max() < 1.1 * np.abs(e).max()
