@@ -53,15 +53,15 @@ def _misfit(fit: OutputErrorFit) -> Flag | None:
 
 
 def _disagreement(data: StepData, fit: OutputErrorFit) -> Flag | None:
-    ms = 1.0
     if fit.views:
         width = fit.high - fit.low
         if width <= 0.3 * max(fit.delay, data.dt):
             return None
-        apart = [f"{name} {delay * ms:.4g} s" for name, delay in fit.views if not _near(fit, delay)]
+        apart = [f"{name} {delay:.4g} s" for name, delay in fit.views if not _near(fit, delay)]
         return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
     own = next(line for line in fit.structures if line.structure == fit.structure)
-    if not fit.high - fit.low > 3 * (own.high - own.low):
+    wide = fit.high - fit.low > 0.3 * max(fit.delay, data.dt)
+    if not wide or fit.high - fit.low <= 1.5 * (own.high - own.low):
         return None
     return Flag(
         "structures_disagree",

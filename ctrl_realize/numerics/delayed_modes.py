@@ -10,19 +10,19 @@ over the moves that have arrived, t > t_l + tau. Derivatives need dE_j/dp_j in a
 
     T_j(t) = sum_l d_l (t - t_l - tau) exp(p_j (t - t_l - tau)).
 
-`MoveTrain` evaluates them at any times for a few moves (steps, ramps), many delays and pole
-sets at once; `SampledInput` does it for a long measured signal, by recursion.
+`MoveTrain` evaluates their means over bins of samples for a few moves (steps, ramps), many delays
+and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from scipy.signal import lfilter
 
-from .arrays import ComplexArray, FloatArray
+from .arrays import ComplexArray, FloatArray, IntArray
 
 Modes: TypeAlias = tuple[FloatArray, ComplexArray, ComplexArray]
 """H (B, m), E (B, m, J) and T (B, m, J)."""
@@ -38,45 +38,94 @@ class HeldInput(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class MoveTrain:
-    """A few moves of the input, and the times at which the response is wanted.
+    """A few moves of the input; the response is wanted as means over bins of samples.
 
     Attributes
     ----------
-    times : ndarray, shape (m,)
-        In s.
-    spread : ndarray, shape (m,)
-        The response is averaged over ``times - spread`` and ``times + spread``. With
-        ``spread = dt sqrt((w^2 - 1) / 12)`` that is the mean over w samples, exact for cubics.
+    first : ndarray, shape (m,)
+        Time of the first sample of every bin, in s.
+    width : ndarray of int, shape (m,)
+        Number of samples in every bin; 1 for single samples.
+    dt : float
+        Sample time in s.
     moves, sizes : ndarray, shape (L,)
-        When, and by how much, the input moves.
+        When, and by how much, the input moves; sorted.
+
+    Notes
+    -----
+    Between two arrivals each mode is one exponential, whatever came before: the sum over the
+    moves is carried along from arrival to arrival. Means of exponentials are geometric sums, so
+    that nothing is approximated; bins during which a move arrives are taken sample by sample.
     """
 
-    times: FloatArray
-    spread: FloatArray
+    first: FloatArray
+    width: IntArray
+    dt: float
     moves: FloatArray
     sizes: FloatArray
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
-        """Evaluate H, E and T at the times; see `HeldInput`."""
-        wide = np.flatnonzero(self.spread)
-        nodes = np.concatenate([self.times - self.spread, (self.times + self.spread)[wide]])
-        static = np.zeros((tau.size, nodes.size))
-        mode = np.zeros((tau.size, nodes.size, poles.shape[1]), dtype=np.complex128)
-        slope = np.zeros_like(mode)
+        """Evaluate H, E and T for every bin; see `HeldInput`."""
         # Real exponentials cost a third of complex ones.
         rates = poles if np.any(poles.imag) else poles.real
-        for move, size in zip(self.moves, self.sizes, strict=True):
-            elapsed = nodes - move - tau[:, None]
-            arrived = size * (elapsed > 0)
-            elapsed = np.maximum(elapsed, 0.0)[:, :, None]
-            part = np.exp(elapsed * rates[:, None, :]) * arrived[:, :, None]
-            static += arrived
-            mode += part
-            slope += elapsed * part
-        m = self.times.size
-        for values in (static, mode, slope):
-            values[:, wide] = 0.5 * (values[:, wide] + values[:, m:])
-        return static[:, :m], mode[:, :m], slope[:, :m]
+        since = self.first - tau[:, None]
+        here = self._arrived(since)
+        last = self._arrived(since + self.dt * (self.width - 1))
+        level, total, stretch = self._carried(rates)
+        start = np.concatenate([[np.inf], self.moves])
+        row = np.arange(tau.size)[:, None]
+        elapsed = np.where(here > 0, since - start[here], 0.0)[:, :, None]
+        decay = np.exp(elapsed * rates[:, None, :])
+        static, mode = level[here], total[row, here] * decay
+        slope = stretch[row, here] * decay + elapsed * mode
+        widths, kind = np.unique(self.width, return_inverse=True)
+        if widths[-1] > 1:
+            mean, turn = _geometric_mean(rates[:, None] * self.dt, widths[:, None])
+            slope = slope * mean[:, kind] + mode * (self.dt * turn)[:, kind]
+            mode = mode * mean[:, kind]
+        row, column = np.nonzero(here != last)
+        if row.size:
+            # The samples of all bins during which a move arrives, one after the other.
+            count = self.width[column]
+            ends = np.cumsum(count)
+            within = np.arange(ends[-1]) - np.repeat(ends - count, count)
+            when = np.repeat(since[row, column], count) + self.dt * within
+            owner, here = np.repeat(row, count), self._arrived(when)
+            elapsed = np.where(here > 0, when - start[here], 0.0)[:, None]
+            decay = np.exp(elapsed * rates[owner])
+            part = total[owner, here] * decay
+            parts = (level[here], part, stretch[owner, here] * decay + elapsed * part)
+            for values, samples in zip((static, mode, slope), parts, strict=True):
+                sums = np.add.reduceat(samples, ends - count, axis=0)
+                values[row, column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
+        return static, mode.astype(np.complex128), slope.astype(np.complex128)
+
+    def _arrived(self, since: FloatArray) -> IntArray:
+        """Count the moves that have arrived at delayed times (B, m)."""
+        return np.searchsorted(self.moves, since, side="left").astype(np.int64)
+
+    def _carried(self, rates: FloatArray | ComplexArray) -> tuple[FloatArray, Any, Any]:
+        """Sum the moves up to each arrival, decayed to that time; entry 0 is before the first."""
+        count = self.moves.size + 1
+        total = np.zeros((rates.shape[0], count, rates.shape[1]), dtype=rates.dtype)
+        stretch = np.zeros_like(total)
+        before = np.concatenate([self.moves[:1], self.moves])
+        for i in range(1, count):
+            gap = before[i] - before[i - 1]
+            decay = np.exp(gap * rates)
+            stretch[:, i] = (stretch[:, i - 1] + gap * total[:, i - 1]) * decay
+            total[:, i] = total[:, i - 1] * decay + self.sizes[i - 1]
+        return np.concatenate([[0.0], np.cumsum(self.sizes)]), total, stretch
+
+
+def _geometric_mean(x: Any, count: IntArray) -> tuple[Any, Any]:
+    """Mean over k = 0...count - 1 of exp(k x), and its derivative with respect to x."""
+    small = np.abs(x * count) < 1e-4
+    ratio, power = np.expm1(x), np.expm1(x * count)
+    mean = power / (count * ratio)
+    turn = (power + 1 - mean * (ratio + 1)) / ratio
+    half, third = (count - 1) / 2, (count - 1) * (2 * count - 1) / 6
+    return np.where(small, 1 + half * x, mean), np.where(small, half + third * x, turn)
 
 
 @dataclass(frozen=True, eq=False)

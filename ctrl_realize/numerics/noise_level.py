@@ -6,6 +6,7 @@ import numpy as np
 
 from .arrays import FloatArray
 
+_MANY = 50  # samples at rest that are enough to tell the noise
 _FEW = 8  # samples at rest below which the whole record must tell the noise
 
 
@@ -70,6 +71,10 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     index = np.arange(before.size) - before.size
     slope, level = np.polyfit(index, before, 1)
     sigma = max(winsorised_sigma(before - level - slope * index, quantum, lost=2), floor)
+    if before.size < _MANY:
+        # A dozen samples tell sigma to a factor of two: the settled half of the record helps.
+        settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
+        sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
     error = sigma * np.sqrt(12 / before.size**3)
     known = before.size > 0.05 * (record.size - before.size)
     return sigma, float(slope) if known and abs(slope) > 5 * error else 0.0

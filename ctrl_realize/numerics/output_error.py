@@ -9,8 +9,8 @@ The rule:
 3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
    first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
    of up to three poles for the first 63 % and for all of it. The delay is their median.
-4. The interval then spans the views, without the lowest: a fit that goes wrong takes delay for
-   lag, while nothing but noise puts a delay after the first motion.
+4. The interval then spans the views and a third-order lag on the first 15 % (more lags, less
+   delay), without the lowest: a fit that goes wrong takes delay for lag.
 5. No delay is later than the first lasting motion of the output.
 """
 
@@ -36,13 +36,13 @@ from .step_problem import (
 )
 from .structure_search import (
     ALL_STRUCTURES,
-    PLAUSIBLE,
     SIMPLE_STRUCTURES,
     Candidate,
     Scales,
     choose,
     criteria,
     parameter_bounds,
+    plausible,
     refine,
     search,
 )
@@ -153,11 +153,13 @@ def fit_output_error(
         simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
         chosen = whole.candidates[choose(simple)]
         views = _views(data, chosen, latest, factor, huber)
-    profiles = _profiles(whole, chosen)
+    kept = [chosen.structure] if views else plausible(whole.criterion, chosen.structure)
+    profiles = _profiles(whole, kept)
     table = _table(whole, profiles)
     if views:
-        delays = np.sort([delay for _, delay in views])
-        delay, low, high = float(np.median(delays)), float(delays[1]), float(delays[-1])
+        delay = float(np.median([at for _, at in views[:-1]]))
+        delays = np.sort([at for _, at in views])
+        low, high = float(delays[1]), float(delays[-1])
         std = (high - low) / 3.92
         chosen = _with_delay(whole, chosen, delay)
     else:
@@ -199,8 +201,10 @@ def _fit_window(
     lost = 1 + best.structure.order + best.structure.zeros + columns.shape[1]
     freedom = max(after.size - lost, 1)
     level = float(np.sqrt(np.sum(after**2) / freedom))
-    level = max(level, 0.3 * data.sigma)
-    correlation = correlation_time(after)
+    # Below that the residual is rounding, and its correlation says nothing.
+    floor = 0.3 * data.sigma
+    correlation = correlation_time(after) if level > floor else 1.0
+    level = max(level, floor)
     criterion = criteria(candidates, level**2 * correlation, after.size / correlation)
     chosen = candidates[choose(criterion)]
     misfit = np.sqrt(chosen.cost / max(problem.data.size - lost, 1)) / data.sigma
@@ -261,9 +265,9 @@ def _predict(
 def _views(
     data: StepData, whole: Candidate, latest: float | None, known: KnownFactor, huber: bool
 ) -> tuple[tuple[str, float], ...]:
-    """Five independent looks at the delay, in s."""
+    """Looks at the delay that err in different ways, in s; the last serves the interval only."""
     assert data.motion is not None
-    lags = (Structure(1, 1), Structure(2, 2))
+    lags = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
     early = _fit_window(data, stop_at(data, 0.15), lags, latest, known, huber)
     rise = _fit_window(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, known, huber)
     onset = data.motion.onset * data.dt
@@ -273,18 +277,16 @@ def _views(
         ("second-order lag, first 15 %", early.candidates[lags[1]].delay),
         ("best model of the first 63 %", rise.best.delay),
         ("best model of the whole record", whole.delay),
+        ("third-order lag, first 15 %", early.candidates[lags[2]].delay),
     )
 
 
 def _profiles(
-    whole: _WindowFit, chosen: Candidate
+    whole: _WindowFit, kept: list[Structure]
 ) -> dict[Structure, tuple[FloatArray, FloatArray]]:
-    """Profiles of the chosen structure and of those that the data cannot rule out."""
-    limit = min(whole.criterion.values()) + PLAUSIBLE
     return {
-        s: delay_profile(whole.problem, c, whole.variance, whole.scales)
-        for s, c in whole.candidates.items()
-        if whole.criterion[s] <= limit or s == chosen.structure
+        s: delay_profile(whole.problem, whole.candidates[s], whole.variance, whole.scales)
+        for s in kept
     }
 
 

@@ -14,6 +14,8 @@ from .arrays import FloatArray, IntArray
 
 _GROWTH = 0.04
 _BINS_AT_REST = 12
+# Few different widths: what depends on the width alone is computed once for each.
+_WIDTHS = np.unique((1.19 ** np.arange(80)).astype(np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,16 +30,8 @@ class Bins:
         sums = np.add.reduceat(values[: int(self.first[-1] + self.width[-1])], self.first, axis=0)
         return np.asarray(sums / self.width.reshape(-1, *[1] * (values.ndim - 1)))
 
-    def centre(self) -> FloatArray:
-        """Middle of every bin, in samples."""
-        return self.first + 0.5 * (self.width - 1)
 
-    def spread(self) -> FloatArray:
-        """Offset of the two nodes whose mean equals that of the bin, in samples."""
-        return np.sqrt((self.width**2 - 1.0) / 12)
-
-
-def response_bins(stop: int, edges: list[int], crossing: int, widest: float) -> Bins:
+def response_bins(stop: int, edges: list[int], crossing: int) -> Bins:
     """Lay bins over samples 0...stop - 1 of a record.
 
     Parameters
@@ -49,8 +43,6 @@ def response_bins(stop: int, edges: list[int], crossing: int, widest: float) -> 
     crossing : int
         First lasting motion after an edge, in samples. Bins are single samples there and grow
         by 4 % of the distance from it.
-    widest : float
-        No bin after the first edge is wider than this.
     """
     bounds = sorted({*np.linspace(0, edges[0], min(_BINS_AT_REST, edges[0]) + 1).astype(int)})
     starts = [*edges, stop]
@@ -60,9 +52,8 @@ def response_bins(stop: int, edges: list[int], crossing: int, widest: float) -> 
         distance = float(np.abs(onsets - k).min())
         nearest = onsets - k
         ahead = nearest[nearest > 0]
-        width = max(1, int(min(_GROWTH * distance, widest)))
-        if ahead.size:
-            width = max(1, min(width, int(ahead.min())))
+        room = min(_GROWTH * distance, float(ahead.min())) if ahead.size else _GROWTH * distance
+        width = int(_WIDTHS[np.searchsorted(_WIDTHS, max(room, 1.0), side="right") - 1])
         following = min(s for s in starts if s > k)
         k = min(k + width, following, stop)
         bounds.append(k)

@@ -113,7 +113,7 @@ def bins_until(data: StepData, stop: int) -> Bins:
     """Bins over the samples up to `stop`."""
     crossing = data.motion.crossing if data.motion else 0
     edges = [i for i, _ in data.edges if i < stop]
-    return response_bins(stop, edges, crossing, float(stop))
+    return response_bins(stop, edges, crossing)
 
 
 def bin_weights(data: StepData, bins: Bins) -> FloatArray:
@@ -127,9 +127,8 @@ def problem_until(
     data: StepData, values: FloatArray, bins: Bins, stop: int, known: KnownFactor
 ) -> Problem:
     """Set up the fit of values (N,) on the bins."""
-    time = data.dt * bins.centre()
     index, size = input_moves(data.input, data.edges, stop)
-    drive = MoveTrain(time, data.dt * bins.spread(), _at(index, data.dt), size)
+    drive = MoveTrain(_at(bins.first, data.dt), bins.width, data.dt, _at(index, data.dt), size)
     return Problem(
         bins.average(values[:stop]),
         np.sqrt(bin_weights(data, bins)),
@@ -142,7 +141,8 @@ def problem_until(
 def sample_drive(data: StepData, stop: int) -> HeldInput:
     """Drive that gives the response at every sample."""
     index, size = input_moves(data.input, data.edges, stop)
-    return MoveTrain(_at(np.arange(stop), data.dt), np.zeros(stop), _at(index, data.dt), size)
+    single = np.ones(stop, dtype=np.int64)
+    return MoveTrain(_at(np.arange(stop), data.dt), single, data.dt, _at(index, data.dt), size)
 
 
 def fixed_regressors(data: StepData) -> FloatArray:

@@ -13,8 +13,8 @@ from .separable_fit import Bounds, Problem, Structure, fit_batch
 
 ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
 SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)
-NEEDLESS = 4.0
-"""Charged for a zero, and for a pole beyond the third, on top of the information criterion."""
+NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
+"""Charged for every zero, and for every pole beyond the third, when a structure is chosen."""
 
 PLAUSIBLE = 10.0
 """A structure is not ruled out while its criterion is within this of the best."""
@@ -89,9 +89,14 @@ def search(
 def refine(
     problem: Problem, candidates: dict[Structure, Candidate], scales: Scales
 ) -> dict[Structure, Candidate]:
-    """Fit again from the optima of slightly different data."""
+    """Fit again from the optima of slightly different data; hopeless structures are let be."""
+    best = min(candidate.cost for candidate in candidates.values())
+    hopeless = best * (1 + 100 / problem.data.size)
     again: dict[Structure, Candidate] = {}
     for structure, old in candidates.items():
+        if old.cost > hopeless:
+            again[structure] = old
+            continue
         parameters, cost = fit_batch(
             problem,
             structure,
@@ -130,10 +135,22 @@ def criteria(
 
 def choose(criterion: dict[Structure, float]) -> Structure:
     """Structure of the lowest criterion, where zeros and a fourth pole must be worth it."""
-    return min(
-        criterion,
-        key=lambda s: criterion[s] + NEEDLESS * (s.zeros + max(s.order - 3, 0)),
-    )
+    return min(criterion, key=lambda s: criterion[s] + _needless(s))
+
+
+def plausible(criterion: dict[Structure, float], chosen: Structure) -> list[Structure]:
+    """List what the data cannot rule out: within 10 of the best, or, simplicity counted, of the chosen."""
+    limit = min(criterion.values()) + PLAUSIBLE
+    weighed = criterion[chosen] + _needless(chosen) + PLAUSIBLE
+    return [
+        s
+        for s, value in criterion.items()
+        if value <= limit or value + _needless(s) <= weighed or s == chosen
+    ]
+
+
+def _needless(structure: Structure) -> float:
+    return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
 
 
 def _pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
