@@ -18,6 +18,7 @@ from ..numerics.edges import Edge, difference_noise, find_edges
 from ..numerics.filters import low_pass, settling_samples
 from ..numerics.rest import rest_line
 from ..numerics.rise import rise_time
+from ..numerics.time_axis import EXTREME
 from ..signals import FilterSpec, ImpulseResponse, Record, StepEdge, StepResponse
 
 BANDWIDTH_TIMES_RISE = 0.35
@@ -85,6 +86,8 @@ def detect_step(
         )
     edges = tuple(_to_step_edge(edge, record) for edge in found)
     highest = max(abs(edge.amplitude) for edge in edges)
+    if highest < 1 / EXTREME:
+        raise NoStepError(f"the largest edge {_of(record)} is {highest:g} high, which is nothing")
     main = next(edge for edge in edges if abs(edge.amplitude) >= 0.5 * highest)
     if main.index + main.samples >= record.n_samples:
         raise NoStepError(
@@ -149,6 +152,8 @@ def unit_step(
             f"the edge lies at samples {at.start}...{at.index}...{at.stop}, the record has "
             f"{record.n_samples} samples; is it the edge of another record?"
         )
+    if abs(at.amplitude) < 1 / EXTREME:
+        raise DataError(f"the edge is {at.amplitude:g} high; nothing can be divided by that")
     if at.stop - at.index < 5:
         raise DataError(
             f"only {at.stop - at.index} samples follow the step {_of(record)} before the next "

@@ -13,8 +13,11 @@ Time stamps printed with few digits (0.000073 s steps of 73.24 us) stay well ins
 missed sample is twenty times as large.
 """
 
-EXTREME = 1e100
-"""Stamps beyond this (or steps below its inverse) are no time, and their squares overflow."""
+EXTREME = 1e70
+"""Numbers beyond this, and steps below its inverse, are no measurement.
+
+The square of a quotient of two numbers inside is still a double.
+"""
 
 
 def sample_time(time: FloatArray) -> float:

@@ -15,6 +15,7 @@ from ..numerics.arrays import FloatArray, read_only
 from ..numerics.time_axis import EXTREME, axis_fault, sample_time
 
 MIN_SAMPLES = 3
+MAX_DENSER = 100
 MISSING = ("refuse", "keep")
 
 
@@ -241,7 +242,13 @@ class Record:
                 f"usual; max_jitter={max_jitter:g} allows {(1 + max_jitter) * usual:.6g} s"
             )
         step = sample_time(stamps) if dt is None else positive(dt, "dt", "sample time in s")
-        count = int(np.floor((stamps[-1] - stamps[0]) / step * (1 + 1e-12))) + 1
+        samples = (stamps[-1] - stamps[0]) / step
+        if samples > MAX_DENSER * stamps.size:
+            raise OptionError(
+                f"dt={step:g} s makes {samples:.4g} samples of {stamps.size}; at most "
+                f"{MAX_DENSER} times as many are made"
+            )
+        count = int(np.floor(samples * (1 + 1e-12))) + 1
         uniform = stamps[0] + step * np.arange(count)
         moved = []
         for what, given in (("input", input), ("output", output)):

@@ -1,0 +1,86 @@
+"""Cases that the fuzz lane has found, each as a test of its own with what was wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, FileFormatError, NoStepError, OptionError, TimeAxisError
+from tests.fuzz.lane import good_end
+
+
+def test_five_thousand_digits_do_not_take_minutes(tmp_path):
+    # the pattern for numbers had two ways to match digits: time grew with their square
+    (tmp_path / "a.csv").write_text("t,u,y\n" + ("9" * 40_000 + ",1,2\n") * 5)
+    with good_end(seconds=10), pytest.raises(DataError, match=r"\(or too large for a double\)"):
+        cr.read_record(tmp_path / "a.csv")
+
+
+def test_a_header_without_end_does_not_take_minutes(tmp_path):
+    for name in ("_" * 50_000, "1" * 50_000, "[" * 50_000 + "]", " s" * 25_000):
+        (tmp_path / "a.csv").write_text(f"t,u,{name},z\n0,1,2,3\n1,2,3,4\n2,3,4,5\n")
+        with good_end(seconds=10), pytest.raises(OptionError, match="which column is the"):
+            cr.read_record(tmp_path / "a.csv")
+
+
+def test_brackets_without_end_in_an_npy_header_are_a_damaged_file(tmp_path):
+    # NumPy's parser ends in tokenize.TokenError, which is no ValueError
+    (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\x01\x00\x88\x13" + b"[" * 5000)
+    with pytest.raises(FileFormatError, match="damaged"):
+        cr.read_record(tmp_path / "a.npy")
+
+
+def test_times_near_the_end_of_the_doubles_are_refused():
+    # their differences overflowed with a warning of NumPy
+    with pytest.raises(TimeAxisError, match=r"time is -1.7e\+308 s at row 0"):
+        cr.Record([-1.7e308, 0, 1.7e308], [1, 2, 3], [1, 2, 3])
+    with pytest.raises(TimeAxisError, match=r"steps of 4.94066e-324 s"):
+        cr.Record([0, 5e-324, 1e-323], [1, 2, 3], [1, 2, 3])
+
+
+def test_values_near_the_end_of_the_doubles_are_refused():
+    with pytest.raises(DataError, match=r"output is beyond 1e\+70 at index 1"):
+        cr.Record([0, 1, 2], [1, 2, 3], [1, 1.7e308, 3])
+
+
+def test_rows_of_different_lengths_are_no_array():
+    # the ValueError was NumPy's
+    with pytest.raises(DataError, match="time is no array"):
+        cr.Record([[], [0.0]], [1, 2], [1, 2])
+
+
+def test_a_long_record_is_not_resampled_to_billions_of_samples():
+    # 28 GB for three samples
+    stamps = np.array([0.0, 1.02, 3.7e9])
+    with pytest.raises(OptionError, match=r"dt=1 s makes 3.7e\+09 samples of 3"):
+        cr.Record.resampled(stamps, stamps, stamps, max_jitter=1.0, dt=1.0)
+
+
+def test_an_edge_of_almost_nothing_is_no_step():
+    # the response divided by it overflowed with a warning of NumPy
+    u = np.where(np.arange(40) < 9, 0.0, 5e-324)
+    record = cr.Record(np.arange(40.0), u, np.arange(40.0))
+    with pytest.raises(NoStepError, match=r"4\.9.*e-324 high, which is nothing"):
+        cr.detect_step(record)
+
+
+def test_a_response_that_underflows_behind_the_delay_makes_no_noise():
+    # the inverse roots of singular values around 1e-313 overflowed
+    g = np.zeros((2, 2, 3))
+    g[0], g[1] = [[1, -1e-313, 6e-313], [2, -2e-313, 1e-312]], [[-1, 1e-313, -6e-313], [0, 0, 1]]
+    with good_end() as models:
+        models.append(cr.estimate_delay(g, 1, max_delay=0, dt=1.0))
+    for model in models:
+        assert np.isfinite(model.delay_free.A).all()
+
+
+@pytest.mark.parametrize(("samples", "length"), [(12, 2), (20, 2), (20, 5)])
+def test_a_short_exact_step_gives_an_impulse_response_or_one_of_our_errors(samples, length):
+    # a sum of squares rounded to below zero, and a prior too wide for the rounding of the sums
+    u = (np.arange(samples) >= 1).astype(float)
+    y = np.concatenate([[0.0], 1 - 0.8 ** np.arange(samples - 1)])
+    with good_end() as results:
+        results.append(cr.impulse_from_io(cr.Record(np.arange(float(samples)), u, y), length))
+    for impulse in results:
+        assert np.isfinite(impulse.markov).all()
