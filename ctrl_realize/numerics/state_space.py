@@ -76,12 +76,31 @@ def _observability_blocks(
     A: FloatArray, C: FloatArray, count: int
 ) -> tuple[FloatArray, FloatArray]:
     """Stack C, CA, ..., CA^(count-1) by doubling; also return A^count. Count: a power of two."""
-    stack = C[None]
+    p, n = C.shape
+    stack = np.empty((count * p, n))
+    stack[:p] = C
     power = A
-    while stack.shape[0] < count:
-        stack = np.concatenate([stack, stack @ power])
+    have = p
+    while have < count * p:
+        np.matmul(stack[:have], power, out=stack[have : 2 * have])
         power = power @ power
-    return stack, power
+        have *= 2
+    return stack.reshape(count, p, n), power
+
+
+def _reachability_blocks(A: FloatArray, B: FloatArray, count: int) -> FloatArray:
+    """Stack B, AB, ..., A^(count-1)B by doubling, shape (m, count, n)."""
+    n, m = B.shape
+    stack = np.empty((m, count, n))
+    stack[:, 0] = B.T
+    power = A.T
+    have = 1
+    while have < count:
+        more = min(have, count - have)
+        np.matmul(stack[:, :more], power, out=stack[:, have : have + more])
+        power = power @ power
+        have += more
+    return stack
 
 
 def markov(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: int) -> FloatArray:
@@ -99,19 +118,21 @@ def markov(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: in
     """
     n, m = B.shape
     p = C.shape[0]
-    out = np.zeros((p, m, count))
-    if count > 0:
-        out[:, :, 0] = D
-    if count > 1 and n > 0:
-        block = min(BLOCK, 1 << (count - 2).bit_length())
-        rows, jump = _observability_blocks(A, C, block)
-        columns = [B]
-        for _ in range((count - 2) // block):
-            columns.append(jump @ columns[-1])
-        # rows (L, p, n) times columns (blocks, n, m) -> (blocks, L, p, m)
-        values = np.einsum("lpn,bnm->pmbl", rows, np.stack(columns), optimize=True)
-        out[:, :, 1:] = values.reshape(p, m, -1)[:, :, : count - 1]
-    return out
+    if n == 0 or count < 2:
+        out = np.zeros((p, m, count))
+        out[:, :, :1] = D[:, :, None]
+        return out
+    # About as many rows as columns: the product of both then is nearly all of the work.
+    block = 1 << (((count - 2).bit_length() + 1) // 2)
+    rows, jump = _observability_blocks(A, C, block)
+    columns = _reachability_blocks(jump, B, -(-(count - 1) // block))
+    padded = np.empty((p, m, 1 + columns.shape[1] * block))
+    padded[:, :, 0] = D
+    for i in range(p):
+        for j in range(m):
+            target = padded[i, j, 1:].reshape(-1, block)
+            np.matmul(columns[j], rows[:, i].T, out=target)
+    return padded[:, :, :count]
 
 
 def step_response(
@@ -126,9 +147,10 @@ def step_response(
     n, m = B.shape
     # [[A, B], [0, I]] carries the held input: its Markov parameters are the step response,
     # without the running sum that would lose digits in long records.
-    held = np.block([[A, B], [np.zeros((m, n)), np.eye(m)]])
-    start = np.vstack([np.zeros((n, m)), np.eye(m)])
-    seen = np.hstack([C, D])
+    held = np.eye(n + m)
+    held[:n, :n], held[:n, n:] = A, B
+    start = np.eye(n + m)[:, n:]
+    seen = np.concatenate([C, D], axis=1)
     return markov(held, start, seen, np.zeros_like(D), count + 1)[:, :, 1:]
 
 
