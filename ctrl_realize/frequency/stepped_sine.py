@@ -44,8 +44,9 @@ def stepped_sine_frf(
         Frequency of each point in Hz, where the sines were generated. The start of the fit, or
         with ``free_frequency=False`` the truth. By default the strongest line of the input.
     settle : float, optional
-        Time in s to leave out at the start of each record. By default it is found: from where
-        on the misfit of the sine stays at the level of the last half.
+        Time in s to leave out at the start of each record. By default it is found: twice the
+        time after which the misfit of the sine stays at the level of the last half; at most half
+        of the record.
     free_frequency : bool, default True
         Estimate the frequency of each record.
     drift : bool, default False
@@ -218,7 +219,10 @@ def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
     bound = _STEADY_RATIO * np.maximum(late_most, floor)
     moving = np.any(squares > bound, axis=1)
     moving[:, half:] = False
-    start = edges[np.where(moving.any(axis=1), half - np.argmax(moving[:, half - 1 :: -1], 1), 0)]
+    settled = np.where(moving.any(axis=1), half - np.argmax(moving[:, half - 1 :: -1], 1), 0)
+    # By then a transient has sunk to the noise; left in, it would still be a bias common to all
+    # repeats. What decays exponentially is gone after the same time once more.
+    start = edges[np.minimum(2 * settled + 1, half)]
     return np.asarray((np.arange(n_samples) >= start[:, None]) * 1.0)
 
 

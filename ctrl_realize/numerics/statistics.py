@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
+from scipy import optimize, special
 
 from .arrays import FloatArray
 
@@ -99,3 +99,31 @@ def trimmed_statistics(
         count=int(kept.size),
         dropped=2 * trim,
     )
+
+
+def mixture_quantile(
+    level: float, centres: FloatArray, spreads: FloatArray, shares: FloatArray
+) -> float:
+    """Return a quantile of a mixture of normal distributions.
+
+    Parameters
+    ----------
+    level : float
+        In 0...1, ends excluded.
+    centres, spreads, shares : ndarray, shape (K,)
+        Means, standard deviations and weights (of any sum).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> print(f"{mixture_quantile(0.975, np.zeros(2), np.ones(2), np.ones(2)):.4f}")
+    1.9600
+    """
+    weights = shares / shares.sum()
+    reach = 40 * spreads
+
+    def excess(value: float) -> float:
+        return float(weights @ special.ndtr((value - centres) / spreads)) - level
+
+    low, high = float(np.min(centres - reach)), float(np.max(centres + reach))
+    return float(optimize.brentq(excess, low, high, xtol=1e-12 * (high - low)))

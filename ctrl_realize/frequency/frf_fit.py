@@ -1,0 +1,176 @@
+"""The result of fitting a transfer function with dead time to a frequency response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import control as ct
+import numpy as np
+
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..results import Flag, Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class FRFStructure:
+    """One structure that was tried.
+
+    Attributes
+    ----------
+    order, relative_degree : int
+        Number of poles, and poles minus zeros.
+    dead_time, std : float
+        Estimate and its standard deviation in s; infinite where this structure leaves the dead
+        time undetermined.
+    cost : float
+        Weighted misfit.
+    bic : float
+        Bayesian information criterion; smaller is better, differences count.
+    """
+
+    order: int
+    relative_degree: int
+    dead_time: float
+    std: float
+    cost: float
+    bic: float
+
+
+@dataclass(frozen=True, eq=False)
+class FRFFit(Result):
+    r"""A transfer function with dead time, fitted to a frequency response.
+
+    ``response(omega) == core(1j * omega) * exp(-1j * omega * dead_time)`` minimises
+    ``sum |(measured - response) / sigma|^2`` over poles, numerator and dead time, and
+    ``misfit**2`` is that sum divided by the degrees of freedom (points minus half of the number
+    of parameters). `interval` also covers the other structures, by their evidence
+    ``exp(-bic / 2)``.
+
+    Attributes
+    ----------
+    order, relative_degree : int
+    dead_time : float
+        In s, not rounded to samples.
+    std : float
+        Standard deviation of `dead_time` in the chosen structure, in s.
+    interval : tuple of float
+        95 % interval of the dead time in s.
+    frequency_hz : ndarray, shape (K,)
+    measured : ndarray of complex, shape (K,)
+        What was fitted; a hold was divided out where asked.
+    sigma : ndarray, shape (K,)
+        Standard deviation that weighted each point; where the FRF had none, a relative one.
+    noise_known : bool
+        Whether `sigma` is the measured standard deviation.
+    misfit : float
+        Size of the residuals in units of `sigma`; 1 is a fit down to the noise if it is known.
+    matrices : tuple of ndarray
+        A, B, C, D of the continuous core.
+    structures : tuple of FRFStructure
+        All that were tried, best first.
+    name : str
+        Name of the FRF.
+    flags : tuple of Flag
+    """
+
+    order: int
+    relative_degree: int
+    dead_time: float
+    std: float
+    interval: tuple[float, float]
+    frequency_hz: FloatArray
+    measured: ComplexArray
+    sigma: FloatArray
+    noise_known: bool
+    misfit: float
+    matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    structures: tuple[FRFStructure, ...]
+    name: str
+    flags: tuple[Flag, ...] = field(default=())
+
+    @property
+    def core(self) -> ct.StateSpace:
+        """The continuous system without its dead time."""
+        return ct.ss(*self.matrices, name="core", inputs="u", outputs="y")
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles of the core in rad/s, slow ones first."""
+        poles = np.linalg.eigvals(self.matrices[0]).astype(np.complex128)
+        return np.asarray(poles[np.argsort(np.abs(poles), kind="stable")])
+
+    @property
+    def gain(self) -> float:
+        """Response at frequency zero."""
+        A, B, C, D = self.matrices
+        return float((D - C @ np.linalg.solve(A, B))[0, 0])
+
+    @property
+    def total_delay(self) -> float:
+        """Delay of slow signals in s: dead time and all lags of the core."""
+        A, B, C, _ = self.matrices
+        slope = C @ np.linalg.solve(A, np.linalg.solve(A, B))
+        return self.dead_time + float(slope[0, 0]) / self.gain
+
+    @property
+    def relative_error(self) -> FloatArray:
+        """``|response / measured - 1|`` at each point."""
+        model = self.response(2 * np.pi * self.frequency_hz)
+        return np.asarray(np.abs(model / self.measured - 1))
+
+    def response(self, omega: FloatArray) -> ComplexArray:
+        """Evaluate core and dead time at `omega` in rad/s."""
+        points = 1j * np.asarray(omega, dtype=np.float64)
+        core = np.asarray(self.core(points, squeeze=False))[0, 0]
+        return np.asarray(core * np.exp(-points * self.dead_time), dtype=np.complex128)
+
+    def table(self) -> pd.DataFrame:
+        """List the structures that were tried, best first."""
+        import pandas as pd
+
+        return pd.DataFrame([vars(structure) for structure in self.structures])
+
+    def _title(self) -> str:
+        return f"Transfer function with dead time from the FRF {self.name!r}"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        unit = "the measured noise" if self.noise_known else "the response"
+        shown = [
+            f"{abs(p) / (2 * np.pi):.4g} Hz"
+            + (f" (damping {-p.real / abs(p):.2g})" if p.imag > 0 else "")
+            for p in self.poles
+            if p.imag >= 0
+        ]
+        return [
+            ("dead time", f"{1e3 * self.dead_time:.5g} ms, std {1e3 * self.std:.2g} ms"),
+            (
+                "95 % interval",
+                f"{1e3 * self.interval[0]:.5g} to {1e3 * self.interval[1]:.5g} ms",
+            ),
+            ("total delay at DC", f"{1e3 * self.total_delay:.5g} ms"),
+            ("structure", f"order {self.order}, relative degree {self.relative_degree}"),
+            ("poles", ", ".join(shown)),
+            ("gain", f"{self.gain:.5g}"),
+            (
+                "points",
+                f"{self.frequency_hz.size}, {self.frequency_hz[0]:.4g} to "
+                f"{self.frequency_hz[-1]:.4g} Hz",
+            ),
+            (
+                "misfit",
+                f"{self.misfit:.3g} x {unit}"
+                if self.noise_known
+                else f"{100 * self.misfit:.3g} % of {unit}",
+            ),
+        ]
+
+    def __repr__(self) -> str:
+        low, high = self.interval
+        return (
+            f"<FRFFit order {self.order}, dead time {1e3 * self.dead_time:.5g} ms "
+            f"({1e3 * low:.5g} to {1e3 * high:.5g} ms)>"
+        )

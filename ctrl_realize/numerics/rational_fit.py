@@ -1,0 +1,234 @@
+"""Search and refinement for transfer functions with dead time; see `rational`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import ComplexArray, FloatArray
+from .rational import (
+    factor_parameters,
+    full_jacobian,
+    project,
+    relocate_poles,
+    trial_poles,
+)
+
+_RELOCATIONS = 8
+_MAX_ITERATIONS = 60
+_MAX_STARTS = 4
+_CHI2_95 = 3.841458820694124
+
+
+@dataclass(frozen=True, eq=False)
+class FRFData:
+    """A frequency response with weights, in units where frequencies are around 1.
+
+    Parameters
+    ----------
+    s : ndarray, shape (K,)
+        ``j omega``.
+    response : ndarray, shape (K,)
+        Measured.
+    weight : ndarray, shape (K,)
+        One over the standard deviation of the complex response, up to a factor.
+    max_dead_time : float
+        Upper bound of the search.
+    """
+
+    s: ComplexArray
+    response: ComplexArray
+    weight: FloatArray
+    max_dead_time: float
+
+
+@dataclass(frozen=True, eq=False)
+class RationalFit:
+    """A local minimum of the weighted misfit.
+
+    ``cost`` is the sum of ``|weight (response - model)|^2`` at pole parameters and dead time
+    `theta` and the best `numerator`.
+    """
+
+    order: int
+    theta: FloatArray
+    numerator: FloatArray
+    cost: float
+
+
+def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[FloatArray]:
+    """Find poles for each candidate dead time, and keep the candidates worth refining.
+
+    With the dead time fixed the problem is linear but for a few pole relocations, which need no
+    start. The minima of the misfit over the grid of dead times come first; this is what spares
+    the maximum-likelihood fit its good initial guess.
+    """
+    omega = np.abs(data.s)
+    low, high = omega.min(), omega.max()
+    costs, found = [], []
+    for delay in delays:
+        turned = data.response * np.exp(data.s * delay)
+        best_cost, best = np.inf, np.zeros(0)
+        for resonant in (False, True):
+            poles = trial_poles(low, high, order, resonant=resonant)
+            for _ in range(_RELOCATIONS):
+                poles = relocate_poles(data.s, turned, data.weight, poles)
+            theta = _inside(np.append(factor_parameters(poles), delay), data, order)
+            cost = _cost(project(data.s, data.response, data.weight, theta, order, order).residual)
+            if cost < best_cost:
+                best_cost, best = cost, theta
+            if order == 1:
+                break
+        costs.append(best_cost)
+        found.append(best)
+    curve = np.array(costs)
+    padded = np.concatenate([[np.inf], curve, [np.inf]])
+    minima = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
+    ranked = minima[np.argsort(curve[minima])][:_MAX_STARTS]
+    return [found[k] for k in ranked]
+
+
+def refine(
+    data: FRFData, order: int, count: int, start: FloatArray, *, frozen_delay: bool = False
+) -> RationalFit:
+    """Minimise the misfit from one start by Levenberg-Marquardt on poles and dead time.
+
+    Parameters
+    ----------
+    data : FRFData
+    order, count : int
+        Poles, and coefficients of the numerator.
+    start : ndarray, shape (order + 1,)
+    frozen_delay : bool
+        Keep the dead time of the start.
+    """
+    theta = _inside(start, data, order)
+    now = project(data.s, data.response, data.weight, theta, order, count)
+    cost = _cost(now.residual)
+    damping = 1e-3
+    stalled = 0
+    for _ in range(_MAX_ITERATIONS):
+        J = now.jacobian.copy()
+        if frozen_delay or _pinned(theta, float(J[:, order] @ now.residual), data, order):
+            J[:, order] = 0.0
+        gram, slope = J.T @ J, J.T @ now.residual
+        size = np.maximum(np.diag(gram), 1e-30 + 1e-12 * np.diag(gram).max())
+        improved = False
+        for _ in range(8):
+            step = np.linalg.solve(gram + np.diag(damping * size), -slope)
+            # A factor of e in one step is as far as the linear picture goes.
+            step[:order] = np.clip(step[:order], -1.0, 1.0)
+            trial = _inside(theta + step, data, order)
+            moved = project(data.s, data.response, data.weight, trial, order, count)
+            trial_cost = _cost(moved.residual)
+            if trial_cost < cost:
+                improved = True
+                break
+            damping = min(damping * 6.0, 1e12)
+        if not improved:
+            break
+        drop = cost - trial_cost
+        theta, now, cost = trial, moved, trial_cost
+        damping = max(damping / 8.0, 1e-12)
+        # Two small steps in a row: one alone may be a damped step in a narrow valley.
+        stalled = stalled + 1 if drop <= 1e-9 * cost else 0
+        if stalled == 2:
+            break
+    return RationalFit(order=order, theta=theta, numerator=now.numerator, cost=cost)
+
+
+def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
+    """Invert the information on (poles, dead time, numerator).
+
+    Parameters
+    ----------
+    data : FRFData
+    fit : RationalFit
+    scale : float
+        Variance of the weighted misfit at a point, real and imaginary part together.
+
+    Returns
+    -------
+    ndarray, shape (P, P)
+        With infinite diagonal entries where the data say nothing.
+    """
+    J = full_jacobian(data.s, data.weight, fit.theta, fit.numerator, fit.order)
+    size = np.linalg.norm(J, axis=0)
+    size[size == 0] = 1.0
+    _, sv, Vt = np.linalg.svd(J / size, full_matrices=False)
+    if sv[-1] <= 1e-10 * sv[0]:
+        return np.full((size.size, size.size), np.inf)
+    root = Vt.T / sv
+    # Half of the complex variance is in each of the two rows of a point.
+    return np.asarray(0.5 * scale * (root @ root.T) / np.outer(size, size))
+
+
+def profile_interval(
+    data: FRFData, fit: RationalFit, count: int, scale: float, std: float
+) -> tuple[float, float]:
+    """Find the dead times at which the misfit has grown by what 95 % confidence allows."""
+    allowed = 0.5 * scale * _CHI2_95
+    best = fit.theta[fit.order]
+    ends = []
+    for side in (-1.0, 1.0):
+        bound = 0.0 if side < 0 else data.max_dead_time
+        reach = abs(bound - best)
+        step = min(max(1.96 * std if np.isfinite(std) else 0.1 * reach, 1e-9), reach)
+        inside, outside = 0.0, None
+        start = fit.theta
+        for _ in range(12):
+            if step <= 0:
+                break
+            theta = start.copy()
+            theta[fit.order] = best + side * step
+            moved = refine(data, fit.order, count, theta, frozen_delay=True)
+            grown = moved.cost - fit.cost
+            if grown < allowed:
+                inside, start = step, moved.theta
+                if step >= reach:
+                    break
+                if grown > 0.8 * allowed:
+                    break
+                ratio = np.sqrt(allowed / max(grown, 1e-3 * allowed))
+                wanted = step * min(1.02 * ratio, 3.0)
+                step = min(wanted, reach) if outside is None else 0.5 * (step + outside)
+            else:
+                outside = step
+                if outside - inside < 0.05 * outside:
+                    break
+                ratio = np.sqrt(allowed / grown)
+                step = max(step * ratio, inside + 0.1 * (outside - inside))
+        ends.append(best + side * (inside if outside is None else 0.5 * (inside + outside)))
+    return float(ends[0]), float(ends[1])
+
+
+def delay_grid(data: FRFData, order: int) -> FloatArray:
+    """Spread candidate dead times, close enough that no minimum is missed."""
+    # The misfit has a minimum about every half turn of the phase at the highest frequency.
+    turns = data.max_dead_time * np.abs(data.s).max() / (2 * np.pi)
+    count = int(np.clip(np.ceil(4 * turns), 6, 200))
+    return np.linspace(0.0, data.max_dead_time, count + 1)
+
+
+def _inside(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
+    """Keep poles near the band, dampings sane and the dead time in its range."""
+    omega = np.abs(data.s)
+    low, high = np.log(omega.min() / 100), np.log(omega.max() * 100)
+    kept = theta.copy()
+    pairs = order - order % 2
+    kept[0:pairs:2] = np.clip(kept[0:pairs:2], 2 * low, 2 * high)
+    middle = 0.5 * kept[0:pairs:2] + np.log(2.0)
+    kept[1:pairs:2] = np.clip(kept[1:pairs:2], middle + np.log(1e-4), middle + np.log(1e3))
+    kept[pairs:order] = np.clip(kept[pairs:order], low, high)
+    kept[order] = np.clip(kept[order], 0.0, data.max_dead_time)
+    return kept
+
+
+def _pinned(theta: FloatArray, slope: float, data: FRFData, order: int) -> bool:
+    at_zero = theta[order] <= 0.0 and slope >= 0.0
+    return bool(at_zero or (theta[order] >= data.max_dead_time and slope <= 0.0))
+
+
+def _cost(residual: FloatArray) -> float:
+    return float(residual @ residual)

@@ -1,0 +1,248 @@
+"""Transfer function with dead time from a frequency response."""
+
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.numerics.spectra import hold_response
+
+F = np.geomspace(0.1, 30, 80)
+S = 2j * np.pi * F
+
+
+def second_order(s, tau=0.04):
+    """Gain 2, poles at 2 and 5 Hz, relative degree 2."""
+    return 2 * np.exp(-s * tau) / (s / (4 * np.pi) + 1) / (s / (10 * np.pi) + 1)
+
+
+def noisy(seed, *, f=F, level=0.01, plant=second_order):
+    rng = np.random.default_rng(seed)
+    exact = plant(2j * np.pi * f)
+    std = np.full(f.size, level)
+    noise = std * (rng.standard_normal(f.size) + 1j * rng.standard_normal(f.size)) / np.sqrt(2)
+    return cr.MeasuredFRF(exact + noise, f, std=std)
+
+
+def read_frf(path):
+    table = np.genfromtxt(path, delimiter=",", skip_header=1)
+    return cr.MeasuredFRF(table[:, 1] * np.exp(1j * np.radians(table[:, 2])), table[:, 0])
+
+
+@given(
+    tau=st.floats(0, 0.5),
+    gain=st.floats(0.01, 100),
+    slow=st.floats(0.3, 3),
+    pair=st.floats(4, 12),
+    damping=st.floats(0.1, 0.95),
+)
+def test_exact_data_give_the_exact_model_without_a_guess(tau, gain, slow, pair, damping):
+    w = 2 * np.pi * pair
+    response = gain * np.exp(-S * tau) / (S / (2 * np.pi * slow) + 1)
+    response = response * w**2 / (S**2 + 2 * damping * w * S + w**2)
+    fit = cr.fit_frf(cr.MeasuredFRF(response, F), 3, relative_degree=3, dt=1e-3).fit
+    # Rounding (1e-16) over curvature: three superfluous digits are lost at low damping.
+    assert fit.dead_time == pytest.approx(tau, abs=1e-7)
+    assert fit.gain == pytest.approx(gain, rel=1e-6)
+    assert fit.misfit < 1e-7
+
+
+def test_model_is_the_continuous_fit_behind_a_hold_with_its_fractional_delay():
+    model = cr.fit_frf(noisy(0), 2, dt=1 / 1280)
+    assert isinstance(model, cr.DelayedStateSpace)
+    omega = 2 * np.pi * np.array([0.3, 2.0, 13.0])
+    expected = model.fit.response(omega) * hold_response(omega, 1 / 1280)
+    # Aliases of a plant of relative degree 2 at 13 Hz of 1280: (13/1280)^2.
+    assert_allclose(model(np.exp(1j * omega / 1280)), expected, rtol=3e-4)
+    assert model.dead_time == pytest.approx(model.fit.dead_time, abs=1 / 1280)
+    omega = np.array([1.0, 5.0])
+    by_hand = model.fit.core(1j * omega) * np.exp(-1j * omega * model.fit.dead_time)
+    assert_allclose(model.fit.response(omega), by_hand, rtol=1e-12)
+
+
+def test_dead_times_scatter_as_the_stated_deviation_and_are_covered():
+    fits = [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(80)]
+    error = np.array([fit.dead_time - 0.04 for fit in fits])
+    std = np.array([fit.std for fit in fits])
+    # Standard deviation of 80 runs is known to 8 %; three of them.
+    assert error.std() == pytest.approx(std.mean(), rel=0.24)
+    assert abs(error.mean()) < 3 * std.mean() / np.sqrt(80)
+    inside = np.mean([fit.interval[0] <= 0.04 <= fit.interval[1] for fit in fits])
+    assert 0.88 <= inside <= 1.0  # 95 +- 2.4 %, three of them
+    assert np.mean([fit.misfit for fit in fits]) == pytest.approx(1.0, abs=0.03)
+
+
+def test_stated_deviation_is_the_cramer_rao_bound():
+    fit = cr.fit_frf(noisy(3), 2, relative_degree=2, dt=1e-3).fit
+
+    def model(p):
+        return p[0] * np.exp(-S * p[1]) / (S / p[2] + 1) / (S / p[3] + 1)
+
+    truth = np.array([2, 0.04, 4 * np.pi, 10 * np.pi])
+    J = np.stack(
+        [
+            (model(truth + h) - model(truth - h)) / (2 * np.abs(h).max())
+            for h in np.diag(1e-6 * truth)
+        ],
+        axis=1,
+    )
+    information = 2 * (J.conj().T @ J).real / 0.01**2
+    bound = np.sqrt(np.linalg.inv(information)[1, 1])
+    # The misfit of 76 degrees of freedom scales it: 8 % above at most here.
+    assert fit.std == pytest.approx(bound, rel=0.1)
+
+
+def test_structure_is_found_from_the_data():
+    right = 0
+    for seed in range(10):
+        fit = cr.fit_frf(noisy(seed), dt=1e-3).fit
+        right += (fit.order, fit.relative_degree) == (2, 2)
+        assert fit.interval[0] <= 0.04 <= fit.interval[1]
+    assert right >= 9  # a superfluous parameter must gain 5 in BIC: 2 % of runs
+
+
+def test_superfluous_zero_takes_the_dead_time_away_and_is_said():
+    # Theorem: no information on the dead time where the numerator is freer than the plant's.
+    fit = cr.fit_frf(noisy(1), 2, relative_degree=1, dt=1e-3).fit
+    exact = cr.fit_frf(noisy(1), 2, relative_degree=2, dt=1e-3).fit
+    assert fit.interval[1] - fit.interval[0] > 5 * (exact.interval[1] - exact.interval[0])
+    assert fit.interval[0] <= 0.04 <= fit.interval[1]
+    assert fit.total_delay == pytest.approx(exact.total_delay, rel=0.01)
+
+
+def test_many_turns_of_phase_need_no_guess():
+    fit = cr.fit_frf(noisy(2, plant=lambda s: second_order(s, tau=1.5)), 2, dt=1e-3).fit
+    assert fit.dead_time == pytest.approx(1.5, abs=0.002)
+
+
+@given(st.floats(1e-6, 1e6), st.floats(1e-3, 1e3))
+def test_units_of_output_and_time_change_nothing_else(size, rate):
+    frf = noisy(5)
+    plain = cr.fit_frf(frf, 2, dt=1e-3).fit
+    moved = cr.MeasuredFRF(frf.complex * size, F * rate, std=frf.std * size)
+    other = cr.fit_frf(moved, 2, dt=1e-3 / rate).fit
+    # Minima are found to 1e-9 of the cost, so to 1e-5 of a standard deviation or better.
+    assert other.dead_time * rate == pytest.approx(plain.dead_time, abs=1e-3 * plain.std)
+    assert other.gain == pytest.approx(plain.gain * size, rel=1e-5)
+    assert other.misfit == pytest.approx(plain.misfit, rel=1e-6)
+    assert_allclose(np.array(other.interval) * rate, plain.interval, rtol=1e-3)
+
+
+def test_simulated_valve_gives_37_samples_within_a_tenth():
+    valve = cr.bench.valve()
+    frf = cr.stepped_sine_frf(valve.stepped_sine(11, points=250))
+    fit = cr.fit_frf(frf, dt=valve.dt).fit
+    assert (fit.order, fit.relative_degree) == (4, 4)
+    assert fit.dead_time / valve.dt == pytest.approx(37, abs=0.3)
+    assert fit.interval[0] <= 37 * valve.dt <= fit.interval[1]
+    assert fit.total_delay == pytest.approx(valve.truth.total_delay, rel=1e-3)
+    assert np.sort(np.abs(fit.poles)) / (2 * np.pi) == pytest.approx([2.2, 8, 8, 30], rel=0.05)
+
+
+def test_motor_with_tacho_has_2_9_ms_of_dead_time_and_one_lag(shared_data):
+    fit = cr.fit_frf(read_frf(shared_data / "dc_motor_tacho" / "frf.csv"), 1, dt=73e-6).fit
+    assert fit.dead_time == pytest.approx(2.9e-3, abs=0.1e-3)
+    assert fit.gain == pytest.approx(2.03, abs=0.02)
+    assert -1 / fit.poles[0].real == pytest.approx(11.75e-3, rel=0.01)
+    assert not fit.noise_known
+
+
+def test_circuit_without_delay_is_given_less_than_three_samples(shared_data):
+    fit = cr.fit_frf(read_frf(shared_data / "rlc_zero_delay" / "frf.csv"), dt=20e-6).fit
+    assert fit.interval[0] < 40e-6
+    assert fit.dead_time < 60e-6
+
+
+def test_stage_has_its_authors_poles_inside_the_band(shared_data):
+    frf = read_frf(shared_data / "stage" / "frf_output_1.csv")
+    fit = cr.fit_frf(frf, 8, dt=1e-4, band_hz=(2, 400)).fit
+    for pole in (-131.1 + 1868.1j, -22.70 + 559.8j, -5.447 + 191.4j):
+        assert np.abs(fit.poles - pole).min() < 0.02 * abs(pole)
+
+
+def test_motor_bench_resonance_and_one_sample_of_delay(shared_data):
+    data = np.load(shared_data / "motor_bench_multisine.npz")
+    dt = float(data["dt"])
+    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
+    frf = cr.spectral_frf(record, period=int(data["period"]))
+    fit = cr.fit_frf(frf, dt=dt, hold="zoh").fit
+    assert fit.dead_time / dt == pytest.approx(1, abs=0.3)
+    assert np.abs(fit.poles[-1]) / (2 * np.pi) == pytest.approx(76.6, abs=1)
+    assert [flag.code for flag in fit.flags] == ["misfit"]
+
+
+def test_hold_is_divided_out_where_the_input_was_held():
+    dt = 0.004
+    plant = cr.delayed_ss(ct.tf([2], [0.08, 1]), dead_time=0.0243, dt=dt)
+    f = np.geomspace(0.1, 30, 60)
+    frf = cr.MeasuredFRF(plant(np.exp(2j * np.pi * f * dt)), f)
+    with_hold = cr.fit_frf(frf, 1, dt=dt, hold="zoh", weighting="uniform").fit.dead_time
+    without = cr.fit_frf(frf, 1, dt=dt, weighting="uniform").fit.dead_time
+    # Aliases of a first-order lag are not part of the hold: (30/250)^2 at the last points.
+    assert with_hold == pytest.approx(0.0243, abs=5e-5)
+    assert without - with_hold == pytest.approx(dt / 2, rel=0.1)
+
+
+def test_direct_term_is_fitted_and_its_delay_rounded_and_said():
+    response = np.exp(-S * 0.0105) * (S + 40) / (S + 10)
+    model = cr.fit_frf(cr.MeasuredFRF(response, F), 1, relative_degree=0, dt=0.002)
+    assert model.fit.dead_time == pytest.approx(0.0105, abs=1e-7)
+    assert model.delay == 5
+    assert model.fit.matrices[3][0, 0] == pytest.approx(1.0, rel=1e-6)
+    assert model.fit.flags[0].code == "dead_time_rounded"
+
+
+def test_noisy_points_count_for_little():
+    std = np.where(F > 10, 3.0, 0.003)
+    rng = np.random.default_rng(8)
+    noise = std * (rng.standard_normal(F.size) + 1j * rng.standard_normal(F.size)) / np.sqrt(2)
+    frf = cr.MeasuredFRF(second_order(S) + noise, F, std=std)
+    weighted = cr.fit_frf(frf, 2, relative_degree=2, dt=1e-3).fit
+    flat = cr.fit_frf(frf, 2, relative_degree=2, dt=1e-3, weighting="uniform").fit
+    assert abs(weighted.dead_time - 0.04) < 1e-3
+    assert abs(flat.dead_time - 0.04) > 10 * abs(weighted.dead_time - 0.04)
+
+
+def test_result_pickles_and_tells_itself():
+    model = cr.fit_frf(noisy(0), 2, dt=1e-3, name="bench")
+    assert model.name == "bench"
+    fit = pickle.loads(pickle.dumps(model)).fit
+    assert fit.dead_time == model.fit.dead_time
+    assert "\n" not in repr(fit)
+    assert "95 % interval" in fit.report()
+    table = fit.table()
+    assert len(table) == 2
+    assert table["bic"].is_monotonic_increasing
+    with pytest.raises(ValueError, match="read-only"):
+        model.fit.measured[0] = 0
+
+
+@pytest.mark.parametrize(
+    ("frf", "options", "match"),
+    [
+        (3.0, {}, "float"),
+        (ct.frd(np.ones((2, 1, 5)), np.arange(1, 6.0)), {}, "2 outputs"),
+        (cr.MeasuredFRF(second_order(S), F), {"order": 0}, "order"),
+        (cr.MeasuredFRF(second_order(S), F), {"order": []}, "empty"),
+        (cr.MeasuredFRF(second_order(S), F), {"order": 2.5}, "order"),
+        (cr.MeasuredFRF(second_order(S), F), {"order": 2, "relative_degree": 3}, "above"),
+        (cr.MeasuredFRF(second_order(S[:4]), F[:4]), {"order": 3}, "too few"),
+        (cr.MeasuredFRF(0 * S, F), {}, "usable"),
+        (cr.MeasuredFRF(second_order(S), F), {"band_hz": (50, 60)}, "usable"),
+        (cr.MeasuredFRF(second_order(S), F), {"weighting": "std"}, "no standard deviation"),
+        (cr.MeasuredFRF(second_order(S), F), {"weighting": "best"}, "'relative'"),
+        (cr.MeasuredFRF(second_order(S), F), {"hold": "zoh"}, "needs dt"),
+        (cr.MeasuredFRF(second_order(S), F), {"dt": -1.0}, "dt"),
+        (cr.MeasuredFRF(second_order(S), F), {"max_dead_time": 0.0}, "max_dead_time"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(frf, options, match):
+    with pytest.raises(cr.CtrlRealizeError, match=match):
+        cr.fit_frf(frf, **options)
