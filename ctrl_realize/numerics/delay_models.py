@@ -160,7 +160,9 @@ def _single_channel(
     group = max(1, int(GROUP_BYTES // (8 * size * order)))
     for start in range(0, delays.size, group):
         rows = slice(start, start + group)
-        h = windows[delays[rows] + 1]
+        first, final = int(delays[rows][0]), int(delays[rows][-1])
+        in_a_row = np.array_equal(delays[rows], np.arange(first, final + 1))
+        h = windows[first + 1 : final + 2] if in_a_row else windows[delays[rows] + 1]
         pairs = leading_eigenpairs(h if padded else h[:, : 2 * size - 1], size, order, tol=tol)
         last = None if padded else h[:, size : 2 * size]
         A[rows], B[rows, :, 0], C[rows, 0] = realize_symmetric(pairs.values, pairs.vectors, last)

@@ -42,9 +42,11 @@ CHUNK_BYTES = 8e6
 PROBES = 5
 """Members that are looked at before all are."""
 
-LEAST_WAIT = 2
 LONGEST_WAIT = 10
 """Steps between two looks at the residuals."""
+
+LOOK_COST = 2e5
+"""Numbers in the vectors of a step that costs as much as a look."""
 
 LOSS_OVER_TOL = 1e-3
 """Loss of orthogonality that is let pass, relative to the tolerance of the residuals."""
@@ -147,11 +149,13 @@ class _Result:
         return _Result(self.values[rows], self.vectors[rows], self.following[rows])
 
     def put(self, d: int, values: FloatArray, vectors: FloatArray, following: float) -> None:
+        """Store pairs up to the numerical rank; `vectors` may lie in their place already."""
         magnitude = np.abs(values)
         rounding = vectors.shape[1] * np.finfo(float).eps * magnitude.max()
         rank = int(np.count_nonzero(magnitude > rounding))
         self.values[d, :rank] = values[:rank]
         self.vectors[d, :rank] = vectors[:rank]
+        self.vectors[d, rank:] = 0.0
         self.following[d] = following
 
 
@@ -161,7 +165,7 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
     room = int(BASIS_BYTES // (8 * size * members.size))
     capacity = min(size - 1, MAX_STEPS, max(room, 2 * count + 6))
     run = LanczosRecurrence(h, size, capacity, LOSS_OVER_TOL * tol)
-    pace = _Pace(count + 2)
+    pace = _Pace(count + 2, LOOK_COST / (size * members.size))
     while members.size and run.steps < capacity:
         run.advance()
         exhausted = run.exhausted_at <= run.steps
@@ -175,15 +179,20 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
         if excess > 1:
             continue
         doubtful = exhausted & ~run.sees_everything() if exhausted.any() else exhausted
-        left = []
-        for i, d in enumerate(members.tolist()):
-            values, residuals, coordinates, following = run.ritz(i, count)
+        pairs = [run.ritz(i, count) for i in range(members.size)]
+        left = [i for i, pair in enumerate(pairs) if _excess(*pair[:2], tol) > 1]
+        if not left:
+            run.end_products()
+        for i in sorted(set(range(members.size)) - set(left)):
+            d = int(members[i])
+            values, _, coordinates, following = pairs[i]
             if doubtful[i]:
                 _fall_back(h[d], size, count, run.mixture(i, coordinates), result, d)
-            elif _excess(values, residuals, tol) <= 1:
-                result.put(d, values, run.vectors(i, coordinates), following)
             else:
-                left.append(i)
+                # straight to their place: a million samples leave no room for a copy
+                vectors = result.vectors[d, : values.size]
+                run.vectors(i, coordinates, vectors)
+                result.put(d, values, vectors, following)
         members = members[left]
         if left:
             run.keep(np.array(left))
@@ -204,17 +213,18 @@ def _excess(values: FloatArray, residuals: FloatArray, tol: float) -> float:
 class _Pace:
     """Says when to look at the residuals again: they fall about geometrically."""
 
-    def __init__(self, first: int) -> None:
+    def __init__(self, first: int, longest: float) -> None:
         self.next_look = first
+        self._longest = max(1.0, min(longest, LONGEST_WAIT))
         self._looked = 0
         self._excess = np.inf
 
     def set(self, steps: int, excess: float) -> None:
-        waited, wait = steps - self._looked, LEAST_WAIT
+        waited, wait = steps - self._looked, min(2.0, self._longest)
         if 1 < excess < self._excess < np.inf:
             needed = waited * np.log(excess) / np.log(self._excess / excess)
-            wait = int(np.clip(0.6 * needed, LEAST_WAIT, LONGEST_WAIT))
-        self.next_look, self._looked, self._excess = steps + wait, steps, excess
+            wait = min(max(0.6 * needed, wait), self._longest)
+        self.next_look, self._looked, self._excess = steps + int(wait), steps, excess
 
 
 def _fall_back(

@@ -126,14 +126,17 @@ class LanczosRecurrence:
         residuals = self.beta[i, steps - 1] * np.abs(coordinates[-1, :count])
         return values[:count], residuals, coordinates[:, :count], following
 
-    def vectors(self, i: int, coordinates: FloatArray) -> FloatArray:
-        """Return the Ritz vectors of member i, as rows."""
-        vectors: FloatArray = coordinates.T @ self.basis[i, : coordinates.shape[0]]
-        return vectors
+    def end_products(self) -> None:
+        """Give back the memory that only further steps would need."""
+        del self.stack
+
+    def vectors(self, i: int, coordinates: FloatArray, out: FloatArray) -> None:
+        """Write the Ritz vectors of member i into the rows of `out`."""
+        np.matmul(coordinates.T, self.basis[i, : coordinates.shape[0]], out=out)
 
     def mixture(self, i: int, coordinates: FloatArray) -> FloatArray:
         """Return a start vector that holds all leading directions of member i."""
-        vector: FloatArray = self.vectors(i, coordinates).sum(axis=0)
+        vector: FloatArray = coordinates.sum(axis=1) @ self.basis[i, : coordinates.shape[0]]
         vector += 1e-3 * self.basis[i, 0]
         return vector
 
