@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Literal, TypedDict
 
 import control as ct
 import numpy as np
 
 from ..checks import one_of, positive
 from ..delayed import DelayedStateSpace, delayed_ss
-from ..errors import DataError, OptionError, OrderError
-from ..numerics.arrays import FloatArray
+from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.output_error import OutputErrorFit, fit_output_error
-from ..numerics.separable_fit import Structure
-from ..numerics.step_problem import StepData, step_data
+from ..numerics.sampled_fit import fit_sampled
+from ..numerics.separable_fit import KnownFactor, Structure
+from ..numerics.step_problem import StepData, bare_data, step_data
 from ..signals import Record
-from .delay_fit_result import DelayFit, StructureRow
-from .fit_flags import INTEGRATOR, fit_flags
+from .averaging import aligned_steps, delay_outliers, mean_step, repeatability
+from .delay_fit_result import DelayFit, Repeatability
+from .fit_flags import fit_flags, repeat_flags, sampled_flags
+from .fit_summary import fitted_core, summarise
 from .known_dynamics import known_factor
 from .steps import detect_step
 
 Loss = Literal["huber", "least_squares"]
 
 MOST_ORDER = 8
+_MOST_EDGES = 12  # an input with more of them is no step experiment
+_DWELL = 3  # times the first motion: steps that follow faster hide each other's onset
 
 
 def fit_delay(
@@ -98,19 +103,85 @@ def fit_delay(
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)
     several = _records(records)
+    settings: _Settings = {"structures": tried, "known": factor, "huber": loss == "huber"}
     if len(several) > 1:
-        raise DataError("one record at a time")
-    record = several[0]
-    data = _step_data(record)
-    fit = fit_output_error(
-        data,
-        structures=tried,
-        latest=None if limit is None else limit * data.dt,
-        known=factor,
-        huber=loss == "huber",
+        result, fit = _fit_mean(several, limit, settings)
+    else:
+        result, fit = _fit_one(several[0], limit, settings)
+    core = fitted_core(fit, result.poles)
+    if include_known and known is not None:
+        core = ct.ss(known) * core
+    return delayed_ss(
+        core,
+        dead_time=result.dead_time,
+        dt=result.dt,
+        fit=result,
+        name=several[0].name.replace(".", "_") or None,
+        inputs=list(several[0].input_labels),
+        outputs=list(several[0].output_labels),
     )
-    result = _delay_fit(data, fit, several, record.time, limit)
-    return _system(result, fit, data, record, known if include_known else None)
+
+
+class _Settings(TypedDict):
+    structures: tuple[Structure, ...] | None
+    known: KnownFactor
+    huber: bool
+
+
+def _fit_one(
+    record: Record, limit: float | None, settings: _Settings
+) -> tuple[DelayFit, OutputErrorFit]:
+    data = _step_data(record)
+    latest = None if limit is None else limit * record.dt
+    if data is not None:
+        fit = fit_output_error(data, latest=latest, **settings)
+        flags = fit_flags(data, fit, limit)
+        return summarise(fit, data, record.time, (record,), flags), fit
+    signal, output = np.ravel(record.input), np.ravel(record.output)
+    if np.ptp(signal) == 0:
+        raise NoStepError(f"the input of record {record.name!r} does not move")
+    fit = fit_sampled(output, signal, record.dt, latest=latest, **settings)
+    n = fit.fitted.size
+    flags = sampled_flags(fit, record.dt, n * record.dt, limit)
+    rest = bare_data(output[:n], signal[:n], record.dt, fit.residual)
+    return summarise(fit, rest, record.time[:n], (record,), flags), fit
+
+
+def _fit_mean(
+    records: tuple[Record, ...], limit: float | None, settings: _Settings
+) -> tuple[DelayFit, OutputErrorFit]:
+    steps = aligned_steps(records)
+    latest = None if limit is None else limit * steps[0].dt
+    skip: tuple[int, ...] = ()
+    for _ in range(2):
+        mean = mean_step(steps, skip)
+        data = step_data(mean.output, mean.input, mean.dt, [(mean.edge, 1)])
+        if data.motion is None:
+            raise DataError("the mean of the records does not leave its rest level by 5 sigma")
+        fit = fit_output_error(data, latest=latest, **settings)
+        repeats = repeatability(steps, mean, fit.fitted, fit.delay)
+        apart = delay_outliers(repeats, mean.used)
+        if not apart:
+            break
+        skip = apart
+    fit = _widened(fit, repeats, mean.used)
+    flags = fit_flags(data, fit, limit) + repeat_flags(repeats)
+    time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
+    result = summarise(fit, data, time, records, flags)
+    return replace(result, repeatability=repeats), fit
+
+
+def _widened(fit: OutputErrorFit, repeats: Repeatability, used: tuple[int, ...]) -> OutputErrorFit:
+    """Add the scatter of the mean where records differ by more than their noise."""
+    if repeats.p_value >= 0.01:
+        return fit
+    between = float(repeats.delays[list(used)].std(ddof=1)) / np.sqrt(len(used))
+    return replace(
+        fit,
+        low=max(fit.low - 1.96 * between, 0.0),
+        high=fit.high + 1.96 * between,
+        std=float(np.hypot(fit.std, between)),
+    )
 
 
 def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -145,148 +216,21 @@ def _structures(structures: Sequence[tuple[int, int]] | None) -> tuple[Structure
     return tuple(dict.fromkeys(chosen))
 
 
-def _step_data(record: Record) -> StepData:
-    edge = detect_step(record)
+def _step_data(record: Record) -> StepData | None:
+    """Data of a step record, None where the input is anything else."""
+    try:
+        edges = detect_step(record).edges
+    except NoStepError:
+        return None
+    if len(edges) > _MOST_EDGES:
+        return None
     signal, output = np.ravel(record.input), np.ravel(record.output)
-    data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edge.edges])
+    data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edges])
     if data.motion is None:
         raise DataError(
             f"the output of record {record.name!r} does not leave its rest level by 5 sigma "
-            f"({5 * data.sigma:.3g}) for long after the step at {edge.time:.6g} s"
+            f"({5 * data.sigma:.3g}) for long after the step at {edges[0].time:.6g} s"
         )
+    if len(edges) > 1 and edges[1].index - edges[0].index < _DWELL * data.motion.crossing:
+        return None
     return data
-
-
-def _delay_fit(
-    data: StepData,
-    fit: OutputErrorFit,
-    records: tuple[Record, ...],
-    time: FloatArray,
-    max_delay: float | None,
-) -> DelayFit:
-    assert data.motion is not None
-    lag = fit.delay + _lags(fit, data)
-    return DelayFit(
-        dead_time=fit.delay,
-        std=fit.std,
-        interval=(fit.low, fit.high),
-        onset=data.motion.onset * data.dt,
-        total_delay=lag,
-        order=fit.structure.order,
-        relative_degree=fit.structure.relative_degree,
-        poles=_locked(np.sort_complex(_integrators_at_zero(fit, data))),
-        zeros=_locked(_zeros(fit)),
-        gain=_gain(fit, data),
-        at_noise_level=fit.adequate,
-        misfit=fit.misfit,
-        noise=data.sigma,
-        residual=fit.residual,
-        correlation=fit.correlation,
-        views=dict(fit.views),
-        structures=tuple(
-            StructureRow(
-                line.structure.order,
-                line.structure.relative_degree,
-                line.delay,
-                line.total_delay,
-                line.excess,
-                None if np.isnan(line.low) else (line.low, line.high),
-            )
-            for line in fit.structures
-        ),
-        profile_delay=_locked(fit.profile[0]),
-        profile_excess=_locked(fit.profile[1]),
-        time=time,
-        measured=_locked(data.output),
-        fitted=_locked(fit.fitted),
-        dt=data.dt,
-        records=records,
-        choices=_choices(data, fit),
-        flags=fit_flags(data, fit, max_delay),
-    )
-
-
-def _locked(values: Any) -> Any:
-    values = np.array(values)
-    values.flags.writeable = False
-    return values
-
-
-def _integrators_at_zero(fit: OutputErrorFit, data: StepData) -> Any:
-    length = (data.output.size - data.edge) * data.dt
-    return np.where(np.abs(fit.poles) < INTEGRATOR / length, 0.0, fit.poles)
-
-
-def _zeros(fit: OutputErrorFit) -> Any:
-    if fit.numerator.size == 1:
-        return np.empty(0, dtype=np.complex128)
-    return np.sort_complex(np.roots(fit.numerator[::-1]))
-
-
-def _lags(fit: OutputErrorFit, data: StepData) -> float:
-    poles = _integrators_at_zero(fit, data)
-    lag = float(np.sum(-1.0 / poles[poles != 0]).real)
-    if fit.numerator.size > 1 and fit.numerator[0] != 0:
-        lag -= float(fit.numerator[1] / fit.numerator[0])
-    return lag
-
-
-def _gain(fit: OutputErrorFit, data: StepData) -> float:
-    """Gain at zero frequency; for an integrating plant that of s G(s)."""
-    poles = _integrators_at_zero(fit, data)
-    return float(fit.numerator[0] / np.prod(-poles[poles != 0]).real)
-
-
-def _choices(data: StepData, fit: OutputErrorFit) -> tuple[str, ...]:
-    s = fit.structure
-    reasons = [
-        f"order {s.order}, relative degree {s.relative_degree}: lowest information criterion of "
-        f"{len(fit.structures)} structures"
-        + ("" if fit.adequate or not fit.views else " with up to three poles")
-    ]
-    if fit.views:
-        reasons.append("dead time: median of five views, as no model leaves only noise")
-    elif fit.adequate:
-        plausible = [line for line in fit.structures if line.low == line.low]
-        reasons.append(
-            "interval: profile likelihood of the "
-            f"{len(plausible)} structure(s) that the data cannot rule out"
-        )
-    if fit.correlation > 1:
-        reasons.append(f"the residual is correlated: {fit.correlation:.3g} samples count as one")
-    return tuple(reasons)
-
-
-def _system(
-    result: DelayFit,
-    fit: OutputErrorFit,
-    data: StepData,
-    record: Record,
-    known: ct.LTI | None,
-) -> DelayedStateSpace:
-    core = _core(fit.numerator, _integrators_at_zero(fit, data))
-    if known is not None:
-        core = ct.ss(known) * core
-    return delayed_ss(
-        core,
-        dead_time=result.dead_time,
-        dt=data.dt,
-        fit=result,
-        name=record.name.replace(".", "_") or None,
-        inputs=list(record.input_labels),
-        outputs=list(record.output_labels),
-    )
-
-
-def _core(numerator: FloatArray, poles: Any) -> ct.StateSpace:
-    """Companion form of b(s)/a(s) in a time unit that makes its entries comparable."""
-    n = poles.size
-    unit = float(np.exp(np.mean(np.log(np.abs(poles[poles != 0]))))) if np.any(poles) else 1.0
-    a = np.real(np.poly(poles / unit))[1:]
-    b = np.zeros(n)
-    b[: numerator.size] = numerator * unit ** np.arange(numerator.size) / unit**n
-    matrix = np.eye(n, k=1)
-    matrix[-1] = -a[::-1]
-    last = np.zeros((n, 1))
-    last[-1] = 1.0
-    return ct.StateSpace(unit * matrix, unit * last, b[None], np.zeros((1, 1)))

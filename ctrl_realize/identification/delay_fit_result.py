@@ -183,7 +183,6 @@ class Repeatability:
     p_value: float
     trend: float
     trend_error: float
-    gain_spread: float
     outlying: tuple[str, ...]
 
     def rows(self) -> list[tuple[str, str]]:

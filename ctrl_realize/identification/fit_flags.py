@@ -7,27 +7,80 @@ import numpy as np
 from ..numerics.output_error import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
+from .delay_fit_result import Repeatability
 
 _SAMPLES_BESIDE_NOTHING = 0.5
 
 
 def fit_flags(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> tuple[Flag, ...]:
     """List the flags of a fit of one (mean) step record."""
+    length = (data.output.size - data.edge) * data.dt
     found = [
-        _bound(data, fit, max_delay),
+        *model_flags(fit, data.dt, length, max_delay),
         _misfit(fit),
-        _disagreement(data, fit),
-        _nothing(data, fit),
-        _integrating(data, fit),
-        _unsettled(data, fit),
-        _inverse(data, fit),
+        _disagreement(data.dt, fit),
         *_disturbances(data, fit),
     ]
     return tuple(flag for flag in found if flag is not None)
 
 
-def _bound(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> Flag | None:
-    if max_delay is None or fit.latest < max_delay * data.dt * (1 - 1e-9):
+def sampled_flags(
+    fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
+) -> tuple[Flag, ...]:
+    """List the flags of a fit of a record whose input is no step."""
+    found = [*model_flags(fit, dt, length, max_delay), _disagreement(dt, fit)]
+    if not fit.adequate:
+        found.append(
+            Flag(
+                "coloured_residual",
+                f"{fit.correlation:.3g} samples of the residual count as one: disturbances, or "
+                "dynamics that the model lacks; the interval is widened by that",
+            )
+        )
+    return tuple(flag for flag in found if flag is not None)
+
+
+def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
+    """List what several records say about each other."""
+    flags = []
+    if result.outlying:
+        flags.append(
+            Flag("outlying_records", "left out of the mean: " + ", ".join(result.outlying))
+        )
+    if result.p_value < 0.01:
+        flags.append(
+            Flag(
+                "records_differ",
+                f"delays differ from record to record by more than their noise (chi-square "
+                f"{result.chi_square:.3g}, p = {result.p_value:.2g}): trigger jitter, friction "
+                "or a changing plant; the interval is widened by that",
+            )
+        )
+    if result.trend_error > 0 and abs(result.trend) > 3 * result.trend_error:
+        flags.append(
+            Flag(
+                "amplitude_trend",
+                f"the delay changes with the amplitude ({result.trend:.2g} +- "
+                f"{result.trend_error:.2g} s per unit): the plant is not linear",
+            )
+        )
+    return tuple(flags)
+
+
+def model_flags(
+    fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
+) -> list[Flag | None]:
+    """List what the model itself shows."""
+    return [
+        _bound(dt, fit, max_delay),
+        _nothing(dt, fit),
+        _slow(fit, length),
+        _inverse(fit),
+    ]
+
+
+def _bound(dt: float, fit: OutputErrorFit, max_delay: float | None) -> Flag | None:
+    if max_delay is None or fit.latest < max_delay * dt * (1 - 1e-9):
         return None
     if fit.high < 0.98 * fit.latest:
         return None
@@ -52,15 +105,15 @@ def _misfit(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _disagreement(data: StepData, fit: OutputErrorFit) -> Flag | None:
+def _disagreement(dt: float, fit: OutputErrorFit) -> Flag | None:
     if fit.views:
         width = fit.high - fit.low
-        if width <= 0.3 * max(fit.delay, data.dt):
+        if width <= 0.3 * max(fit.delay, dt):
             return None
         apart = [f"{name} {delay:.4g} s" for name, delay in fit.views if not _near(fit, delay)]
         return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
     own = next(line for line in fit.structures if line.structure == fit.structure)
-    wide = fit.high - fit.low > 0.3 * max(fit.delay, data.dt)
+    wide = fit.high - fit.low > 0.3 * max(fit.delay, dt)
     if not wide or fit.high - fit.low <= 1.5 * (own.high - own.low):
         return None
     return Flag(
@@ -75,22 +128,11 @@ def _near(fit: OutputErrorFit, delay: float) -> bool:
     return abs(delay - fit.delay) <= 0.15 * fit.delay
 
 
-def _nothing(data: StepData, fit: OutputErrorFit) -> Flag | None:
-    if fit.low > _SAMPLES_BESIDE_NOTHING * data.dt:
+def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
+    if fit.low > _SAMPLES_BESIDE_NOTHING * dt:
         return None
     return Flag(
         "no_delay_resolved", f"a model without dead time fits as well (up to {fit.high:.4g} s)"
-    )
-
-
-def _integrating(data: StepData, fit: OutputErrorFit) -> Flag | None:
-    length = (data.output.size - data.edge) * data.dt
-    if not np.any(np.abs(fit.poles) < INTEGRATOR / length):
-        return None
-    return Flag(
-        "integrating",
-        "the output goes on with a constant slope: a pole is taken as an integrator, the total "
-        "delay is that of the other lags",
     )
 
 
@@ -98,19 +140,24 @@ INTEGRATOR = 5e-3
 """Poles slower than this, times the length of the record, cannot be told from integrators."""
 
 
-def _unsettled(data: StepData, fit: OutputErrorFit) -> Flag | None:
-    length = (data.output.size - data.edge) * data.dt
-    slow = float(np.abs(fit.poles).min())
-    if slow * length >= 2.0 or slow * length < INTEGRATOR:
-        return None
-    return Flag(
-        "not_settled",
-        f"the record ends {slow * length:.2g} of the slowest time constant after the step: gain "
-        "and slowest lag are extrapolated",
-    )
+def _slow(fit: OutputErrorFit, length: float) -> Flag | None:
+    slowest = float(np.abs(fit.poles).min()) * length
+    if slowest < INTEGRATOR:
+        return Flag(
+            "integrating",
+            "the output goes on with a constant slope: a pole is taken as an integrator, the "
+            "total delay is that of the other lags",
+        )
+    if slowest < 2.0:
+        return Flag(
+            "not_settled",
+            f"the record ends {slowest:.2g} of the slowest time constant after the step: gain "
+            "and slowest lag are extrapolated",
+        )
+    return None
 
 
-def _inverse(data: StepData, fit: OutputErrorFit) -> Flag | None:
+def _inverse(fit: OutputErrorFit) -> Flag | None:
     zeros = np.roots(fit.numerator[::-1]) if fit.numerator.size > 1 else np.empty(0)
     right = zeros[zeros.real > 0]
     if not right.size or np.abs(right).min() > 3 * np.abs(fit.poles).max():

@@ -22,36 +22,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import ComplexArray, FloatArray
-from .delayed_modes import HeldInput
-from .noise_level import correlation_time, mad_sigma
+from .fit_window import WindowFit, fit_window
 from .profile_interval import delay_profile, profile_limits
-from .separable_fit import KnownFactor, Problem, Structure, evaluate, fit_batch, respond
-from .step_problem import (
-    StepData,
-    bins_until,
-    fixed_regressors,
-    problem_until,
-    sample_drive,
-    stop_at,
-)
+from .separable_fit import KnownFactor, Structure, evaluate, fit_batch
+from .step_problem import StepData, step_scales, stop_at, window
 from .structure_search import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
     Candidate,
-    Scales,
     choose,
-    criteria,
     parameter_bounds,
     plausible,
-    refine,
-    search,
 )
 
 ADEQUATE = 1.3
 """Residual over noise, in means over bins, up to which a model is taken for right."""
-
-_HUBER = 1.345
-_PASSES = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +71,6 @@ class OutputErrorFit:
     structure: Structure
     poles: ComplexArray
     numerator: FloatArray
-    total_delay: float
     adequate: bool
     misfit: float
     residual: float
@@ -96,27 +80,6 @@ class OutputErrorFit:
     fitted: FloatArray
     profile: tuple[FloatArray, FloatArray]
     latest: float
-
-
-@dataclass(frozen=True, eq=False)
-class _WindowFit:
-    """Candidates on one window, and the noise that the best of them leaves."""
-
-    problem: Problem
-    candidates: dict[Structure, Candidate]
-    criterion: dict[Structure, float]
-    scales: Scales
-    sigma: float
-    correlation: float
-    misfit: float
-
-    @property
-    def variance(self) -> float:
-        return self.sigma**2 * self.correlation
-
-    @property
-    def best(self) -> Candidate:
-        return self.candidates[choose(self.criterion)]
 
 
 def fit_output_error(
@@ -145,121 +108,54 @@ def fit_output_error(
     """
     factor = known or KnownFactor()
     tried = ALL_STRUCTURES if structures is None else tuple(structures)
-    whole = _fit_window(data, data.output.size, tried, latest, factor, huber)
+    whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
     adequate = whole.misfit <= ADEQUATE * data.colour
-    views: tuple[tuple[str, float], ...] = ()
+    if adequate or structures is not None:
+        return likelihood_fit(whole, adequate=adequate)
+    simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
+    chosen = whole.candidates[choose(simple)]
+    return _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
+
+
+def likelihood_fit(whole: WindowFit, *, adequate: bool) -> OutputErrorFit:
+    """Take delay and interval from the likelihood (points 1 and 2 of the rule)."""
     chosen = whole.best
-    if not adequate and structures is None:
-        simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
-        chosen = whole.candidates[choose(simple)]
-        views = _views(data, chosen, latest, factor, huber)
-    kept = [chosen.structure] if views else plausible(whole.criterion, chosen.structure)
-    profiles = _profiles(whole, kept)
-    table = _table(whole, profiles)
-    if views:
-        delay = float(np.median([at for _, at in views[:-1]]))
-        delays = np.sort([at for _, at in views])
-        low, high = float(delays[1]), float(delays[-1])
-        std = (high - low) / 3.92
-        chosen = _with_delay(whole, chosen, delay)
-    else:
-        delay = chosen.delay
-        low = min([delay, *(line.low for line in table if line.low == line.low)])
-        high = max([delay, *(line.high for line in table if line.high == line.high)])
-        own = profile_limits(*profiles[chosen.structure])
-        std = (own[1] - own[0]) / 3.92
-    return _result(data, whole, chosen, adequate, views, table, profiles, (delay, low, high, std))
+    profiles = _profiles(whole, plausible(whole.criterion, chosen.structure))
+    limits = [profile_limits(*profile) for profile in profiles.values()]
+    low = min(chosen.delay, *(ends[0] for ends in limits), chosen.delay)
+    high = max(chosen.delay, *(ends[1] for ends in limits), chosen.delay)
+    own = profile_limits(*profiles[chosen.structure])
+    interval = (low, high, (own[1] - own[0]) / 3.92)
+    return _result(whole, chosen, adequate, (), profiles, interval)
 
 
-def _fit_window(
+def _robust_fit(
+    whole: WindowFit, chosen: Candidate, views: tuple[tuple[str, float], ...]
+) -> OutputErrorFit:
+    """Take delay and interval from the views (points 3 and 4 of the rule)."""
+    delay = float(np.median([at for _, at in views[:-1]]))
+    delays = np.sort([at for _, at in views])
+    low, high = float(delays[1]), float(delays[-1])
+    profiles = _profiles(whole, [chosen.structure])
+    fixed = _with_delay(whole, chosen, delay)
+    return _result(whole, fixed, False, views, profiles, (low, high, (high - low) / 3.92))
+
+
+def _fit_until(
     data: StepData,
     stop: int,
     structures: Sequence[Structure],
     latest: float | None,
     known: KnownFactor,
     huber: bool,
-) -> _WindowFit:
-    """Search all structures on the samples up to `stop`."""
-    bins = bins_until(data, stop)
-    problem = problem_until(data, data.output, bins, stop, known)
-    scales = _scales(data, stop, latest)
-    first = search(problem, [Structure(1, 1)], scales)
-    rough = first[Structure(1, 1)]
-    scales = _with_ringing(data, stop, problem, rough, scales)
-    candidates = search(problem, structures, scales)
-    drive, columns = sample_drive(data, stop), fixed_regressors(data)[:stop]
-    passes = _PASSES if huber else 0
-    for turn in range(passes + 1):
-        best = min(candidates.values(), key=lambda c: c.cost)
-        error = data.output[:stop] - _predict(problem, best, drive, columns)
-        if turn < passes:
-            values = _pseudo_values(error, data, huber)
-            problem = problem_until(data, data.output[:stop] - error + values, bins, stop, known)
-            candidates = refine(problem, candidates, scales)
-    left = _pseudo_values(error, data, huber)
-    after = left[data.edge :]
-    lost = 1 + best.structure.order + best.structure.zeros + columns.shape[1]
-    freedom = max(after.size - lost, 1)
-    level = float(np.sqrt(np.sum(after**2) / freedom))
-    # Below that the residual is rounding, and its correlation says nothing.
-    floor = 0.3 * data.sigma
-    correlation = correlation_time(after) if level > floor else 1.0
-    level = max(level, floor)
-    criterion = criteria(candidates, level**2 * correlation, after.size / correlation)
-    chosen = candidates[choose(criterion)]
-    misfit = np.sqrt(chosen.cost / max(problem.data.size - lost, 1)) / data.sigma
-    return _WindowFit(problem, candidates, criterion, scales, level, correlation, float(misfit))
-
-
-def _scales(data: StepData, stop: int, latest: float | None) -> Scales:
-    motion = data.motion
-    assert motion is not None
-    dt, length = data.dt, (stop - data.edge) * data.dt
-    rise = (min(stop, stop_at(data, 0.63)) - data.edge - motion.onset) * dt
-    last = (motion.crossing + max(1.0, 0.05 * motion.crossing)) * dt
-    return Scales(
-        onset=max(motion.onset, 0.5) * dt,
-        rise=max(rise, 2 * dt),
-        length=length,
-        dt=dt,
-        latest=last if latest is None else min(last, latest),
+) -> WindowFit:
+    return fit_window(
+        window(data, stop, known),
+        structures,
+        step_scales(data, stop, latest),
+        (data.sigma, data.quantum),
+        huber,
     )
-
-
-def _with_ringing(
-    data: StepData, stop: int, problem: Problem, rough: Candidate, scales: Scales
-) -> Scales:
-    """Add the frequency that a first-order fit leaves over."""
-    assert data.motion is not None
-    start = data.edge + data.motion.crossing
-    if stop - start < 16:
-        return scales
-    error = data.output[:stop] - _predict(
-        problem, rough, sample_drive(data, stop), fixed_regressors(data)[:stop]
-    )
-    left = error[start:] - error[start:].mean()
-    power = np.abs(np.fft.rfft(left)) ** 2
-    peak = int(np.argmax(power[2:])) + 2
-    ringing = 2 * np.pi * peak / (left.size * data.dt)
-    return Scales(**{**scales.__dict__, "ringing": float(ringing)})
-
-
-def _pseudo_values(error: FloatArray, data: StepData, huber: bool) -> FloatArray:
-    """Residuals whose least squares are Huber's loss: clipped, and scaled by 1 / E psi'."""
-    if not huber:
-        return error
-    limit = _HUBER * max(mad_sigma(error), 0.5 * data.quantum, 0.1 * data.sigma)
-    inside = float(np.mean(np.abs(error) <= limit))
-    return np.asarray(np.clip(error, -limit, limit) / max(inside, 0.5))
-
-
-def _predict(
-    problem: Problem, candidate: Candidate, drive: HeldInput, columns: FloatArray
-) -> FloatArray:
-    """Model at every sample, with the linear terms of the problem."""
-    state = evaluate(problem, candidate.structure, candidate.parameters[None])
-    model = respond(drive, problem.known, state.numerator[0], candidate.parameters)
-    return np.asarray(model + columns @ state.regression[0])
 
 
 def _views(
@@ -268,8 +164,8 @@ def _views(
     """Looks at the delay that err in different ways, in s; the last serves the interval only."""
     assert data.motion is not None
     lags = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
-    early = _fit_window(data, stop_at(data, 0.15), lags, latest, known, huber)
-    rise = _fit_window(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, known, huber)
+    early = _fit_until(data, stop_at(data, 0.15), lags, latest, known, huber)
+    rise = _fit_until(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, known, huber)
     onset = data.motion.onset * data.dt
     return (
         ("first motion", onset if latest is None else min(onset, latest)),
@@ -282,7 +178,7 @@ def _views(
 
 
 def _profiles(
-    whole: _WindowFit, kept: list[Structure]
+    whole: WindowFit, kept: list[Structure]
 ) -> dict[Structure, tuple[FloatArray, FloatArray]]:
     return {
         s: delay_profile(whole.problem, whole.candidates[s], whole.variance, whole.scales)
@@ -291,7 +187,7 @@ def _profiles(
 
 
 def _table(
-    whole: _WindowFit, profiles: dict[Structure, tuple[FloatArray, FloatArray]]
+    whole: WindowFit, profiles: dict[Structure, tuple[FloatArray, FloatArray]]
 ) -> tuple[StructureFit, ...]:
     best = min(whole.criterion.values())
     lines = []
@@ -312,7 +208,7 @@ def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
     return lag
 
 
-def _with_delay(whole: _WindowFit, candidate: Candidate, delay: float) -> Candidate:
+def _with_delay(whole: WindowFit, candidate: Candidate, delay: float) -> Candidate:
     """Best model of the same structure with a given delay."""
     start = candidate.parameters.copy()
     start[0] = delay
@@ -324,36 +220,31 @@ def _with_delay(whole: _WindowFit, candidate: Candidate, delay: float) -> Candid
 
 
 def _result(
-    data: StepData,
-    whole: _WindowFit,
+    whole: WindowFit,
     chosen: Candidate,
     adequate: bool,
     views: tuple[tuple[str, float], ...],
-    table: tuple[StructureFit, ...],
     profiles: dict[Structure, tuple[FloatArray, FloatArray]],
-    interval: tuple[float, float, float, float],
+    interval: tuple[float, float, float],
 ) -> OutputErrorFit:
-    n = data.output.size
     state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
-    fitted = _predict(whole.problem, chosen, sample_drive(data, n), fixed_regressors(data))
-    delay, low, high, std = interval
+    low, high, std = interval
     return OutputErrorFit(
-        delay=delay,
+        delay=chosen.delay,
         low=low,
         high=high,
         std=std,
         structure=chosen.structure,
         poles=chosen.poles,
         numerator=numerator,
-        total_delay=delay + lag_sum(chosen.poles, numerator),
         adequate=adequate,
         misfit=whole.misfit,
         residual=whole.sigma,
         correlation=whole.correlation,
-        structures=table,
+        structures=_table(whole, profiles),
         views=views,
-        fitted=fitted,
+        fitted=whole.window.predict(whole.problem, chosen),
         profile=profiles[chosen.structure],
         latest=whole.scales.latest,
     )

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .delayed_modes import HeldInput, MoveTrain
+from .delayed_modes import MoveTrain
 from .first_motion import FirstMotion, first_motion
+from .fit_window import Window
 from .input_moves import input_moves
 from .noise_level import (
     colouring,
@@ -19,6 +20,7 @@ from .noise_level import (
 )
 from .response_bins import Bins, response_bins
 from .separable_fit import KnownFactor, Problem
+from .structure_search import Scales
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +96,11 @@ def step_data(
     return StepData(output, signal, dt, edges, sigma, quantum, drift, colour, hum, motion)
 
 
+def bare_data(output: FloatArray, signal: FloatArray, dt: float, sigma: float) -> StepData:
+    """Data of a record without a step: nothing is known from samples at rest."""
+    return StepData(output, signal, dt, [(0, 1)], sigma, 0.0, 0.0, 1.0, [], None)
+
+
 def stop_at(data: StepData, part: float) -> int:
     """Sample at which the response has first made `part` of its excursion (1: the end)."""
     n = data.output.size
@@ -109,40 +116,38 @@ def stop_at(data: StepData, part: float) -> int:
     return min(n, edge + max(first, int(motion.onset) + 10, motion.crossing + 3))
 
 
-def bins_until(data: StepData, stop: int) -> Bins:
-    """Bins over the samples up to `stop`."""
+def window(data: StepData, stop: int, known: KnownFactor) -> Window:
+    """Set up the fit of the samples up to `stop`."""
     crossing = data.motion.crossing if data.motion else 0
-    edges = [i for i, _ in data.edges if i < stop]
-    return response_bins(stop, edges, crossing)
-
-
-def bin_weights(data: StepData, bins: Bins) -> FloatArray:
-    """Inverse variance of every mean, that of a single sample being 1."""
-    count = bins.width.astype(np.float64)
-    # Means of undithered samples stay wrong by the rounding, however many there are.
-    return count / (1 + count) * 2 if data.coarse else count
-
-
-def problem_until(
-    data: StepData, values: FloatArray, bins: Bins, stop: int, known: KnownFactor
-) -> Problem:
-    """Set up the fit of values (N,) on the bins."""
+    bins = response_bins(stop, [i for i, _ in data.edges if i < stop], crossing)
     index, size = input_moves(data.input, data.edges, stop)
-    drive = MoveTrain(_at(bins.first, data.dt), bins.width, data.dt, _at(index, data.dt), size)
-    return Problem(
-        bins.average(values[:stop]),
-        np.sqrt(bin_weights(data, bins)),
-        drive,
-        bins.average(fixed_regressors(data)[:stop]),
+    moves = _at(index, data.dt)
+    columns = fixed_regressors(data)[:stop]
+    problem = Problem(
+        bins.average(data.output[:stop]),
+        np.sqrt(_weights(data, bins)),
+        MoveTrain(_at(bins.first, data.dt), bins.width, data.dt, moves, size),
+        bins.average(columns),
         known,
     )
-
-
-def sample_drive(data: StepData, stop: int) -> HeldInput:
-    """Drive that gives the response at every sample."""
-    index, size = input_moves(data.input, data.edges, stop)
     single = np.ones(stop, dtype=np.int64)
-    return MoveTrain(_at(np.arange(stop), data.dt), single, data.dt, _at(index, data.dt), size)
+    drive = MoveTrain(_at(np.arange(stop), data.dt), single, data.dt, moves, size)
+    return Window(data.edge, data.output[:stop], problem, drive, columns, bins)
+
+
+def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
+    """Rough times of the response, from its first motion and its 63 % point."""
+    assert data.motion is not None
+    motion, dt = data.motion, data.dt
+    rise = min(stop, stop_at(data, 0.63)) - data.edge - motion.onset
+    last = (motion.crossing + max(1.0, 0.05 * motion.crossing)) * dt
+    return Scales(
+        onset=max(motion.onset, 0.5) * dt,
+        rise=max(rise, 2.0) * dt,
+        length=(stop - data.edge) * dt,
+        dt=dt,
+        latest=last if latest is None else min(last, latest),
+    )
 
 
 def fixed_regressors(data: StepData) -> FloatArray:
@@ -154,6 +159,13 @@ def fixed_regressors(data: StepData) -> FloatArray:
     if data.hum:
         columns.append(_hum_columns(n, data.hum))
     return np.concatenate(columns, axis=1)
+
+
+def _weights(data: StepData, bins: Bins) -> FloatArray:
+    """Inverse variance of every mean, that of a single sample being 1."""
+    count = bins.width.astype(np.float64)
+    # Means of undithered samples stay wrong by the rounding, however many there are.
+    return count / (1 + count) * 2 if data.coarse else count
 
 
 def _at(index: IntArray, dt: float) -> FloatArray:

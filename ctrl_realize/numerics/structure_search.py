@@ -139,7 +139,10 @@ def choose(criterion: dict[Structure, float]) -> Structure:
 
 
 def plausible(criterion: dict[Structure, float], chosen: Structure) -> list[Structure]:
-    """List what the data cannot rule out: within 10 of the best, or, simplicity counted, of the chosen."""
+    """List what the data cannot rule out.
+
+    That is what is within 10 of the best, or of the chosen with its simplicity counted.
+    """
     limit = min(criterion.values()) + PLAUSIBLE
     weighed = criterion[chosen] + _needless(chosen) + PLAUSIBLE
     return [

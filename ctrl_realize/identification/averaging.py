@@ -1,0 +1,205 @@
+"""Average step records of one plant, and tell how much they differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, trim_mean
+
+from ..errors import DataError
+from ..numerics.arrays import FloatArray
+from ..numerics.noise_level import correlation_time, mad_sigma
+from ..signals import Record, StepResponse
+from .delay_fit_result import Repeatability
+from .steps import unit_step
+
+_TRIM = 0.1
+_SAME_AMPLITUDE = 0.03
+_APART = 5.0  # robust standard deviations from the others
+_MOST_LAGS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class MeanStep:
+    """Mean of aligned unit-step responses.
+
+    Attributes
+    ----------
+    output, input : ndarray, shape (N,)
+        Per unit of input; sample `edge` is the first one after the step.
+    edge : int
+    dt : float
+    used, left_out : tuple of int
+        Positions of the records in the mean, and of those that lie apart.
+    """
+
+    output: FloatArray
+    input: FloatArray
+    edge: int
+    dt: float
+    used: tuple[int, ...]
+    left_out: tuple[int, ...]
+
+
+def aligned_steps(records: tuple[Record, ...]) -> tuple[StepResponse, ...]:
+    """Cut all records at their steps and scale them to a unit step.
+
+    Raises
+    ------
+    DataError
+        Records of different sample times.
+    """
+    first = records[0].dt
+    for record in records:
+        if abs(record.dt - first) > 1e-6 * first:
+            raise DataError(
+                f"record {record.name!r} has dt={record.dt:g} s, the first has {first:g} s; "
+                "records that are fitted together need one sample time"
+            )
+    return tuple(unit_step(record) for record in records)
+
+
+def mean_step(steps: tuple[StepResponse, ...], skip: tuple[int, ...] = ()) -> MeanStep:
+    """Average unit-step responses: trimmed mean per amplitude, then by signal-to-noise.
+
+    Parameters
+    ----------
+    steps : tuple of StepResponse
+    skip : tuple of int
+        Positions to leave out in any case; records far from the rest are left out as well.
+    """
+    before = min(step.pre.size for step in steps)
+    after = min(step.n_samples for step in steps)
+    outputs = np.array(
+        [np.concatenate([s.pre[s.pre.size - before :], s.output[:after]]) for s in steps]
+    )
+    inputs = np.array([np.concatenate([np.zeros(before), s.input[:after]]) for s in steps])
+    far = sorted({*skip, *_far_from_the_rest(outputs)})
+    used = [i for i in range(len(steps)) if i not in far] or list(range(len(steps)))
+    total, weight = np.zeros(before + after), 0.0
+    for group in _groups([abs(steps[i].amplitude) for i in used]):
+        members = [used[g] for g in group]
+        share = sum(steps[i].amplitude ** 2 for i in members)
+        total += share * _trimmed(outputs[members])
+        weight += share
+    return MeanStep(
+        total / weight,
+        inputs[used].mean(axis=0),
+        before,
+        steps[0].dt,
+        tuple(used),
+        tuple(i for i in far if i not in used),
+    )
+
+
+def repeatability(
+    steps: tuple[StepResponse, ...], mean: MeanStep, model: FloatArray, delay: float
+) -> Repeatability:
+    """Compare every record with the common model, shifted and scaled.
+
+    Parameters
+    ----------
+    steps : tuple of StepResponse
+    mean : MeanStep
+    model : ndarray, shape (N,)
+        Response of the common model, sampled as the mean.
+    delay : float
+        Its dead time, in s.
+    """
+    shifts, errors, gains = np.array(
+        [_shift(step, mean, model) for step in steps], dtype=np.float64
+    ).T
+    amplitudes = np.array([step.amplitude for step in steps])
+    kept = np.array(mean.used)
+    weight = errors[kept] ** -2
+    centre = float(np.sum(weight * shifts[kept]) / np.sum(weight))
+    statistic = float(np.sum(weight * (shifts[kept] - centre) ** 2))
+    freedom = max(kept.size - 1, 1)
+    trend, trend_error = _trend(
+        np.abs(amplitudes[kept]), shifts[kept], errors[kept], max(statistic / freedom, 1.0)
+    )
+    names = tuple(step.name or f"record {i}" for i, step in enumerate(steps))
+    return Repeatability(
+        names=names,
+        amplitudes=amplitudes,
+        delays=delay + shifts,
+        errors=errors,
+        gains=gains,
+        chi_square=statistic,
+        p_value=float(chi2.sf(statistic, freedom)),
+        trend=trend,
+        trend_error=trend_error,
+        outlying=tuple(names[i] for i in mean.left_out),
+    )
+
+
+def delay_outliers(result: Repeatability, used: tuple[int, ...]) -> tuple[int, ...]:
+    """Positions of records whose delay lies apart from the others'."""
+    delays = result.delays[list(used)]
+    centre = float(np.median(delays))
+    scale = np.maximum(mad_sigma(delays), result.errors)
+    return tuple(i for i in used if abs(result.delays[i] - centre) > _APART * scale[i])
+
+
+def _trimmed(values: FloatArray) -> FloatArray:
+    return np.asarray(trim_mean(values, _TRIM if len(values) >= 5 else 0.0, axis=0))
+
+
+def _groups(amplitudes: list[float]) -> list[list[int]]:
+    """Positions of records with the same amplitude, within 3 %."""
+    groups: list[list[int]] = []
+    for i in np.argsort(amplitudes):
+        last = groups[-1][0] if groups else None
+        if last is not None and amplitudes[i] <= amplitudes[last] * (1 + _SAME_AMPLITUDE):
+            groups[-1].append(int(i))
+        else:
+            groups.append([int(i)])
+    return groups
+
+
+def _far_from_the_rest(outputs: FloatArray) -> list[int]:
+    """Records whose distance to the median response is out of proportion."""
+    if len(outputs) < 4:
+        return []
+    distance = np.sqrt(np.mean((outputs - np.median(outputs, axis=0)) ** 2, axis=1))
+    # Distances are positive and skewed: their logarithms are compared.
+    size = np.log(np.maximum(distance, 1e-300))
+    scale = max(mad_sigma(size), 0.15)
+    return [int(i) for i in np.flatnonzero(size - np.median(size) > _APART * scale)]
+
+
+def _shift(step: StepResponse, mean: MeanStep, model: FloatArray) -> tuple[float, float, float]:
+    """Delay of a record against the model, its standard error (s), and its relative gain."""
+    n = min(step.n_samples, mean.output.size - mean.edge)
+    y = np.concatenate([step.pre[step.pre.size - mean.edge :], step.output[:n]])
+    index = np.arange(y.size, dtype=np.float64)
+    slope = np.gradient(model[: y.size])
+    shift, error, gain = 0.0, np.inf, 1.0
+    for _ in range(_MOST_LAGS):
+        shape = np.interp(index - shift, index, model[: y.size])
+        steep = np.interp(index - shift, index, slope)
+        columns = np.stack([shape, np.ones_like(shape), -steep], axis=1)
+        solution = np.linalg.lstsq(columns, y, rcond=None)[0]
+        left = y - columns @ solution
+        gain = float(solution[0]) or 1.0
+        move = float(solution[2]) / gain
+        shift += float(np.clip(move, -0.2 * mean.edge - 20, 0.2 * mean.edge + 20))
+        variance = float(left @ left) / max(y.size - 3, 1) * correlation_time(left)
+        error = float(np.sqrt(variance * np.linalg.pinv(columns.T @ columns)[2, 2])) / abs(gain)
+        if abs(move) < 1e-3:
+            break
+    return shift * mean.dt, max(error, 1e-12) * mean.dt, gain
+
+
+def _trend(
+    amplitudes: FloatArray, shifts: FloatArray, errors: FloatArray, inflation: float
+) -> tuple[float, float]:
+    """Slope of the delays over the amplitudes and its standard error; zeros if there is none."""
+    weight = errors**-2
+    centre = float(np.sum(weight * amplitudes) / np.sum(weight))
+    spread = float(np.sum(weight * (amplitudes - centre) ** 2))
+    if np.ptp(amplitudes) <= _SAME_AMPLITUDE * float(np.max(amplitudes)) or amplitudes.size < 3:
+        return 0.0, 0.0
+    slope = float(np.sum(weight * (amplitudes - centre) * shifts)) / spread
+    return slope, float(np.sqrt(inflation / spread))

@@ -1,0 +1,108 @@
+"""Turn what the numerics found into the model and the result that users see."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.output_error import OutputErrorFit, lag_sum
+from ..numerics.step_problem import StepData
+from ..results import Flag
+from ..signals import Record
+from .delay_fit_result import DelayFit, StructureRow
+from .fit_flags import INTEGRATOR
+
+
+def summarise(
+    fit: OutputErrorFit,
+    data: StepData,
+    time: FloatArray,
+    records: tuple[Record, ...],
+    flags: tuple[Flag, ...],
+) -> DelayFit:
+    """Collect a `DelayFit`."""
+    length = (data.output.size - data.edge) * data.dt
+    poles = np.where(np.abs(fit.poles) < INTEGRATOR / length, 0.0, fit.poles)
+    onset = data.motion.onset * data.dt if data.motion is not None else float("nan")
+    zeros = np.roots(fit.numerator[::-1]).astype(np.complex128)
+    return DelayFit(
+        dead_time=fit.delay,
+        std=fit.std,
+        interval=(fit.low, fit.high),
+        onset=onset,
+        total_delay=fit.delay + lag_sum(poles[poles != 0], fit.numerator),
+        order=fit.structure.order,
+        relative_degree=fit.structure.relative_degree,
+        poles=_locked(np.sort_complex(poles)),
+        zeros=_locked(np.sort_complex(zeros)),
+        gain=float(fit.numerator[0] / np.prod(-poles[poles != 0]).real),
+        at_noise_level=fit.adequate,
+        misfit=fit.misfit,
+        noise=data.sigma,
+        residual=fit.residual,
+        correlation=fit.correlation,
+        views=dict(fit.views),
+        structures=tuple(
+            StructureRow(
+                line.structure.order,
+                line.structure.relative_degree,
+                line.delay,
+                line.total_delay,
+                line.excess,
+                None if np.isnan(line.low) else (line.low, line.high),
+            )
+            for line in fit.structures
+        ),
+        profile_delay=_locked(fit.profile[0]),
+        profile_excess=_locked(fit.profile[1]),
+        time=_locked(time),
+        measured=_locked(data.output),
+        fitted=_locked(fit.fitted),
+        dt=data.dt,
+        records=records,
+        choices=_choices(fit),
+        flags=flags,
+    )
+
+
+def fitted_core(fit: OutputErrorFit, poles: ComplexArray) -> ct.StateSpace:
+    """Companion form of b(s)/a(s), in a time unit that makes its entries comparable."""
+    n = poles.size
+    moving = np.abs(poles[poles != 0])
+    unit = float(np.exp(np.mean(np.log(moving)))) if moving.size else 1.0
+    a = np.real(np.poly(poles / unit))[1:]
+    b = np.zeros(n)
+    b[: fit.numerator.size] = fit.numerator * unit ** (np.arange(fit.numerator.size) - float(n))
+    matrix = np.eye(n, k=1)
+    matrix[-1] = -a[::-1]
+    last = np.zeros((n, 1))
+    last[-1] = 1.0
+    return ct.StateSpace(unit * matrix, unit * last, b[None], np.zeros((1, 1)))
+
+
+def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
+    s = fit.structure
+    simple = " with up to three poles" if fit.views else ""
+    reasons = [
+        f"order {s.order}, relative degree {s.relative_degree}: lowest information criterion of "
+        f"{len(fit.structures)} structures{simple}, where zeros and a fourth pole must be worth it"
+    ]
+    if fit.views:
+        reasons.append("dead time: median of five views, as no model leaves only noise")
+    else:
+        count = sum(line.low == line.low for line in fit.structures)
+        reasons.append(
+            f"interval: profile likelihood of {count} structure(s) that the data cannot rule out"
+        )
+    if fit.correlation > 1:
+        reasons.append(f"the residual is correlated: {fit.correlation:.3g} samples count as one")
+    return tuple(reasons)
+
+
+def _locked(values: Any) -> Any:
+    values = np.array(values)
+    values.flags.writeable = False
+    return values

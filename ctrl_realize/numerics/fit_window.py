@@ -1,0 +1,147 @@
+"""Fit all structures to one stretch of a record, and see what noise the best of them leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import FloatArray
+from .delayed_modes import HeldInput
+from .noise_level import correlation_time, mad_sigma
+from .response_bins import Bins
+from .separable_fit import Problem, Structure, evaluate, respond
+from .structure_search import Candidate, Scales, choose, criteria, refine, search
+
+_HUBER = 1.345
+_PASSES = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A stretch of a record, sample by sample and as a problem of means over bins.
+
+    Attributes
+    ----------
+    start : int
+        Residuals count from this sample on.
+    output : ndarray, shape (N,)
+    problem : Problem
+        On the bins, or on the samples where there are none.
+    drive : HeldInput
+        For the response at every sample.
+    columns : ndarray, shape (N, q)
+        Regressors at every sample.
+    bins : Bins or None
+    """
+
+    start: int
+    output: FloatArray
+    problem: Problem
+    drive: HeldInput
+    columns: FloatArray
+    bins: Bins | None
+
+    def with_output(self, values: FloatArray) -> Problem:
+        """Return the problem for other values (N,)."""
+        means = values if self.bins is None else self.bins.average(values)
+        return replace(self.problem, data=means)
+
+    def predict(self, problem: Problem, candidate: Candidate) -> FloatArray:
+        """Model at every sample, with the linear terms of the problem."""
+        state = evaluate(problem, candidate.structure, candidate.parameters[None])
+        model = respond(self.drive, problem.known, state.numerator[0], candidate.parameters)
+        return np.asarray(model + self.columns @ state.regression[0])
+
+
+@dataclass(frozen=True, eq=False)
+class WindowFit:
+    """Candidates on one window, and the noise that the best of them leaves.
+
+    ``variance`` is that of independent noise which would scatter the estimates as much as the
+    residual does: its own times its `correlation`. `misfit` is the root mean square of the
+    residual of the chosen structure, in means over bins, over the noise level given.
+    """
+
+    window: Window
+    problem: Problem
+    candidates: dict[Structure, Candidate]
+    criterion: dict[Structure, float]
+    scales: Scales
+    sigma: float
+    correlation: float
+    misfit: float
+
+    @property
+    def variance(self) -> float:
+        """Variance per sample, colour included."""
+        return self.sigma**2 * self.correlation
+
+    @property
+    def best(self) -> Candidate:
+        """Fit of the chosen structure."""
+        return self.candidates[choose(self.criterion)]
+
+
+def fit_window(
+    window: Window,
+    structures: Sequence[Structure],
+    scales: Scales,
+    noise: tuple[float, float],
+    huber: bool,
+) -> WindowFit:
+    """Search all structures.
+
+    Parameters
+    ----------
+    window : Window
+    structures : sequence of Structure
+    scales : Scales
+    noise : tuple of float
+        Noise level and quantisation step.
+    huber : bool
+        Huber's loss by pseudo-values: the data are moved towards the model, so that their least
+        squares are Huber's. Two passes suffice from a least-squares start.
+    """
+    sigma, quantum = noise
+    problem = window.problem
+    rough = search(problem, [Structure(1, 1)], scales)[Structure(1, 1)]
+    error = window.output - window.predict(problem, rough)
+    scales = replace(scales, ringing=_ringing(error[window.start :], scales.dt))
+    candidates = search(problem, structures, scales)
+    passes = _PASSES if huber else 0
+    for turn in range(passes + 1):
+        best = min(candidates.values(), key=lambda c: c.cost)
+        error = window.output - window.predict(problem, best)
+        left = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error
+        if turn < passes:
+            problem = window.with_output(window.output - error + left)
+            candidates = refine(problem, candidates, scales)
+    after = left[window.start :]
+    lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
+    level = float(np.sqrt(np.sum(after**2) / max(after.size - lost, 1)))
+    # Far below the noise the residual is rounding, and its correlation says nothing.
+    floor = 0.3 * sigma
+    correlation = correlation_time(after) if level > floor else 1.0
+    level = max(level, floor)
+    criterion = criteria(candidates, level**2 * correlation, after.size / correlation)
+    chosen = candidates[choose(criterion)]
+    freedom = max(problem.data.size - lost, 1)
+    misfit = float(np.sqrt(chosen.cost / freedom)) / sigma
+    return WindowFit(window, problem, candidates, criterion, scales, level, correlation, misfit)
+
+
+def _clipped(error: FloatArray, least: float) -> FloatArray:
+    """Residuals clipped at 1.345 sigma and scaled up again by the part that was not."""
+    limit = _HUBER * max(mad_sigma(error), least)
+    inside = float(np.mean(np.abs(error) <= limit))
+    return np.asarray(np.clip(error, -limit, limit) / max(inside, 0.5))
+
+
+def _ringing(error: FloatArray, dt: float) -> float:
+    """Angular frequency that stands out of what a first-order fit leaves over."""
+    if error.size < 16:
+        return 0.0
+    power = np.abs(np.fft.rfft(error - error.mean())) ** 2
+    return float(2 * np.pi * (int(np.argmax(power[2:])) + 2) / (error.size * dt))
