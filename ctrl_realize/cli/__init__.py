@@ -10,9 +10,9 @@ from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
-from .compare import compare
-from .demo import demo
-from .identify import identify
+from .compare_command import compare
+from .demo_command import demo
+from .identify_command import identify
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
 
 app = typer.Typer(

@@ -9,6 +9,7 @@ import pandas as pd
 from .. import paper, plots
 from ..io import save_model
 from ..io.atomic import write_text
+from ..plots.fits import evidence_height
 from ..report import Column, Page, Row, Sketch, Table, pairs, verdict_of, write_page
 from ..report.provenance import own_version, record_sha256, versions
 from .demo_run import DemoResult, shown
@@ -68,14 +69,14 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
     assert row is not None
     scan = row.fit
     truth = result.valve.truth.frf(result.frf.frequency_hz)
-    final = [result.frf, result.printed, result.fitted]
+    final = [result.frf, result.fitted, result.printed]
     return [
         Sketch(
             "fit",
             "All forty records, one model",
             "Mean of the records and the output-error fit; below, where the dead time can be.",
             lambda figure: plots.fit_plot(result.fitted, ax=figure),
-            (6.2, 5.6),
+            (6.2, 3.6 + evidence_height(result.fitted.fit)),
         ),
         Sketch(
             "fig8_final_model",

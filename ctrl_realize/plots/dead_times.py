@@ -28,7 +28,7 @@ def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None
     """Draw the dead time as a line, its interval as a band; `factor` is in units per s."""
     wait = estimate_of(system)
     interval = interval_of(system)
-    text = f"dead time {style.in_time(wait)} = {wait / system.dt:.3g} samples"
+    text = f"dead time\n{style.in_time(wait)} = {wait / system.dt:.3g} samples"
     if interval is not None:
         text += f"\n{style.in_time(interval[0])} to {style.in_time(interval[1])}"
         if interval[1] > interval[0]:

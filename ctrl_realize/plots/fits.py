@@ -46,7 +46,8 @@ def fit_plot(
     """
     result = _delay_fit(fit)
     with style.context():
-        axes = style.axes_for(ax, 3, size=(8.0, 7.6), heights=(2.0, 0.9, 1.5), sharex=False)
+        rows = evidence_height(result)
+        axes = style.axes_for(ax, 3, size=(8.0, 4.8 + rows), heights=(2.2, 1.2, rows), sharex=False)
         upper, middle, lower = axes
         lines = _data_and_model(upper, middle, result, **kwargs)
         drawn = _evidence(lower, result)
@@ -88,7 +89,7 @@ def dead_time_plot(
     """
     result = _delay_fit(fit)
     with style.context():
-        axes = style.axes_for(ax, size=(8.0, 4.0))
+        axes = style.axes_for(ax, size=(8.0, 1.0 + evidence_height(result)))
         drawn = _evidence(axes[0], result, **kwargs)
         name = result.records[0].name if result.records else ""
         return style.finished(
@@ -146,21 +147,30 @@ def _output_label(result: DelayFit) -> str:
     return "output" if label == "y" else style.wrapped(label, 26)
 
 
-def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
-    """Draw one row for each structure that is not ruled out, and one for each view."""
+def evidence_height(result: DelayFit) -> float:
+    """Return the height in inches that the rows of `_evidence` need."""
+    return 0.75 + 0.2 * len(_evidence_rows(result))
+
+
+def _evidence_rows(
+    result: DelayFit,
+) -> list[tuple[str, float, tuple[float, float] | None, str]]:
+    """List who sees which dead time, with which interval: structures not ruled out, then views."""
     rows: list[tuple[str, float, tuple[float, float] | None, str]] = []
     for line in result.structures:
-        if line.interval is None or line.excess > _RULED_OUT:
-            continue
-        name = f"order {line.order}, degree {line.relative_degree}"
-        rows.append((name, line.dead_time, line.interval, style.MODEL))
+        if line.interval is not None and line.excess <= _RULED_OUT:
+            name = f"order {line.order}, degree {line.relative_degree}"
+            rows.append((name, line.dead_time, line.interval, style.MODEL))
     rows = rows[:_MOST_STRUCTURES]
     rows += [(name, seen, None, style.MEASURED) for name, seen in result.views.items()]
-    if not rows:
-        rows = [("estimate", result.dead_time, None, style.MODEL)]
+    return rows or [("estimate", result.dead_time, result.interval, style.MODEL)]
+
+
+def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
+    """Draw one row for each structure that is not ruled out, and one for each view."""
+    rows = _evidence_rows(result)
     low, high = result.interval
-    farthest = max(high, *(seen for _, seen, _, _ in rows))
-    factor, unit = style.time_unit(farthest, axes)
+    factor, unit = style.time_unit(max(high, *(seen for _, seen, _, _ in rows)), axes)
     axes.axvspan(factor * low, factor * high, color=style.BAND, alpha=0.22, linewidth=0)
     axes.axvline(factor * result.dead_time, color=style.MODEL, linewidth=1.5)
     points: list[Line2D] = []
@@ -170,12 +180,10 @@ def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
             axes.plot(ends, [height, height], color=colour, linewidth=2.5, alpha=0.5)
         looks = {"color": colour, "marker": "o", "linestyle": "none", **kwargs}
         points += axes.plot([factor * seen], [height], **looks)
-    axes.set_yticks(range(len(rows)), [style.plain(name, 40) for name, *_ in rows], fontsize=10)
+    axes.set_yticks(range(len(rows)), [style.plain(name, 40) for name, *_ in rows], fontsize=9)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
-    digits = 4
-    axes.set_xlabel(
-        f"dead time [{unit}]: {factor * result.dead_time:.{digits}g}, 95 % interval "
-        f"{factor * low:.{digits}g} to {factor * high:.{digits}g}"
-    )
+    axes.set_xlabel(f"dead time [{unit}]")
+    said = f"{style.in_time(result.dead_time)} ({style.in_time(low)} to {style.in_time(high)})"
+    axes.set_title(said, loc="left", fontsize=11)
     return points

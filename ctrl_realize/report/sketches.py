@@ -19,6 +19,7 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..identification.steps import unit_step
 from ..io.atomic import replaced_when_complete
+from ..plots.fits import evidence_height
 from ..signals import Record, StepResponse
 from .page import PageFigure
 from .svg import drawn
@@ -108,9 +109,10 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
             Sketch(
                 "fit",
                 "Data, model and what is left",
-                "The residual should look like noise.",
-                lambda figure: plots.draw(fit, ax=figure),
-                (6.2, 5.0),
+                "The residual should look like noise. Below: where each structure and view puts the "
+                "dead time; the band is the interval.",
+                lambda figure: plots.fit_plot(fit, ax=figure),
+                (6.2, 3.6 + evidence_height(fit)),
             )
         )
     elif step is not None:

@@ -39,9 +39,11 @@ def identify(
         Method, _OPTION(help="output_error fits the raw record; scan and paper realize.")
     ] = Method.output_error,
     order: Annotated[
-        int | None, _OPTION(help="Order without the delay. Default: from the data.")
+        int | None, _OPTION(min=1, help="Order without the delay. Default: from the data.")
     ] = None,
-    max_delay: Annotated[int | None, _OPTION(help="Largest delay to consider, in samples.")] = None,
+    max_delay: Annotated[
+        int | None, _OPTION(min=1, help="Largest delay to consider, in samples.")
+    ] = None,
     frf: Annotated[
         Path | None, _OPTION(help="Measured frequency response to hold the model against.")
     ] = None,

@@ -1,0 +1,286 @@
+"""Plots: what is drawn, where, with which units, and what they leave untouched."""
+
+from __future__ import annotations
+
+import control as ct
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from numpy.testing import assert_allclose, assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize import plots
+from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.plots import style
+
+
+@pytest.fixture(scope="module")
+def valve():
+    return cr.bench.valve(rest=0.5, hold=1.0)
+
+
+@pytest.fixture(scope="module")
+def record(valve):
+    return valve.step_record(16.0, rng=5)
+
+
+@pytest.fixture(scope="module")
+def scanned(record):
+    impulse = cr.impulse_from_step(cr.unit_step(record))
+    return cr.estimate_delay(impulse, 3, max_delay=80, samples=600)
+
+
+@pytest.fixture(scope="module")
+def fitted(record):
+    return cr.fit_delay(record, structures=[(3, 3)])
+
+
+@pytest.fixture(scope="module")
+def campaign(valve):
+    records = [valve.step_record(height, rng=k) for k, height in enumerate((16, 16, 8, 8))]
+    return cr.identify_campaign(records, method="scan", order=3, max_delay=80, progress=False)
+
+
+@pytest.fixture(scope="module")
+def orders(record):
+    impulse = cr.impulse_from_step(cr.unit_step(record))
+    return cr.scan_orders(impulse, 4, max_delay=60, samples=500)
+
+
+@pytest.fixture(scope="module")
+def measured(valve):
+    frequency = np.geomspace(0.1, 50.0, 120)
+    truth = valve.truth.frf(frequency)
+    coherence = 1 / (1 + (frequency / 15.0) ** 6)
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((2, 120)) @ np.eye(120) * 0.02 * np.sqrt(1 - coherence)
+    return cr.MeasuredFRF(
+        truth.frdata[0, 0] + noise[0] + 1j * noise[1],
+        frequency,
+        coherence=coherence,
+        std=0.002 + 0.02 * np.sqrt(1 - coherence),
+    )
+
+
+@pytest.fixture
+def every(record, scanned, fitted, campaign, orders, measured, valve):
+    """Each public plot as (name, function of ax, number of axes)."""
+    impulse = scanned.fit.impulse
+    comparison = cr.compare_frf(fitted, measured)
+    return [
+        ("record_plot", lambda ax: plots.record_plot(record, ax=ax), 2),
+        ("step_plot", lambda ax: plots.step_plot(record, fitted, ax=ax), 1),
+        ("onset_plot", lambda ax: plots.onset_plot(record, fitted, ax=ax), 1),
+        ("impulse_plot", lambda ax: plots.impulse_plot(impulse, scanned, ax=ax), 1),
+        ("delay_plot", lambda ax: plots.delay_plot(scanned, ax=ax), 1),
+        ("singular_value_plot", lambda ax: plots.singular_value_plot(scanned, ax=ax), 1),
+        ("order_plot", lambda ax: plots.order_plot(orders, ax=ax), 2),
+        ("fit_plot", lambda ax: plots.fit_plot(fitted, ax=ax), 3),
+        ("dead_time_plot", lambda ax: plots.dead_time_plot(fitted, ax=ax), 1),
+        ("campaign_plot", lambda ax: plots.campaign_plot(campaign, truth=37, ax=ax), 1),
+        ("frf_plot", lambda ax: plots.frf_plot([measured, fitted], ax=ax), 3),
+        ("comparison_plot", lambda ax: plots.comparison_plot(comparison, ax=ax), 2),
+        ("truth_plot", lambda ax: plots.truth_plot(valve.truth, ax=ax), 2),
+    ]
+
+
+UNITS = {
+    "record_plot": "time [s]",
+    "step_plot": "time after the step [s]",
+    "onset_plot": "time after the step [ms]",
+    "impulse_plot": "time [ms]",
+    "delay_plot": "delay [samples]",
+    "singular_value_plot": "number",
+    "order_plot": "order",
+    "fit_plot": "dead time [ms]",
+    "dead_time_plot": "dead time [ms]",
+    "campaign_plot": "delay [samples]",
+    "frf_plot": "frequency [Hz]",
+    "comparison_plot": "frequency [Hz]",
+    "truth_plot": "frequency [Hz]",
+}
+
+
+def test_every_plot_returns_a_control_plot_with_units_on_its_axes(every):
+    for name, draw, count in every:
+        drawn = draw(None)
+        assert isinstance(drawn, ct.ControlPlot), name
+        assert drawn.axes.size == count, name
+        assert drawn.lines.shape == drawn.axes.shape, name
+        assert all(len(lines) > 0 for lines in drawn.lines.ravel()), name
+        assert drawn.axes.ravel()[-1].get_xlabel().startswith(UNITS[name]), name
+        assert drawn.figure is drawn.axes[0, 0].figure, name
+
+
+def test_plots_draw_into_what_they_are_given_and_make_no_figure_of_their_own(every):
+    for name, draw, count in every:
+        given = np.ravel(Figure().subplots(count, 1, squeeze=False))
+        assert list(draw(given).axes.ravel()) == list(given), name
+        assert draw(Figure()).axes.size == count, name
+    assert plt.get_fignums() == []
+
+
+def test_plots_leave_the_settings_of_matplotlib_as_they_were(every):
+    before = dict(mpl.rcParams)
+    for _, draw, _ in every:
+        draw(Figure())
+    assert dict(mpl.rcParams) == before
+
+
+def test_a_wrong_number_of_axes_is_refused(record):
+    with pytest.raises(OptionError, match="needs 2"):
+        plots.record_plot(record, ax=Figure().subplots())
+    with pytest.raises(OptionError, match="needs 2"):
+        plots.record_plot(record, ax=["upper", "lower"])
+
+
+def test_results_draw_themselves(scanned, fitted, campaign, orders, measured):
+    results = [scanned.fit, scanned.fit.realization, fitted.fit, campaign, orders]
+    results.append(cr.compare_frf(fitted, measured))
+    for result in results:
+        assert isinstance(result.plot(ax=Figure()), ct.ControlPlot)
+
+
+def test_signals_are_drawn_by_draw(record, measured):
+    for thing in (record, cr.unit_step(record), cr.ImpulseResponse([0, 1.0, 0.5], 0.1), measured):
+        assert isinstance(plots.draw(thing, ax=Figure()), ct.ControlPlot)
+
+
+def test_what_has_no_picture_is_named():
+    with pytest.raises(OptionError, match="no picture of a dict"):
+        plots.draw({})
+
+
+def test_every_name_of_the_registry_exists():
+    for target in plots._DRAWN_BY.values():
+        module, function = target.split(":")
+        assert callable(getattr(plots, function)), f"{module} has no public {function}"
+
+
+def test_the_delay_plot_shows_the_misfit_and_its_minimum(scanned):
+    drawn = plots.delay_plot(scanned, ax=Figure())
+    curve = drawn.lines[0, 0][0]
+    assert_array_equal(curve.get_ydata(), scanned.fit.iae)
+    point = drawn.axes[0, 0].get_lines()[1]
+    assert list(point.get_xdata()) == [scanned.fit.delay]
+
+
+def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
+    # 30 points in three decades: the phase turns by many times between neighbours.
+    model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.25, dt=7.8125e-4)
+    frequency = np.geomspace(0.05, 50.0, 30)
+    frf = cr.MeasuredFRF(
+        np.exp(-2j * np.pi * frequency * 0.25) / (1 + 2j * np.pi * frequency * 0.08), frequency
+    )
+    drawn = plots.frf_plot([frf, model], ax=Figure())
+    for line in drawn.lines[1, 0]:
+        hertz, phase = line.get_xdata(), line.get_ydata()
+        exact = -360 * 0.25 * hertz - np.degrees(np.arctan(2 * np.pi * hertz * 0.08))
+        # The model lags by half a sample more: 7 degrees at 50 Hz.
+        assert_allclose(phase, exact, atol=8.0)
+
+
+def test_noise_outside_the_coherent_band_does_not_choose_the_axis(measured):
+    wild = np.array(measured.frdata[0, 0])
+    wild[-5:] = 1e6
+    noisy = cr.MeasuredFRF(wild, measured.frequency_hz, coherence=measured.coherence)
+    top = plots.frf_plot(noisy, ax=Figure()).axes[0, 0].get_ylim()[1]
+    assert top < 0  # the valve's gain is -18 dB at most
+
+
+def test_measured_and_model_have_the_same_colours_everywhere(record, scanned, measured):
+    for drawn in (
+        plots.step_plot(record, scanned, ax=Figure()),
+        plots.impulse_plot(scanned.fit.impulse, scanned, ax=Figure()),
+        plots.frf_plot([measured, scanned], ax=Figure()),
+    ):
+        colours = [line.get_color() for line in drawn.lines[0, 0]]
+        assert colours == [style.MEASURED, style.MODEL]
+
+
+def test_keywords_change_the_main_line(scanned):
+    drawn = plots.delay_plot(scanned, ax=Figure(), color="black", linewidth=7)
+    assert drawn.lines[0, 0][0].get_linewidth() == 7
+    with pytest.raises(AttributeError):
+        plots.delay_plot(scanned, ax=Figure(), colourful=True)
+
+
+def test_names_that_look_like_instructions_are_drawn_as_they_are(record, recwarn):
+    name = "$\\frac{1$ _<b>\n\x00"
+    hostile = cr.Record(
+        record.time, record.input, record.output, name=name, input_labels=["_$x"],
+        output_labels=["$y_{"],
+    )  # fmt: skip
+    drawn = plots.record_plot(hostile)
+    drawn.figure.draw_without_rendering()
+    assert drawn.axes[0, 0].get_title(loc="left") == "\\$\\frac{1\\$ _<b>??"
+    assert len(recwarn) == 0
+
+
+def test_a_record_with_missing_samples_is_drawn_with_gaps():
+    time = 0.1 * np.arange(40)
+    output = np.where((time > 1) & (time < 2), np.nan, time)
+    gappy = cr.Record(time, (time > 1) * 1.0, output, missing="keep")
+    line = plots.record_plot(gappy, ax=Figure()).lines[0, 0][0]
+    assert np.isnan(line.get_ydata()).sum() == np.isnan(output).sum() > 0
+
+
+def test_several_channels_have_a_line_each():
+    time = 0.1 * np.arange(30)
+    two = cr.Record(time, np.ones((2, 30)), np.ones((3, 30)))
+    drawn = plots.record_plot(two, ax=Figure())
+    assert [len(lines) for lines in drawn.lines.ravel()] == [3, 2]
+    assert drawn.legend[0, 0] is not None
+
+
+def test_impulse_responses_of_several_channels_have_axes_each():
+    rng = np.random.default_rng(0)
+    drawn = plots.impulse_plot(cr.ImpulseResponse(rng.standard_normal((2, 3, 20)), 0.1))
+    assert drawn.axes.shape == (2, 3)
+
+
+def test_models_of_other_channels_are_refused(scanned):
+    with pytest.raises(DataError, match="1 x 1 channels"):
+        plots.impulse_plot(cr.ImpulseResponse(np.ones((2, 1, 9)), 0.1), scanned)
+    two = ct.ss(np.eye(2) / 2, np.eye(2), np.eye(2), np.zeros((2, 2)), 0.1)
+    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
+        plots.frf_plot(two)
+
+
+@pytest.mark.parametrize("thing", [3.0, "model", None])
+def test_what_is_no_system_has_no_frequency_response(thing):
+    with pytest.raises(UnsuitableSystemError, match="needed are systems"):
+        plots.frf_plot(thing)
+
+
+def test_a_model_without_scan_has_no_delay_plot(fitted):
+    with pytest.raises(OptionError, match="no delay scan"):
+        plots.delay_plot(fitted)
+    with pytest.raises(OptionError, match="no output-error fit"):
+        plots.fit_plot(cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 3))
+
+
+def test_many_records_are_grouped_by_the_height_of_their_step(valve):
+    records = [valve.step_record(h, rng=k) for h in (16, 8) for k in range(7)]
+    many = cr.identify_campaign(
+        records, method="scan", order=2, max_delay=40, samples=300, progress=False
+    )
+    axes = plots.campaign_plot(many, ax=Figure()).axes[0, 0]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["8", "16"]
+    assert axes.get_ylabel() == "delay [samples]"
+
+
+def test_a_second_plot_keeps_the_time_unit_of_the_axes(scanned):
+    axes = Figure().subplots()
+    axes.set_xlabel("time [s]")
+    plots.impulse_plot(scanned.fit.impulse, ax=axes)
+    assert axes.get_lines()[0].get_xdata()[-1] < 1.0
+
+
+def test_the_onset_is_marked_where_the_model_says(record, scanned):
+    axes = plots.onset_plot(record, scanned, ax=Figure()).axes[0, 0]
+    upright = [line for line in axes.get_lines() if len(set(np.ravel(line.get_xdata()))) == 1]
+    marks = [float(np.ravel(line.get_xdata())[0]) for line in upright]
+    assert_allclose(marks, [0.0, 1e3 * scanned.dead_time], rtol=1e-12)

@@ -1,0 +1,246 @@
+"""Reports: what they say first, what they must not leave out, and that they stay whole."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize import report
+from ctrl_realize.report.provenance import file_sha256, record_sha256
+from ctrl_realize.report.verdict import comparison_verdict, poles_of, verdict_of
+
+HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(2)>$\\frac{'
+
+
+class Tags(HTMLParser):
+    """Collects start tags, and checks that tags nest."""
+
+    VOID = frozenset({"meta", "link", "img", "br"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag, attrs):
+        self.seen.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.seen.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open, tag
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def parsed(path):
+    tags = Tags()
+    tags.feed(path.read_text(encoding="utf-8"))
+    assert tags.open == []
+    return tags
+
+
+@pytest.fixture(scope="module")
+def valve():
+    return cr.bench.valve(rest=0.5, hold=1.0)
+
+
+@pytest.fixture(scope="module")
+def record(valve):
+    return valve.step_record(16.0, rng=5)
+
+
+@pytest.fixture(scope="module")
+def fitted(record):
+    return cr.fit_delay(record, structures=[(3, 3)])
+
+
+@pytest.fixture(scope="module")
+def measured(valve):
+    frequency = np.geomspace(0.1, 20.0, 40)
+    return cr.MeasuredFRF(valve.truth.frf(frequency).frdata[0, 0], frequency, coherence=np.ones(40))
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory, record, fitted, measured):
+    folder = tmp_path_factory.mktemp("page")
+    path = folder / "report.html"
+    data = folder / "data.csv"
+    data.write_text("time,u,y\n", encoding="utf-8")
+    return report.write_identification(
+        path,
+        fitted,
+        record,
+        files=[data],
+        frf=measured,
+        comparison=cr.compare_frf(fitted, measured),
+        settings={"method": "output_error"},
+        calls=[("In Python", "sys = cr.identify(record)")],
+        simulated=True,
+    )
+
+
+def test_a_report_needs_no_network_and_no_script(page):
+    text = page.read_text(encoding="utf-8")
+    tags = parsed(page)
+    assert {tag for tag, _ in tags.seen}.isdisjoint({"script", "iframe", "object", "img"})
+    links = [
+        value
+        for _, attributes in tags.seen
+        for name, value in attributes.items()
+        if name in ("src", "href", "xlink:href", "action", "srcset")
+    ]
+    assert links
+    assert all(link.startswith(("#", "data:")) for link in links)
+    assert "http://" not in text
+    assert "https://" not in text
+    assert "@import" not in text
+
+
+def test_the_verdict_comes_first_with_dead_time_and_interval(page, fitted):
+    text = parsed(page).text
+    verdict = text.index(f"Dead time {1e3 * fitted.fit.dead_time:.4g} ms")
+    assert verdict < text.index("Figures") < text.index("How it was found")
+    low, high = fitted.fit.interval
+    assert f"{1e3 * low:.3g} ms to {1e3 * high:.3g} ms" in text
+    assert text.index("simulated data") < verdict
+
+
+def test_every_flag_of_the_fit_is_a_reason(tmp_path, record):
+    scan = cr.identify(record, method="scan", order=6, max_delay=60)
+    assert scan.fit.flags
+    path = report.write_identification(tmp_path / "r.html", scan, record)
+    text = parsed(path).text
+    for flag in scan.fit.flags:
+        assert flag.message[1:] in text
+
+
+def test_a_report_tells_data_checksum_settings_versions_and_call(page):
+    text = parsed(page).text
+    digest = hashlib.sha256(b"time,u,y\n").hexdigest()
+    for said in (digest, "data.csv", "output_error", "0.10.2", "sys = cr.identify(record)"):
+        assert said in text
+
+
+def test_a_report_is_light(page):
+    assert page.stat().st_size < 600_000
+
+
+def test_figures_of_a_report_are_all_there_and_ids_are_unique(page):
+    tags = parsed(page)
+    figures = [attributes for tag, attributes in tags.seen if tag == "figure"]
+    pictures = [attributes for tag, attributes in tags.seen if tag == "svg"]
+    assert len(figures) == len(pictures) == 5
+    ids = [attributes["id"] for _, attributes in tags.seen if "id" in attributes]
+    assert len(ids) == len(set(ids))
+
+
+def test_hostile_names_stay_text(tmp_path, record, fitted):
+    hostile = cr.Record(
+        record.time, record.input, record.output, name=HOSTILE, input_labels=[HOSTILE],
+        output_labels=[HOSTILE + "y"],
+    )  # fmt: skip
+    path = report.write_identification(
+        tmp_path / "r.html",
+        fitted,
+        hostile,
+        settings={HOSTILE: HOSTILE},
+        calls=[(HOSTILE, HOSTILE)],
+    )
+    tags = parsed(path)
+    assert {tag for tag, _ in tags.seen}.isdisjoint({"script", "img"})
+    assert not any(name.startswith("on") for _, attributes in tags.seen for name in attributes)
+    assert "<script>alert(1)</script>" in tags.text  # said, not done
+
+
+def test_a_report_that_fails_leaves_the_old_one(tmp_path, record, fitted, monkeypatch):
+    path = tmp_path / "r.html"
+    path.write_text("old", encoding="utf-8")
+    monkeypatch.setattr("ctrl_realize.report.build.versions", lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        report.write_identification(path, fitted, record)
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_campaign_report_lists_every_record_and_names_the_failed(tmp_path, valve):
+    flat = valve.record(np.full(2000, 8.0), rng=1, name="flat")
+    records = [valve.step_record(16.0, rng=k, name=f"step {k}") for k in range(3)] + [flat]
+    campaign = cr.identify_campaign(records, method="scan", order=3, max_delay=80, progress=False)
+    assert len(campaign.failed) == 1
+    path = report.write_campaign(
+        tmp_path / "r.html", campaign, records=records, truth=37, simulated=True
+    )
+    tags = parsed(path)
+    for record in records:
+        assert record.name in tags.text
+        assert record_sha256(record) in tags.text
+    assert campaign.failed[0].error in tags.text
+    assert sum(a.get("class") == "failed" for tag, a in tags.seen if tag == "tr") == 1
+    assert f"{campaign.statistics().mean:.2f} samples" in tags.text
+
+
+def test_a_comparison_report_judges_by_the_error_in_the_band(tmp_path, fitted, measured):
+    good = cr.compare_frf(fitted, measured)
+    off = cr.compare_frf(fitted * 1.5, measured)
+    assert off.rms_relative_error > 0.3
+    assert comparison_verdict(fitted, off).level == "poor"
+    assert comparison_verdict(fitted, good).level != "poor"
+    path = report.write_comparison(tmp_path / "r.html", fitted, measured, off)
+    assert "disagree" in parsed(path).text
+
+
+def test_the_level_of_trust_follows_the_flags(record):
+    system = cr.delayed_ss(cr.bench.valve().truth.sampled.delay_free, 37)
+    assert verdict_of(system).level == "good"
+    assert verdict_of(system, [cr.Flag("drift", "a drift was seen")]).level == "caution"
+    bad = verdict_of(system, [cr.Flag("delay_at_bound", "try a larger one")])
+    assert bad.level == "poor"
+    assert bad.reasons == ("Try a larger one.",)
+
+
+def test_poles_are_told_as_corner_frequencies():
+    import control as ct
+
+    slow, fast = 2 * np.pi * 2.2, 2 * np.pi * 8
+    plant = ct.tf([1], [1 / slow, 1]) * ct.tf([1], [1 / fast**2, 1.4 / fast, 1])
+    system = cr.delayed_ss(plant, 3, dt=1e-3)
+    assert poles_of(system) == "2.2 Hz, 8 Hz (damping 0.7)"
+    assert poles_of(cr.delayed_ss(ct.tf([1], [1, 0]), 3, dt=1e-3)) == "integrator"
+
+
+def test_the_checksum_of_a_record_is_that_of_its_samples(record):
+    other = cr.Record(record.time, record.input, record.output + 1e-12, name=record.name)
+    assert record_sha256(other) != record_sha256(record)
+    renamed = cr.Record(record.time, record.input, record.output, name="other")
+    assert record_sha256(renamed) == record_sha256(record)
+
+
+def test_the_checksum_of_a_file_that_is_gone_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        file_sha256(tmp_path / "nowhere.csv")
+
+
+def test_templates_are_in_the_package():
+    from importlib import resources
+
+    names = {entry.name for entry in (resources.files(report) / "templates").iterdir()}
+    assert {"report.html.j2", "report.css"} <= names
+    assert re.search(r'"report/templates/\*"', _pyproject())
+
+
+def _pyproject():
+    from pathlib import Path
+
+    return (Path(report.__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")

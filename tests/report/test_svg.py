@@ -1,0 +1,95 @@
+"""Figures on a page: thin, apart from each other, and in the page's colours."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+from numpy.testing import assert_array_equal
+
+from ctrl_realize.plots import style
+from ctrl_realize.report.svg import drawn, envelope, thin_lines
+
+
+def line(figure):
+    with style.context():
+        axes = figure.subplots()
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=style.MEASURED)
+        axes.set_title('<script>alert("x")</script> & 0.123456789')
+
+
+def test_a_drawn_figure_is_well_formed_and_has_its_own_ids():
+    one, two = drawn(line, "one", (4, 3), "d"), drawn(line, "two", (4, 3), "d")
+    for svg in (one, two):
+        ElementTree.fromstring(svg.replace("<svg ", '<svg xmlns:xlink="x" ', 1))
+    ids = [set(re.findall(r'\bid="([^"]+)"', svg)) for svg in (one, two)]
+    assert all(ids)
+    assert not ids[0] & ids[1]
+    used = set(re.findall(r"#([\w-]+)[)\"]", one))
+    assert used
+    assert used <= ids[0]
+
+
+def test_colours_are_variables_of_the_page():
+    svg = drawn(line, "k", (4, 3), "d")
+    assert "var(--measured)" in svg
+    assert "var(--ink)" in svg
+    assert style.INK not in svg
+
+
+def test_text_in_figures_is_escaped_and_not_rounded():
+    svg = drawn(line, "k", (4, 3), 'a "b" <c>')
+    assert "<script" not in svg
+    assert "&lt;script&gt;" in svg
+    assert "0.123456789" in svg
+    assert 'aria-label="a &quot;b&quot; &lt;c&gt;"' in svg
+
+
+def test_the_same_figure_gives_the_same_text():
+    assert drawn(line, "k", (4, 3), "d") == drawn(line, "k", (4, 3), "d")
+
+
+@given(
+    st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=300),
+    st.integers(2, 60),
+    st.booleans(),
+)
+def test_the_envelope_keeps_ends_and_extremes_and_invents_nothing(values, points, logarithmic):
+    y = np.array(values)
+    x = np.arange(1.0, y.size + 1)
+    thin_x, thin_y = envelope(x, y, points, logarithmic=logarithmic)
+    assert_array_equal(y[thin_x.astype(int) - 1], thin_y)
+    assert np.all(np.diff(thin_x) > 0)
+    assert thin_x[0] == 1
+    assert thin_x[-1] == y.size
+    assert thin_y.min() == y.min()
+    assert thin_y.max() == y.max()
+    assert thin_x.size <= points + 4  # two of each stretch, and both ends
+
+
+def test_gaps_stay_gaps():
+    y = np.r_[np.zeros(100), np.full(100, np.nan), np.ones(100)]
+    _, thin = envelope(np.arange(300.0), y, 30)
+    assert np.isnan(thin).any()
+
+
+def test_long_lines_are_thinned_and_short_ones_are_not():
+    axes = Figure().subplots()
+    (long,) = axes.plot(np.arange(50_000), np.sin(np.arange(50_000)))
+    (short,) = axes.plot(np.arange(10), np.arange(10))
+    thin_lines(axes.figure, points=1000)
+    assert long.get_xdata().size <= 1004
+    assert short.get_xdata().size == 10
+
+
+def test_glyphs_that_the_font_lacks_do_not_stop_a_figure():
+    def draw(figure):
+        figure.subplots().set_title("阀门 🚀")
+
+    with pytest.MonkeyPatch.context():
+        assert "阀门 🚀" in drawn(draw, "k", (4, 3), "d")
