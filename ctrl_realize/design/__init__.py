@@ -4,10 +4,37 @@ Systems in, `control` systems out. Everything works on core and delay apart, so 
 delay.
 """
 
+from .balanced import BalancedReduction as BalancedReduction
+from .balanced import hankel_singular_values as hankel_singular_values
+from .balanced import reduce as reduce
+from .conversions import ContinuousModel as ContinuousModel
+from .conversions import pade_ss as pade_ss
+from .conversions import thiran as thiran
+from .conversions import to_continuous as to_continuous
+from .conversions import to_discrete as to_discrete
+from .conversions import to_tf as to_tf
 from .delay_line import DelayLineController as DelayLineController
 from .delay_robustness import DelayRobustness as DelayRobustness
 from .delay_robustness import delay_robustness as delay_robustness
 from .margins import Margins as Margins
 from .margins import margins as margins
+from .performance import Performance as Performance
+from .performance import performance as performance
 from .phase import unwrapped_phase as unwrapped_phase
+from .pid import pid as pid
+from .pid_controller import PIDController as PIDController
+from .pid_table import PIDComparison as PIDComparison
+from .pid_table import compare_pid as compare_pid
+from .predictor import KalmanPredictor as KalmanPredictor
+from .predictor import PredictorLQR as PredictorLQR
+from .predictor import kalman_predictor as kalman_predictor
+from .predictor import lqg as lqg
+from .predictor import predictor_lqr as predictor_lqr
+from .process_model import ProcessModel as ProcessModel
+from .reduction import reduce_fopdt as reduce_fopdt
+from .reduction import reduce_sopdt as reduce_sopdt
+from .robustness import RobustnessCheck as RobustnessCheck
+from .robustness import UncertaintyBound as UncertaintyBound
+from .robustness import robust_stability as robust_stability
+from .robustness import uncertainty_bound as uncertainty_bound
 from .smith import smith_predictor as smith_predictor

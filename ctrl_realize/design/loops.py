@@ -167,7 +167,18 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
             "sample the continuous one first (design.to_discrete, or .discretised(dt) of a PID)"
         )
     dt = bases.pop() if bases else 0.0
-    return Loop(tuple(factor(system, dt) for system in systems), dt, dead_time)
+    rate = 0.0 if dt else _rate(systems, dead_time)
+    return Loop(tuple(factor(system, dt, rate) for system in systems), dt, dead_time)
+
+
+def _rate(systems: list[Any], dead_time: float) -> float:
+    """Fastest rate of a continuous loop in rad/s: what counts as far from the axis."""
+    sizes = [
+        float(np.abs(system.poles()).max(initial=0.0))
+        for system in systems
+        if isinstance(system, (ct.StateSpace, ct.TransferFunction))
+    ]
+    return max([*sizes, 1 / dead_time if dead_time else 0.0]) or 1.0
 
 
 def _words(dt: float) -> str:
@@ -196,23 +207,27 @@ def _time_base(system: Any) -> float | None:
     return None if system.dt is None else float(system.dt)
 
 
-def factor(system: Any, dt: float) -> Factor:
-    """Make a `Factor` of one system, a number included."""
+def factor(system: Any, dt: float, rate: float = 0.0) -> Factor:
+    """Make a `Factor` of one system, a number included; `rate` as in `reflected`."""
     if isinstance(system, DelayLineController):
         return _line_factor(system)
     if isinstance(system, ct.TransferFunction):
-        return _polynomial_factor(system, dt)
+        return _polynomial_factor(system, dt, rate)
     if isinstance(system, ct.StateSpace):
         delay = int(system.delay) if isinstance(system, DelayedStateSpace) else 0
         core = system.delay_free if isinstance(system, DelayedStateSpace) else system
-        return _state_space_factor(core, dt, delay)
+        return _state_space_factor(core, dt, rate, delay)
     gain = complex(system)
     none = np.zeros(0, dtype=np.complex128)
     return Factor(lambda w: np.full(w.size, gain), np.ones_like, 0, 0, none, none)
 
 
-def reflected(poles: ComplexArray, dt: float) -> tuple[ComplexArray, ComplexArray]:
+def reflected(
+    poles: ComplexArray, dt: float, rate: float = 0.0
+) -> tuple[ComplexArray, ComplexArray]:
     """Find the poles at or beyond the border of stability, and stable places for them.
+
+    In continuous time `rate` (rad/s) says how far from the axis a place must be to be far.
 
     Returns
     -------
@@ -223,15 +238,16 @@ def reflected(poles: ComplexArray, dt: float) -> tuple[ComplexArray, ComplexArra
         moved = poles[np.abs(poles) > 1 - NEAR_AXIS]
         size = np.abs(moved)
         return moved, moved / size * np.minimum(1 / size, 0.9)
-    scale = max(float(np.abs(poles).max(initial=0.0)), 1e-300)
-    moved = poles[poles.real > -NEAR_AXIS * scale]
-    return moved, -np.maximum(np.abs(moved.real), 0.1 * scale) + 1j * moved.imag
+    moved = poles[poles.real > -NEAR_AXIS * rate]
+    return moved, -np.maximum(np.abs(moved.real), 0.1 * rate) + 1j * moved.imag
 
 
-def pole_ratio(poles: ComplexArray, dt: float) -> Callable[[ComplexArray], ComplexArray]:
+def pole_ratio(
+    poles: ComplexArray, dt: float, rate: float = 0.0
+) -> Callable[[ComplexArray], ComplexArray]:
     """Make prod (z - p) / (z - q) over the poles p that `reflected` moves to q."""
     origin = 1.0 if dt else 0.0
-    moved, places = (points - origin for points in reflected(poles, dt))
+    moved, places = (points - origin for points in reflected(poles, dt, rate))
 
     def ratio(w: ComplexArray) -> ComplexArray:
         value = np.ones(w.size, dtype=np.complex128)
@@ -250,7 +266,7 @@ def in_s_plane(points: ComplexArray, dt: float) -> ComplexArray:
     return np.asarray(np.log(points[np.abs(points) > 0.05]) / dt, dtype=np.complex128)
 
 
-def _state_space_factor(core: ct.StateSpace, dt: float, delay: int) -> Factor:
+def _state_space_factor(core: ct.StateSpace, dt: float, rate: float, delay: int) -> Factor:
     A = np.asarray(core.A, dtype=np.float64)
     shift = 1.0 if dt else 0.0
     # The Schur form of A - I: the slow poles of an oversampled model keep their distance to 1.
@@ -269,10 +285,12 @@ def _state_space_factor(core: ct.StateSpace, dt: float, delay: int) -> Factor:
         features = np.concatenate([poles, zeros[np.isfinite(zeros)]])
     # A plain system may hold a chain of its own: its order bounds how often it turns.
     hidden = int(np.sum(np.abs(poles) < 1 - 1e-3)) if dt and core.nstates > 8 else 0
-    return Factor(response, pole_ratio(poles, dt), delay, hidden, in_s_plane(features, dt), poles)
+    return Factor(
+        response, pole_ratio(poles, dt, rate), delay, hidden, in_s_plane(features, dt), poles
+    )
 
 
-def _polynomial_factor(system: ct.TransferFunction, dt: float) -> Factor:
+def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> Factor:
     num = np.atleast_1d(np.asarray(system.num[0][0], dtype=np.float64))
     den = np.atleast_1d(np.asarray(system.den[0][0], dtype=np.float64))
     num = np.trim_zeros(num, "f") if np.any(num) else np.zeros(1)
@@ -290,7 +308,7 @@ def _polynomial_factor(system: ct.TransferFunction, dt: float) -> Factor:
     zeros = np.asarray(np.roots(num), dtype=np.complex128)
     shift = 1.0 if dt else 0.0
     top, bottom = (shifted_polynomial(p, shift) for p in (num, den))
-    ratio = pole_ratio(poles, dt)
+    ratio = pole_ratio(poles, dt, rate)
 
     def response(w: ComplexArray) -> ComplexArray:
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,0 +1,81 @@
+"""Undo a zero-order hold: the continuous model behind a sampled one."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm, logm
+from scipy.optimize import brentq
+
+from .arrays import FloatArray
+from .sampling import zero_order_hold
+
+
+def inverse_zero_order_hold(
+    A: FloatArray, B: FloatArray, dt: float
+) -> tuple[FloatArray, FloatArray]:
+    """Find F, G with x' = F x + G u, held over `dt`, giving x[k+1] = A x[k] + B u[k].
+
+    The principal logarithm is taken: of all models with the same samples, the one whose poles lie
+    below the Nyquist frequency. No eigenvalue of A may be zero or real and negative.
+
+    Parameters
+    ----------
+    A, B : ndarray, shapes (n, n), (n, m)
+    dt : float
+        In s.
+
+    Returns
+    -------
+    F, G : ndarray, shapes (n, n), (n, m)
+    """
+    n = A.shape[0]
+    if n == 0:
+        return A.copy(), B.copy()
+    F = np.asarray(np.real(logm(A)) / dt, dtype=np.float64)
+    _, spread = zero_order_hold(F, np.eye(n), dt)
+    return F, np.asarray(np.linalg.solve(spread, B), dtype=np.float64)
+
+
+def split_fraction(
+    A: FloatArray, B: FloatArray, C: FloatArray, direct: float, dt: float
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Read a fraction of a sample out of the direct term of a sampled model.
+
+    A strictly proper model behind a dead time of (d + f) samples has, sampled, the delay d + 1
+    and the direct term C Gamma0, with Gamma0 the integral of exp(F s) G over the last (1 - f) dt
+    of a sample. This finds f in 0...1 from that.
+
+    Parameters
+    ----------
+    A, B, C : ndarray, shapes (n, n), (n, 1), (1, n)
+    direct : float
+    dt : float
+
+    Returns
+    -------
+    F, G, f
+        None where no fraction explains the direct term.
+    """
+    n = A.shape[0]
+    F = np.asarray(np.real(logm(A)) / dt, dtype=np.float64)
+
+    def held(seconds: float) -> FloatArray:
+        return zero_order_hold(F, np.eye(n), seconds)[1]
+
+    def inputs(f: float) -> FloatArray:
+        # B = exp(F (1-f) dt) (integral over dt) G
+        moved = expm(F * (1 - f) * dt) @ held(dt)
+        return np.asarray(np.linalg.solve(moved, B), dtype=np.float64)
+
+    def misfit(f: float) -> float:
+        return float((C @ held((1 - f) * dt) @ inputs(f))[0, 0]) - direct
+
+    grid = np.linspace(0, 1, 65)
+    values = np.array([misfit(f) for f in grid])
+    change = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
+    if change.size == 0:
+        return None
+    # Next to f = 1 the direct term vanishes with the fraction: the last crossing is the small one.
+    at = int(change[-1])
+    f = float(brentq(misfit, grid[at], grid[at + 1], xtol=1e-15))
+    return F, inputs(f), f
