@@ -21,6 +21,9 @@ from .frequency import stepped_sine_frf as stepped_sine_frf
 from .identification.campaign import Campaign as Campaign
 from .identification.campaign_row import CampaignRow as CampaignRow
 from .identification.campaign_run import identify_campaign as identify_campaign
+from .identification.channels import ChannelRealization as ChannelRealization
+from .identification.channels import channel_delays as channel_delays
+from .identification.channels import realize_channels as realize_channels
 from .identification.delay_fit import fit_delay as fit_delay
 from .identification.delay_fit_result import DelayFit as DelayFit
 from .identification.delay_scan import DelayScan as DelayScan

@@ -1,0 +1,155 @@
+"""Cores of several channels: aligned with one A, or a model for each output or input."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..delayed import DelayedStateSpace
+from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.delay_models import realize_at
+from ..numerics.delay_split import Matrices, joined_columns, joined_rows
+from ..results import Flag
+from ..signals import ImpulseResponse
+from .impulses import channels, check_samples
+from .realization import realize
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Core of all channels, with the delays outside it and the orders of what it is made of."""
+
+    core: Matrices
+    inputs: tuple[int, ...]
+    outputs: tuple[int, ...]
+    orders: tuple[int, ...]
+    flags: tuple[Flag, ...]
+
+    @property
+    def states(self) -> int:
+        """States of the whole model, delays included."""
+        return int(self.core[0].shape[0]) + sum(self.inputs) + sum(self.outputs)
+
+    def system(self, dt: float, fit: Any = None) -> DelayedStateSpace:
+        """Attach the delays."""
+        core = ct.ss(*self.core, dt)
+        return DelayedStateSpace(core, self.inputs, output_delay=self.outputs, fit=fit)
+
+
+def misfit(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
+    """Return the sum of absolute errors of every entry over that of its data."""
+    markov = channels(data)
+    model = np.reshape(pieces.system(data.dt).markov(data.n_samples), markov.shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.abs(model - markov).sum(axis=-1)
+    sums = np.abs(markov).sum(axis=-1)
+    error = np.where(np.isfinite(error), error, np.inf)
+    share: FloatArray = np.divide(error, sums, out=np.zeros_like(sums), where=sums > 0)
+    return share
+
+
+def _aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
+    """Move every channel ahead by its delay; the length is what all channels have."""
+    p, m, N = markov.shape
+    length = N - int(delays.max())
+    return np.stack(
+        [
+            np.stack([markov[i, j, delays[i, j] : delays[i, j] + length] for j in range(m)])
+            for i in range(p)
+        ]
+    )
+
+
+def _realized(
+    data: ImpulseResponse, markov: FloatArray, order: int, options: dict[str, Any]
+) -> tuple[Matrices, tuple[Flag, ...]]:
+    """Realize aligned data with at most `order` states."""
+    moved: ImpulseResponse = ImpulseResponse(markov, data.dt, filter=data.filter, name=data.name)
+    padded = options["hankel"] == "padded"
+    samples = check_samples(moved, options["samples"], order, 0, padded=padded, what="delays")
+    rank = int(
+        np.count_nonzero(
+            realize_at(markov, 0, samples, order, padded=padded).singular_values[:order]
+        )
+    )
+    if rank == 0:
+        p, m, _ = markov.shape
+        direct = np.zeros((p, m)) if options["feedthrough"] is False else markov[:, :, 0]
+        return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), direct), ()
+    system = realize(moved, rank, **options)
+    core = system.delay_free
+    return (core.A, core.B, core.C, core.D), system.fit.flags
+
+
+def aligned_core(
+    data: ImpulseResponse,
+    order: int,
+    outputs: IntArray,
+    inputs: IntArray,
+    options: dict[str, Any],
+) -> Assembly:
+    """Align all channels by delays of inputs and outputs, and realize them with one A."""
+    moved = _aligned(channels(data), np.add.outer(outputs, inputs))
+    core, flags = _realized(data, moved, order, options)
+    before, behind = (tuple(int(d) for d in share) for share in (inputs, outputs))
+    return Assembly(core, before, behind, (core[0].shape[0],), flags)
+
+
+def cores_by_rows(
+    data: ImpulseResponse,
+    order: int,
+    found: IntArray,
+    options: dict[str, Any],
+) -> Assembly:
+    """Realize every output by itself, behind tapped input lines."""
+    markov = channels(data)
+    # An entry without response follows the line as it is, and adds no tap to it.
+    first = np.where(found >= 0, found, found.max() + 1).min(axis=0)
+    first = np.where((found >= 0).any(axis=0), first, 0)
+    full = np.where(found >= 0, found, first)
+    parts: list[Matrices] = []
+    flags: list[Flag] = []
+    for i in range(full.shape[0]):
+        part, notes = _realized(data, _aligned(markov[[i]], full[[i]]), order, options)
+        parts.append(part)
+        flags += notes
+    return Assembly(
+        joined_rows(parts, full - first),
+        tuple(int(d) for d in first),
+        (0,) * full.shape[0],
+        tuple(part[0].shape[0] for part in parts),
+        _unique(flags),
+    )
+
+
+def cores_by_columns(
+    data: ImpulseResponse,
+    order: int,
+    found: IntArray,
+    options: dict[str, Any],
+) -> Assembly:
+    """Realize every input by itself, in front of tapped output lines."""
+    markov = channels(data)
+    first = np.where(found >= 0, found, found.max() + 1).min(axis=1)
+    first = np.where((found >= 0).any(axis=1), first, 0)
+    full = np.where(found >= 0, found, first[:, None])
+    parts: list[Matrices] = []
+    flags: list[Flag] = []
+    for j in range(full.shape[1]):
+        part, notes = _realized(data, _aligned(markov[:, [j]], full[:, [j]]), order, options)
+        parts.append(part)
+        flags += notes
+    return Assembly(
+        joined_columns(parts, full - first[:, None]),
+        (0,) * full.shape[1],
+        tuple(int(d) for d in first),
+        tuple(part[0].shape[0] for part in parts),
+        _unique(flags),
+    )
+
+
+def _unique(flags: list[Flag]) -> tuple[Flag, ...]:
+    return tuple({flag.code: flag for flag in flags}.values())

@@ -1,0 +1,168 @@
+from __future__ import annotations
+
+import bz2
+import importlib.util
+import pickle
+from pathlib import Path
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, DelayRangeError, OptionError
+
+DT = 0.1
+CORE = ct.ss(
+    [[0.8, 0.1, 0.0], [0.0, 0.5, 0.2], [0.1, 0.0, 0.3]],
+    [[1.0, 0.5], [1.0, 1.0], [0.3, -1.0]],
+    [[1.0, 0.2, 0.1], [1.0, 1.0, -0.5], [0.4, -1.0, 1.0]],
+    np.zeros((3, 2)),
+    DT,
+)  # all nine products C B are away from zero: every entry has relative degree 1
+delays_of = st.integers(0, 12)
+
+
+@given(st.tuples(delays_of, delays_of), st.tuples(delays_of, delays_of, delays_of))
+def test_delays_of_inputs_and_outputs_come_back_with_one_core(inputs, outputs):
+    plant = cr.DelayedStateSpace(CORE, inputs, output_delay=outputs)
+    data = plant.markov(200)
+    sys = cr.realize_channels(data, 3, level=0.0, dt=DT)
+    assert sys.fit.structure == "common"
+    assert np.array_equal(np.broadcast_to(sys.delay, (3, 2)), np.add.outer(outputs, inputs))
+    assert sys.delay_free.nstates == 3
+    # the response has decayed to 1e-13 of its size within the samples
+    assert_allclose(sys.markov(200), data, rtol=0, atol=1e-11)
+    assert_allclose(np.sort_complex(sys.delay_free.poles()), np.sort_complex(CORE.poles()),
+                    rtol=0, atol=1e-8)  # fmt: skip
+
+
+def separate(delays):
+    """Entries of first and second order, each with a delay of its own, shape (2, 2)."""
+    entries = np.zeros((2, 2, 200))
+    for (i, j), d in np.ndenumerate(delays):
+        pulse = np.concatenate([np.zeros(d + 1), (0.5 + 0.1 * i + 0.2 * j) ** np.arange(200.0)])
+        entries[i, j] = pulse[:200]
+    return entries
+
+
+@pytest.mark.parametrize(
+    ("delays", "structure"),
+    [
+        ([[3, 20], [5, 20]], "rows"),  # input lines of 5 and 20 samples
+        ([[3, 5], [20, 20]], "columns"),
+    ],
+)
+def test_delays_that_no_split_explains_take_the_fewest_states(delays, structure):
+    data = separate(np.array(delays))
+    sys = cr.realize_channels(data, 2, dt=DT)
+    fit = sys.fit
+    assert fit.structure == structure
+    assert_allclose(sys.markov(200), data, rtol=0, atol=1e-9)
+    assert sys.nstates == fit.states == 4 + 25
+    for other in ("rows", "columns"):
+        assert cr.realize_channels(data, 2, dt=DT, structure=other).nstates >= fit.states
+    # with one core and that many states the data are explained as well
+    core = cr.realize_channels(data, 12, dt=DT, structure="common")
+    assert core.nstates >= fit.states - 1
+
+
+def test_fields_of_the_fit_add_up():
+    for delays in ([[3, 20], [5, 20]], [[3, 4], [9, 10]]):
+        fit = cr.realize_channels(separate(np.array(delays)), 4, dt=DT).fit
+        total = np.add.outer(fit.output_delays, fit.input_delays) + fit.rest
+        assert np.array_equal(fit.delays, delays)
+        assert np.array_equal(total, delays)
+        assert fit.misfit.max() < 1e-9
+        assert "samples" in fit.report()
+        assert np.array_equal(pickle.loads(pickle.dumps(fit)).rest, fit.rest)
+
+
+def test_other_units_change_no_delay_and_no_pole():
+    data = separate(np.array([[3, 4], [9, 10]]))
+    units = np.array([1e3, 1e-2])[:, None, None] * np.array([5.0, 0.1])[:, None]
+    plain, other = (cr.realize_channels(d, 3, dt=DT) for d in (data, units * data))
+    assert np.array_equal(plain.delay, other.delay)
+
+
+def test_an_entry_without_response_puts_no_limit():
+    data = separate(np.array([[3, 4], [9, 10]]))
+    data[0, 1] = 0.0
+    assert cr.channel_delays(data, dt=DT).tolist() == [[3, -1], [9, 10]]
+    sys = cr.realize_channels(data, 3, dt=DT)
+    assert_allclose(sys.markov(200), data, rtol=0, atol=1e-9)
+
+
+def test_noise_is_not_taken_for_a_response():
+    plant = cr.DelayedStateSpace(CORE, (4, 7), output_delay=(0, 2, 0))
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal((2, 3000))
+    y = plant.simulate(u) + 0.05 * rng.standard_normal((3, 3000))
+    estimate = cr.impulse_from_io(cr.Record(DT * np.arange(3000), u, y), 60)
+    assert np.array_equal(cr.channel_delays(estimate), plant.delay)
+    sys = cr.realize_channels(estimate, 3)
+    assert np.array_equal(sys.delay, plant.delay)
+    assert np.abs(sys.markov(60) - plant.markov(60)).max() < 0.03
+    fresh = rng.standard_normal((2, 1000))
+    check = cr.check_residuals(sys, cr.Record(DT * np.arange(1000), fresh, plant.simulate(fresh)))
+    assert np.all(check.fit_percent > 97)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "match"),
+    [
+        ({"delays": [[1, 2, 3]]}, DelayRangeError, "shape"),
+        ({"delays": [[1.5, 2], [3, 4]]}, DelayRangeError, "whole numbers"),
+        ({"delays": [[1, 2], [3, 199]]}, DelayRangeError, "199"),
+        ({"delays": -np.ones((2, 2), dtype=int)}, DataError, "no channel"),
+        ({"structure": "best"}, OptionError, "'rows'"),
+        ({"level": 1.0}, OptionError, "level"),
+        ({"hankel": "round"}, OptionError, "hankel"),
+    ],
+)
+def test_unusable_choices_are_refused(options, error, match):
+    with pytest.raises(error, match=match):
+        cr.realize_channels(separate(np.array([[3, 4], [9, 10]])), 2, dt=DT, **options)
+
+
+class _Plain:
+    pass
+
+
+class _WithoutTheirClasses(pickle.Unpickler):
+    """Reads the numbers of a pickle; importing its package would need a sound card library."""
+
+    def find_class(self, module, name):
+        return _Plain if module.startswith("slab") else super().find_class(module, name)
+
+
+def kemar():
+    """Azimuth [deg] and responses (direction, ear, sample) of the horizontal directions."""
+    package = importlib.util.find_spec("slab")
+    if package is None:
+        pytest.skip("package slab, which holds the KEMAR responses, is not installed")
+    folder = Path(package.submodule_search_locations[0]) / "data"
+    with bz2.open(folder / "mit_kemar_normal_pinna.bz2") as file:
+        head = _WithoutTheirClasses(file).load()
+    sources = np.asarray(head.sources)
+    level = np.flatnonzero(np.abs(sources[:, 1]) < 0.5)
+    return sources[level, 0], np.stack([head.data[i].data.T for i in level]), head.samplerate
+
+
+def test_delays_between_two_ears_are_those_of_a_sphere():
+    azimuth, responses, rate = kemar()
+    assert responses.shape == (72, 2, 512)
+    lateral = np.arcsin(np.sin(np.deg2rad(azimuth)))
+    sphere = 0.0875 / 343 * (lateral + np.sin(lateral)) * rate
+    found = []
+    for ears in responses:
+        sys = cr.realize_channels(ears[:, None, :], 12, samples=160, dt=1 / rate)
+        assert sys.fit.structure == "common"
+        left, right = sys.output_delays
+        found.append(right - left)
+    error = np.array(found) - sphere
+    assert np.sqrt(np.mean(error**2)) <= 1.0  # sample; 0.82 when this was written
+    assert np.abs(error).max() < 2.5
