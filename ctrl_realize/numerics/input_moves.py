@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from .arrays import FloatArray, IntArray
 from .edges import difference_noise
@@ -37,6 +38,8 @@ def input_moves(
     A clean input is returned exactly. A noisy one keeps its edges sample by sample; between
     them it is replaced by means over segments that grow from the edge on, as far as these
     means differ by more than their noise: a drooping amplifier is followed, its noise is not.
+    Spikes of a few samples are those of the measurement or the drive, too short to move the
+    plant, and are left out.
     """
     signal = signal[:stop]
     moves = np.diff(signal, prepend=signal[0])
@@ -59,6 +62,7 @@ def input_moves(
 
 def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
     """Piecewise means; one mean where they do not differ significantly."""
+    values = _without_spikes(values, noise)
     n = values.size
     mean = np.full(n, float(np.median(values)))
     if not grow or n < 16:
@@ -72,3 +76,9 @@ def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
     if np.all(off <= 6 * noise / np.sqrt(widths)):
         return mean
     return np.repeat(means, widths)
+
+
+def _without_spikes(values: FloatArray, noise: float) -> FloatArray:
+    """Replace what stands out of a running median of seven samples, so up to three of them."""
+    middle = median_filter(values, size=7, mode="nearest")
+    return np.where(np.abs(values - middle) > 6 * noise, middle, values)
