@@ -15,6 +15,8 @@ from .demo_command import demo
 from .identify_command import identify
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
 
+INTERRUPTED = 130
+
 app = typer.Typer(
     name="ctrl-realize",
     help="Models with dead time from measured responses, as python-control state-space systems.",
@@ -72,8 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 standalone_mode=False,
             )
         except (KeyboardInterrupt, typer.Abort):
-            complain("interrupted; nothing was written")
-            return 130
+            code = INTERRUPTED
         except BrokenPipeError:
             return 1
         except (CtrlRealizeError, OSError) as error:
@@ -85,4 +86,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 raise
             complain(one_line(error.format_message()) + " (see --help)")
             return 2
+    if code == INTERRUPTED:  # typer tells of it by an exception or by the code
+        complain("interrupted; nothing was written")
     return code if isinstance(code, int) else 0
