@@ -78,16 +78,17 @@ def leading_triplets(
         return _dense(h, rows, columns, count)
     exponent = int(np.frexp(np.abs(h).max())[1])
     H = BlockHankel(np.ldexp(h, -exponent), rows, columns)
-    found = _golub_kahan(H, count, tol, None)
-    rest = None if found is None else _golub_kahan(H, 1, REST_TOL, found)
+    # One start vector finds one copy of a multiple singular value, as equal channels have
+    # them. A second start, beside what is known, shows whether anything larger is left.
+    starts = iter(np.random.default_rng(2005).spawn(2 * count + 2))
+    found = _golub_kahan(H, count, tol, None, next(starts))
+    rest = None if found is None else _golub_kahan(H, 1, REST_TOL, found, next(starts))
     for _ in range(count):
         if found is None or rest is None or not rest[1][0] > found[1][-1]:
             break
-        # One start vector finds one copy of a multiple singular value, as equal channels
-        # have them. Look again beside what is known, until nothing larger is left.
-        more = _golub_kahan(H, count, tol, found)
+        more = _golub_kahan(H, count, tol, found, next(starts))
         found = None if more is None else _largest(found, more, count)
-        rest = None if found is None else _golub_kahan(H, 1, REST_TOL, found)
+        rest = None if found is None else _golub_kahan(H, 1, REST_TOL, found, next(starts))
     if found is None or rest is None:
         if shorter <= DENSE_FALLBACK_SIZE:
             return _dense(h, rows, columns, count)
@@ -127,7 +128,9 @@ def _largest(one: Triple, other: Triple, count: int) -> Triple:
     return U, values[order], V
 
 
-def _golub_kahan(H: BlockHankel, count: int, tol: float, locked: Triple | None) -> Triple | None:
+def _golub_kahan(
+    H: BlockHankel, count: int, tol: float, locked: Triple | None, start: np.random.Generator
+) -> Triple | None:
     """Bidiagonalise H, beside triplets that are known, until the wanted ones have converged.
 
     After j steps ``H V_j = U_j B`` and ``H^T U_j = V_j B^T + above_j v e_j^T``
@@ -143,7 +146,7 @@ def _golub_kahan(H: BlockHankel, count: int, tol: float, locked: Triple | None) 
     if locked is not None:
         U[:known], V[:known], scale = locked[0].T, locked[2].T, float(locked[1][0])
     diagonal, above = np.zeros(steps), np.zeros(steps)
-    V[known] = _unit(np.random.default_rng(2005).standard_normal(width), V[:known])
+    V[known] = _unit(start.standard_normal(width), V[:known])
     for j in range(steps):
         at = known + j
         if at == U.shape[0]:

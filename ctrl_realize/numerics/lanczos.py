@@ -48,6 +48,9 @@ LONGEST_WAIT = 10
 LOOK_COST = 2e5
 """Numbers in the vectors of a step that costs as much as a look."""
 
+TWINS = 1e-10
+"""Relative difference of magnitudes up to which eigenvalues are twins."""
+
 LOSS_OVER_TOL = 1e-3
 """Loss of orthogonality that is let pass, relative to the tolerance of the residuals."""
 
@@ -186,7 +189,7 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
         for i in sorted(set(range(members.size)) - set(left)):
             d = int(members[i])
             values, _, coordinates, following = pairs[i]
-            if doubtful[i]:
+            if doubtful[i] or _has_twins(values, following):
                 _fall_back(h[d], size, count, run.mixture(i, coordinates), result, d)
             else:
                 # straight to their place: a million samples leave no room for a copy
@@ -208,6 +211,16 @@ def _excess(values: FloatArray, residuals: FloatArray, tol: float) -> float:
     asked = max(tol * float(magnitude[-1]), FLOOR * float(magnitude[0]))
     largest = float(residuals.max())
     return largest / asked if asked > 0 else float(largest > 0)
+
+
+def _has_twins(values: FloatArray, following: float) -> bool:
+    """Tell whether two eigenvalues have the same magnitude, which noise never makes.
+
+    A pulse on top of a smooth response has 1 and -1 many times, and one
+    start vector finds one of each.
+    """
+    magnitude = np.append(np.abs(values), following)
+    return bool((magnitude[1:] > (1 - TWINS) * magnitude[:-1]).any())
 
 
 class _Pace:

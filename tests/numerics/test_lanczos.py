@@ -99,6 +99,15 @@ def test_a_pulse_has_one_and_minus_one_many_times(size):
     assert_allclose(np.abs(pairs.values[0]), np.ones(8), rtol=1e-13)
 
 
+@pytest.mark.parametrize("place", [3, 40, 77])
+def test_a_pulse_on_a_smooth_response_does_not_hide_its_copies(place):
+    k = np.arange(2 * 150)
+    h = windows(0.99**k * np.cos(0.1 * k) + (k == 2 * place), 150, 1)
+    expected = np.linalg.svd(hankel_matrix(h[0], 150, 150), compute_uv=False)[:6]
+    found = np.abs(leading_eigenpairs(h, 150, 6).values[0])
+    assert_allclose(found, expected, rtol=0, atol=1e-10 * expected[0])
+
+
 def test_members_that_fail_to_converge_are_solved_densely(monkeypatch):
     h = windows(valve_pulse("unfiltered"), 250, 6)
     converged = leading_eigenpairs(h, 250, 3)
@@ -161,6 +170,18 @@ def test_block_triplets_are_the_dense_ones(p, m, noise):
     assert_allclose(found.values, expected[:6], rtol=0, atol=1e-12 * expected[0])
     assert_allclose(H @ found.V, found.U * found.values, atol=1e-10 * expected[0])
     assert_allclose(H.T @ found.U, found.V * found.values, atol=1e-10 * expected[0])
+
+
+@pytest.mark.parametrize("rank", [1, 3])
+def test_equal_channels_of_low_rank_are_not_taken_for_one(rank):
+    A, B, C, _ = modal(np.random.default_rng(rank), rank)
+    one = np.array([(C @ np.linalg.matrix_power(A, k) @ B)[0, 0] for k in range(639)])
+    h = np.kron(np.eye(3)[:, :, np.newaxis], one)
+    expected = np.linalg.svd(hankel_matrix(h, 320, 320), compute_uv=False)
+    found = leading_triplets(h, 320, 320, 3 * rank + 1)
+    assert not found.complete
+    assert_allclose(found.values[:-1], expected[: 3 * rank], rtol=0, atol=1e-12 * expected[0])
+    assert found.values[-1] == 0
 
 
 def test_equal_channels_have_every_singular_value_twice():
