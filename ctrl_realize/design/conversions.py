@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -337,10 +338,10 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
             f"dead_time={wait:g} s is {samples + rest:.3g} samples; a filter needs half a sample"
         )
     total = samples + rest
-    used = min(most, round(total)) or 1
-    kept = round(total) - used
-    den = thiran_denominator(total - kept, used)
-    return DelayedStateSpace(_allpass(den, step), max(kept, 0))
+    nearest = math.floor(total + 0.5)
+    used = min(most, nearest)
+    den = thiran_denominator(total - (nearest - used), used)
+    return DelayedStateSpace(_allpass(den, step), nearest - used)
 
 
 def _allpass(den: FloatArray, dt: float) -> ct.StateSpace:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 from scipy.linalg import expm, logm
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from .arrays import FloatArray
 from .sampling import zero_order_hold
@@ -70,12 +73,39 @@ def split_fraction(
     def misfit(f: float) -> float:
         return float((C @ held((1 - f) * dt) @ inputs(f))[0, 0]) - direct
 
-    grid = np.linspace(0, 1, 65)
-    values = np.array([misfit(f) for f in grid])
-    change = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
-    if change.size == 0:
+    roots = _roots_in_unit_interval(misfit, abs(direct))
+    if not roots:
         return None
-    # Next to f = 1 the direct term vanishes with the fraction: the last crossing is the small one.
-    at = int(change[-1])
-    f = float(brentq(misfit, grid[at], grid[at + 1], xtol=1e-15))
-    return F, inputs(f), f
+
+    def direct_slope(f: float) -> float:
+        # Of several exact answers the one whose response starts most smoothly is meant.
+        return abs(float((C @ inputs(f))[0, 0]))
+
+    best = min(roots, key=direct_slope)
+    return F, inputs(best), best
+
+
+def _roots_in_unit_interval(function: Callable[[float], float], scale: float) -> list[float]:
+    """Roots in 0...1, pairs that nearly touch included."""
+    grid = np.linspace(0, 1, 33)
+    values = np.array([function(float(x)) for x in grid])
+    nodes = list(zip(grid.tolist(), values.tolist(), strict=True))
+    size = np.abs(values)
+    for i in np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1:
+        sign = np.sign(values[i])
+        low, high = float(grid[i - 1]), float(grid[i + 1])
+        found = minimize_scalar(
+            lambda x, s=sign: s * function(float(x)),
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 1e-12},
+        )
+        nodes.append((float(found.x), function(float(found.x))))
+    nodes.sort()
+    roots = []
+    for (a, at_a), (b, at_b) in pairwise(nodes):
+        if abs(at_a) <= 1e-13 * scale:
+            roots.append(a)
+        elif at_a * at_b < 0:
+            roots.append(float(brentq(function, a, b, xtol=1e-15)))
+    return roots

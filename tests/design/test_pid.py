@@ -1,0 +1,224 @@
+"""Tuning rules against their published forms, loops against brute-force simulation."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import OptionError, UnsuitableSystemError
+
+DT = 7.8125e-4
+FOPDT = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=2.0)
+SOPDT = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=2.0, second_lag=3.0)
+IPDT = cr.design.ProcessModel(gain=0.5, lag=0.0, dead_time=2.0, integrating=True)
+
+
+def stepped(system, count):
+    A, B, C, D = (np.asarray(M) for M in (system.A, system.B, system.C, system.D))
+    x, out = np.zeros(A.shape[0]), np.empty(count)
+    for k in range(count):
+        out[k] = (C @ x)[0] + D[0, 0]
+        x = A @ x + B[:, 0]
+    return out
+
+
+@pytest.mark.parametrize(
+    ("model", "rule", "kind", "expected"),
+    [  # by hand from the published formulas, K = 2, T = 10, L = 2 (K' = 0.5, L = 2)
+        (FOPDT, "simc", "P", (1.25, np.inf, 0)),
+        (FOPDT, "simc", "PI", (1.25, 10, 0)),
+        (SOPDT, "simc", "PID", (1.25 * 1.3, 13, 3 / 1.3)),
+        (IPDT, "simc", "PI", (0.5, 16, 0)),
+        (FOPDT, "lambda", "PI", (10 / (2 * 12), 10, 0)),
+        (IPDT, "lambda", "PI", (14 / (0.5 * 64), 14, 0)),
+        (FOPDT, "imc", "PI", (22 / (4 * 3.4), 11, 0)),
+        (FOPDT, "imc", "PID", (22 / (4 * 2.6), 11, 20 / 22)),
+        (FOPDT, "amigo", "PI", (0.075 + (0.35 - 20 / 144) * 2.5, 0.7 + 2600 / 368, 0)),
+        (FOPDT, "amigo", "PID", (1.225, 8.8 / 12 * 2 * 10 / 10, 10 / 10.6)),
+        (IPDT, "amigo", "PI", (0.35, 26.8, 0)),
+        (IPDT, "amigo", "PID", (0.45, 16, 1)),
+        (FOPDT, "ziegler_nichols", "P", (2.5, np.inf, 0)),
+        (FOPDT, "ziegler_nichols", "PI", (2.25, 20 / 3, 0)),
+        (FOPDT, "ziegler_nichols", "PID", (3.0, 4, 1)),
+        (FOPDT, "cohen_coon", "P", (2.5 * (1 + 0.2 / 3), np.inf, 0)),
+        (FOPDT, "cohen_coon", "PI", (2.5 * (0.9 + 0.2 / 12), 2 * 30.6 / 13, 0)),
+        (FOPDT, "cohen_coon", "PD", (2.5 * (1.25 + 0.2 / 6), np.inf, 2 * 5.6 / 22.6)),
+        (FOPDT, "cohen_coon", "PID", (2.5 * (4 / 3 + 0.05), 2 * 33.2 / 14.6, 8 / 11.4)),
+    ],
+)
+def test_rules_give_their_published_parameters(model, rule, kind, expected):
+    found = cr.design.pid(model, rule, kind)
+    if rule == "amigo" and kind == "PID" and not model.integrating:
+        expected = (1.225, (0.4 * 2 + 0.8 * 10) / (2 + 1.0) * 2, 0.5 * 20 / (0.6 + 10))
+    np.testing.assert_allclose((found.kp, found.ti, found.td), expected, rtol=1e-12)
+    assert found.kind == kind
+    assert found.dt == 0
+    assert found.name == f"{kind}_{rule}"
+
+
+def test_the_ultimate_rule_starts_from_the_exact_ultimate_gain(valve):
+    plant = valve(37)
+    found = cr.design.pid(plant, "ziegler_nichols_ultimate", "P")
+    ultimate = 2 * found.kp
+    inside = ct.feedback(ct.ss(plant) * (ultimate * (1 - 1e-6)), 1)
+    outside = ct.feedback(ct.ss(plant) * (ultimate * (1 + 1e-6)), 1)
+    assert np.all(np.abs(inside.poles()) < 1)
+    assert np.any(np.abs(outside.poles()) > 1)
+    pid = cr.design.pid(-plant, "ziegler_nichols_ultimate", "PID")
+    assert pid.kp == pytest.approx(-0.6 * ultimate)
+
+
+def test_a_system_is_tuned_half_a_sample_later_than_its_model():
+    plant = FOPDT.system(0.5)
+    found = cr.design.pid(plant, "ziegler_nichols", "P")
+    assert found.kp == pytest.approx(10 / (2 * 2.25), rel=1e-6)
+    assert found.dt == 0.5
+    assert found.model.dead_time == pytest.approx(2.25, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["P", "PI", "PD", "PID"])
+@pytest.mark.parametrize("limit", [1.3, 1.6, 2.0])
+def test_the_optimal_controller_reaches_its_limit_on_sensitivity(valve, kind, limit):
+    plant = valve(37)
+    found = cr.design.pid(plant, "optimal", kind, max_sensitivity=limit)
+    checked = cr.design.margins(plant, found)
+    assert checked.stable
+    assert checked.ms == pytest.approx(limit, rel=1e-3)  # limit is read on a grid of 0.05 rad
+
+
+def test_no_neighbour_of_the_optimal_pi_is_better(valve):
+    plant = valve(37)
+    best = cr.design.pid(plant, "optimal", "PI", max_sensitivity=1.6)
+
+    def load_error(controller):
+        return np.abs(stepped(ct.feedback(ct.ss(plant), ct.ss(controller)), 2500)).sum()
+
+    lowest = load_error(best)
+    for share in (0.8, 0.9, 1.1, 1.25):
+        low, high = 0.0, 10 * best.kp
+        for _ in range(40):  # largest gain within the limit, by bisection on exact margins
+            kp = (low + high) / 2
+            other = cr.design.PIDController(kp, share * best.ti, dt=plant.dt)
+            found = cr.design.margins(plant, other)
+            low, high = (kp, high) if found.stable and found.ms <= 1.6 else (low, kp)
+        assert load_error(cr.design.PIDController(low, share * best.ti, dt=plant.dt)) > lowest
+
+
+def test_the_optimal_rule_handles_integrating_plants_and_negative_gains(cores, valve):
+    plant = cr.delayed_ss(cores["integrating"], 37)
+    for sign in (1, -1):
+        found = cr.design.pid(sign * plant, "optimal", "PI", max_sensitivity=1.7)
+        checked = cr.design.margins(sign * plant, found)
+        assert checked.stable
+        assert checked.ms == pytest.approx(1.7, rel=2e-3)
+        assert np.sign(found.kp) == sign
+    minus = cr.design.pid(-valve(37), "optimal", "PID")
+    assert minus.kp == pytest.approx(-cr.design.pid(valve(37), "optimal", "PID").kp, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["PI", "PID"])
+def test_table_numbers_are_those_of_brute_force_simulation(valve, kind):
+    plant = valve(37)
+    table = cr.design.compare_pid(plant, ["simc", "cohen_coon"], [kind])
+    for row, controller in zip(table.table().itertuples(), table.controllers, strict=True):
+        setpoint = stepped(ct.feedback(ct.ss(plant) * ct.ss(controller), 1), 4000)
+        load = stepped(ct.feedback(ct.ss(plant), ct.ss(controller)), 4000)
+        assert row.iae_setpoint == pytest.approx(np.abs(1 - setpoint).sum() * DT, rel=1e-4)
+        assert row.iae_load == pytest.approx(np.abs(load).sum() * DT, rel=1e-4)
+        assert row.overshoot == pytest.approx(setpoint.max() - 1, abs=1e-5)
+        late = np.flatnonzero(np.abs(setpoint - 1) > 0.02)[-1] + 1
+        assert row.settling_time == pytest.approx(late * DT, abs=1.5 * DT)
+        assert row.ms == pytest.approx(cr.design.margins(plant, controller).ms)
+
+
+def test_the_table_keeps_going_where_a_rule_has_no_answer(cores):
+    found = cr.design.compare_pid(cr.delayed_ss(cores["integrating"], 37), kinds=["PI"])
+    assert {rule for rule, _, _ in found.refused} == {"imc", "cohen_coon"}
+    assert len(found.controllers) == 6
+    assert "imc" in found.report()
+    with pytest.raises(OptionError, match="smallest is"):
+        found.best(max_sensitivity=1.02)
+
+
+def test_an_error_that_stays_is_infinite(valve):
+    found = cr.design.compare_pid(valve(37), ["simc"], ["P"])
+    assert found.performance[0].load_error == np.inf
+    assert found.performance[0].setpoint_error == np.inf
+
+
+@pytest.mark.parametrize("method", ["tustin", "forward", "backward"])
+def test_discrete_controller_tends_to_the_continuous_one(method):
+    slow = cr.design.PIDController(2.0, 3.0, 0.5, 0.1, method=method)
+    s = 0.7j
+    expected = 2 * (1 + 1 / (3 * s) + 0.5 * s / (0.1 * s + 1))
+    assert slow(s) == pytest.approx(expected, rel=1e-12)
+    errors = [abs(slow.discretised(h)(np.exp(s * h)) - expected) for h in (0.02, 0.01)]
+    assert errors[1] < 0.55 * errors[0]  # first order through the derivative
+    assert slow.discretised(0.01).continuous(s) == pytest.approx(expected, rel=1e-12)
+
+
+def test_integral_rules_are_what_their_names_say():
+    z, h = np.exp(0.3j), 0.1
+    sums = {
+        "forward": h / (z - 1),
+        "backward": h * z / (z - 1),
+        "tustin": h / 2 * (z + 1) / (z - 1),
+    }
+    for method, integral in sums.items():
+        found = cr.design.PIDController(2.0, 3.0, dt=h, method=method)
+        assert found(z) == pytest.approx(2 * (1 + integral / 3), rel=1e-12)
+
+
+def test_controllers_pickle_copy_and_print():
+    found = cr.design.pid(FOPDT, "amigo", "PID", dt=0.1)
+    for again in (pickle.loads(pickle.dumps(found)), copy.deepcopy(found)):
+        assert (again.kp, again.ti, again.td, again.tf) == (found.kp, found.ti, found.td, found.tf)
+        assert again.model.lag == found.model.lag
+        assert repr(again) == repr(found)
+    assert isinstance(found, ct.StateSpace)
+
+
+def test_plants_are_not_changed(valve):
+    plant = valve(5)
+    before = [np.array(M) for M in (plant.A, plant.B, plant.C, plant.D)]
+    cr.design.compare_pid(plant, ["simc", "optimal"], ["PI"])
+    for a, b in zip(before, (plant.A, plant.B, plant.C, plant.D), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "match"),
+    [
+        ((FOPDT, "simk"), {}, OptionError, "rule='simk'"),
+        ((FOPDT, "simc", "PIDD"), {}, OptionError, "kind='PIDD'"),
+        ((FOPDT, "lambda", "PID"), {}, OptionError, "has no PID; it knows PI"),
+        ((FOPDT, "simc", "PID"), {}, OptionError, "second lag"),
+        ((FOPDT, "amigo"), {"closed_loop_time": 1.0}, OptionError, "closed_loop_time is for"),
+        ((FOPDT, "simc"), {"closed_loop_time": -1.0}, OptionError, "closed_loop_time=-1"),
+        ((FOPDT, "optimal"), {"max_sensitivity": 1.0}, OptionError, "max_sensitivity=1"),
+        ((FOPDT, "amigo", "PID"), {"derivative_filter": 0}, OptionError, "derivative_filter=0"),
+        ((FOPDT.system(0.1),), {"dt": 0.1}, OptionError, "takes its sample time"),
+        ((IPDT, "imc"), {}, UnsuitableSystemError, "not for integrating"),
+        ((cr.design.ProcessModel(1.0, 1.0, 0.0), "amigo"), {}, OptionError, "the model has none"),
+        ((ct.tf([1], [1, 1]),), {}, UnsuitableSystemError, "discrete system"),
+        ((ct.ss(1.2, 1, 1, 0, 0.1),), {}, UnsuitableSystemError, "unstable"),
+        ((ct.ss(1.2, 1, 1, 0, 0.1), "optimal"), {}, UnsuitableSystemError, "unstable"),
+    ],
+)  # fmt: skip
+def test_impossible_requests_are_refused(arguments, options, error, match):
+    with pytest.raises(error, match=match):
+        cr.design.pid(*arguments, **options)
+
+
+def test_impossible_controllers_are_refused():
+    with pytest.raises(OptionError, match="tf > 0"):
+        cr.design.PIDController(1.0, 1.0, 0.5)
+    with pytest.raises(OptionError, match="ti=0"):
+        cr.design.PIDController(1.0, 0.0)
+    with pytest.raises(OptionError, match="dt=-1"):
+        cr.design.PIDController(1.0, dt=-1.0)

@@ -1,0 +1,147 @@
+"""Regulator and filter against the big Riccati equations, controllers against eigenvalues."""
+
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+
+
+@pytest.fixture(scope="module")
+def balanced(valve):
+    """The valve in balanced coordinates, where the big Riccati equation keeps its digits."""
+    core = cr.design.reduce(valve(0), 3).delay_free
+    return lambda delay: cr.delayed_ss(core, delay)
+
+
+def enlarged(plant, Q):
+    weight = np.zeros((plant.nstates, plant.nstates))
+    weight[: Q.shape[0], : Q.shape[0]] = Q
+    return weight
+
+
+@pytest.mark.parametrize("delay", [0, 1, 5, 37])
+def test_gain_equals_dlqr_of_the_augmented_system(balanced, delay):
+    plant = balanced(delay)
+    C = np.asarray(plant.delay_free.C)
+    Q = C.T @ C + 1e-3 * np.eye(3)
+    found = cr.design.predictor_lqr(plant, Q, 0.1)
+    K, _, _ = ct.dlqr(plant.A, plant.B, enlarged(plant, Q), 0.1)
+    np.testing.assert_allclose(found.gain, K, rtol=1e-9, atol=1e-9)
+    # The chain's poles at 0 are defective: eigenvalues scatter by eps^(1/d).
+    moved = np.linalg.eigvals(plant.A - plant.B @ found.gain)
+    np.testing.assert_allclose(np.sort(np.abs(moved))[-3:], np.sort(np.abs(found.poles)), rtol=1e-6)
+
+
+def test_gain_at_a_thousand_samples_is_the_prediction_law(balanced):
+    plant = balanced(1000)
+    found = cr.design.predictor_lqr(plant, np.eye(3), 1.0)
+    assert found.gain.shape == (1, 1003)
+    A, B = np.asarray(plant.delay_free.A), np.asarray(plant.delay_free.B)
+    x = np.random.default_rng(0).standard_normal(1003)
+    state, sent = x[:3], x[3:]  # u[k-1] ... u[k-1000]
+    for u in sent[::-1]:
+        state = A @ state + B[:, 0] * u
+    assert found.gain @ x == pytest.approx(found.core_gain @ state, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["integrating", "unstable", "resonant"])
+def test_gain_equals_dlqr_for_cores_that_are_not_stable(cores, kind):
+    plant = cr.delayed_ss(cores[kind], 12)
+    Q = np.eye(2)
+    K, *_ = ct.dlqr(plant.A, plant.B, enlarged(plant, Q), 1.0)
+    np.testing.assert_allclose(cr.design.predictor_lqr(plant, Q, 1.0).gain, K, rtol=1e-9)
+
+
+def test_several_inputs_share_one_delay():
+    rng = np.random.default_rng(0)
+    A = np.diag([0.9, 0.8, 0.99]) + 0.05 * rng.standard_normal((3, 3))
+    core = ct.ss(A, rng.standard_normal((3, 2)), rng.standard_normal((2, 3)), 0, 0.1)
+    plant = cr.delayed_ss(core, 5)
+    R = np.diag([1.0, 2.0])
+    K, *_ = ct.dlqr(plant.A, plant.B, enlarged(plant, np.eye(3)), R)
+    np.testing.assert_allclose(
+        cr.design.predictor_lqr(plant, np.eye(3), R).gain, K, rtol=1e-9, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("delay", [0, 5, 37])
+def test_filter_equals_dlqe_of_the_augmented_system(balanced, delay):
+    plant = balanced(delay)
+    QN = 1e-3 * np.eye(3)
+    found = cr.design.kalman_predictor(plant, QN, 0.1)
+    into = np.eye(plant.nstates)[:, :3]
+    L, *_ = ct.dlqe(plant.A, into, plant.C, QN, np.array([[0.1]]))
+    np.testing.assert_allclose(L[:3], found.gain, rtol=1e-9)
+    np.testing.assert_allclose(L[3:], 0, atol=1e-12)
+    A, C = np.asarray(plant.delay_free.A), np.asarray(plant.delay_free.C)
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(A - found.gain @ C)), np.sort_complex(found.poles)
+    )
+
+
+@pytest.mark.parametrize("delay", [0, 1, 20])
+@pytest.mark.parametrize("kind", ["stable", "integrating", "unstable", "resonant", "direct"])
+def test_lqg_closes_the_loop_at_the_poles_of_regulator_and_estimator(cores, kind, delay):
+    plant = cr.delayed_ss(cores[kind], delay)
+    n = cores[kind].nstates
+    controller = cr.design.lqg(plant, np.eye(n), 1.0, np.eye(n), 1.0)
+    assert controller.nstates == n + delay
+    loop = ct.ss(plant) * ct.ss(controller)
+    poles = np.linalg.eigvals(loop.A - loop.B @ loop.C)
+    expected = np.concatenate([controller.regulator.poles, controller.estimator.poles])
+    # The chain's own poles at 0 are defective and scatter to |z| = eps^(1/20) or so.
+    expected = np.sort(np.abs(expected[np.abs(expected) > 0.6]))[::-1]
+    found = np.sort(np.abs(poles))[::-1][: expected.size]
+    np.testing.assert_allclose(found, expected, rtol=1e-5)  # close pairs cost half the digits
+    assert cr.design.margins(plant, controller).stable
+
+
+def test_lqg_response_from_structure_equals_its_matrices(balanced):
+    controller = cr.design.lqg(balanced(37), np.eye(3), 1.0, np.eye(3), 1.0)
+    plain = ct.ss(controller)
+    z = np.exp(0.1j)
+    direct = plain.C @ np.linalg.solve(z * np.eye(plain.nstates) - plain.A, plain.B) + plain.D
+    assert controller(z) == pytest.approx(direct[0, 0], rel=1e-9)
+
+
+def test_results_print_and_pickle(balanced):
+    regulator = cr.design.predictor_lqr(balanced(3), np.eye(3), 1.0)
+    estimator = cr.design.kalman_predictor(balanced(3), np.eye(3), 1.0)
+    for found in (regulator, estimator):
+        again = pickle.loads(pickle.dumps(found))
+        np.testing.assert_array_equal(again.gain, found.gain)
+        assert "pole" in found.report()
+        assert "\n" not in repr(found)
+        with pytest.raises(ValueError, match="read-only"):
+            found.gain[0, 0] = 1.0
+    controller = pickle.loads(pickle.dumps(cr.design.lqg(balanced(3), np.eye(3), 1, np.eye(3), 1)))
+    assert controller.regulator.delay == 3
+
+
+def test_wrong_weights_and_systems_are_refused(balanced, cores):
+    lqr = cr.design.predictor_lqr
+    with pytest.raises(DataError, match=r"Q has shape \(2, 2\); there are 3"):
+        lqr(balanced(3), np.eye(2), 1.0)
+    with pytest.raises(OptionError, match="not symmetric"):
+        lqr(balanced(3), np.triu(np.ones((3, 3))), 1.0)
+    with pytest.raises(DataError, match="non-finite"):
+        lqr(balanced(3), np.full((3, 3), np.nan), 1.0)
+    unreachable = ct.ss(np.diag([1.1, 0.5]), [[0.0], [1.0]], [[1.0, 1.0]], 0, 0.1)
+    with pytest.raises(UnsuitableSystemError, match="no stabilizing solution"):
+        lqr(cr.delayed_ss(unreachable, 3), np.eye(2), 1.0)
+    two = cr.delayed_ss(ct.ss(np.diag([0.5, 0.5]), np.eye(2), [[1.0, 1.0]], 0, 0.1), [1, 2])
+    with pytest.raises(UnsuitableSystemError, match="one delay that all inputs share"):
+        lqr(two, np.eye(2), np.eye(2))
+    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
+        cr.design.lqg(two, np.eye(2), np.eye(2), np.eye(2), 1.0)
+    behind = cr.delayed_ss(ct.ss(0.5, [[1.0, 1.0]], 1.0, 0, 0.1), 0, output_delay=2)
+    with pytest.raises(UnsuitableSystemError, match="outputs have delays"):
+        cr.design.kalman_predictor(behind, 1.0, 1.0)
+    with pytest.raises(UnsuitableSystemError, match="discrete"):
+        lqr(ct.ss(-1, 1, 1, 0), 1.0, 1.0)

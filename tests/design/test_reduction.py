@@ -1,0 +1,142 @@
+"""Process models and reductions against published examples and closed forms."""
+
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+import ctrl_realize as cr
+from ctrl_realize.errors import OptionError, UnsuitableSystemError
+from ctrl_realize.numerics.half_rule import half_rule
+from ctrl_realize.numerics.process_step import process_step
+
+ProcessModel = cr.design.ProcessModel
+
+
+def lags(*times):
+    system = ct.tf([1.0], [1.0])
+    for T in times:
+        system = system * ct.tf([1.0], [T, 1.0])
+    return system
+
+
+def test_half_rule_reproduces_the_examples_of_the_paper():
+    """Skogestad (2003), examples E1-E4 of section 2 and table 4."""
+    factor, kept, wait = half_rule(np.array([1, 0.2]), np.zeros(0), np.zeros(0), 0.0, 1)
+    assert (factor, kept[0], wait) == (1.0, pytest.approx(1.1), pytest.approx(0.1))
+    # E2: k (-0.3 s + 1)(0.08 s + 1) / ((2 s + 1)(s + 1)(0.4 s + 1)(0.2 s + 1)(0.05 s + 1)^3)
+    many = np.array([2, 1, 0.4, 0.2, 0.05, 0.05, 0.05])
+    lead, inverse = np.array([0.08]), np.array([0.3])
+    _, kept, wait = half_rule(many, lead, inverse, 0.0, 1)
+    assert kept == pytest.approx([2.5])
+    assert wait == pytest.approx(1.47)
+    _, kept, wait = half_rule(many, lead, inverse, 0.0, 2)
+    assert kept == pytest.approx([2.0, 1.2])
+    assert wait == pytest.approx(0.77)
+
+
+@given(
+    lag=st.floats(0.1, 5), second=st.floats(0, 1), wait=st.floats(0, 3), integrating=st.booleans()
+)
+def test_step_response_in_closed_form_is_the_convolution(lag, second, wait, integrating):
+    second *= lag
+    time = np.array([0.5, 2.0, 9.0])
+    found = process_step(time, lag, second, wait, integrating=integrating)
+    plain = process_step(time, lag, 0.0, wait, integrating=integrating)
+    if second < 0.01 * lag:
+        np.testing.assert_allclose(found, plain, atol=2 * second + 1e-9)
+        return
+    expected = [
+        quad(
+            lambda x, t=t: np.exp(-x / second) / second
+            * process_step(np.array([t - x]), lag, 0.0, wait, integrating=integrating)[0],
+            0, max(t - wait, 0), epsabs=1e-9, limit=200,
+        )[0]
+        for t in time
+    ]  # fmt: skip
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("integrating", [False, True])
+@pytest.mark.parametrize("second_lag", [0.0, 0.4])
+def test_a_process_model_and_its_sampled_system_agree(integrating, second_lag):
+    model = ProcessModel(2.0, 1.0, 0.33, second_lag, integrating)
+    plant = model.system(0.05)
+    time = 0.05 * np.arange(200)
+    np.testing.assert_allclose(plant.step(200), model.step(time), atol=1e-10)
+
+
+@pytest.mark.parametrize("method", ["optimal", "half_rule"])
+@pytest.mark.parametrize("integrating", [False, True])
+def test_a_model_of_the_right_structure_comes_back(method, integrating):
+    truth = ProcessModel(-2.0, 1.0, 0.3, 0.5, integrating=False)
+    reduce = cr.design.reduce_sopdt
+    if integrating:
+        truth = ProcessModel(-2.0, 0.6, 0.3, 0.0, integrating=True)
+    for dt in (0.01, 0.013):  # whole samples of dead time, and a fraction
+        found = reduce(truth.system(dt), method=method)
+        expected = [truth.gain, truth.lag, truth.second_lag, truth.dead_time]
+        values = [found.gain, found.lag, found.second_lag, found.dead_time]
+        np.testing.assert_allclose(values, expected, rtol=1e-4, atol=1e-4)
+        assert found.integrating == integrating
+        assert found.error < 1e-4
+
+
+def test_the_optimal_fit_is_never_worse_than_the_half_rule(valve):
+    for system in (valve(37), lags(1, 0.5, 0.3, 0.1), lags(3, 3, 3)):
+        for reduce in (cr.design.reduce_fopdt, cr.design.reduce_sopdt):
+            half, best = reduce(system, method="half_rule"), reduce(system)
+            assert best.error <= half.error * (1 + 1e-6)
+        assert cr.design.reduce_sopdt(system).error < cr.design.reduce_fopdt(system).error
+
+
+def test_the_error_is_the_distance_of_the_step_responses():
+    system = lags(1.0, 0.5, 0.2)
+    found = cr.design.reduce_fopdt(system, dead_time=0.4)
+    time = np.linspace(0, 20, 10_001)
+    true = ct.step_response(system, time).outputs
+    true = np.interp(time - 0.4, time, true, left=0.0)
+    rms = np.sqrt(np.trapezoid((found.step(time) - true) ** 2, time) / (1.7 + 0.4))
+    assert found.error == pytest.approx(rms, rel=0.02)  # total time is itself an estimate
+
+
+def test_gain_and_time_unit_scale_the_model(valve):
+    one = cr.design.reduce_fopdt(valve(37))
+    two = cr.design.reduce_fopdt(-3 * valve(37))
+    assert two.gain == pytest.approx(-3 * one.gain)
+    assert two.lag == pytest.approx(one.lag, rel=1e-6)
+    assert two.error == pytest.approx(one.error, rel=1e-6)
+
+
+def test_models_print_pickle_and_check_themselves():
+    model = ProcessModel(1.0, 0.08, 0.029)
+    assert pickle.loads(pickle.dumps(model)).lag == 0.08
+    assert "exp(-0.029 s)" in model.report()
+    assert model.normalized_dead_time == pytest.approx(0.029 / 0.109)
+    for wrong in ((0.0, 1.0, 0.1), (1.0, -1.0, 0.1), (1.0, 1.0, -0.1), (1.0, 1.0, 0.1, 2.0)):
+        with pytest.raises(OptionError):
+            ProcessModel(*wrong)
+    with pytest.raises(OptionError, match="no tuning rule"):
+        ProcessModel(1.0, 0.0, 0.1)
+
+
+def test_unsuitable_systems_are_refused(cores):
+    reduce = cr.design.reduce_fopdt
+    with pytest.raises(UnsuitableSystemError, match="unstable"):
+        reduce(cr.delayed_ss(cores["unstable"], 3))
+    with pytest.raises(UnsuitableSystemError, match="more than one integrator"):
+        reduce(ct.tf([1], [1, 1, 0, 0]))
+    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
+        reduce(cr.delayed_ss(ct.ss(np.diag([0.5, 0.5]), np.eye(2), [[1.0, 1.0]], 0, 0.1), 1))
+    with pytest.raises(UnsuitableSystemError, match=r"z = -0\.5"):
+        reduce(cr.delayed_ss(ct.ss(-0.5, 1, 1, 0, 0.1), 1), method="half_rule")
+    with pytest.raises(UnsuitableSystemError, match="static gain is 0"):
+        reduce(cr.delayed_ss(ct.ss(ct.tf([1, -1], [1, -0.5], 0.1)), 1))
+    with pytest.raises(OptionError, match="method='area'"):
+        reduce(lags(1.0), method="area")
