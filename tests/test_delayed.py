@@ -303,3 +303,10 @@ def test_cards_show_core_and_shift():
 def test_unusable_arguments_are_refused(make, error, match):
     with pytest.raises(error, match=match):
         make()
+
+
+def test_the_gain_is_a_real_number():
+    core = ct.ss(ct.sample_system(ct.ss(ct.tf([1], [1e-3, 0.05, 1])), 0.01, "zoh"))
+    gain = cr.delayed_ss(core, 37).dcgain()
+    assert np.isrealobj(gain)
+    assert float(gain) == pytest.approx(1.0, rel=1e-12)  # rounding of one solve

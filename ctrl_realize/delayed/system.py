@@ -238,6 +238,9 @@ class DelayedStateSpace(ct.StateSpace):  # type: ignore[misc]  # control is unty
                 out = out * powers(points, self.input_delays)[None, :, :]
             if any(self.output_delays):
                 out = out * powers(points, self.output_delays)[:, None, :]
+        # The Schur form leaves rounding in the imaginary part, and dcgain() would be complex.
+        on_axis = points.imag == 0
+        out[..., on_axis] = out[..., on_axis].real
         lost = ~np.isfinite(out)
         if lost.any():
             if warn_infinite:
