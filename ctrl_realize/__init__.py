@@ -16,6 +16,7 @@ from .frequency import FRFComparison as FRFComparison
 from .frequency import FRFFit as FRFFit
 from .frequency import compare_frf as compare_frf
 from .frequency import fit_frf as fit_frf
+from .frequency import impulse_from_frf as impulse_from_frf
 from .frequency import spectral_frf as spectral_frf
 from .frequency import stepped_sine_frf as stepped_sine_frf
 from .identification.campaign import Campaign as Campaign
@@ -24,6 +25,9 @@ from .identification.campaign_run import identify_campaign as identify_campaign
 from .identification.channels import ChannelRealization as ChannelRealization
 from .identification.channels import channel_delays as channel_delays
 from .identification.channels import realize_channels as realize_channels
+from .identification.cross_check import DelayCheck as DelayCheck
+from .identification.cross_check import DelayView as DelayView
+from .identification.cross_check import check_delay as check_delay
 from .identification.delay_fit import fit_delay as fit_delay
 from .identification.delay_fit_result import DelayFit as DelayFit
 from .identification.delay_scan import DelayScan as DelayScan

@@ -1,0 +1,291 @@
+"""One delay, seen in many ways: a table, and whether they agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from ..checks import whole
+from ..errors import CtrlRealizeError, DataError
+from ..numerics.onset import correlation_onset, phase_slope
+from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
+from ..results import Flag, Result
+from ..signals import MeasuredFRF, Record
+from ..signals.record import check_complete
+from .delay_fit import fit_delay
+from .delay_fit_result import DelayFit
+from .delay_scan import estimate_delay
+from .from_io import impulse_from_io
+from .steps import impulse_from_step, unit_step
+
+Kind = Literal["dead time", "upper bound"]
+TOP_BAND = 1 / 3
+"""Part of the band, from its upper end, where the slope of the phase is taken."""
+MOST_LAGS = 1000
+
+
+@dataclass(frozen=True)
+class DelayView:
+    """One way to look at the delay, in s.
+
+    ``low <= value <= high``. A view of kind ``"dead time"`` estimates the dead time itself; an
+    ``"upper bound"`` sees the dead time and part of the lags: the dead time is not above `high`.
+    """
+
+    method: str
+    source: str
+    kind: Kind
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class DelayCheck(Result):
+    """Delay from several methods side by side.
+
+    `agree` is true when one dead time lies in the interval of every dead-time view and not above
+    any upper bound; `common` is then the interval of such dead times. Otherwise `common` is None
+    and `conflicts` names the pairs that cannot both be right.
+
+    Attributes
+    ----------
+    views : tuple of DelayView
+    agree : bool
+    common : tuple of float or None
+        In s.
+    conflicts : tuple of (str, str)
+    dt : float or None
+        Sample time of the record in s.
+    flags : tuple of Flag
+        What could not be done, and why.
+    """
+
+    views: tuple[DelayView, ...]
+    agree: bool
+    common: tuple[float, float] | None
+    conflicts: tuple[tuple[str, str], ...]
+    dt: float | None
+    flags: tuple[Flag, ...] = ()
+
+    def table(self) -> pd.DataFrame:
+        """Tabulate the views, one row each, in s and in samples."""
+        rows = pd.DataFrame([vars(view) for view in self.views]).set_index("method")
+        if self.dt is not None:
+            rows["samples"] = rows["value"] / self.dt
+        return rows
+
+    def _title(self) -> str:
+        return "Delay seen in several ways"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = []
+        for view in self.views:
+            samples = "" if self.dt is None else f" = {view.value / self.dt:.4g} samples"
+            sign = "" if view.kind == "dead time" else ", upper bound"
+            rows.append(
+                (
+                    f"{view.method} ({view.source})",
+                    f"{view.value:.5g} s{samples} ({view.low:.5g} to {view.high:.5g} s{sign})",
+                )
+            )
+        if self.common is None:
+            words = "no: " + "; ".join(f"{a} against {b}" for a, b in self.conflicts)
+        else:
+            words = f"yes, on {self.common[0]:.5g} to {self.common[1]:.5g} s"
+        return [*rows, ("they agree", words)]
+
+    def __repr__(self) -> str:
+        verdict = "agree" if self.agree else "do not agree"
+        return f"<DelayCheck: {len(self.views)} views that {verdict}>"
+
+
+def check_delay(
+    record: Record | None = None,
+    *,
+    frf: MeasuredFRF | None = None,
+    max_delay: int | None = None,
+    order: int | None = None,
+) -> DelayCheck:
+    """Estimate a delay in every way that the data allow, and compare.
+
+    From a record: output-error fit (`fit_delay`), the paper's scan (`estimate_delay`, on the
+    differentiated step or on `impulse_from_io`), first motion after a step, and the onset of
+    the cross-correlation with a whitened input. From an FRF: fit with a free dead time
+    (`fit_frf`) and slope of the phase at the top of the band.
+
+    Parameters
+    ----------
+    record : Record, optional
+        A step or any other input; one input, one output.
+    frf : MeasuredFRF, optional
+        Of the same plant, one input, one output.
+    max_delay : int, optional
+        Largest delay of the scan in samples. Default: the total delay of the fit, and ten
+        samples.
+    order : int, optional
+        Order of the scan; default: that of the output-error fit, at most 3.
+
+    Returns
+    -------
+    DelayCheck
+
+    Raises
+    ------
+    DataError
+        Neither record nor FRF, or data from which no method finds anything.
+
+    Notes
+    -----
+    The scan has no confidence interval: its row shows the delays that fit about as well, with
+    one sample to both sides for the part of a sample that it cannot see. First motion, onset of
+    the correlation and slope of the phase cannot be before the dead time ends (but for noise),
+    and lie after it by part of the lags: they bound it from above.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
+    >>> rng = np.random.default_rng(0)
+    >>> u = np.repeat(rng.choice([-1.0, 1.0], 100), 15)
+    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(1500)
+    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(1500), u, y))
+    >>> check.agree, [view.method for view in check.views]
+    (True, ['output error', 'scan', 'cross-correlation'])
+    """
+    if record is None and frf is None:
+        raise DataError("neither a record nor an FRF is given")
+    if max_delay is not None:
+        whole(max_delay, "max_delay", 0)
+    if order is not None:
+        whole(order, "order", 1)
+    views: list[DelayView] = []
+    flags: list[Flag] = []
+    if record is not None:
+        _from_record(record, max_delay, order, views, flags)
+    if frf is not None:
+        _from_frf(frf, views, flags)
+    if not views:
+        raise DataError("no method found a delay: " + "; ".join(map(str, flags)))
+    common, conflicts = _verdict(views)
+    return DelayCheck(
+        views=tuple(views),
+        agree=common is not None,
+        common=common,
+        conflicts=conflicts,
+        dt=None if record is None else record.dt,
+        flags=tuple(flags),
+    )
+
+
+def _from_record(
+    record: Record,
+    max_delay: int | None,
+    order: int | None,
+    views: list[DelayView],
+    flags: list[Flag],
+) -> None:
+    check_complete(record, "check_delay")
+    if not record.issiso:
+        raise DataError(f"{record!r} has several channels; needed is one input and one output")
+    dt = record.dt
+    total, model_order = 0.1 * record.n_samples * dt, 2
+    stepped = False
+    try:
+        fit: DelayFit = fit_delay(record).fit
+    except CtrlRealizeError as problem:
+        flags.append(Flag("no_output_error", f"output error: {problem}"))
+    else:
+        views.append(DelayView("output error", "record", "dead time", fit.dead_time, *fit.interval))
+        stepped = bool(np.isfinite(fit.onset))
+        if stepped:
+            # Walked back to the last sample at rest; the motion began within the sample before.
+            first = max(fit.onset, 0.0)
+            views.append(DelayView("first motion", "record", "upper bound", first, 0.0, first + dt))
+        total, model_order = max(fit.total_delay, fit.dead_time), min(fit.order, 3)
+    most = int(np.ceil(total / dt)) + 10 if max_delay is None else max_delay
+    try:
+        views.append(_scan(record, stepped, most, order or model_order, total))
+    except CtrlRealizeError as problem:
+        flags.append(Flag("no_scan", f"scan: {problem}"))
+    if stepped:
+        return
+    lags = int(min(MOST_LAGS, max(most, 20), record.n_samples // 4))
+    seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 0.99)
+    if seen.onset < 0:
+        flags.append(
+            Flag("no_correlation", f"cross-correlation: nothing stands out up to lag {lags}")
+        )
+        return
+    # Behind a hold, what is seen at lag k for the first time came within the sample before.
+    value = seen.onset * dt
+    views.append(DelayView("cross-correlation", "record", "upper bound", value, 0.0, value))
+
+
+def _scan(record: Record, stepped: bool, most: int, order: int, total: float) -> DelayView:
+    if stepped:
+        impulse = impulse_from_step(unit_step(record))
+    else:
+        tail = int(np.ceil(6 * total / record.dt)) + 20
+        length = min(most + max(tail, 8 * order), record.n_samples // 4)
+        impulse = impulse_from_io(record, length)
+    scan = estimate_delay(impulse, order, max_delay=min(most, impulse.n_samples // 2)).fit
+    low, high = scan.interval
+    return DelayView(
+        "scan",
+        "record",
+        "dead time",
+        scan.delay * record.dt,
+        max(low - 1, 0) * record.dt,
+        (high + 1) * record.dt,
+    )
+
+
+def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> None:
+    # Not at the top: most checks have no FRF, and its fit is a large part of the package.
+    from ..frequency.fit_frf import fit_frf
+
+    try:
+        fit = fit_frf(frf).fit
+    except CtrlRealizeError as problem:
+        flags.append(Flag("no_frf_fit", f"FRF fit: {problem}"))
+    else:
+        views.append(DelayView("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval))
+    omega = 2 * np.pi * np.asarray(frf.frequency_hz)
+    values = np.asarray(frf.complex, dtype=np.complex128).ravel()
+    if omega.size < 4:
+        flags.append(Flag("no_phase_slope", f"phase slope: {omega.size} lines are too few"))
+        return
+    phase = unwrap_with_dead_time(omega, values, dead_time_from_phase(omega, values))
+    slope, std = phase_slope(omega, phase, TOP_BAND)
+    views.append(
+        DelayView(
+            "phase slope", "FRF", "upper bound", slope, max(slope - 2 * std, 0.0), slope + 2 * std
+        )
+    )
+
+
+def _verdict(
+    views: list[DelayView],
+) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
+    """Find the dead times that no view rules out, or the pairs that rule each other out."""
+    times = [view for view in views if view.kind == "dead time"]
+    low = max((view.low for view in times), default=0.0)
+    high = min(view.high for view in views)
+    if low <= high:
+        return (low, high), ()
+    pairs = [
+        (times[i], other)
+        for i in range(len(times))
+        for other in [*times[i + 1 :], *(v for v in views if v.kind == "upper bound")]
+    ]
+    return None, tuple(
+        (a.method, b.method)
+        for a, b in pairs
+        if a.low > b.high or (b.kind == "dead time" and b.low > a.high)
+    )

@@ -1,0 +1,146 @@
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.identification.cross_check import DelayView, _verdict
+from tests.rigs import R1, R2, step_record
+
+DT = 0.01
+
+
+def operating_record(plant=R2, delay=12.4, n=1500, seed=0):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], n // 10), 10)
+    y = cr.delayed_ss(plant, dead_time=delay * DT, dt=DT).simulate(u)
+    return cr.Record(DT * np.arange(n), 5 + u, 3 + y + 0.02 * rng.standard_normal(n))
+
+
+def frequency_response(plant=R2, dead_time=12.4 * DT, seed=0):
+    hz = np.geomspace(0.1, 20, 60)
+    w = 2 * np.pi * hz
+    rng = np.random.default_rng(seed)
+    noise = 0.002 * (rng.standard_normal(60) + 1j * rng.standard_normal(60))
+    values = plant(1j * w) * np.exp(-1j * w * dead_time) + noise
+    return cr.MeasuredFRF(values, hz, std=np.full(60, 0.002))
+
+
+def view(method, low, high, kind="dead time"):
+    return DelayView(method, "test", kind, (low + high) / 2, low, high)
+
+
+@pytest.fixture(scope="module")
+def both():
+    return cr.check_delay(operating_record(), frf=frequency_response())
+
+
+def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(both):
+    assert [(v.method, v.source) for v in both.views] == [
+        ("output error", "record"),
+        ("scan", "record"),
+        ("cross-correlation", "record"),
+        ("FRF fit", "FRF"),
+        ("phase slope", "FRF"),
+    ]
+    assert both.agree
+    low, high = both.common
+    assert low <= 12.4 * DT <= high
+    assert both.conflicts == ()
+    assert "yes, on" in both.report()
+
+
+def test_a_step_is_seen_in_three_ways():
+    check = cr.check_delay(step_record(R1, noise=0.002))
+    assert [v.method for v in check.views] == ["output error", "first motion", "scan"]
+    fit, onset, _ = check.views
+    assert fit.low <= 37 * 7.8125e-4 <= fit.high
+    assert fit.value <= onset.high
+    assert check.table().loc["output error", "samples"] == pytest.approx(37, abs=0.5)
+
+
+def test_frequency_response_of_another_plant_does_not_agree(both):
+    other = cr.check_delay(frf=frequency_response(dead_time=0.4))
+    views = (*both.views[:3], *other.views)
+    common, conflicts = _verdict(list(views))
+    assert common is None
+    assert ("output error", "FRF fit") in conflicts
+    check = replace(both, views=views, agree=False, common=None, conflicts=conflicts)
+    assert "no: " in check.report()
+    assert "do not agree" in repr(check)
+
+
+def test_a_frequency_response_alone_is_enough():
+    check = cr.check_delay(frf=frequency_response())
+    assert [v.method for v in check.views] == ["FRF fit", "phase slope"]
+    fit, slope = check.views
+    assert fit.low <= 0.124 <= fit.high
+    # R2's lags are steep even at the top of the band: the bound is above the dead time
+    assert slope.high > 0.124
+    assert "samples" not in check.table().columns
+
+
+def test_the_verdict_is_the_intersection_of_dead_times_below_all_bounds():
+    views = [view("a", 1.0, 3.0), view("b", 2.0, 5.0), view("c", 0.0, 2.5, "upper bound")]
+    assert _verdict(views) == ((2.0, 2.5), ())
+    apart = [*views, view("d", 4.0, 5.0)]
+    common, conflicts = _verdict(apart)
+    assert common is None
+    assert set(conflicts) == {("a", "d"), ("d", "c")}
+
+
+def test_two_bounds_never_contradict_each_other():
+    views = [view("a", 4.0, 5.0, "upper bound"), view("b", 1.0, 2.0, "upper bound")]
+    assert _verdict(views) == ((0.0, 2.0), ())
+
+
+def test_what_could_not_be_done_is_said():
+    rng = np.random.default_rng(0)
+    noise = cr.Record(DT * np.arange(400), rng.normal(size=400), rng.normal(size=400))
+    check = cr.check_delay(noise)
+    assert "no_correlation" in [flag.code for flag in check.flags]
+    assert "up to lag" in check.report()
+
+
+def test_the_check_pickles(both):
+    assert pickle.loads(pickle.dumps(both)).views == both.views
+
+
+def test_unusable_data_are_refused():
+    with pytest.raises(DataError, match="neither"):
+        cr.check_delay()
+    with pytest.raises(OptionError, match="max_delay"):
+        cr.check_delay(operating_record(), max_delay=-1)
+    with pytest.raises(OptionError, match="order"):
+        cr.check_delay(operating_record(), order=0)
+    two = cr.Record(DT * np.arange(50), np.ones((2, 50)), np.ones(50))
+    with pytest.raises(DataError, match="several channels"):
+        cr.check_delay(two)
+    flat = cr.Record(DT * np.arange(50), np.ones(50), np.ones(50))
+    with pytest.raises(DataError, match="no method found a delay"):
+        cr.check_delay(flat)
+
+
+@pytest.mark.parametrize(("plant", "low", "high"), [("hairdryer", 2, 3), ("gas_furnace", 2, 3)])
+def test_measured_plants_under_random_input_are_agreed_on(shared_data, plant, low, high):
+    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
+    record = cr.Record(*table.T)
+    check = cr.check_delay(record)
+    assert check.agree
+    assert low * record.dt <= check.common[1] * (1 + 1e-9)
+    assert check.common[0] <= high * record.dt
+
+
+def test_the_motor_has_its_step_and_its_frequency_response_in_one_table(shared_data):
+    folder = shared_data / "dc_motor_tacho"
+    record = cr.Record(*np.loadtxt(folder / "up.csv", delimiter=",", skiprows=1).T)
+    check = cr.check_delay(record, frf=cr.read_frf(folder / "frf.csv"))
+    table = check.table()
+    # 2.5 ms from the step and 2.9 ms from the FRF, by the look of the data's keepers
+    assert 1.8e-3 < table.loc["output error", "value"] < 3.2e-3
+    assert 2.2e-3 < table.loc["FRF fit", "value"] < 3.4e-3
+    assert set(table["source"]) == {"record", "FRF"}

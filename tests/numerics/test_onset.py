@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+from ctrl_realize.numerics.onset import correlation_onset, phase_slope
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.95])
+@pytest.mark.parametrize("delay", [0, 1, 17])
+def test_the_first_lag_of_the_response_is_seen_through_a_coloured_input(delay, colour):
+    rng = np.random.default_rng(delay)
+    u = lfilter([1], [1, -colour], rng.normal(size=3000))
+    y = lfilter(np.r_[np.zeros(delay), 1.0], [1, -0.8], u)
+    seen = correlation_onset(u, y + 0.1 * y.std() * rng.normal(size=3000), 60, 0.99)
+    assert seen.onset == delay
+    assert seen.peak == delay
+
+
+def test_nothing_is_seen_where_nothing_is():
+    rng = np.random.default_rng(0)
+    seen = [correlation_onset(*rng.normal(size=(2, 500)), 40, 0.99).onset for _ in range(200)]
+    assert np.mean(np.array(seen) >= 0) < 0.03  # 1 % asked for, 200 draws
+
+
+def test_slope_of_the_phase_of_a_pure_delay_is_the_delay():
+    omega = np.linspace(1, 50, 40)
+    slope, std = phase_slope(omega, 0.3 - 0.07 * omega, 1 / 3)
+    assert_allclose([slope, std], [0.07, 0], rtol=1e-12, atol=1e-12)
+
+
+def test_std_of_the_slope_is_its_scatter():
+    omega = np.geomspace(0.1, 50, 80)
+    rng = np.random.default_rng(0)
+    found = np.array(
+        [phase_slope(omega, -0.02 * omega + 0.05 * rng.normal(size=80), 0.5) for _ in range(400)]
+    )
+    assert_allclose(found[:, 0].std(), np.sqrt(np.mean(found[:, 1] ** 2)), rtol=0.12)  # 3.5 %
