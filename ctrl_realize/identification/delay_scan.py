@@ -10,16 +10,15 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import one_of, whole
+from ..checks import whole
 from ..delayed import DelayedStateSpace
 from ..errors import OrderError
 from ..numerics.arrays import FloatArray, read_only
-from ..numerics.delay_models import DelayModels, hankel_size, misfit, realize_at_delays
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
-from .impulses import as_impulse, channels, check_samples, noise_floor, settled_samples
-from .realization import HANKEL, Realization, realize
+from .realization import Realization, realize
 from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
+from .scan_surface import Surface, scan_surface
 
 
 class Candidates(Sequence[DelayedStateSpace]):
@@ -260,63 +259,54 @@ def estimate_delay(
     >>> sys.delay, sys.fit.interval
     (37, (37, 38))
     """
-    data = as_impulse(impulse, dt)
     order = whole(order, "order", 1)
-    max_delay = whole(max_delay, "max_delay", 0)
-    padded = one_of(hankel, "hankel", HANKEL) == "padded"
-    check_samples(data, samples, order, max_delay, padded=padded, what="max_delay")
-    if samples is None:
-        samples = settled_samples(data, order, max_delay)
-    markov = channels(data)[:, :, : samples + max_delay + 1]
-    delays = np.arange(max_delay + 1)
-    direct = feedthrough is not False
-    D = markov[:, :, delays].transpose(2, 0, 1)
-    if not direct:
-        D = np.zeros_like(D)
-    models = realize_at_delays(markov, delays, samples, order, padded=padded)
-    iae = misfit(markov, delays, models, order, D)
-    rounding = 1e-11 * float(np.abs(markov).sum())
+    surface = scan_surface(impulse, (order,), max_delay, samples, feedthrough, hankel, dt)
+    return best_of(surface, order)
+
+
+def best_of(surface: Surface, order: int) -> DelayedStateSpace:
+    """Realize behind the best delay of one order, and tell how it was found."""
+    iae, rounding = surface.row(order), surface.rounding
     delay = best_delay(iae, rounding)
-    system = _final(data, order, delay, samples, feedthrough, hankel, models)
-    realization: Realization = system.fit
-    floor = noise_floor(data, hankel_size(samples, padded=padded))
-    fit = DelayScan(
-        iae=read_only(iae),
-        delay=delay,
-        interval=flat_set(iae, delay, rounding),
-        order=order,
-        samples=samples,
-        feedthrough=direct,
-        singular_values=read_only(models.singular_values),
-        noise_floor=floor,
-        candidates=Candidates(models.A, models.B, models.C, D, data.dt),
-        realization=realization,
-        flags=(
-            *curve_flags(iae, delay, rounding),
-            *noise_flags(float(models.singular_values[delay, -1]), floor, order),
-            *realization.flags,
-        ),
-    )
-    return system.replace(fit=fit)
-
-
-def _final(
-    data: ImpulseResponse,
-    order: int,
-    delay: int,
-    samples: int,
-    feedthrough: bool | None,
-    hankel: str,
-    models: DelayModels,
-) -> DelayedStateSpace:
-    """Realize behind the best delay."""
-    rank = int(np.count_nonzero(models.singular_values[delay]))
+    models = surface.models
+    rank = int(np.count_nonzero(models.singular_values[delay, :order]))
     if rank < order:
         raise OrderError(
             f"order={order}, but at the best delay of {delay} samples the data have the "
             f"numerical rank {rank}; "
             + (f"use an order of at most {rank}" if rank else "they are zero: a pure gain")
         )
-    return realize(
-        data, order, delay=delay, samples=samples, feedthrough=feedthrough, hankel=hankel
+    system = realize(
+        surface.impulse,
+        order,
+        delay=delay,
+        samples=surface.samples,
+        feedthrough=surface.feedthrough,
+        hankel=surface.hankel,
     )
+    realization: Realization = system.fit
+    last = surface.singular_value(order, delay)
+    fit = DelayScan(
+        iae=read_only(iae),
+        delay=delay,
+        interval=flat_set(iae, delay, rounding),
+        order=order,
+        samples=surface.samples,
+        feedthrough=surface.feedthrough is not False,
+        singular_values=read_only(models.singular_values[:, :order]),
+        noise_floor=surface.noise_floor,
+        candidates=Candidates(
+            models.A[:, :order, :order],
+            models.B[:, :order],
+            models.C[:, :, :order],
+            surface.direct,
+            realization.dt,
+        ),
+        realization=realization,
+        flags=(
+            *curve_flags(iae, delay, rounding),
+            *noise_flags(last, surface.noise_floor, order),
+            *realization.flags,
+        ),
+    )
+    return system.replace(fit=fit)

@@ -9,22 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import one_of, whole
+from ..checks import whole
+from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray, read_only
-from ..numerics.delay_models import hankel_size, misfit, realize_at_delays
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
-from .impulses import (
-    as_impulse,
-    channels,
-    check_samples,
-    filter_flags,
-    noise_floor,
-    settled_samples,
-)
-from .realization import HANKEL
+from .delay_scan import best_of
+from .impulses import filter_flags
 from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
+from .scan_surface import Surface, scan_surface
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,6 +74,7 @@ class OrderScan(Result):
     order: int
     samples: int
     impulse: ImpulseResponse = field(repr=False)
+    _surface: Surface = field(repr=False)
     flags: tuple[Flag, ...] = ()
 
     @property
@@ -96,6 +91,24 @@ class OrderScan(Result):
     def delay(self) -> int:
         """Best delay of the suggested order, in samples."""
         return self.delays[self.orders.index(self.order)]
+
+    def system(self, order: int | None = None) -> DelayedStateSpace:
+        """Return what `estimate_delay` finds for an order, without another decomposition.
+
+        Parameters
+        ----------
+        order : int, optional
+            One of `orders`; default the suggested one.
+
+        Returns
+        -------
+        DelayedStateSpace
+            Its `fit` is a `DelayScan`.
+        """
+        chosen = self.order if order is None else whole(order, "order", 1)
+        if chosen not in self.orders:
+            raise OptionError(f"order={chosen} was not scanned; choose one of {self.orders}")
+        return best_of(self._surface, chosen)
 
     def last_singular_value(self, order: int) -> float:
         """Return singular value `order` at the best delay of that order."""
@@ -201,42 +214,30 @@ def scan_orders(
     >>> scan.order, scan.delay
     (2, 21)
     """
-    data = as_impulse(impulse, dt)
-    tried = _orders(orders)
-    highest = tried[-1]
-    max_delay = whole(max_delay, "max_delay", 0)
-    padded = one_of(hankel, "hankel", HANKEL) == "padded"
-    check_samples(data, samples, highest, max_delay, padded=padded, what="max_delay")
-    if samples is None:
-        samples = settled_samples(data, highest, max_delay)
-    markov = channels(data)[:, :, : samples + max_delay + 1]
-    at = np.arange(max_delay + 1)
-    D = markov[:, :, at].transpose(2, 0, 1)
-    if feedthrough is False:
-        D = np.zeros_like(D)
-    models = realize_at_delays(markov, at, samples, highest, padded=padded)
-    iae = np.stack([misfit(markov, at, models, order, D) for order in tried])
-    rounding = 1e-11 * float(np.abs(markov).sum())
-    delays = tuple(best_delay(row, rounding) for row in iae)
-    floor = noise_floor(data, hankel_size(samples, padded=padded))
-    last = [float(models.singular_values[d, k - 1]) for d, k in zip(delays, tried, strict=True)]
-    chosen = _suggest(tried, np.array(last), iae.min(axis=1), floor, rounding)
-    i = tried.index(chosen)
+    surface = scan_surface(impulse, _orders(orders), max_delay, samples, feedthrough, hankel, dt)
+    rounding = surface.rounding
+    delays = tuple(best_delay(row, rounding) for row in surface.iae)
+    last = [surface.singular_value(k, d) for k, d in zip(surface.orders, delays, strict=True)]
+    chosen = _suggest(surface, np.array(last))
+    i = surface.orders.index(chosen)
     return OrderScan(
-        orders=tried,
-        iae=read_only(iae),
+        orders=surface.orders,
+        iae=read_only(surface.iae),
         delays=delays,
-        intervals=tuple(flat_set(row, d, rounding) for row, d in zip(iae, delays, strict=True)),
-        singular_values=read_only(models.singular_values),
-        noise_floor=floor,
-        order=chosen,
-        samples=samples,
-        impulse=data,
-        flags=(
-            *curve_flags(iae[i], delays[i], rounding),
-            *noise_flags(last[i], floor, chosen),
-            *filter_flags(data),
+        intervals=tuple(
+            flat_set(row, d, rounding) for row, d in zip(surface.iae, delays, strict=True)
         ),
+        singular_values=read_only(surface.models.singular_values),
+        noise_floor=surface.noise_floor,
+        order=chosen,
+        samples=surface.samples,
+        impulse=surface.impulse,
+        flags=(
+            *curve_flags(surface.iae[i], delays[i], rounding),
+            *noise_flags(last[i], surface.noise_floor, chosen),
+            *filter_flags(surface.impulse),
+        ),
+        _surface=surface,
     )
 
 
@@ -249,15 +250,12 @@ def _orders(orders: int | Iterable[int]) -> tuple[int, ...]:
     return tuple(range(1, whole(orders, "orders", 1) + 1))
 
 
-def _suggest(
-    orders: tuple[int, ...],
-    last: FloatArray,
-    misfits: FloatArray,
-    floor: float | None,
-    rounding: float,
-) -> int:
+def _suggest(surface: Surface, last: FloatArray) -> int:
     """Choose the order whose singular values stand out."""
-    if floor:
-        above = np.flatnonzero(last > ABOVE_NOISE * floor)
+    orders = surface.orders
+    if surface.noise_floor:
+        above = np.flatnonzero(last > ABOVE_NOISE * surface.noise_floor)
         return orders[int(above[-1])] if above.size else orders[0]
-    return orders[int(np.flatnonzero(misfits <= AS_GOOD * misfits.min() + rounding)[0])]
+    misfits = surface.iae.min(axis=1)
+    as_good = misfits <= AS_GOOD * misfits.min() + surface.rounding
+    return orders[int(np.flatnonzero(as_good)[0])]

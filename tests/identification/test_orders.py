@@ -39,6 +39,23 @@ def test_rows_are_the_delay_scans_of_their_orders():
         assert surface.intervals[i] == scan.interval
 
 
+def test_system_of_an_order_is_what_estimate_delay_finds():
+    pulse = valve_pulse("zero-phase", n=461)
+    surface = cr.scan_orders(pulse, 5, max_delay=60, samples=400, feedthrough=True, dt=TS)
+    for order in (2, 3):
+        direct = cr.estimate_delay(pulse, order, max_delay=60, samples=400, feedthrough=True, dt=TS)
+        system = surface.system(order)
+        assert system.delay == direct.delay
+        assert np.array_equal(system.delay_free.A, direct.delay_free.A)
+        assert np.array_equal(system.delay_free.D, direct.delay_free.D)
+        np.testing.assert_allclose(system.fit.iae, direct.fit.iae, rtol=1e-8)
+        assert system.fit.interval == direct.fit.interval
+        assert system.fit.candidates[7].nstates == order + 7
+    assert surface.system().fit.order == surface.order
+    with pytest.raises(OptionError, match="order=7 was not scanned"):
+        surface.system(7)
+
+
 def rest(noise: float, seed: int = 77) -> np.ndarray:
     return valve_pulse("zero-phase", noise=noise, delay=9000.0, seed=seed, n=3500)
 

@@ -59,9 +59,10 @@ def test_misfit_is_the_sum_over_one_window_for_all_delays(delays):
 
 
 def test_a_model_that_leaves_the_range_of_floats_has_an_infinite_misfit():
-    A = np.array([[[1e30]], [[0.5]]])
-    ones = np.ones((2, 1))
-    misfit = integrated_absolute_error(np.ones(50), np.array([0, 1]), (A, ones, ones, ones[:, 0]))
+    # two states that grow beyond all bounds and cancel: inf - inf
+    A = np.array([np.diag([1e30, 1e30]), np.diag([0.5, 0.5])])
+    B, C = np.ones((2, 2)), np.array([[1.0, -1.0], [1.0, -1.0]])
+    misfit = integrated_absolute_error(np.ones(50), np.array([0, 1]), (A, B, C, np.ones(2)))
     assert misfit[0] == np.inf
     assert np.isfinite(misfit[1])
 
