@@ -131,12 +131,12 @@ def _collect(
     if not depth or len(arrays) >= _MAX_ARRAYS:
         raise _DamagedError(f"more than {_MAX_ARRAYS} arrays, or {_MAX_DEPTH} levels of structs")
     parts = _elements(data, order)
-    flags = int(_numbers(_next(parts), order)[0])
-    shape = [int(side) for side in _numbers(_next(parts), order)]
+    flags, *_ = _sizes(_next(parts), order)
+    shape = _sizes(_next(parts), order)
     name = prefix or bytes(_next(parts)[1]).decode("ascii", "replace")
     if prefix:
         _next(parts)
-    if not shape or min(shape) < 0:
+    if min(shape) < 0:
         raise _DamagedError(f"the shape {shape}")
     kind, count = flags & 0xFF, math.prod(shape)
     if kind in _CLASSES and name:
@@ -155,16 +155,29 @@ def _collect(
 def _array(
     parts: Iterator[tuple[int, memoryview]], flags: int, shape: list[int], order: str
 ) -> AnyArray:
-    values: AnyArray = _numbers(_next(parts), order).astype(_CLASSES[flags & 0xFF])
+    stored, kind = _numbers(_next(parts), order), _CLASSES[flags & 0xFF]
+    if stored.dtype.kind == "f" and "f" not in kind:
+        raise _DamagedError("whole numbers stored as fractions")
+    values: AnyArray = stored.astype(kind)
     if flags & _COMPLEX:
-        values = values + 1j * _numbers(_next(parts), order)
+        imaginary = _numbers(_next(parts), order)
+        if imaginary.size != values.size:
+            raise _DamagedError("real and imaginary parts of different lengths")
+        values = _complex(values, imaginary)
     if values.size != math.prod(shape):
         raise _DamagedError(f"{values.size} numbers for the shape {shape}")
     return values.reshape(shape, order="F")
 
 
+def _complex(real: AnyArray, imaginary: AnyArray) -> AnyArray:
+    # not real + 1j * imaginary, which makes NaN of an infinite part
+    values = np.empty(real.shape, dtype=np.complex128)
+    values.real, values.imag = real, imaginary
+    return values
+
+
 def _field_names(parts: Iterator[tuple[int, memoryview]], order: str) -> list[str]:
-    length = int(_numbers(_next(parts), order)[0])
+    length, *_ = _sizes(_next(parts), order)
     names = bytes(_next(parts)[1])
     if length < 1 or len(names) > 64 * _MAX_ARRAYS:
         raise _DamagedError(f"names of fields with {length} letters")
@@ -184,10 +197,14 @@ def _numbers(part: tuple[int, memoryview], order: str) -> AnyArray:
     dtype = np.dtype(order + _TYPES[kind]) if kind in _TYPES else None
     if dtype is None or len(data) % dtype.itemsize:
         raise _DamagedError(f"{len(data)} bytes of type {kind}")
-    numbers = np.frombuffer(data, dtype)
-    if not numbers.size and kind in (5, 6):
-        raise _DamagedError("an empty list of sizes")
-    return numbers
+    return np.frombuffer(data, dtype)
+
+
+def _sizes(part: tuple[int, memoryview], order: str) -> list[int]:
+    numbers = _numbers(part, order)
+    if not numbers.size or numbers.dtype.kind == "f":
+        raise _DamagedError("sizes are missing")
+    return [int(number) for number in numbers]
 
 
 def _old_variables(content: memoryview) -> Iterator[tuple[str, AnyArray]]:
@@ -218,7 +235,6 @@ def _old_variables(content: memoryview) -> Iterator[tuple[str, AnyArray]]:
         name = bytes(content[start - letters : start]).rstrip(b"\0").decode("ascii", "replace")
         numbers: AnyArray = np.frombuffer(content[start:at], dtype)
         if imaginary:
-            real, imag = np.split(numbers, 2)
-            numbers = real + 1j * imag
+            numbers = _complex(*np.split(numbers, 2))
         if digits[3] == "0":
             yield name, numbers.reshape(rows, columns, order="F")
