@@ -167,11 +167,12 @@ def _scan(
             samples=samples,
             feedthrough=feedthrough,
         )
-        order = orders.order
-        choices.append(f"order {order}: its last singular value is {_against_noise(orders)}")
-    system = estimate_delay(
-        impulse, order, max_delay=reach, samples=samples, feedthrough=feedthrough
-    )
+        choices.append(f"order {orders.order}: its last singular value is {_against_noise(orders)}")
+        system = orders.system()
+    else:
+        system = estimate_delay(
+            impulse, order, max_delay=reach, samples=samples, feedthrough=feedthrough
+        )
     return _named(system, choices, step)
 
 
@@ -243,4 +244,4 @@ def _against_noise(orders: Any) -> str:
     value = orders.last_singular_value(orders.order)
     if orders.noise_floor:
         return f"{value / orders.noise_floor:.1f} times that of the noise before the step"
-    return f"{value:.3g}, the last before the gap (the noise before the step is not known)"
+    return f"{value:.3g}, and none fits better by 10 % (the noise before the step is not known)"
