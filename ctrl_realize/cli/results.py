@@ -15,6 +15,7 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..io import save_model
 from ..io.atomic import write_text
+from ..plots.style import time_unit
 from ..report.sketches import (
     Sketch,
     campaign_sketches,
@@ -113,6 +114,7 @@ def file_name(name: str) -> str:
 
 def campaign_table(campaign: Campaign) -> str:
     """Lay out a campaign for the terminal: one line for each record."""
+    scale, unit = time_unit(float(np.median([row.dead_time for row in campaign.good])))
     rows = []
     for row in campaign.rows:
         if row.system is None:
@@ -126,13 +128,14 @@ def campaign_table(campaign: Campaign) -> str:
                 printable(row.name),
                 _number(row.amplitude),
                 f"{row.delay:.4g}",
-                f"{1e3 * row.dead_time:.4g}",
-                f"{1e3 * low:.4g} ... {1e3 * high:.4g}",
+                f"{scale * row.dead_time:.4g}",
+                f"{scale * low:.4g} ... {scale * high:.4g}",
                 str(row.system.delay_free.nstates),
                 remarks,
             ]
         )
-    columns = ["record", "step", "delay", "dead time [ms]", "interval [ms]", "order", "remarks"]
+    columns = ["record", "step", "delay", f"dead time [{unit}]", f"interval [{unit}]"]
+    columns += ["order", "remarks"]
     return table(columns, rows, numbers=(1, 2, 3, 4, 5))
 
 

@@ -9,6 +9,14 @@ import control as ct
 
 from ..errors import OptionError
 from .campaigns import campaign_plot as campaign_plot
+from .design_plots import closed_loop_plot as closed_loop_plot
+from .design_plots import delay_robustness_plot as delay_robustness_plot
+from .design_plots import hankel_plot as hankel_plot
+from .design_plots import margins_plot as margins_plot
+from .design_plots import pid_comparison_plot as pid_comparison_plot
+from .design_plots import process_model_plot as process_model_plot
+from .design_plots import robustness_plot as robustness_plot
+from .design_plots import uncertainty_plot as uncertainty_plot
 from .fits import dead_time_plot as dead_time_plot
 from .fits import fit_plot as fit_plot
 from .frequencies import comparison_plot as comparison_plot
@@ -25,18 +33,25 @@ from .scans import order_plot as order_plot
 from .scans import singular_value_plot as singular_value_plot
 
 _DRAWN_BY = {
+    "BalancedReduction": "design_plots:hankel_plot",
     "Campaign": "campaigns:campaign_plot",
     "DelayFit": "fits:fit_plot",
+    "DelayRobustness": "design_plots:delay_robustness_plot",
     "DelayScan": "scans:delay_plot",
     "DelayTrack": "others:track_plot",
     "FRFComparison": "frequencies:comparison_plot",
     "FRFFit": "others:frf_fit_plot",
     "ImpulseResponse": "impulses:impulse_plot",
+    "Margins": "design_plots:margins_plot",
     "MeasuredFRF": "frequencies:frf_plot",
     "OrderScan": "scans:order_plot",
+    "PIDComparison": "design_plots:pid_comparison_plot",
+    "ProcessModel": "design_plots:process_model_plot",
     "Realization": "scans:singular_value_plot",
     "Record": "records:record_plot",
+    "RobustnessCheck": "design_plots:robustness_plot",
     "StepResponse": "records:step_plot",
+    "UncertaintyBound": "design_plots:uncertainty_plot",
     "ValveTruth": "others:truth_plot",
 }
 """Class of a result -> module of this package and function that draws it."""

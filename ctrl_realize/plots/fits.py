@@ -57,7 +57,7 @@ def fit_plot(
             [*lines, drawn],
             title=name if title is None else title,
             own_figure=ax is None,
-            loc="best",
+            loc="lower right" if result.fitted[-1] >= result.fitted[0] else "upper right",
         )
 
 
@@ -143,8 +143,10 @@ def _first_motion(result: DelayFit) -> int:
 
 
 def _output_label(result: DelayFit) -> str:
+    if len(result.records) > 1:  # records of different steps are scaled before they are averaged
+        return "unit step\nresponse"
     label = result.records[0].output_labels[0] if result.records else "y"
-    return "output" if label == "y" else style.wrapped(label, 26)
+    return "output" if label == "y" else style.wrapped(label, 18)
 
 
 def evidence_height(result: DelayFit) -> float:

@@ -167,7 +167,9 @@ def comparison_plot(
                     linewidth=0, label="noise of the FRF (2 std)",
                 )  # fmt: skip
             one.axhline(0.0, color=style.INK, linewidth=1.0)
-            lines.append(list(one.plot(comparison.frequency_hz, error, **looks)))
+            trusted = np.where(comparison.trusted, error, np.nan)
+            one.plot(comparison.frequency_hz, error, **{**looks, "alpha": 0.3, "label": None})
+            lines.append(list(one.plot(comparison.frequency_hz, trusted, **looks)))
             inside = np.abs(error[comparison.trusted])
             limit = 1.6 * max(float(inside.max()), 1e-9)
             one.set_ylim(-limit, limit)

@@ -76,7 +76,7 @@ def delay_plot(
             style.note(axes[0], f"the filter's delay of {lag:.1f} samples is in it", 0.08)
         _misfit_axes(axes[0])
         name = result.impulse.name if title is None else title
-        return style.finished(axes, [lines], title=name, own_figure=ax is None)
+        return style.finished(axes, [lines], title=name, own_figure=ax is None, loc="upper center")
 
 
 def singular_value_plot(
@@ -166,7 +166,7 @@ def order_plot(
         axes[1].set_ylabel("singular value\nat the best delay")
         name = scan.impulse.name if title is None else title
         return style.finished(
-            axes, [lines, points], title=name, own_figure=ax is None, legends=(1,), loc="best"
+            axes, [lines, points], title=name, own_figure=ax is None, legends=(1,)
         )
 
 

@@ -46,7 +46,10 @@ _SETTINGS: Any = {
     "xtick.labelsize": 11,
     "ytick.labelsize": 11,
     "legend.fontsize": 11,
-    "legend.frameon": False,
+    "legend.frameon": True,
+    "legend.facecolor": PAPER,
+    "legend.edgecolor": "none",
+    "legend.framealpha": 0.75,
     "legend.borderaxespad": 0.3,
     "lines.linewidth": 2.0,
     "lines.markersize": 5.0,
@@ -166,7 +169,7 @@ def finished(
     legends: Sequence[int] = (0,),
     title: str | None = None,
     own_figure: bool = False,
-    loc: Any = "best",
+    loc: Any = "upper right",
 ) -> ct.ControlPlot:
     """Put legends and title on, and bundle everything as python-control's plots do."""
     for position in legends:

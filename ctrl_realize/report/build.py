@@ -13,6 +13,7 @@ import numpy as np
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
+from ..plots.style import time_unit
 from ..results import Result
 from ..signals import Record
 from .page import Column, Page, Row, Table, pairs, write_page
@@ -299,12 +300,14 @@ def _extent(record: Record | None) -> tuple[str, str, str]:
 
 
 def _campaign_table(campaign: Campaign) -> Table:
+    waits = [row.dead_time for row in campaign.good]
+    scale, unit = time_unit(float(np.median(waits)))
     columns = (
-        Column("record"),
+        Column("record", "name"),
         Column("step", "number"),
         Column("delay [samples]", "number"),
-        Column("dead time [ms]", "number"),
-        Column("interval [ms]", "number"),
+        Column(f"dead time [{unit}]", "number"),
+        Column(f"interval [{unit}]", "number"),
         Column("order", "number"),
         Column("misfit", "number"),
         Column("remarks"),
@@ -322,8 +325,8 @@ def _campaign_table(campaign: Campaign) -> Table:
             row.name,
             _number(row.amplitude),
             f"{row.delay:.4g}",
-            f"{1e3 * row.dead_time:.4g}",
-            f"{1e3 * low:.4g} to {1e3 * high:.4g}",
+            f"{scale * row.dead_time:.4g}",
+            f"{scale * low:.4g} to {scale * high:.4g}",
             str(row.system.delay_free.nstates),
             f"{row.misfit:.3g}",
             ", ".join([*remarks, *row.warnings]),

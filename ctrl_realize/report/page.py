@@ -27,7 +27,7 @@ class PageFigure:
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column; `kind` is "text", "number" or "mono"."""
+    """Heading of a column; `kind` is "text", "name", "number" or "mono"."""
 
     name: str
     kind: str = "text"

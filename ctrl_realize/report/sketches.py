@@ -109,8 +109,8 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
             Sketch(
                 "fit",
                 "Data, model and what is left",
-                "The residual should look like noise. Below: where each structure and view puts the "
-                "dead time; the band is the interval.",
+                "The residual should look like noise. Below: where each structure and view puts "
+                "the dead time; the band is the interval.",
                 lambda figure: plots.fit_plot(fit, ax=figure),
                 (6.2, 3.6 + evidence_height(fit)),
             )

@@ -28,6 +28,8 @@ SEVERE = frozenset(
 CLOSE, FAR = 0.05, 0.2
 """Relative errors (rms, in the trusted band) under which a model is close, over which it is off."""
 
+INTEGRATING = "none: it integrates"
+
 Level = Literal["good", "caution", "poor"]
 
 _JUDGEMENTS: dict[Level, str] = {
@@ -62,9 +64,14 @@ def campaign_verdict(campaign: Campaign) -> Verdict:
     system = campaign.system
     own = tuple(campaign.flags)
     flags = (*own, *getattr(system.fit, "flags", ()))
+    summary = campaign.statistics()
     facts = [
         ("records", f"{len(campaign.good)} of {len(campaign.rows)} identified"),
-        *(row for row in campaign._rows() if row[0] != "identified"),
+        (
+            "trimmed mean of their delays",
+            f"{summary.mean:.2f} samples, {in_time(summary.mean * campaign.dt, 4)}",
+        ),
+        ("scatter (std)", f"{np.sqrt(summary.variance):.2g} samples"),
         *facts_of(system),
     ]
     level = _level(flags)
@@ -96,13 +103,15 @@ def headline_of(system: DelayedStateSpace) -> str:
     """Say the model in one sentence."""
     wait = estimate_of(system)
     sentence = (
-        f"Dead time {in_time(wait, 4)} ({wait / system.dt:.4g} samples of {in_time(system.dt, 4)})"
+        f"Dead time {in_time(wait, 4)} ({wait / system.dt:.4g} samples of {in_time(system.dt, 6)})"
     )
     interval = interval_of(system)
     if interval is not None:
         sentence += f", {interval_name(system)} {in_time(interval[0])} to {in_time(interval[1])}"
     order = system.delay_free.nstates
-    return f"{sentence}; behind it a model of order {order} with a gain of {_gain(system)}."
+    gain = _gain(system)
+    behind = "an integrating model" if gain == INTEGRATING else f"a model of gain {gain} and"
+    return f"{sentence}; behind it {behind} of order {order}."
 
 
 def interval_name(system: DelayedStateSpace) -> str:
@@ -124,6 +133,8 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
         ("total_delay", "total delay of slow signals"),
     ):
         value = getattr(system.fit, attribute, None)
+        if attribute == "total_delay" and _gain(system) == INTEGRATING:
+            continue
         if isinstance(value, float) and np.isfinite(value):
             facts.append((label, in_time(value, 4)))
     facts.append(("order without the delay", str(system.delay_free.nstates)))
@@ -156,7 +167,7 @@ def poles_of(system: DelayedStateSpace) -> str:
 
 def _gain(system: DelayedStateSpace) -> str:
     gain = float(np.real(np.ravel(system.delay_free.dcgain())[0]))
-    return f"{gain:.4g}" if np.isfinite(gain) else "infinite (integrating)"
+    return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
 
 
 def _level(flags: Sequence[Any]) -> Level:
