@@ -193,7 +193,10 @@ def _search(
     start: FloatArray,
     size: float,
 ) -> FloatArray:
-    """Minimize -2 log marginal likelihood over the logarithms of the hyper-parameters."""
+    """Minimize -2 log marginal likelihood over the logarithms of the hyper-parameters.
+
+    The simplex starts with steps of `size`, and ends with a thirtieth of that.
+    """
     span = lags * group
     shapes = _shape_count(kernel)
     low = np.tile([np.log(0.1 / span)] * shapes + [-80.0], m)
@@ -217,12 +220,12 @@ def _search(
         inside,
         method="Nelder-Mead",
         bounds=list(zip(low, high, strict=True)),
-        # A difference of 0.02 in -2 log likelihood is far inside what the data can tell.
+        # A difference of 0.1 in -2 log likelihood is far inside what the data can tell.
         options={
             "initial_simplex": simplex,
-            "xatol": 0.02,
-            "fatol": 0.02,
-            "maxfev": 300 * m,
+            "xatol": max(size / 30, 0.02),
+            "fatol": 0.02 if size > 0.5 else 0.1,
+            "maxfev": (300 if size > 0.5 else 40) * m,
         },
     )
     return np.asarray(found.x, dtype=np.float64)
