@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Draw the picture at the top of the README: the three lines on the simulated valve."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import control as ct
+import matplotlib.pyplot as plt
+import numpy as np
+
+import ctrl_realize as cr
+
+TARGET = Path(__file__).resolve().parents[1] / "docs" / "images" / "result.png"
+DATA, MODEL, SHADE = "#0072b2", "#d55e00", "#f2cf7a"
+
+
+def main() -> None:
+    valve = cr.bench.valve()
+    rng = np.random.default_rng(5)
+    record = valve.step_record(16.0, rng)
+    system = cr.identify(record)
+    frf = cr.stepped_sine_frf(valve.stepped_sine(rng))
+    fit = system.fit
+
+    plt.rcParams.update({"font.size": 15, "axes.spines.top": False, "axes.spines.right": False})
+    figure, axes = plt.subplot_mosaic(
+        [["step", "gain"], ["step", "phase"]], figsize=(15, 6.2), layout="constrained"
+    )
+    step = cr.unit_step(record)
+    shown = step.time < 0.6
+    axes["step"].plot(1e3 * step.time[shown], step.output[shown], color=DATA, lw=2, label="data")
+    model = system.step(step.n_samples)
+    axes["step"].plot(
+        1e3 * step.time[shown], model[shown], color=MODEL, lw=2.5, ls="--", label="model"
+    )
+    low, high = fit.interval
+    axes["step"].axvspan(1e3 * low, 1e3 * high, color=SHADE, lw=0)
+    axes["step"].axvline(1e3 * fit.dead_time, color=MODEL, lw=1.5)
+    axes["step"].set(
+        xlabel="time after the step [ms]",
+        ylabel="unit step response [mm/mA]",
+        title=f"dead time {1e3 * fit.dead_time:.1f} ms = {fit.delay:.1f} samples, "
+        f"95 %: {1e3 * low:.1f}...{1e3 * high:.1f} ms",
+    )
+    axes["step"].legend(loc="center right", frameon=False)
+
+    omega = 2 * np.pi * frf.frequency_hz
+    response = np.ravel(system(np.exp(1j * omega * system.dt)))
+    good = frf.coherence >= 0.95
+    for name, of in (
+        ("gain", lambda g: 20 * np.log10(np.abs(g))),
+        ("phase", lambda g: np.degrees(np.unwrap(np.angle(g)))),
+    ):
+        axes[name].semilogx(
+            frf.frequency_hz[good],
+            of(frf.complex[good]),
+            color=DATA,
+            lw=4,
+            label="stepped sine, coherence above 0.95",
+        )
+        axes[name].semilogx(
+            frf.frequency_hz, of(response), color=MODEL, lw=2.5, ls="--", label="model of the step"
+        )
+    axes["gain"].set(ylabel="gain [dB]", title="the model beside a stepped-sine FRF")
+    axes["phase"].set(xlabel="frequency [Hz]", ylabel="phase [deg]")
+    axes["gain"].legend(loc="lower left", frameon=False)
+    figure.text(0.998, 0.002, "simulated valve (37 samples = 28.9 ms)", ha="right", va="bottom", size=11, color="#666666")
+    assert isinstance(system, ct.StateSpace)
+    TARGET.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(TARGET, dpi=90)
+
+
+main()
