@@ -1,0 +1,133 @@
+"""Pages of the API reference, written from the package itself, so that no name is forgotten."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any, get_origin
+
+GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "data": (
+        "Data",
+        "What was measured, and reading it from files.",
+        ("ctrl_realize.signals", "ctrl_realize.io.records", "ctrl_realize.io.frf"),
+    ),
+    "steps": (
+        "From data to an impulse response",
+        "Each step of the method is a plain function.",
+        (
+            "ctrl_realize.identification.steps",
+            "ctrl_realize.identification.from_io",
+            "ctrl_realize.identification.from_frf",
+        ),
+    ),
+    "identification": (
+        "Models and their dead time",
+        "Functions return the model itself; how it was found is in its `.fit`.",
+        ("ctrl_realize.identification", "ctrl_realize.numerics"),
+    ),
+    "systems": (
+        "Systems with dead time",
+        "A `control.StateSpace` that keeps its dead time beside the core; saving and loading.",
+        ("ctrl_realize.delayed", "ctrl_realize.io"),
+    ),
+    "frequency": (
+        "Frequency responses",
+        "From records to a measured frequency response, and a model beside it.",
+        ("ctrl_realize.frequency",),
+    ),
+    "errors": (
+        "Results, flags and errors",
+        "What all results share, and what can go wrong.",
+        ("ctrl_realize.errors", "ctrl_realize.results"),
+    ),
+}
+"""Page -> title, one line, and the modules whose names it lists (longest prefix wins)."""
+
+SUBMODULES = {
+    "design": "Controllers for plants with dead time.",
+    "plots": "Pictures of results; each returns a `control.ControlPlot`.",
+    "bench": "Simulated set-ups with known truth.",
+    "paper": "Every number that the paper prints.",
+}
+
+
+def public(module: ModuleType) -> dict[str, Any]:
+    """Names that a user may write after the module's name, modules themselves left out."""
+    return {
+        name: value
+        for name, value in sorted(vars(module).items())
+        if not name.startswith("_")
+        and not inspect.ismodule(value)
+        and name not in ("annotations", "import_module", "Any", "Literal", "dataclass")
+        and _belongs(value, module)
+    }
+
+
+def _belongs(value: Any, module: ModuleType) -> bool:
+    home = getattr(value, "__module__", None)
+    if get_origin(value) is not None:  # aliases of types
+        return False
+    if home is None or not (inspect.isclass(value) or inspect.isroutine(value)):
+        # Data: settings and tables of the module itself.
+        return module.__name__ == "ctrl_realize.paper"
+    return str(home).startswith("ctrl_realize")
+
+
+def group_of(value: Any) -> str:
+    home = str(getattr(value, "__module__", ""))
+    fitting = {
+        prefix: page
+        for page, (_, _, prefixes) in GROUPS.items()
+        for prefix in prefixes
+        if home == prefix or home.startswith(prefix + ".")
+    }
+    return fitting[max(fitting, key=len)] if fitting else "errors"
+
+
+def pages() -> dict[str, str]:
+    """Name of each page -> its MyST text."""
+    package = import_module("ctrl_realize")
+    sorted_names: dict[str, list[str]] = {page: [] for page in GROUPS}
+    for name, value in public(package).items():
+        sorted_names[group_of(value)].append(f"ctrl_realize.{name}")
+    # Errors and result mixins are caught by name; they need not be at the top level.
+    for module_name in ("ctrl_realize.errors", "ctrl_realize.results"):
+        for name, value in public(import_module(module_name)).items():
+            full = f"{module_name}.{name}"
+            if getattr(value, "__module__", "") == module_name and not hasattr(package, name):
+                sorted_names["errors"].append(full)
+    texts = {
+        page: _page(title, line, sorted_names[page]) for page, (title, line, _) in GROUPS.items()
+    }
+    for name, line in SUBMODULES.items():
+        module = import_module(f"ctrl_realize.{name}")
+        names = [f"ctrl_realize.{name}.{each}" for each in public(module)]
+        texts[name] = _page(f"`{name}`", line, names, about=(module.__doc__ or "").split("\n")[0])
+    return texts
+
+
+def _page(title: str, line: str, names: list[str], about: str = "") -> str:
+    ordered = sorted(names, key=lambda name: (_is_class(name), name.lower()))
+    text = [f"# {title}", "", line, ""]
+    if about and about.rstrip(".") != line.rstrip("."):
+        text += [about, ""]
+    text += ["```{eval-rst}", ".. autosummary::", "   :toctree: entries", "   :nosignatures:", ""]
+    text += [f"   {name}" for name in ordered]
+    return "\n".join([*text, "```", ""])
+
+
+def _is_class(full: str) -> bool:
+    module, _, name = full.rpartition(".")
+    return inspect.isclass(getattr(import_module(module), name, None))
+
+
+def write_pages(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pages().items():
+        path = folder / f"{name}.md"
+        # Unchanged pages are not touched, so that a second build has nothing to do.
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)

@@ -1,0 +1,129 @@
+"""Sphinx configuration. Everything numeric on the pages comes from cells that run at build."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path.insert(0, str(HERE / "_ext"))
+sys.path.insert(0, str(ROOT))
+
+import public_names  # noqa: E402
+
+import ctrl_realize  # noqa: E402
+
+project = "ctrl_realize"
+author = "the ctrl_realize developers"
+copyright = "2026, the ctrl_realize developers"
+version = release = ctrl_realize.__version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "numpydoc",
+    "myst_nb",
+    "sphinx_copybutton",
+    "mathml",
+]
+exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints", "*_table.md", "generated/tables"]
+templates_path = ["_templates"]
+root_doc = "index"
+
+# -- what is written before the build ------------------------------------------------------------
+
+GENERATED = HERE / "generated"
+GENERATED.mkdir(exist_ok=True)
+public_names.write_pages(GENERATED / "api")
+
+
+def _notebooks_into_source() -> None:
+    """Show the notebooks' folder to Sphinx, which reads nothing outside of its own."""
+    link = GENERATED / "notebooks"
+    if not link.exists():
+        link.unlink(missing_ok=True)
+        link.symlink_to(Path("..") / ".." / "notebooks", target_is_directory=True)
+
+
+_notebooks_into_source()
+
+# Tables that the benchmarks write, or a line that says how to make them.
+TABLES = {
+    "performance": ("docs/performance_table.md", "python -m benchmarks.speed"),
+    "accuracy": ("docs/accuracy_table.md", "python -m benchmarks.accuracy"),
+    "peers": ("docs/peers_table.md", "python -m benchmarks.peers"),
+}
+(GENERATED / "tables").mkdir(exist_ok=True)
+for _name, (_file, _command) in TABLES.items():
+    _stored = ROOT / _file
+    _text = (
+        _stored.read_text()
+        if _stored.exists()
+        else f"*No table is stored yet; `{_command}` makes it.*\n"
+    )
+    (GENERATED / "tables" / f"{_name}.md").write_text(_text)
+
+# -- notebooks and code cells --------------------------------------------------------------------
+
+# Sharp figures, whatever the reader's own IPython is set to.
+PROFILE = HERE / "_build" / "ipython"
+(PROFILE / "profile_default").mkdir(parents=True, exist_ok=True)
+(PROFILE / "profile_default" / "ipython_kernel_config.py").write_text(
+    'c = get_config()\nc.InlineBackend.figure_formats = {"retina"}\n'
+    'c.HistoryManager.enabled = False\n'
+)
+os.environ["IPYTHONDIR"] = str(PROFILE)
+os.environ.pop("MPLBACKEND", None)  # the kernel brings its own
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(threads, "1")
+
+nb_execution_mode = "force"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
+nb_merge_streams = True
+# Measured records are no part of the project; where they are absent the stored outputs show.
+MEASURED = sorted(
+    path.name for path in (ROOT / "notebooks").glob("*.ipynb") if "shared/data" in path.read_text()
+)
+if not (ROOT / ".." / "shared" / "data").is_dir():
+    nb_execution_excludepatterns = [f"generated/notebooks/{name}" for name in MEASURED]
+suppress_warnings = ["mystnb.unknown_mime_type"]
+
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "colon_fence", "smartquotes"]
+myst_heading_anchors = 3
+html_math_renderer = "mathml"
+
+# -- API reference -------------------------------------------------------------------------------
+
+autosummary_generate = True
+autosummary_imported_members = True
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+default_role = "code"
+
+# -- look ----------------------------------------------------------------------------------------
+
+html_theme = "furo"
+html_title = "ctrl_realize"
+html_static_path = ["_static"]
+html_css_files = ["style.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "light_css_variables": {
+        "color-brand-primary": "#0060a0",
+        "color-brand-content": "#0060a0",
+        "font-stack": "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif",
+        "font-stack--monospace": "ui-monospace, 'SF Mono', Menlo, 'DejaVu Sans Mono', monospace",
+    },
+    "dark_css_variables": {
+        "color-brand-primary": "#6cb6ff",
+        "color-brand-content": "#6cb6ff",
+    },
+}
+copybutton_exclude = ".linenos, .gp, .go"

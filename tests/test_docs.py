@@ -1,0 +1,111 @@
+"""The documentation names everything that is public, and names nothing that is not there."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import re
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import ctrl_realize as cr
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted(
+    path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts)
+)
+
+
+def public_names():
+    spec = importlib.util.spec_from_file_location(
+        "public_names", DOCS / "_ext" / "public_names.py"
+    )
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def reference() -> dict[str, str]:
+    return public_names().pages()
+
+
+def listed(reference: dict[str, str]) -> set[str]:
+    return set(re.findall(r"^   (ctrl_realize\.[\w.]+)$", "\n".join(reference.values()), re.M))
+
+
+def test_every_public_name_has_an_entry(reference):
+    entries = listed(reference)
+    for name, value in vars(cr).items():
+        if name.startswith("_") or inspect.ismodule(value):
+            continue
+        assert f"ctrl_realize.{name}" in entries
+    for submodule in ("design", "plots", "bench", "paper"):
+        module = import_module(f"ctrl_realize.{submodule}")
+        for name, value in vars(module).items():
+            home = str(getattr(value, "__module__", ""))
+            if name.startswith("_") or not callable(value) or not home.startswith("ctrl_realize"):
+                continue
+            assert f"ctrl_realize.{submodule}.{name}" in entries
+
+
+def test_every_entry_can_be_imported_and_has_a_docstring(reference):
+    for entry in listed(reference):
+        module, _, name = entry.rpartition(".")
+        value = getattr(import_module(module), name)
+        if inspect.isclass(value) or inspect.isroutine(value):
+            assert inspect.getdoc(value), entry
+
+
+def test_all_pages_of_the_reference_are_in_its_contents(reference):
+    contents = (DOCS / "api" / "index.md").read_text()
+    for page in reference:
+        assert f"../generated/api/{page}\n" in contents
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
+def test_links_inside_the_site_lead_somewhere(page: Path):
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
+    for target in re.findall(r"\]\(([^)#\s]+)(?:#[\w-]+)?\)", text):
+        if "://" in target or target.startswith("mailto:"):
+            continue
+        path = target
+        if "generated/notebooks/" in target:
+            path = str(ROOT / "notebooks" / target.split("generated/notebooks/")[1])
+        found = (page.parent / path).resolve()
+        candidates = [found, found.with_name(found.name + ".md"), found.with_name(found.name + ".ipynb")]
+        assert any(candidate.exists() for candidate in candidates), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
+def test_tests_that_a_page_names_exist(page: Path):
+    for file, name in re.findall(r"(tests/[\w/]+\.py)(?:::(test_\w+))?", page.read_text()):
+        assert (ROOT / file).exists(), file
+        if name:
+            assert f"def {name}(" in (ROOT / file).read_text(), f"{file}::{name}"
+
+
+def test_glossary_terms_that_pages_use_are_defined():
+    glossary = (DOCS / "glossary.md").read_text()
+    defined = set(re.findall(r"^([A-Za-z][^\n]*)\n  \S", glossary, re.M))
+    for page in PAGES:
+        for term in re.findall(r"\{term\}`([^`]+)`", page.read_text()):
+            assert term in defined or term.lower() in {each.lower() for each in defined}, term
+
+
+def test_every_page_is_linked_from_a_table_of_contents():
+    contents = "\n".join(
+        "\n".join(re.findall(r"```\{toctree\}.*?```", page.read_text(), re.S)) for page in PAGES
+    )
+    for page in PAGES:
+        if page == DOCS / "index.md" or page.name.endswith("_table.md"):
+            continue
+        assert page.stem in contents, page
+
+
+def test_errata_of_the_paper_are_all_on_the_map():
+    text = (DOCS / "paper_map.md").read_text()
+    assert "ERRATA" in text  # the cell that prints them all
