@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import control as ct
 import numpy as np
 
-from ..checks import one_of, positive, real, whole
+from ..checks import one_of, positive, whole
 from ..delayed import DelayedStateSpace, delayed_ss
-from ..errors import DataError, OptionError, OrderError, UnsuitableSystemError
-from ..numerics.arrays import ComplexArray, FloatArray, read_only
-from ..numerics.rational import chain_state_space, factor_parameters, poles_of
-from ..numerics.rational_fit import (
-    FRFData,
-    RationalFit,
-    covariance,
-    delay_grid,
-    profile_interval,
-    refine,
-    starting_points,
-)
+from ..errors import DataError, OptionError, OrderError
+from ..numerics.arrays import read_only
+from ..numerics.rational import chain_state_space
+from ..numerics.rational_fit import FRFData, RationalFit, covariance, profile_interval
+from ..numerics.rational_search import dead_time_bound, fit_structures, residual_variance
 from ..numerics.spectra import hold_response
 from ..numerics.statistics import mixture_quantile
 from ..results import Flag
 from .frf_fit import FRFFit, FRFStructure
+from .points import FRFPoints, frf_points
 
 _DEFAULT_ORDERS = range(1, 5)
-_SMOOTHED_POINTS = 9
 _NEAR_BIC = 8.0
 _SMALL_WIDTH = 1e-3
 _SAMPLES_PER_SHORTEST_PERIOD = 20
@@ -121,7 +115,16 @@ def fit_frf(
     >>> print(f"{model.fit.dead_time:.6f}")
     0.028900
     """
-    response, frequency, sigma, noise_known, band_dt = _points(frf, weighting, hold, band_hz, dt)
+    if hold is not None:
+        one_of(hold, "hold", ("zoh",))
+        if dt is None:
+            raise OptionError("hold='zoh' needs dt, the sample time of the held input in s")
+    step = None if dt is None else positive(dt, "dt", "sample time in s")
+    below_hz = 0.5 / step if hold is not None and step is not None else np.inf
+    points = frf_points(frf, weighting, band_hz, below_hz=below_hz)
+    frequency, response, sigma = points.frequency_hz, points.response, points.sigma
+    if hold is not None and step is not None:
+        response = response / hold_response(2 * np.pi * frequency, step)
     orders = _candidates(order, "order", 1, tuple(_DEFAULT_ORDERS))
     degrees = _candidates(relative_degree, "relative_degree", 0, None)
     pairs = [(n, r) for n in orders for r in (degrees or range(1, n + 1)) if r <= n]
@@ -136,11 +139,13 @@ def fit_frf(
             f"{frequency.size} points are too few for order {max(orders)}; "
             f"{needed} are needed, or a lower order"
         )
-    sample_time = band_dt if dt is None else positive(dt, "dt", "sample time in s")
+    sample_time = (
+        1 / (_SAMPLES_PER_SHORTEST_PERIOD * float(frequency[-1])) if step is None else step
+    )
     omega = 2 * np.pi * frequency
     unit = float(np.sqrt(omega[0] * omega[-1]))
     longest = (
-        _phase_slope_bound(response, omega, sigma)
+        dead_time_bound(response, omega, sigma)
         if max_dead_time is None
         else positive(max_dead_time, "max_dead_time", "time in s")
     )
@@ -152,83 +157,9 @@ def fit_frf(
         weight=size / sigma,
         max_dead_time=longest * unit,
     )
-    fits = _all_structures(data, pairs)
-    return _result(
-        frf, data, fits, frequency, response, sigma, noise_known, unit, size, sample_time, name
-    )
-
-
-def _points(
-    frf: Any,
-    weighting: str,
-    hold: str | None,
-    band_hz: tuple[float, float] | None,
-    dt: float | None,
-) -> tuple[ComplexArray, FloatArray, FloatArray, bool, float]:
-    """Choose the points, take the hold out and give each point its standard deviation."""
-    if not isinstance(frf, ct.FrequencyResponseData):
-        raise UnsuitableSystemError(
-            f"frf is a {type(frf).__name__}; needed is a MeasuredFRF or a control FRD"
-        )
-    if (frf.noutputs, frf.ninputs) != (1, 1):
-        raise UnsuitableSystemError(
-            f"the FRF has {frf.ninputs} inputs and {frf.noutputs} outputs; fit one channel at a "
-            "time, as frf[i, j]"
-        )
-    one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
-    order = np.argsort(frf.omega, kind="stable")
-    frequency = np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi)
-    response = np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order]
-    std = getattr(frf, "std", None)
-    std = None if std is None else np.reshape(std, -1)[order]
-    coherence = getattr(frf, "coherence", None)
-    coherence = None if coherence is None else np.reshape(coherence, -1)[order]
-    usable = (frequency > 0) & (np.abs(response) > 0) & np.isfinite(response)
-    if band_hz is not None:
-        low, high = (real(edge, "band_hz", "frequency in Hz") for edge in band_hz)
-        usable &= (frequency >= low) & (frequency <= high)
-    if hold is not None:
-        one_of(hold, "hold", ("zoh",))
-        if dt is None:
-            raise OptionError("hold='zoh' needs dt, the sample time of the held input in s")
-        usable &= frequency < 0.5 / dt
-    if usable.sum() < 3:
-        raise DataError(
-            f"{int(usable.sum())} usable points: above 0 Hz, not zero and inside the band; "
-            "at least 3 are needed"
-        )
-    frequency, response = frequency[usable], response[usable]
-    std = None if std is None else std[usable]
-    coherence = None if coherence is None else coherence[usable]
-    if hold is not None and dt is not None:
-        response = response / hold_response(2 * np.pi * frequency, dt)
-
-    known = weighting == "std" or (weighting == "auto" and std is not None)
-    if known and (std is None or not np.any(std > 0)):
-        if weighting == "std":
-            raise OptionError("weighting='std', but the FRF has no standard deviation")
-        known = False
-    if known and std is not None:
-        sigma = _smoothed(np.maximum(std, 1e-3 * np.median(std[std > 0])))
-    elif weighting == "uniform":
-        sigma = np.full(frequency.size, float(np.sqrt(np.mean(np.abs(response) ** 2))))
-    else:
-        sigma = np.abs(response)
-        if coherence is not None:
-            part = np.clip(coherence, 1e-3, 1 - 1e-6)
-            sigma = sigma * np.sqrt((1 - part) / part)
-    shortest = 1 / (_SAMPLES_PER_SHORTEST_PERIOD * float(frequency[-1]))
-    return response, frequency, sigma, known, shortest
-
-
-def _smoothed(std: FloatArray) -> FloatArray:
-    """Smooth uncertain standard deviations along frequency where there are many points."""
-    if std.size < 50:
-        return std
-    half = _SMOOTHED_POINTS // 2
-    padded = np.pad(np.log(std), half, mode="reflect")
-    kernel = np.full(_SMOOTHED_POINTS, 1 / _SMOOTHED_POINTS)
-    return np.asarray(np.exp(np.convolve(padded, kernel, mode="valid")))
+    fits = fit_structures(data, pairs)
+    used = replace(points, response=response)
+    return _result(frf, data, fits, used, unit, size, sample_time, name)
 
 
 def _candidates(
@@ -249,59 +180,18 @@ def _candidates(
         raise OrderError(str(error)) from error
 
 
-def _phase_slope_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
-    """Bound the dead time by the steepest slope of the phase over half of the band."""
-    clear = sigma < 0.3 * np.abs(response) if np.any(sigma < 0.3 * np.abs(response)) else sigma > 0
-    if clear.sum() < 4:
-        clear = np.ones(omega.size, dtype=bool)
-    w, phase = omega[clear], np.unwrap(np.angle(response[clear]))
-    slopes = [0.0]
-    # From low frequencies upwards: unwrapping goes wrong first where points lie far apart, and
-    # lags add to the slope there, so the steepest one bounds the dead time from above.
-    for stop in [*(w[0] * 2.0 ** np.arange(1, 1 + np.log2(w[-1] / w[0]))), w[-1]]:
-        for part in (w <= stop, (w <= stop) & (w >= 0.5 * stop)):
-            if part.sum() >= 4:
-                slopes.append(-float(np.polyfit(w[part], phase[part], 1)[0]))
-    # Half a turn at the highest frequency for noise and for phases that lead.
-    return 1.1 * max(slopes) + np.pi / float(w[-1])
-
-
-def _all_structures(
-    data: FRFData, pairs: list[tuple[int, int]]
-) -> dict[tuple[int, int], RationalFit]:
-    """Fit every structure; each also starts from its neighbours' solutions."""
-    fits: dict[tuple[int, int], RationalFit] = {}
-    starts: dict[int, list[FloatArray]] = {}
-    fastest = np.abs(data.s).max()
-    for n, r in pairs:
-        if n not in starts:
-            starts[n] = starting_points(data, n, delay_grid(data, n))
-        tried = list(starts[n])
-        if (n, r - 1) in fits:
-            tried.append(fits[n, r - 1].theta)
-        if (n - 1, r - 1) in fits:
-            smaller = fits[n - 1, r - 1]
-            poles = np.append(poles_of(smaller.theta, n - 1), -3.0 * fastest)
-            tried.append(np.append(factor_parameters(poles), smaller.theta[n - 1]))
-        attempts = [refine(data, n, n + 1 - r, start) for start in tried]
-        fits[n, r] = min(attempts, key=lambda fit: fit.cost)
-    return fits
-
-
 def _result(
     frf: Any,
     data: FRFData,
     fits: dict[tuple[int, int], RationalFit],
-    frequency: FloatArray,
-    response: ComplexArray,
-    sigma: FloatArray,
-    noise_known: bool,
+    points: FRFPoints,
     unit: float,
     size: float,
     dt: float,
     name: str | None,
 ) -> DelayedStateSpace:
     """Choose the structure, state the uncertainty and build the model."""
+    frequency, noise_known = points.frequency_hz, points.noise_known
     n_values = 2 * frequency.size
     floor = n_values * (1e-13 * np.max(np.abs(data.response) * data.weight)) ** 2
     rows, scales = [], {}
@@ -309,7 +199,7 @@ def _result(
         n_parameters = 2 * n + 2 - r
         cost = max(fit.cost, floor)
         bic = n_values * np.log(cost) + n_parameters * np.log(n_values)
-        scales[n, r] = _variance(data, fit, n_values - n_parameters, noise_known)
+        scales[n, r] = residual_variance(data, fit, n_values - n_parameters, noise_known)
         spread = covariance(data, fit, scales[n, r])[n, n]
         rows.append(
             FRFStructure(
@@ -345,7 +235,7 @@ def _result(
                     f"{1e3 * used:.5g} ms, not {1e3 * dead_time:.5g} ms; a shorter dt rounds less",
                 )
             )
-    locked = np.array(response)
+    locked = np.array(points.response)
     locked.flags.writeable = False
     result = FRFFit(
         order=n,
@@ -355,7 +245,7 @@ def _result(
         interval=interval,
         frequency_hz=read_only(frequency),
         measured=locked,
-        sigma=read_only(sigma),
+        sigma=read_only(points.sigma),
         noise_known=noise_known,
         misfit=misfit,
         matrices=matrices,
@@ -364,24 +254,6 @@ def _result(
         flags=tuple(flags),
     )
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
-
-
-def _variance(data: FRFData, fit: RationalFit, freedom: int, noise_known: bool) -> float:
-    """Return the variance of the weighted residual, with what its correlation costs."""
-    A, B, C, D = chain_state_space(fit.theta, fit.numerator, fit.order)
-    eye = np.eye(fit.order)
-    states = np.linalg.solve(data.s[:, None, None] * eye - A, B.astype(complex))
-    model = (C @ states)[:, 0, 0] + D[0, 0]
-    residual = data.weight * (data.response - model * np.exp(-data.s * fit.theta[fit.order]))
-    power = float(np.sum(np.abs(residual) ** 2))
-    neighbours = float(np.sum((residual[1:] * residual[:-1].conj()).real))
-    correlation = float(np.clip(neighbours / power if power > 0 else 0.0, 0.0, 0.95))
-    if correlation < 2 / np.sqrt(residual.size):
-        correlation = 0.0
-    scale = 2 * power / max(freedom, 1)
-    if noise_known:
-        scale = max(scale, 1.0)
-    return scale * (1 + correlation) / (1 - correlation)
 
 
 def _profiles(

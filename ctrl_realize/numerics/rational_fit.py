@@ -73,7 +73,10 @@ def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[Float
         for resonant in (False, True):
             poles = trial_poles(low, high, order, resonant=resonant)
             for _ in range(_RELOCATIONS):
-                poles = relocate_poles(data.s, turned, data.weight, poles)
+                before, poles = poles, relocate_poles(data.s, turned, data.weight, poles)
+                moved = np.sort_complex(poles) - np.sort_complex(before)
+                if np.max(np.abs(moved) / np.abs(poles)) < 1e-3:
+                    break
             theta = _inside(np.append(factor_parameters(poles), delay), data, order)
             cost = _cost(project(data.s, data.response, data.weight, theta, order, order).residual)
             if cost < best_cost:

@@ -7,7 +7,7 @@ import pickle
 import control as ct
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -36,6 +36,7 @@ def read_frf(path):
     return cr.MeasuredFRF(table[:, 1] * np.exp(1j * np.radians(table[:, 2])), table[:, 0])
 
 
+@settings(max_examples=10)
 @given(
     tau=st.floats(0, 0.5),
     gain=st.floats(0.01, 100),
@@ -68,14 +69,14 @@ def test_model_is_the_continuous_fit_behind_a_hold_with_its_fractional_delay():
 
 
 def test_dead_times_scatter_as_the_stated_deviation_and_are_covered():
-    fits = [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(80)]
+    fits = [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(50)]
     error = np.array([fit.dead_time - 0.04 for fit in fits])
     std = np.array([fit.std for fit in fits])
-    # Standard deviation of 80 runs is known to 8 %; three of them.
-    assert error.std() == pytest.approx(std.mean(), rel=0.24)
-    assert abs(error.mean()) < 3 * std.mean() / np.sqrt(80)
+    # Standard deviation of 50 runs is known to 10 %; three of them.
+    assert error.std() == pytest.approx(std.mean(), rel=0.3)
+    assert abs(error.mean()) < 3 * std.mean() / np.sqrt(50)
     inside = np.mean([fit.interval[0] <= 0.04 <= fit.interval[1] for fit in fits])
-    assert 0.88 <= inside <= 1.0  # 95 +- 2.4 %, three of them
+    assert 0.88 <= inside <= 1.0  # 95 +- 3.1 %, two of them
     assert np.mean([fit.misfit for fit in fits]) == pytest.approx(1.0, abs=0.03)
 
 
@@ -101,11 +102,11 @@ def test_stated_deviation_is_the_cramer_rao_bound():
 
 def test_structure_is_found_from_the_data():
     right = 0
-    for seed in range(10):
+    for seed in range(4):
         fit = cr.fit_frf(noisy(seed), dt=1e-3).fit
         right += (fit.order, fit.relative_degree) == (2, 2)
         assert fit.interval[0] <= 0.04 <= fit.interval[1]
-    assert right >= 9  # a superfluous parameter must gain 5 in BIC: 2 % of runs
+    assert right >= 3  # a superfluous parameter must gain 5 in BIC: 2 % of runs
 
 
 def test_superfluous_zero_takes_the_dead_time_away_and_is_said():
@@ -122,6 +123,7 @@ def test_many_turns_of_phase_need_no_guess():
     assert fit.dead_time == pytest.approx(1.5, abs=0.002)
 
 
+@settings(max_examples=6)
 @given(st.floats(1e-6, 1e6), st.floats(1e-3, 1e3))
 def test_units_of_output_and_time_change_nothing_else(size, rate):
     frf = noisy(5)
@@ -137,7 +139,7 @@ def test_units_of_output_and_time_change_nothing_else(size, rate):
 
 def test_simulated_valve_gives_37_samples_within_a_tenth():
     valve = cr.bench.valve()
-    frf = cr.stepped_sine_frf(valve.stepped_sine(11, points=250))
+    frf = cr.stepped_sine_frf(valve.stepped_sine(11, points=120))
     fit = cr.fit_frf(frf, dt=valve.dt).fit
     assert (fit.order, fit.relative_degree) == (4, 4)
     assert fit.dead_time / valve.dt == pytest.approx(37, abs=0.3)

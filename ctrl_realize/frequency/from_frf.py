@@ -1,0 +1,199 @@
+"""A unit-pulse response from a measured frequency response."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import control as ct
+import numpy as np
+
+from ..checks import one_of, positive, whole
+from ..errors import DataError
+from ..identification.from_io import ImpulseEstimate
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.fir_kernels import fit_kernel
+from ..numerics.lagged import NormalEquations
+from ..numerics.spectra import hold_response
+from ..results import Flag
+from .points import FRFPoints, frf_points
+
+_BLOCK = 256
+_STILL_ALIVE = 0.02
+_TAIL = 0.05
+_UNEXPLAINED = 0.02
+_LEAST_NOISE = 1e-3
+
+
+def impulse_from_frf(
+    frf: ct.FrequencyResponseData,
+    dt: float,
+    length: int,
+    *,
+    kernel: Literal["TC", "DC", "SS"] = "SS",
+    weighting: Literal["auto", "std", "relative", "uniform"] = "auto",
+    hold: Literal["zoh"] | None = None,
+    band_hz: tuple[float, float] | None = None,
+) -> ImpulseEstimate:
+    r"""Estimate the unit-pulse response that explains a frequency response.
+
+    Regularised least squares: the Markov parameters whose transform is nearest to the measured
+    points, under a prior of decay (and smoothness) whose parameters maximise the marginal
+    likelihood. Frequencies may lie anywhere: no interpolation to a uniform grid and no inverse
+    FFT is involved, so nothing wraps around and nothing rings.
+
+    Parameters
+    ----------
+    frf : MeasuredFRF
+        One input, one output.
+    dt : float
+        Sample time of the response in s.
+    length : int
+        Number of Markov parameters; the response must have died away within it.
+    kernel : {"TC", "DC", "SS"}
+        Prior; "SS" is smooth, "TC" allows a jump at lag 0 (see `impulse_from_io`).
+    weighting : {"auto", "std", "relative", "uniform"}
+        As for `fit_frf`, but "auto" is "std" where there is one, else "uniform".
+    hold : {"zoh", None}
+        None: the FRF is that of the plant itself, and the hold of a step-invariant model is put
+        in. "zoh": it was estimated from samples of a held input and has the hold in it.
+    band_hz : tuple of float, optional
+        Use points in this band alone.
+
+    Returns
+    -------
+    ImpulseEstimate
+        Step-invariant; goes into `realize` and `estimate_delay`, with `std` beside.
+
+    Raises
+    ------
+    DataError
+        Too few points, or none below the Nyquist frequency of `dt`.
+    UnsuitableSystemError
+        An FRF with several inputs or outputs.
+    OptionError
+        Options that make no sense.
+
+    Notes
+    -----
+    The data say nothing about frequencies outside of their band; there the prior speaks. Two
+    flags tell when that matters: ``"ends_early"`` when the response is still alive at the highest
+    frequency (the pulse response is then smoother than the plant's, and features shorter than
+    half a period of that frequency are not in it), and ``"starts_late"`` when the lowest
+    frequency is above that of one period in `length` (gain and slow modes are then
+    extrapolated). ``"cut_off"`` and ``"unexplained"`` tell that `length` is too short, the latter
+    also that the data are noisy. `fit_frf` needs no
+    such care where a model of low order will do.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> f = np.linspace(0.05, 25, 200)
+    >>> s = 2j * np.pi * f
+    >>> frf = cr.MeasuredFRF(np.exp(-0.1 * s) / (0.1 * s + 1) ** 2, f)
+    >>> g = cr.impulse_from_frf(frf, 0.02, 80)
+    >>> print(f"{g.markov.sum():.3f}", np.abs(g.markov[:5]).max() < 0.002)
+    1.000 True
+    """
+    one_of(kernel, "kernel", ("TC", "DC", "SS"))
+    step = positive(dt, "dt", "sample time in s")
+    count = whole(length, "length", 8)
+    one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
+    points = frf_points(frf, weighting, band_hz, below_hz=0.5 / step)
+    if weighting == "auto" and not points.noise_known:
+        points = frf_points(frf, "uniform", band_hz, below_hz=0.5 / step)
+    if hold is not None:
+        one_of(hold, "hold", ("zoh",))
+    omega = 2 * np.pi * points.frequency_hz
+    response = points.response
+    sigma = points.sigma
+    if hold is None:
+        response = response * hold_response(omega, step)
+        if points.noise_known:
+            # What the plant still answers beyond Nyquist comes back as an alias that no hold
+            # knows; of a plant that falls with 1/omega it is about this large.
+            image = omega / (2 * np.pi / step - omega)
+            sigma = np.hypot(sigma, np.abs(response) * image**2)
+    if 2 * omega.size < 16:
+        raise DataError(f"{omega.size} points are too few for a pulse response; 8 are needed")
+    equations = _equations(omega * step, response, 1 / sigma, count)
+    fit = fit_kernel(equations, count, kernel)
+    markov = fit.markov[0]
+    return ImpulseEstimate(
+        markov,
+        step,
+        std=fit.std[0],
+        noise_std=np.array([np.sqrt(fit.noise_variance) * float(np.median(sigma))]),
+        method=f"{kernel} kernel on {omega.size} points, {fit.effective:.0f} free parameters",
+        rows=2 * omega.size,
+        flags=_flags(points, response, markov, step, fit.noise_variance / equations.power[0, 0]),
+        name=str(frf.name or ""),
+    )
+
+
+def _equations(
+    angle: FloatArray, response: ComplexArray, weight: FloatArray, count: int
+) -> NormalEquations:
+    """Sum the normal equations of ``response = sum_k markov[k] exp(-1j angle k)``."""
+    lags = np.arange(count)
+    gram, cross = np.zeros((count, count)), np.zeros((count, 1))
+    # Blocks of points: memory stays with the block.
+    for first in range(0, angle.size, _BLOCK):
+        part = slice(first, first + _BLOCK)
+        turned = weight[part, None] * np.exp(-1j * angle[part, None] * lags)
+        rows = np.concatenate([turned.real, turned.imag])
+        target = weight[part] * response[part]
+        gram += rows.T @ rows
+        cross[:, 0] += rows.T @ np.concatenate([target.real, target.imag])
+    # No FRF is taken to be more exact than a thousandth: hold and aliases are not, and a prior
+    # that may trust them fully fills the frequencies between the points with anything.
+    power = np.array([[(1 + _LEAST_NOISE**2) * float(np.sum(np.abs(weight * response) ** 2))]])
+    return NormalEquations(gram, cross, power, 2 * angle.size, 2 * angle.size)
+
+
+def _flags(
+    points: FRFPoints, response: ComplexArray, markov: FloatArray, dt: float, variance: float
+) -> tuple[Flag, ...]:
+    """Say where the estimate stands on little; `variance` is a row's, as a share of the power."""
+    flags = []
+    unexplained = variance * 2 * response.size
+    if unexplained > _UNEXPLAINED:
+        flags.append(
+            Flag(
+                "unexplained",
+                f"{100 * unexplained:.2g} % of the response's power is not explained: it is noise, "
+                "or the response lasts longer than the length asked for",
+            )
+        )
+    f = points.frequency_hz
+    size = np.abs(response)
+    last = float(np.median(size[f >= 0.9 * f[-1]]) / size.max())
+    if f[-1] < 0.45 / dt and last > _STILL_ALIVE:
+        flags.append(
+            Flag(
+                "ends_early",
+                f"at {f[-1]:.4g} Hz, the highest frequency, the response is still "
+                f"{100 * last:.2g} % of its largest; up to {0.5 / dt:.4g} Hz the prior speaks: "
+                "take a longer dt, or fit_frf",
+            )
+        )
+    duration = markov.size * dt
+    if f[0] * duration > 1:
+        flags.append(
+            Flag(
+                "starts_late",
+                f"the lowest frequency of {f[0]:.4g} Hz has {f[0] * duration:.2g} periods in the "
+                f"{duration:.4g} s asked for: gain and slow modes are extrapolated",
+            )
+        )
+    tail = markov[-max(2, markov.size // 10) :]
+    left = float(np.abs(tail).max() / np.abs(markov).max())
+    if left > _TAIL:
+        flags.append(
+            Flag(
+                "cut_off",
+                f"the last tenth still reaches {100 * left:.2g} % of the largest value: the "
+                "response has not died away; ask for a larger length",
+            )
+        )
+    return tuple(flags)

@@ -1,0 +1,103 @@
+"""The points of a frequency response that an estimate uses, each with its weight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..checks import one_of, real
+from ..errors import DataError, OptionError, UnsuitableSystemError
+from ..numerics.arrays import ComplexArray, FloatArray
+
+_SMOOTHED_POINTS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class FRFPoints:
+    """Rising frequencies, responses, and standard deviations up to a factor.
+
+    `noise_known` says that `sigma` is the measured standard deviation itself.
+    """
+
+    frequency_hz: FloatArray
+    response: ComplexArray
+    sigma: FloatArray
+    noise_known: bool
+
+
+def frf_points(
+    frf: Any, weighting: str, band_hz: tuple[float, float] | None, *, below_hz: float = np.inf
+) -> FRFPoints:
+    """Choose the usable points of an FRF and give each its standard deviation.
+
+    Parameters
+    ----------
+    frf : control.FrequencyResponseData
+    weighting : {"auto", "std", "relative", "uniform"}
+    band_hz : tuple of float or None
+        Ends of the band, both inside.
+    below_hz : float
+        Points from here on are left out.
+    """
+    if not isinstance(frf, ct.FrequencyResponseData):
+        raise UnsuitableSystemError(
+            f"frf is a {type(frf).__name__}; needed is a MeasuredFRF or a control FRD"
+        )
+    if (frf.noutputs, frf.ninputs) != (1, 1):
+        raise UnsuitableSystemError(
+            f"the FRF has {frf.ninputs} inputs and {frf.noutputs} outputs; take one channel at a "
+            "time, as frf[i, j]"
+        )
+    one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
+    order = np.argsort(frf.omega, kind="stable")
+    frequency = np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi)
+    response = np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order]
+    usable = (frequency > 0) & (np.abs(response) > 0) & np.isfinite(response)
+    usable &= frequency < below_hz
+    if band_hz is not None:
+        low, high = (real(edge, "band_hz", "frequency in Hz") for edge in band_hz)
+        usable &= (frequency >= low) & (frequency <= high)
+    if usable.sum() < 3:
+        limit = f", below {below_hz:.4g} Hz" if np.isfinite(below_hz) else ""
+        raise DataError(
+            f"{int(usable.sum())} usable points: above 0 Hz{limit}, not zero and inside the band; "
+            "at least 3 are needed"
+        )
+    std, coherence = (
+        None if beside is None else np.reshape(beside, -1)[order][usable]
+        for beside in (getattr(frf, "std", None), getattr(frf, "coherence", None))
+    )
+    frequency, response = frequency[usable], response[usable]
+    sigma, known = _sigma(response, std, coherence, weighting)
+    return FRFPoints(frequency, response, sigma, known)
+
+
+def _sigma(
+    response: ComplexArray, std: FloatArray | None, coherence: FloatArray | None, weighting: str
+) -> tuple[FloatArray, bool]:
+    """Return the standard deviation of each point and whether it was measured."""
+    if weighting in ("auto", "std") and std is not None and np.any(std > 0):
+        return _smoothed(np.maximum(std, 1e-3 * np.median(std[std > 0]))), True
+    if weighting == "std":
+        raise OptionError("weighting='std', but the FRF has no standard deviation")
+    if weighting == "uniform":
+        size = float(np.sqrt(np.mean(np.abs(response) ** 2)))
+        return np.full(response.size, size), False
+    sigma = np.abs(response)
+    if coherence is not None:
+        part = np.clip(coherence, 1e-3, 1 - 1e-6)
+        sigma = sigma * np.sqrt((1 - part) / part)
+    return np.asarray(sigma, dtype=np.float64), False
+
+
+def _smoothed(std: FloatArray) -> FloatArray:
+    """Smooth uncertain standard deviations along frequency where there are many points."""
+    if std.size < 50:
+        return std
+    half = _SMOOTHED_POINTS // 2
+    padded = np.pad(np.log(std), half, mode="reflect")
+    kernel = np.full(_SMOOTHED_POINTS, 1 / _SMOOTHED_POINTS)
+    return np.asarray(np.exp(np.convolve(padded, kernel, mode="valid")))
