@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import FileFormatError
 from .checks import check_size
-from .sniff import MAX_COLUMNS
+from .sniff import MAX_COLUMNS, MAX_NAME
 from .tables import Column, Table
 from .units import split_unit
 
@@ -20,7 +20,6 @@ def read_parquet(path: Path, *, max_bytes: float) -> Table:
         If pyarrow is missing, the file is damaged, or too large when unpacked.
     """
     try:
-        import pyarrow
         import pyarrow.parquet as pq
     except ImportError as error:
         raise FileFormatError(
@@ -40,14 +39,19 @@ def read_parquet(path: Path, *, max_bytes: float) -> Table:
                     f"{path} has {file.metadata.num_columns} columns, "
                     f"at most {MAX_COLUMNS} are read"
                 )
-            frame = file.read().to_pandas()
-    except (pyarrow.ArrowException, OSError, ValueError, MemoryError) as error:
-        if isinstance(error, FileFormatError):
-            raise
-        raise FileFormatError(f"{path} is a damaged Parquet file: {error}") from error
+            # without what pandas noted about its index: a named one is a column like any other
+            frame = file.read().to_pandas(ignore_metadata=True)
+    except FileFormatError:
+        raise
+    # damaged metadata end in every kind of exception, ArrowException and TypeError among them
+    except Exception as error:
+        reason = str(error).partition("\n")[0][:200]
+        raise FileFormatError(f"{path} is a damaged Parquet file: {reason}") from error
     columns = tuple(
-        Column(str(name), split_unit(str(name))[1], frame[name].to_numpy())
-        for name in frame.columns
+        Column(
+            str(name)[:MAX_NAME], split_unit(str(name)[:MAX_NAME])[1], frame.iloc[:, k].to_numpy()
+        )
+        for k, name in enumerate(frame.columns)
     )
     if not columns:
         raise FileFormatError(f"{path} has no columns")

@@ -305,6 +305,8 @@ def test_parquet_files_are_read(tmp_path):
     frame = pd.DataFrame({"time_ms": 1000 * T, "u": U, "y": Y, "who": ["me"] * N})
     frame.to_parquet(tmp_path / "a.parquet")
     check(read_record(tmp_path / "a.parquet"))
+    frame.set_index("time_ms").to_parquet(tmp_path / "indexed.parquet")
+    check(read_record(tmp_path / "indexed.parquet"))
     frame["time_ms"] = pd.Timestamp("2026-03-01") + pd.to_timedelta(T, unit="s")
     frame.to_parquet(tmp_path / "b.parquet")
     check(read_record(tmp_path / "b.parquet", time="time_ms"))
