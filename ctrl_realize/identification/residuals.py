@@ -112,6 +112,7 @@ class Prediction(Result):
     fit_percent: FloatArray
     steps: int
     noise_order: tuple[int, ...]
+    record: Record
 
     def _title(self) -> str:
         return f"Prediction {self.steps} samples ahead"
@@ -289,6 +290,7 @@ def predict(
         fit_percent=read_only(fit_percent(y, output)),
         steps=ahead,
         noise_order=tuple(c.size for c in models),
+        record=record,
     )
 
 

@@ -17,6 +17,9 @@ from .design_plots import pid_comparison_plot as pid_comparison_plot
 from .design_plots import process_model_plot as process_model_plot
 from .design_plots import robustness_plot as robustness_plot
 from .design_plots import uncertainty_plot as uncertainty_plot
+from .diagnostics import delay_check_plot as delay_check_plot
+from .diagnostics import prediction_plot as prediction_plot
+from .diagnostics import residual_plot as residual_plot
 from .fits import dead_time_plot as dead_time_plot
 from .fits import fit_plot as fit_plot
 from .frequencies import comparison_plot as comparison_plot
@@ -35,6 +38,7 @@ from .scans import singular_value_plot as singular_value_plot
 _DRAWN_BY = {
     "BalancedReduction": "design_plots:hankel_plot",
     "Campaign": "campaigns:campaign_plot",
+    "DelayCheck": "diagnostics:delay_check_plot",
     "DelayFit": "fits:fit_plot",
     "DelayRobustness": "design_plots:delay_robustness_plot",
     "DelayScan": "scans:delay_plot",
@@ -46,9 +50,11 @@ _DRAWN_BY = {
     "MeasuredFRF": "frequencies:frf_plot",
     "OrderScan": "scans:order_plot",
     "PIDComparison": "design_plots:pid_comparison_plot",
+    "Prediction": "diagnostics:prediction_plot",
     "ProcessModel": "design_plots:process_model_plot",
     "Realization": "scans:singular_value_plot",
     "Record": "records:record_plot",
+    "ResidualCheck": "diagnostics:residual_plot",
     "RobustnessCheck": "design_plots:robustness_plot",
     "StepResponse": "records:step_plot",
     "UncertaintyBound": "design_plots:uncertainty_plot",

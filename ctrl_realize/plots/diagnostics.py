@@ -1,0 +1,150 @@
+"""Plots of residuals, predictions, and of a delay that was seen in several ways."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ..checks import whole
+from ..identification.cross_check import DelayCheck
+from ..identification.residuals import Prediction, ResidualCheck
+from ..numerics.arrays import FloatArray
+from ..signals import Record
+from . import style
+
+
+def residual_plot(
+    check: ResidualCheck,
+    *,
+    output: int = 0,
+    input: int = 0,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw measured and simulated output, and the correlations of what is left with its bounds.
+
+    Parameters
+    ----------
+    check : ResidualCheck
+    output, input : int, optional
+        Channels to show.
+    ax : sequence of three Axes, or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the simulated output.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    row = whole(output, "output", 0, check.fit_percent.size - 1)
+    column = whole(input, "input", 0, check.cross.shape[1] - 1)
+    with style.context():
+        axes = style.axes_for(ax, 3, size=(8.0, 7.0), heights=(2.0, 1.0, 1.0), sharex=False)
+        label = f"simulated, fit {check.fit_percent[row]:.1f} %"
+        above = _signals(
+            axes[0], check.record, np.atleast_2d(check.simulated)[row], row, label, kwargs
+        )
+        lags = check.lags
+        count = check.autocorrelation.shape[1]
+        own = _stems(axes[1], np.arange(count), check.autocorrelation[row], check.bound)
+        cross = _stems(axes[2], lags, check.cross[row, column], check.cross_bound[row, column])
+        axes[1].set_ylabel("residual with\nitself")
+        axes[2].set_ylabel("residual with\ninput before")
+        axes[2].set_xlabel("lag [samples]")
+        return style.finished(axes, [above, own, cross], title=title, own_figure=ax is None)
+
+
+def prediction_plot(
+    prediction: Prediction,
+    *,
+    output: int = 0,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw a predicted output over the measured one.
+
+    Parameters
+    ----------
+    prediction : Prediction
+    output : int, optional
+        Channel to show.
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the prediction.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    row = whole(output, "output", 0, prediction.fit_percent.size - 1)
+    with style.context():
+        axes = style.axes_for(ax)
+        label = f"{prediction.steps} ahead, fit {prediction.fit_percent[row]:.1f} %"
+        values = np.atleast_2d(prediction.output)[row]
+        lines = _signals(axes[0], prediction.record, values, row, label, kwargs)
+        return style.finished(axes, [lines], title=title, own_figure=ax is None)
+
+
+def delay_check_plot(
+    check: DelayCheck, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the intervals of a delay that was seen in several ways, and what they agree on.
+
+    Parameters
+    ----------
+    check : DelayCheck
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the intervals.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    with style.context():
+        axes = style.axes_for(ax, size=(8.0, 1.6 + 0.5 * len(check.views)))
+        factor, unit = style.time_unit(max(view.high for view in check.views))
+        lines: list[Line2D] = []
+        for place, view in enumerate(reversed(check.views)):
+            bound = view.kind == "upper bound"
+            looks = {"color": style.NOISE if bound else style.MODEL, "linewidth": 3.0, **kwargs}
+            lines += axes[0].plot(factor * np.array([view.low, view.high]), [place, place], **looks)
+            mark = "<" if bound else "o"
+            axes[0].plot(factor * view.value, place, mark, color=looks["color"], markersize=8)
+        if check.common is not None:
+            low, high = (factor * edge for edge in check.common)
+            axes[0].axvspan(low, high, color=style.BAND, alpha=0.3, label="all agree", linewidth=0)
+        names = [f"{view.method}\n({view.source})" for view in reversed(check.views)]
+        axes[0].set_yticks(range(len(names)), names)
+        axes[0].set_ylim(-0.6, len(names) - 0.4)
+        axes[0].set_xlabel(f"dead time, or bound ◂ [{unit}]")
+        return style.finished(axes, [lines], title=title, own_figure=ax is None)
+
+
+def _signals(
+    axes: Axes, record: Record, values: FloatArray, row: int, label: str, looks: dict[str, Any]
+) -> list[Line2D]:
+    factor, unit = style.time_unit(float(np.ptp(record.time)), axes)
+    time = factor * record.time
+    measured = np.atleast_2d(record.output)[row]
+    settings = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": label, **looks}
+    lines = axes.plot(time, measured, color=style.MEASURED, label="measured")
+    lines += axes.plot(time, values, **settings)
+    axes.set_ylabel(style.wrapped(record.output_labels[row], 16))
+    axes.set_xlabel(f"time [{unit}]")
+    return list(lines)
+
+
+def _stems(axes: Axes, lags: FloatArray, rho: FloatArray, bound: float) -> list[Line2D]:
+    axes.axhspan(-bound, bound, color=style.BAND, alpha=0.3, linewidth=0)
+    axes.vlines(lags, 0, rho, color=style.MEASURED, linewidth=1.5)
+    return list(axes.plot(lags, rho, "o", color=style.MEASURED, markersize=3.5))
