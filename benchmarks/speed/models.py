@@ -10,7 +10,7 @@ import numpy as np
 import ctrl_realize as cr
 
 from .measure import Line, cpu_seconds, import_seconds, once, seconds
-from .rigs import TS, valve
+from .rigs import TS, record, valve
 
 
 def lines() -> Iterator[Line]:
@@ -44,6 +44,12 @@ def lines() -> Iterator[Line]:
     yield Line(
         "step response, 1 000 000 samples, d = 37", seconds(fast), seconds(250 * slow),
         250 * slow / fast, "", "", "python-control, 4000 samples scaled",
+    )  # fmt: skip
+    short = record(1, 2e-3).between(2.69, 5.04)
+    yield Line(
+        f"output-error fit of a record of {short.n_samples} samples, all structures",
+        seconds(cpu_seconds(lambda: cr.fit_delay(short), runs=3)), "", None, "0.5 s", "0.15 s",
+        "no peer fits the dead time in one go",
     )  # fmt: skip
     base, whole = import_seconds("control"), import_seconds("ctrl_realize")
     yield Line(

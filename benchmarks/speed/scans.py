@@ -7,12 +7,11 @@ from collections.abc import Iterator
 
 import control as ct
 import numpy as np
-from joblib import Parallel, delayed
 
 import ctrl_realize as cr
 
 from .measure import Line, cpu_seconds, once, seconds
-from .rigs import DELAYS, MAX_DELAY, SAMPLES, TS, pulse
+from .rigs import DELAYS, MAX_DELAY, SAMPLES, pulse, record
 
 BASELINE_DELAYS = (0, 25, 50, 75, 100)
 RECORDS = 40
@@ -77,25 +76,24 @@ def lines() -> Iterator[Line]:
 
 
 def campaign(one_record: float) -> Iterator[Line]:
-    """Forty records, one after the other and on two processes."""
-    impulses = [pulse("zero-phase", seed) for seed in range(RECORDS)]
+    """Forty records from their steps to the statistics, on one and on two processes."""
+    records = [record(seed, 2e-3) for seed in range(RECORDS)]
+
+    def identify(n_jobs: int, some: list[cr.Record] = records) -> None:
+        cr.identify_campaign(some, method="paper", n_jobs=n_jobs, progress=False)
+
     slow = RECORDS * one_record
-    serial = cpu_seconds(lambda: [ours(impulse, 3) for impulse in impulses], runs=2)
+    serial = cpu_seconds(lambda: identify(1), runs=2)
     yield Line(
-        f"campaign of {RECORDS} records, serial", seconds(serial), seconds(slow), slow / serial,
-        "60", "100", f"python-control, one record scaled to {RECORDS}",
+        f"campaign of {RECORDS} records, from the steps to the statistics, serial",
+        seconds(serial), seconds(slow), slow / serial,
+        "60", "100", f"python-control, the realizations of one record scaled to {RECORDS}",
     )  # fmt: skip
-    with Parallel(n_jobs=2) as pool:
-        pool(delayed(ours)(impulse, 3) for impulse in impulses[:4])
-        start = time.perf_counter()
-        pool(delayed(ours)(impulse, 3) for impulse in impulses)
-        wall = time.perf_counter() - start
+    identify(2, records[:4])  # starts the workers
+    start = time.perf_counter()
+    identify(2)
+    wall = time.perf_counter() - start
     yield Line(
         f"campaign of {RECORDS} records, two processes, wall time", seconds(wall), seconds(slow),
         slow / wall, "100", "190", "python-control, serial CPU time",
     )  # fmt: skip
-
-
-def example() -> None:
-    """Show that the dead time is right, for a look by hand."""
-    print(ours(pulse("zero-phase"), 3).report(), TS)
