@@ -51,8 +51,7 @@ def residual_plot(
             axes[0], check.record, np.atleast_2d(check.simulated)[row], row, label, kwargs
         )
         lags = check.lags
-        count = check.autocorrelation.shape[1]
-        own = _stems(axes[1], np.arange(count), check.autocorrelation[row], check.bound)
+        own = _stems(axes[1], lags[lags >= 0], check.autocorrelation[row], check.bound)
         cross = _stems(axes[2], lags, check.cross[row, column], check.cross_bound[row, column])
         axes[1].set_ylabel("residual with\nitself")
         axes[2].set_ylabel("residual with\ninput before")
