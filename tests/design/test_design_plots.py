@@ -1,0 +1,66 @@
+"""Design plots: every result draws itself, into given axes too, and marks the right places."""
+
+from __future__ import annotations
+
+import control as ct
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import OptionError
+
+
+@pytest.fixture(scope="module")
+def results(valve, pi_controller):
+    plant, pi = valve(37), pi_controller(0.5, 0.1)
+    bound = cr.design.uncertainty_bound([1.1 * plant], plant, dead_time_interval=(0.028, 0.031))
+    return {
+        "margins": cr.design.margins(plant, pi),
+        "delay": cr.design.delay_robustness(plant, pi, (0.02, 0.4)),
+        "rules": cr.design.compare_pid(plant, ["simc", "amigo"]),
+        "bound": bound,
+        "check": bound.check(pi),
+        "reduction": cr.design.reduce(plant, 2).fit,
+        "model": cr.design.reduce_fopdt(plant),
+    }
+
+
+@pytest.mark.parametrize(
+    "kind", ["margins", "delay", "rules", "bound", "check", "reduction", "model"]
+)
+def test_every_result_draws_itself(results, kind):
+    drawn = results[kind].plot()
+    assert isinstance(drawn, ct.ControlPlot)
+    assert all(axes.get_xlabel() for axes in np.ravel(drawn.axes))
+    assert all(len(lines) for lines in np.ravel(drawn.lines))
+    plt.close(drawn.figure)
+
+
+def test_margins_are_marked_where_they_are(results):
+    found = results["margins"]
+    gain, phase, _ = np.ravel(found.plot(title="loop").axes)
+    (mark,) = [line for line in gain.lines if line.get_label().startswith("gain margin")]
+    assert mark.get_xdata()[0] == pytest.approx(found.phase_crossover / (2 * np.pi))
+    assert mark.get_ydata()[1] == pytest.approx(-20 * np.log10(found.gain_margin))
+    (mark,) = [line for line in phase.lines if line.get_label().startswith("phase margin")]
+    assert mark.get_ydata()[0] == pytest.approx(-180, abs=0.1)  # read off the followed curve
+    plt.close("all")
+
+
+def test_plots_go_into_given_axes(results):
+    figure, axes = plt.subplots(1, 3)
+    drawn = results["margins"].plot(ax=axes)
+    assert drawn.figure is figure
+    with pytest.raises(OptionError, match="needs 3"):
+        results["margins"].plot(ax=axes[0])
+    plt.close(figure)
+
+
+def test_closed_loops_are_drawn_as_they_respond(valve, pi_controller):
+    plant, pi = valve(37), pi_controller(0.5, 0.1)
+    drawn = cr.plots.closed_loop_plot(plant, {"PI": pi}, span=0.8)
+    line = np.ravel(drawn.lines)[0][0]
+    exact = ct.step_response(ct.feedback(ct.ss(plant) * pi, 1), timepts=np.arange(1025) * plant.dt)
+    np.testing.assert_allclose(line.get_ydata(), exact.outputs[: line.get_ydata().size], atol=1e-5)
+    plt.close(drawn.figure)
