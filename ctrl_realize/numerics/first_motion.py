@@ -8,6 +8,8 @@ import numpy as np
 
 from .arrays import FloatArray
 
+_SMOOTHINGS = (1, 8, 8)  # one after the other: 1, 8, 64 samples
+
 
 @dataclass(frozen=True)
 class FirstMotion:
@@ -51,9 +53,16 @@ def first_motion(
     moved = level - rest
     end = max(5, (n - edge) // 50)
     span = max(abs(float(np.median(moved[-end:]))), float(np.percentile(np.abs(moved[edge:]), 80)))
-    threshold = max(5 * sigma, 1.5 * quantum, 0.005 * span)
-    crossing = _lasting_excursion(moved[edge:], threshold)
-    if crossing is None:
+    for smoothing in _SMOOTHINGS:
+        # A small step in much noise shows only in means.
+        if smoothing > 1:
+            moved = np.convolve(moved, np.ones(smoothing) / smoothing, "same")
+            sigma = sigma / np.sqrt(smoothing)
+        threshold = max(5 * sigma, 1.5 * quantum, 0.005 * span)
+        crossing = _lasting_excursion(moved[edge:], threshold)
+        if crossing is not None:
+            break
+    else:
         return None
     stretch = moved[edge + crossing : edge + crossing + _lasting(crossing)]
     sign = float(np.sign(np.mean(stretch)))

@@ -120,7 +120,8 @@ def fit_output_error(
 def likelihood_fit(whole: WindowFit, *, adequate: bool) -> OutputErrorFit:
     """Take delay and interval from the likelihood (points 1 and 2 of the rule)."""
     chosen = whole.best
-    profiles = _profiles(whole, plausible(whole.criterion, chosen.structure))
+    kept = plausible(whole.candidates, whole.criterion, whole.variance, chosen.structure)
+    profiles = _profiles(whole, kept)
     limits = [profile_limits(*profile) for profile in profiles.values()]
     low = min(chosen.delay, *(ends[0] for ends in limits), chosen.delay)
     high = max(chosen.delay, *(ends[1] for ends in limits), chosen.delay)

@@ -8,8 +8,9 @@ from .arrays import FloatArray
 from .separable_fit import Problem, evaluate, fit_batch
 from .structure_search import Candidate, Scales, parameter_bounds
 
-_NEAR = np.array([-4, -2.4, -1.6, -1.2, -1, -0.8, 0.8, 1, 1.2, 1.6, 2.4, 4])
-_FAR = 13
+_NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])
+_FAR = 9
+_NOTHING = 1e-9  # part of a sensitivity that is rounding
 
 
 def delay_profile(
@@ -43,7 +44,7 @@ def delay_profile(
     starts[:, 0] = grid
     bounds = parameter_bounds(candidate.structure.order, scales)
     _, cost = fit_batch(
-        problem, candidate.structure, starts, bounds, delay_fixed=True, most_iterations=12
+        problem, candidate.structure, starts, bounds, delay_fixed=True, most_iterations=10
     )
     delay = np.append(grid, candidate.delay)
     excess = np.append(cost, candidate.cost)
@@ -53,16 +54,17 @@ def delay_profile(
 
 def delay_error(problem: Problem, candidate: Candidate, variance: float) -> float:
     """Standard error of the delay from the local curvature (infinite if there is none), in s."""
-    jacobian = evaluate(problem, candidate.structure, candidate.parameters[None]).jacobian[0]
+    state = evaluate(problem, candidate.structure, candidate.parameters[None])
+    jacobian, free = state.jacobian[0], float(state.sensitivity[0, 0])
     size = np.sqrt((jacobian**2).sum(axis=0))
-    if size[0] == 0:
+    if size[0] <= _NOTHING * free:
         return float("inf")
-    moving = size > 1e-9 * size.max()
+    moving = size > _NOTHING * size.max()
     columns: FloatArray = (jacobian / np.where(moving, size, 1.0))[:, moving]
     # The delay comes last, so that the corner is what the others leave of it.
     triangle = np.linalg.qr(columns[:, ::-1])[1]
     corner = float(np.abs(triangle[-1, -1])) * float(size[0])
-    return float(np.sqrt(variance)) / corner if corner > 1e-12 * float(size[0]) else float("inf")
+    return float(np.sqrt(variance)) / corner if corner > _NOTHING * free else float("inf")
 
 
 def profile_limits(

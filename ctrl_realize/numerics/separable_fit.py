@@ -74,12 +74,15 @@ class Evaluation:
     """The eliminated problem at B parameter sets.
 
     ``residual`` (B, m) is weighted and orthogonal to all linear terms, ``jacobian``
-    (B, m, 1 + n) is minus its derivative (Kaufman's form), ``numerator`` (B, n - r + 1) has
-    the coefficients of b, lowest power first, and ``regression`` (B, q) those of the regressors.
+    (B, m, 1 + n) is minus its derivative (Kaufman's form), ``sensitivity`` (B, 1 + n) the norm
+    of the model's derivative before the linear terms are taken out of it. ``numerator``
+    (B, n - r + 1) has the coefficients of b, lowest power first, ``regression`` (B, q) those of
+    the regressors.
     """
 
     residual: FloatArray
     jacobian: FloatArray
+    sensitivity: FloatArray
     numerator: FloatArray
     regression: FloatArray
 
@@ -125,7 +128,8 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     derivative[:, :, 1:] += static[:, :, None] * level[:, None]
     derivative *= weight[:, None]
     jacobian = derivative - q @ (np.swapaxes(q, 1, 2) @ derivative)
-    return Evaluation(residual, jacobian, numerator, linear[:, count:])
+    sensitivity = np.sqrt(np.einsum("bmp,bmp->bp", derivative, derivative))
+    return Evaluation(residual, jacobian, sensitivity, numerator, linear[:, count:])
 
 
 def respond(

@@ -102,7 +102,7 @@ def refine(
             structure,
             old.parameters[None],
             parameter_bounds(structure.order, scales),
-            most_iterations=12,
+            most_iterations=6,
         )
         again[structure] = Candidate(structure, parameters[0], float(cost[0]))
     return again
@@ -138,17 +138,28 @@ def choose(criterion: dict[Structure, float]) -> Structure:
     return min(criterion, key=lambda s: criterion[s] + _needless(s))
 
 
-def plausible(criterion: dict[Structure, float], chosen: Structure) -> list[Structure]:
+def plausible(
+    candidates: dict[Structure, Candidate],
+    criterion: dict[Structure, float],
+    variance: float,
+    chosen: Structure,
+) -> list[Structure]:
     """List what the data cannot rule out.
 
-    That is what is within 10 of the best, or of the chosen with its simplicity counted.
+    That is what is within 10 of the best criterion, or of the chosen with its simplicity
+    counted; and chains of up to three lags that fit no worse, for noise hides lags, but does not
+    remove them.
     """
     limit = min(criterion.values()) + PLAUSIBLE
     weighed = criterion[chosen] + _needless(chosen) + PLAUSIBLE
+    fits = candidates[chosen].cost + PLAUSIBLE * variance
     return [
         s
         for s, value in criterion.items()
-        if value <= limit or value + _needless(s) <= weighed or s == chosen
+        if value <= limit
+        or value + _needless(s) <= weighed
+        or s == chosen
+        or (s.zeros == 0 and s.order <= 3 and candidates[s].cost <= fits)
     ]
 
 

@@ -1,0 +1,302 @@
+"""fit_delay: right on simulated plants, honest where the model is wrong."""
+
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from tests import rigs
+
+TS = rigs.TS
+
+
+def codes(fit) -> set[str]:
+    return {flag.code for flag in fit.flags}
+
+
+def covers(fit, delay: float) -> bool:
+    low, high = fit.delay_interval
+    return low <= delay <= high
+
+
+def changed(record: cr.Record, output) -> cr.Record:
+    return cr.Record(record.time, record.input, output)
+
+
+@pytest.fixture(scope="module")
+def valve() -> cr.DelayedStateSpace:
+    return cr.fit_delay(rigs.step_record(noise=0.001, delay=36.4))
+
+
+def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(valve):
+    fit = valve.fit
+    assert fit.structure == (3, 3)
+    assert abs(fit.delay - 36.4) < 4 * 0.092  # four times the Cramer-Rao bound at 0.1 %
+    assert fit.std / TS == pytest.approx(0.092, rel=0.15)
+    assert covers(fit, 36.4)
+    assert fit.at_noise_level
+    assert not fit.views
+    # Delay and lags together: 165.2 samples for 37, less 0.6; known to 0.02.
+    assert abs(fit.total_delay / TS - 164.6) < 0.1
+    assert fit.onset > fit.dead_time
+
+
+def test_the_model_is_a_sampled_system_whose_response_is_the_fit(valve):
+    fit, record = valve.fit, valve.fit.records[0]
+    response = valve.simulate(record.input - record.input[0])
+    assert_allclose(response + fit.fitted[0], fit.fitted, rtol=0, atol=1e-10 * 16)
+    assert valve.delay == 37  # 36.4 samples: exact with feedthrough and one sample more
+    assert valve.dt == TS
+    assert_allclose(valve.dcgain(), fit.gain, rtol=1e-8)
+
+
+def test_kung_realizes_the_fitted_response_as_the_fitted_model(valve):
+    markov = valve.markov(600)
+    again = cr.realize(cr.ImpulseResponse(markov, TS), 3, delay=valve.delay)
+    assert_allclose(again.markov(600), markov, rtol=0, atol=1e-9 * np.abs(markov).max())
+
+
+def test_the_table_lists_all_structures_best_first(valve):
+    rows = valve.fit.structures
+    assert {(row.order, row.relative_degree) for row in rows} == {
+        (n, r) for n in range(1, 6) for r in range(1, n + 1)
+    }
+    assert [row.excess for row in rows] == sorted(row.excess for row in rows)
+    assert all(row.interval for row in rows if row.excess <= 10)
+    low = min(row.interval[0] for row in rows if row.interval)
+    high = max(row.interval[1] for row in rows if row.interval)
+    assert valve.fit.interval == (low, high)
+
+
+def test_the_result_pickles_and_says_itself_in_one_line(valve):
+    again = pickle.loads(pickle.dumps(valve)).fit
+    assert again.dead_time == valve.fit.dead_time
+    assert "\n" not in repr(valve.fit)
+    assert "total delay" in valve.fit.report()
+
+
+def test_gain_offset_and_time_unit_do_not_matter():
+    record = rigs.step_record(noise=0.002, seed=3, before=400, after=1200)
+    fit = cr.fit_delay(record).fit
+    other = cr.Record(1000 * record.time, record.input, 7.0 - 300 * record.output)
+    same = cr.fit_delay(other).fit
+    # Thresholds of the iterations are relative; what is left is rounding in the start values.
+    assert same.delay == pytest.approx(fit.delay, abs=2e-3)
+    assert same.dead_time == pytest.approx(1000 * fit.dead_time, abs=2e-3 * 1000 * TS)
+    assert_allclose(same.delay_interval, fit.delay_interval, atol=0.2)
+    assert same.gain == pytest.approx(-300 * fit.gain, rel=1e-4)
+
+
+def test_the_callers_record_is_not_changed():
+    record = rigs.step_record(noise=0.002, before=200, after=600)
+    before = record.output.copy(), record.input.copy()
+    cr.fit_delay(record)
+    assert np.array_equal(before[0], record.output)
+    assert np.array_equal(before[1], record.input)
+
+
+def test_an_unknown_sensor_widens_the_interval_and_a_known_one_narrows_it():
+    sensor = rigs.lag(30.0)
+    for seed in range(2):
+        record = rigs.step_record(rigs.R4, noise=0.005, seed=seed, before=600, after=1500)
+        blind = cr.fit_delay(record).fit
+        assert covers(blind, 37)  # the order chosen is 3, which alone would be off by 5.4
+        told = cr.fit_delay(record, known=sensor, structures=[(3, 3)]).fit
+        assert abs(told.delay - 37) < 3 * told.std / TS
+        assert told.std < 1.2 * 0.48 * TS  # the Cramer-Rao bound is 0.48 samples
+        assert_allclose(np.sort(told.poles.real), np.sort(rigs.R3.poles().real), rtol=0.1)
+
+
+def test_known_dynamics_stay_out_of_the_model_unless_asked_for():
+    sensor = rigs.lag(30.0)
+    record = rigs.step_record(rigs.R4, noise=0.001, before=400, after=1200)
+    without = cr.fit_delay(record, known=sensor, structures=[(3, 3)])
+    within = cr.fit_delay(record, known=sensor, structures=[(3, 3)], include_known=True)
+    assert (without.delay_free.nstates, within.delay_free.nstates) == (3, 4)
+    s = 2j * np.pi * 5.0
+    ratio = within(np.exp(s * TS)) / without(np.exp(s * TS))
+    assert_allclose(ratio, sensor(s), atol=2e-3)  # the hold acts once, not twice: (5/1280)^2
+
+
+def test_hum_and_drift_before_the_step_are_fitted_along():
+    record = rigs.step_record(noise=0.001)
+    hum = 0.005 * 16 * np.sin(2 * np.pi * 50 * record.time + 1)
+    fit = cr.fit_delay(changed(record, record.output + hum)).fit
+    assert abs(fit.delay - 37) < 0.5
+    assert "hum" in codes(fit)
+    drifting = cr.fit_delay(changed(record, record.output + 0.02 * 16 * record.time)).fit
+    assert abs(drifting.delay - 37) < 0.5
+    assert "drift" in codes(drifting)
+
+
+def test_outliers_hardly_move_the_delay():
+    for seed in range(3):
+        record = rigs.step_record(noise=0.005, seed=seed, before=1000, after=1500)
+        rng = np.random.default_rng(100 + seed)
+        wild = (rng.random(2500) < 0.02) * 0.05 * 16 * rng.choice([-1, 1], 2500)
+        spiky = changed(record, record.output + wild)
+        robust = cr.fit_delay(spiky, structures=[(3, 3)]).fit
+        plain = cr.fit_delay(spiky, structures=[(3, 3)], loss="least_squares").fit
+        assert "outliers" in codes(robust)
+        assert abs(robust.delay - 37) < 3 * 0.54  # three times the scatter over many seeds
+        # 2 % of 10 sigma: least squares sees sqrt(1 + 0.02 * 100) = 1.7 times the noise
+        assert plain.std / robust.std > 1.3
+
+
+def test_eight_bit_quantisation_is_seen_and_the_interval_covers():
+    clean = rigs.step_record(noise=0.0)
+    step = 16 * 1.2 / 128
+    fit = cr.fit_delay(changed(clean, np.round(clean.output / step) * step)).fit
+    assert "coarse_quantisation" in codes(fit)
+    assert covers(fit, 37)
+
+
+def test_a_slew_limit_is_called_a_misfit():
+    clean = rigs.step_record(noise=0.0).output
+    limited = np.empty_like(clean)
+    limited[0] = clean[0]
+    for k in range(1, clean.size):
+        limited[k] = limited[k - 1] + np.clip(clean[k] - limited[k - 1], -48 * TS, 48 * TS)
+    record = rigs.step_record(noise=0.0)
+    noise = 0.016 * np.random.default_rng(0).standard_normal(clean.size)
+    fit = cr.fit_delay(changed(record, limited + noise)).fit
+    assert not fit.at_noise_level
+    assert "structured_misfit" in codes(fit)
+    assert len(fit.views) == 6
+
+
+@pytest.mark.parametrize("plant", [rigs.R1, rigs.R3])
+def test_no_delay_is_said_to_be_no_delay(plant):
+    fit = cr.fit_delay(rigs.step_record(plant, delay=0.0, noise=0.001)).fit
+    assert "no_delay_resolved" in codes(fit)
+    assert fit.interval[0] == 0
+    assert fit.delay < 1
+
+
+def test_a_delay_beyond_max_delay_is_flagged_and_found_without_the_limit():
+    record = rigs.step_record(delay=130.0, noise=0.001)
+    limited = cr.fit_delay(record, max_delay=100).fit
+    assert "delay_at_bound" in codes(limited)
+    assert limited.delay <= 100
+    free = cr.fit_delay(record).fit
+    assert "delay_at_bound" not in codes(free)
+    assert free.delay == pytest.approx(130, abs=0.5)
+
+
+def test_a_truncated_record_is_fitted_and_flagged():
+    record = rigs.step_record(noise=0.001, after=160)
+    fit = cr.fit_delay(record).fit
+    assert covers(fit, 37)
+    assert "not_settled" in codes(fit)
+
+
+def test_an_inverse_response_is_found_with_its_zero():
+    w = 2 * np.pi * 5.0
+    fit = cr.fit_delay(rigs.step_record(rigs.R3 * ct.tf([-1, w], [w]), noise=0.001)).fit
+    assert fit.structure == (3, 2)
+    assert abs(fit.delay - 37) < 1
+    assert "inverse_response" in codes(fit)
+    assert fit.zeros[0].real == pytest.approx(w, rel=0.1)
+
+
+def test_an_integrating_plant_gets_an_exact_integrator():
+    # 1/s times R2: the ramp lags by the lags of R2, 1/w1 + 1/w2.
+    record = rigs.step_record(rigs.R2, noise=0.0, before=1000, after=1500)
+    ramp = np.cumsum(record.output - record.output[0]) * TS
+    ramp = ramp + 0.002 * np.random.default_rng(0).standard_normal(ramp.size)
+    system = cr.fit_delay(changed(record, ramp))
+    fit = system.fit
+    assert "integrating" in codes(fit)
+    assert np.any(fit.poles == 0)
+    assert fit.gain == pytest.approx(1.0, rel=0.01)
+    lags = (1 / 2.2 + 1 / 11.0) / (2 * np.pi * TS)
+    # the sum above integrates half a sample ahead
+    assert fit.total_delay / TS == pytest.approx(37 + lags - 0.5, abs=1.0)
+    assert covers(fit, 37)
+
+
+@pytest.mark.parametrize("plant", [rigs.pair(8.0, 0.05), rigs.lag(3.0) * rigs.pair(8.0, 0.05)])
+def test_a_lightly_damped_plant_is_no_difficulty(plant):
+    fit = cr.fit_delay(rigs.step_record(plant, noise=0.001)).fit
+    assert abs(fit.delay - 37) < 0.5
+    assert fit.order == len(plant.poles())
+    ringing = fit.poles[np.argmax(np.abs(fit.poles.imag))]
+    assert -ringing.real / abs(ringing) == pytest.approx(0.05, rel=0.05)
+
+
+@pytest.mark.parametrize("before", [1, 12])
+def test_few_or_no_samples_before_the_step_suffice(before):
+    fit = cr.fit_delay(rigs.step_record(noise=0.002, before=before)).fit
+    assert abs(fit.delay - 37) < 4 * 0.19
+    assert ("no_rest" in codes(fit)) == (before < 8)
+
+
+def test_correlated_noise_widens_the_interval():
+    record = rigs.step_record(noise=0.0)
+    rng = np.random.default_rng(2)
+    noise = np.zeros(record.n_samples)
+    for k in range(1, noise.size):
+        noise[k] = 0.9 * noise[k - 1] + 0.016 * 2 * np.sqrt(1 - 0.81) * rng.standard_normal()
+    coloured = cr.fit_delay(changed(record, record.output + noise), structures=[(3, 3)]).fit
+    white = cr.fit_delay(rigs.step_record(noise=0.002), structures=[(3, 3)]).fit
+    # (1 + 0.9) / (1 - 0.9) = 19 samples count as one: 4.4 times the standard error
+    assert coloured.correlation == pytest.approx(19, rel=0.4)
+    assert 3 < coloured.std / white.std < 6
+    assert covers(coloured, 37)
+
+
+def test_a_ramped_edge_and_a_noisy_input_are_taken_as_measured():
+    k = np.arange(2500)
+    u = np.clip((k - 999) / 20, 0, 1)
+    y = sum(rigs.exact_step(rigs.R3, (k - 1000 - 37 - j) * TS) / 20 for j in range(20))
+    rng = np.random.default_rng(5)
+    y = y + 0.002 * rng.standard_normal(2500)
+    for signal in (u, u + 0.01 * rng.standard_normal(2500)):
+        fit = cr.fit_delay(cr.Record(k * TS, signal, y), structures=[(3, 3)]).fit
+        assert abs(fit.delay - 37) < 4 * 0.19
+
+
+def test_a_random_binary_input_serves_as_well():
+    rng = np.random.default_rng(0)
+    u = rng.choice([-1.0, 1.0], 160).repeat(5)
+    t = 0.01 * np.arange(u.size)
+    moves = np.diff(u, prepend=0.0)
+    y = sum(moves[k] * rigs.exact_step(rigs.R2, t - t[k] - 0.0432) for k in np.flatnonzero(moves))
+    fit = cr.fit_delay(cr.Record(t, u, 3 + y + 0.01 * rng.standard_normal(t.size))).fit
+    assert fit.delay == pytest.approx(4.32, abs=0.15)
+    assert covers(fit, 4.32)
+    assert np.isnan(fit.onset)
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "match"),
+    [
+        ({"structures": [(2, 3)]}, cr.errors.OrderError, "1 <= relative degree <= order"),
+        ({"structures": []}, cr.errors.OptionError, "empty"),
+        ({"structures": [3]}, cr.errors.OptionError, "relative_degree"),
+        ({"loss": "l1"}, cr.errors.OptionError, "choose one of"),
+        ({"max_delay": -1}, cr.errors.OptionError, "positive"),
+        ({"known": ct.tf([1], [1, -1])}, cr.errors.UnsuitableSystemError, "stable"),
+        ({"known": ct.tf([1], [1, -0.5], 0.1)}, cr.errors.UnsuitableSystemError, "continuous"),
+        ({"known": 3.0}, cr.errors.UnsuitableSystemError, "float"),
+    ],
+)
+def test_unusable_choices_are_refused(kwargs, error, match):
+    with pytest.raises(error, match=match):
+        cr.fit_delay(rigs.step_record(before=50, after=200), **kwargs)
+
+
+def test_an_output_at_rest_is_refused():
+    record = rigs.step_record(before=200, after=400)
+    noise = np.random.default_rng(0).standard_normal(600)
+    with pytest.raises(cr.errors.DataError, match="does not leave its rest level"):
+        cr.fit_delay(changed(record, noise))
+    with pytest.raises(cr.errors.NoStepError, match="does not move"):
+        cr.fit_delay(cr.Record(record.time, np.ones(600), record.output))
+    with pytest.raises(cr.errors.DataError, match="records is empty"):
+        cr.fit_delay([])
