@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import pandas as pd
 
 from ..checks import whole
 from ..errors import CtrlRealizeError, DataError
@@ -20,6 +19,9 @@ from .delay_fit_result import DelayFit
 from .delay_scan import estimate_delay
 from .from_io import impulse_from_io
 from .steps import impulse_from_step, unit_step
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Kind = Literal["dead time", "upper bound"]
 TOP_BAND = 1 / 3
@@ -73,6 +75,8 @@ class DelayCheck(Result):
 
     def table(self) -> pd.DataFrame:
         """Tabulate the views, one row each, in s and in samples."""
+        import pandas as pd
+
         rows = pd.DataFrame([vars(view) for view in self.views]).set_index("method")
         if self.dt is not None:
             rows["samples"] = rows["value"] / self.dt

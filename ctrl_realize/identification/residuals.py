@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import control as ct
 import numpy as np
-import pandas as pd
 from scipy.special import ndtri
 
 from ..checks import real, whole
@@ -25,6 +24,9 @@ from ..numerics.correlation import (
 from ..results import Flag, Result
 from ..signals import Record
 from .record_simulation import simulate_record
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Start = Literal["estimate", "rest"]
 NOISE_ORDER = 20
@@ -329,6 +331,8 @@ def cross_validate(
     """
     if not records:
         raise DataError("records is empty")
+    import pandas as pd
+
     names = [record.name or f"record {i}" for i, record in enumerate(records)]
     return pd.DataFrame(
         {
