@@ -19,7 +19,7 @@ from .hankel import BlockHankel, hankel_matrix
 
 Triple: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 
-DENSE_SIZE = 300
+DENSE_SIZE = 200
 """Shorter side up to which the dense SVD is used."""
 
 DENSE_FALLBACK_SIZE = 1500
