@@ -135,19 +135,19 @@ def smallest_distance(curve: Curve, grid: FloatArray) -> tuple[float, float]:
     """Smallest magnitude of a curve, and the frequency where it is reached.
 
     The grid is first refined until neighbours differ by less than a factor of 2; every local
-    minimum within 2.5 times the smallest value is then narrowed by nested grids.
+    minimum within 30 % of the smallest value is then narrowed by nested grids.
     """
     grid, values = follow(curve, grid)
     size = np.abs(values)
     padded = np.concatenate([[np.inf], size, [np.inf]])
     lows = np.flatnonzero((size <= padded[:-2]) & (size <= padded[2:]))
-    lows = lows[size[lows] <= 2.5 * size.min()]
+    lows = lows[size[lows] <= 1.3 * size.min()]
     lows = lows[np.argsort(size[lows])][:64]
     left = grid[np.maximum(lows - 1, 0)]
     right = grid[np.minimum(lows + 1, grid.size - 1)]
     share = np.linspace(0, 1, 9)[:, None]
     rows = np.arange(lows.size)
-    for _ in range(14):
+    for _ in range(11):
         points = left + (right - left) * share
         heights = np.abs(curve(points.ravel())).reshape(points.shape)
         best = np.argmin(heights, axis=0)
