@@ -1,0 +1,115 @@
+"""Time and frequency responses: the answers of `StateSpace`, for any delay.
+
+`gangof4_response` is left out: python-control 0.10.2 evaluates discrete systems at jw there.
+"""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+
+from tests.host.pairs import CORES, DELAYS, DT, GRID, OTHER, assert_same, pair, quietly
+
+N = 90
+T = DT * np.arange(N)
+U = np.sin(0.3 * np.arange(N)) + (np.arange(N) > 10)
+
+
+def rows(s):
+    """An input for any number of channels."""
+    return U if s.ninputs == 1 else np.stack([U * (k + 1) for k in range(s.ninputs)])
+
+
+def state(s):
+    return np.cos(np.arange(s.nstates))
+
+
+ANY = {
+    "step": lambda s: ct.step_response(s, T),
+    "step, default time": lambda s: ct.step_response(s).outputs[..., :5],
+    "step to an end": lambda s: ct.step_response(s, 4.0),
+    "step with states": lambda s: ct.step_response(s, T, return_states=True),
+    "step of one channel": lambda s: ct.step_response(s, T, input_indices=0, output_indices=0),
+    "step from a state": lambda s: ct.step_response(s, T, state(s)),
+    "step, unsqueezed": lambda s: ct.step_response(s, T, squeeze=False),
+    "step, squeezed": lambda s: ct.step_response(s, T, squeeze=True),
+    "step, transposed": lambda s: ct.step_response(s, T, transpose=True).outputs,
+    "step as a tuple": lambda s: tuple(ct.step_response(s, T)),
+    "impulse": lambda s: ct.impulse_response(s, T),
+    "impulse of one channel": lambda s: ct.impulse_response(s, T, input_indices=0),
+    "initial": lambda s: ct.initial_response(s, T, state(s)),
+    "initial of one output": lambda s: ct.initial_response(s, T, state(s), output_indices=0),
+    "forced": lambda s: ct.forced_response(s, T, rows(s)),
+    "forced from a state": lambda s: ct.forced_response(s, T, rows(s), state(s)),
+    "forced with states": lambda s: ct.forced_response(s, T, rows(s), return_states=True),
+    "forced without time": lambda s: ct.forced_response(s, inputs=rows(s)),
+    "forced, single precision": lambda s: ct.forced_response(s, T, rows(s).astype("f4")),
+    "input_output": lambda s: ct.input_output_response(s, T, rows(s)),
+    "input_output from a state": lambda s: ct.input_output_response(s, T, rows(s), state(s)),
+    "call of the response": lambda s: ct.step_response(s, T)(squeeze=False).outputs,
+    "labels of the response": lambda s: ct.forced_response(s, T, rows(s)).output_labels,
+    "frequency response": lambda s: ct.frequency_response(s, GRID),
+    "frequency response as a tuple": lambda s: tuple(ct.frequency_response(s, GRID)),
+    "frequency response, Hz": lambda s: ct.frequency_response(s, GRID / 7, Hz=True),
+    "frequency response, unsqueezed": lambda s: ct.frequency_response(s, GRID, squeeze=False).phase,
+    "frequency response, method": lambda s: s.frequency_response(GRID),
+    "frequency response, limits": lambda s: ct.frequency_response(
+        s, omega_limits=[0.1, 9], omega_num=20
+    ),
+    "frequency response of two": lambda s: list(ct.frequency_response([s, 2 * s], GRID)),
+    "singular values": lambda s: ct.singular_values_response(s, GRID).magnitude,
+    "frd": lambda s: ct.frd(s, GRID),
+    "frd, twice": lambda s: ct.frd(s, GRID) * 2,
+    "frd plus number": lambda s: ct.frd(s, GRID) + 1,
+    "frd, smooth": lambda s: ct.frd(s, GRID, smooth=True).eval(GRID[3] * 1.01),
+    "poles and zeros": lambda s: np.sort_complex(ct.pole_zero_map(s).poles),
+}  # fmt: skip
+
+SISO = {
+    "frequency response, default": lambda s: ct.frequency_response(s).frdata[..., :30],
+    "step_info": lambda s: ct.step_info(s, timepts=DT * np.arange(300)),
+    "bode": lambda s: ct.bode_plot(s, GRID, plot=False),
+    "nyquist count": lambda s: ct.nyquist_response(0.05 * s, omega=GRID).count,
+    "nyquist contour": lambda s: ct.nyquist_response(0.05 * s, omega=GRID).response,
+    "margins of the response": lambda s: ct.stability_margins(ct.frd(0.3 * s, GRID, smooth=True)),
+    "frd times a system": lambda s: ct.frd(s, GRID) * OTHER,
+    "system times frd": lambda s: s * ct.frd(OTHER, GRID),
+    "frd over a system": lambda s: ct.frd(OTHER, GRID) / s,
+    "frd in feedback": lambda s: ct.frd(0.1 * s, GRID).feedback(1),
+    "phase, wrapped": lambda s: ct.frequency_response(s, GRID).phase,
+    "disk margins": lambda s: ct.disk_margins(0.05 * s, GRID),
+    "norm of the loop": lambda s: ct.norm(ct.feedback(0.1 * s, 1), 2),
+    "eigensys_realization": lambda s: np.abs(
+        ct.eigensys_realization(ct.impulse_response(s, T), 2, m=40, n=40)[1][:4]
+    ),
+    "markov": lambda s: ct.markov(ct.forced_response(s, T, U), 50),
+}  # fmt: skip
+
+ALL = {
+    **{f"any: {name}": operation for name, operation in ANY.items()},
+    **{f"one channel: {name}": operation for name, operation in SISO.items()},
+}
+CASES = [
+    (core, operation)
+    for operation in ALL
+    for core in CORES
+    if operation.startswith("any") or core in ("siso", "direct")
+]
+# What python-control 0.10.2 refuses, and we in the same way: {delay: error}.
+REFUSED: dict[tuple[str, str], dict[int, type[Exception]]] = {
+    ("wide", "any: poles and zeros"): dict.fromkeys(DELAYS, NotImplementedError)
+}
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize(("core", "operation"), CASES)
+def test_the_answer_is_that_of_state_space(core, operation, delay):
+    ours, theirs = pair(core, delay)
+    refused = REFUSED.get((core, operation), {}).get(delay)
+    if refused is None:
+        assert_same(quietly(ALL[operation], ours), quietly(ALL[operation], theirs))
+    else:
+        for system in (ours, theirs):
+            with pytest.raises(refused):
+                quietly(ALL[operation], system)
