@@ -12,9 +12,7 @@ from ..frequency import compare_frf
 from ..io import load_model, read_frf
 from ..io.atomic import write_text
 from ..report import write_comparison
-from ..report.sketches import frf_sketches
 from .inputs import check_files, typed_call
-from .results import save_figures
 from .staging import appearing
 from .terminal import printable, say
 
@@ -72,7 +70,6 @@ def compare(
             words += ["--hold", hold.value]
         with appearing(output) as folder:
             write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
-            save_figures(folder, frf_sketches([system], measured, comparison))
             write_comparison(
                 folder / "report.html",
                 system,
@@ -80,6 +77,7 @@ def compare(
                 comparison,
                 files=[model, frf],
                 calls=[("In a terminal", typed_call("compare", words))],
+                figures=folder / "figures",
             )
     say(printable(f"{model}: {system!r}"))
     say(comparison.report())

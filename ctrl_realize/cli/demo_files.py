@@ -12,10 +12,10 @@ from ..io.atomic import write_text
 from ..plots.fits import evidence_height
 from ..report import Column, Page, Row, Sketch, Table, pairs, verdict_of, write_page
 from ..report.provenance import own_version, record_sha256, versions
+from ..report.sketches import save_sketches
 from .demo_run import DemoResult, shown
 from .demo_tables import OUTCOME, outcome_rows, simulated_table, table_1_columns, table_1_rows
 from .inputs import typed_call
-from .results import save_figures
 
 _TITLE = "A control valve with dead time, identified"
 
@@ -28,7 +28,7 @@ def write_demo_files(folder: Path, result: DemoResult) -> list[str]:
     save_model(folder / "model_paper.json", result.printed, settings=settings, note=note)
     _write_tables(folder, result)
     sketches = demo_sketches(result)
-    save_figures(folder, sketches)
+    save_sketches(folder / "figures", sketches)
     write_page(folder / "report.html", demo_page(result, sketches))
     return [
         "report.html",

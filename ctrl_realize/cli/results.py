@@ -16,12 +16,6 @@ from ..identification.campaign import Campaign
 from ..io import save_model
 from ..io.atomic import write_text
 from ..plots.style import time_unit
-from ..report.sketches import (
-    Sketch,
-    campaign_sketches,
-    frf_sketches,
-    identification_sketches,
-)
 from ..signals import Record
 from .terminal import printable, table
 
@@ -48,8 +42,8 @@ def write_record_files(
         comparison=comparison,
         settings=settings,
         calls=calls,
+        figures=folder / "figures",
     )
-    save_figures(folder, identification_sketches(system, record, frf=frf, comparison=comparison))
     if comparison is not None:
         write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
 
@@ -79,11 +73,8 @@ def write_campaign_files(
         settings=settings,
         calls=calls,
         title=f"Campaign of {len(campaign.rows)} records",
+        figures=folder / "figures",
     )
-    sketches = campaign_sketches(campaign)
-    if frf is not None:
-        sketches += frf_sketches([system], frf, comparison)
-    save_figures(folder, sketches)
     if comparison is not None:
         write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
 
@@ -96,14 +87,6 @@ def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -
         if row.system is not None:
             name = f"{number:03d}_{file_name(row.name)}.json"
             save_model(models / name, row.system, settings=settings, note=f"from {row.name}")
-
-
-def save_figures(folder: Path, sketches: Sequence[Sketch]) -> None:
-    """Write figures as PNG files, which any program shows."""
-    figures = folder / "figures"
-    figures.mkdir(exist_ok=True)
-    for sketch in sketches:
-        sketch.save(figures / f"{sketch.key}.png")
 
 
 def file_name(name: str) -> str:

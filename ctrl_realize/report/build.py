@@ -18,7 +18,13 @@ from ..results import Result
 from ..signals import Record
 from .page import Column, Page, Row, Table, pairs, write_page
 from .provenance import file_sha256, own_version, record_sha256, versions
-from .sketches import Sketch, campaign_sketches, frf_sketches, identification_sketches
+from .sketches import (
+    Sketch,
+    campaign_sketches,
+    frf_sketches,
+    identification_sketches,
+    save_sketches,
+)
 from .verdict import campaign_verdict, comparison_verdict, verdict_of
 
 Paths = Sequence[str | os.PathLike[str]]
@@ -35,6 +41,7 @@ def write_identification(
     settings: Mapping[str, Any] | None = None,
     calls: Sequence[tuple[str, str]] = (),
     simulated: bool = False,
+    figures: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write the report of one identification: one HTML file that needs nothing else.
 
@@ -58,6 +65,8 @@ def write_identification(
         What to type to do it again.
     simulated : bool, default False
         Whether the data are simulated; it is then said at the top.
+    figures : path-like, optional
+        Folder to save the figures to as well, as PNG files.
 
     Returns
     -------
@@ -94,6 +103,8 @@ def write_identification(
         *_settings_tables(settings),
         pairs("Versions", versions()),
     ]
+    if figures is not None:
+        save_sketches(figures, sketches)
     page = Page(
         title=f"Model of {record.name}" if record.name else "Identified model",
         subtitle=_kind(system),
@@ -122,6 +133,7 @@ def write_campaign(
     title: str = "Campaign",
     truth: float | None = None,
     simulated: bool = False,
+    figures: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write the report of a campaign: one HTML file that needs nothing else.
 
@@ -133,7 +145,7 @@ def write_campaign(
         Files that the data came from, for their checksums.
     records : sequence of Record, optional
         The records, for theirs, where there are no files.
-    frf, comparison, settings, calls, simulated
+    frf, comparison, settings, calls, simulated, figures
         As for `write_identification`; the comparison is that of ``campaign.system``.
     more_tables, more_sketches : sequence, optional
         Further tables and figures, behind the campaign's own.
@@ -156,6 +168,9 @@ def write_campaign(
     sketches = campaign_sketches(campaign, truth=truth)
     if frf is not None:
         sketches += frf_sketches([system], frf, comparison)
+    sketches += more_sketches
+    if figures is not None:
+        save_sketches(figures, sketches)
     tables = [_campaign_table(campaign), _amplitude_table(campaign), *more_tables]
     if comparison is not None:
         tables.append(pairs("Against the measured frequency response", comparison._rows()))
@@ -168,7 +183,7 @@ def write_campaign(
         subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
         verdict=campaign_verdict(campaign),
         version=own_version(),
-        figures=[sketch.on_page() for sketch in [*sketches, *more_sketches]],
+        figures=[sketch.on_page() for sketch in sketches],
         tables=tables,
         calls=calls,
         simulated=simulated,
@@ -185,6 +200,7 @@ def write_comparison(
     files: Paths = (),
     calls: Sequence[tuple[str, str]] = (),
     simulated: bool = False,
+    figures: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write the report of a model beside a measured frequency response: one HTML file.
 
@@ -196,7 +212,7 @@ def write_comparison(
         Measured.
     comparison : FRFComparison
         Of `system` with `frf`.
-    files, calls, simulated
+    files, calls, simulated, figures
         As for `write_identification`.
 
     Returns
@@ -208,12 +224,15 @@ def write_comparison(
     OSError
         The folder is missing or cannot be written.
     """
+    sketches = frf_sketches([system], frf, comparison)
+    if figures is not None:
+        save_sketches(figures, sketches)
     page = Page(
         title=f"{system.name} beside {frf.name}",
         subtitle="a model and a measured frequency response",
         verdict=comparison_verdict(system, comparison),
         version=own_version(),
-        figures=[one.on_page() for one in frf_sketches([system], frf, comparison)],
+        figures=[sketch.on_page() for sketch in sketches],
         tables=[
             pairs("Against the measured frequency response", comparison._rows()),
             _model_table(system),

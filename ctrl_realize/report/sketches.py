@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import control as ct
@@ -22,7 +23,7 @@ from ..io.atomic import replaced_when_complete
 from ..plots.fits import evidence_height
 from ..signals import Record, StepResponse
 from .page import PageFigure
-from .svg import drawn
+from .svg import inline_svg, laid_out, missing_glyphs_allowed
 
 MOST_DRAWN = 60
 """Most step responses in one picture."""
@@ -49,23 +50,30 @@ class Sketch:
     draw: Callable[[Figure], Any]
     size: tuple[float, float] = (6.2, 4.0)
 
+    @cached_property
+    def figure(self) -> Figure:
+        """The figure, drawn once."""
+        return laid_out(self.draw, self.size)
+
     def on_page(self) -> PageFigure:
-        """Draw it for a page."""
-        description = f"{self.title}. {self.caption}"
+        """Put it on a page."""
         key = self.key.replace("_", "-")
-        return PageFigure(
-            key, self.title, self.caption, Markup(drawn(self.draw, key, self.size, description))
-        )
+        svg = inline_svg(self.figure, key, f"{self.title}. {self.caption}")
+        return PageFigure(key, self.title, self.caption, Markup(svg))
 
     def save(self, path: str | os.PathLike[str], *, dpi: float = 150) -> None:
-        """Draw it to a file, whole or not at all; the ending tells the format."""
+        """Save it to a file, whole or not at all; the ending tells the format."""
         kind = os.path.splitext(path)[1].lstrip(".").lower() or "png"
-        figure = Figure(figsize=self.size, layout="constrained")
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message=r"Glyph .* missing", category=UserWarning)
-            self.draw(figure)
-            with replaced_when_complete(path) as temporary:
-                figure.savefig(temporary, format=kind, dpi=dpi, facecolor="white")
+        with missing_glyphs_allowed(), replaced_when_complete(path) as temporary:
+            self.figure.savefig(temporary, format=kind, dpi=dpi, facecolor="white")
+
+
+def save_sketches(folder: str | os.PathLike[str], sketches: Sequence[Sketch]) -> None:
+    """Save figures as PNG files, which any program shows, to a folder that is made if needed."""
+    place = Path(folder)
+    place.mkdir(exist_ok=True)
+    for sketch in sketches:
+        sketch.save(place / f"{sketch.key}.png")
 
 
 def identification_sketches(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
@@ -34,31 +35,35 @@ _VARIABLES = {
 def drawn(
     draw: Callable[[Figure], Any], key: str, size: tuple[float, float], description: str
 ) -> str:
-    """Draw a figure and return it as inline SVG.
+    """Draw a figure and return it as inline SVG, see `laid_out` and `inline_svg`."""
+    return inline_svg(laid_out(draw, size), key, description)
+
+
+def laid_out(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure:
+    """Draw a figure and fix the places of everything in it, so that it can be saved cheaply.
 
     Parameters
     ----------
     draw : callable
         Gets a new figure to draw in, which pyplot does not know.
-    key : str
-        Letters and digits, different for each figure of a page; keeps their ids apart.
     size : tuple of float
         Width and height in inches of 72 points.
-    description : str
-        Read out in place of the picture.
-
-    Returns
-    -------
-    str
-        An ``<svg>`` element. Its colours are variables of the page.
     """
     figure = Figure(figsize=size, layout="constrained")
-    with warnings.catch_warnings():
-        # A letter of a name that the font does not have is drawn as a box, and that is enough.
-        warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
+    with missing_glyphs_allowed():
         draw(figure)
         thin_lines(figure)
-        return inline_svg(figure, key, description)
+        figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    return figure
+
+
+@contextmanager
+def missing_glyphs_allowed() -> Iterator[None]:
+    """Draw a letter that the font does not have as a box, without a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
+        yield
 
 
 def thin_lines(figure: Figure, points: int = POINTS) -> None:
@@ -109,10 +114,19 @@ def envelope(
 
 
 def inline_svg(figure: Figure, key: str, description: str) -> str:
-    """Write a figure as an ``<svg>`` element whose ids begin with `key`."""
+    """Write a figure as an ``<svg>`` element whose colours are variables of the page.
+
+    Parameters
+    ----------
+    figure : Figure
+    key : str
+        Letters and digits, different for each figure of a page; all ids begin with it.
+    description : str
+        Read out in place of the picture.
+    """
     buffer = io.StringIO()
     settings: Any = {"svg.fonttype": "none", "svg.hashsalt": key}
-    with mpl.rc_context(settings):
+    with mpl.rc_context(settings), missing_glyphs_allowed():
         figure.savefig(
             buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None}
         )
