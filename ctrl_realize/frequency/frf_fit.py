@@ -146,7 +146,7 @@ class FRFFit(Result):
             if p.imag >= 0
         ]
         return [
-            ("dead time", f"{1e3 * self.dead_time:.5g} ms, std {1e3 * self.std:.2g} ms"),
+            ("dead time", f"{1e3 * self.dead_time:.5g} ms, {self._std_in_words()}"),
             (
                 "95 % interval",
                 f"{1e3 * self.interval[0]:.5g} to {1e3 * self.interval[1]:.5g} ms",
@@ -167,6 +167,13 @@ class FRFFit(Result):
                 else f"{100 * self.misfit:.3g} % of {unit}",
             ),
         ]
+
+    def _std_in_words(self) -> str:
+        low, high = self.interval
+        # At a bound, or with a superfluous zero, the curvature says nothing; the interval does.
+        if self.std > 2 * (high - low):
+            return "its standard deviation is not determined"
+        return f"std {1e3 * self.std:.2g} ms"
 
     def __repr__(self) -> str:
         low, high = self.interval

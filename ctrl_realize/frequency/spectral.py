@@ -89,6 +89,13 @@ def spectral_frf(
     number of segments, reduced for what overlapping ones share (Welch 1967). For periods it
     comes from their scatter [1]_.
 
+    A file that does not fit into memory is gone through piece by piece::
+
+        n, t = 2**20, dt * np.arange(2**20)
+        u, y = (np.memmap(name, dtype="f4", mode="r") for name in ("u.bin", "y.bin"))
+        pieces = (cr.Record(t, u[k : k + n], y[k : k + n]) for k in range(0, u.size - n + 1, n))
+        frf = cr.spectral_frf(pieces, segment=8192)
+
     An input that is held between the samples makes this the response of the *sampled* plant,
     which has the hold in it: ``compare_frf(..., hold=None)``.
 

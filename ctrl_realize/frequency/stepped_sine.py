@@ -13,7 +13,7 @@ from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.sines import SineFit, dominant_frequency, fit_sines
 from ..signals import MeasuredFRF, Record
 
-_BATCH_SAMPLES = 2_000_000
+_BATCH_SAMPLES = 300_000
 _STEADY_RATIO = 1.5
 _MIN_PERIODS = 0.9
 
