@@ -309,7 +309,8 @@ def _riccati(
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     try:
         gain, cost, poles = solver(A, B, Q, R)
-    except (np.linalg.LinAlgError, ct.ControlArgument, ValueError) as error:
+    # Slycot, where it is there, has errors of its own, all of them ArithmeticErrors.
+    except (ArithmeticError, ct.ControlArgument, ValueError) as error:
         raise UnsuitableSystemError(
             f"the Riccati equation of the core has no stabilizing solution for these {weights} "
             f"({error}); an unstable or integrating mode may be out of reach or without weight"
