@@ -19,6 +19,8 @@ from .frequency import fit_frf as fit_frf
 from .frequency import impulse_from_frf as impulse_from_frf
 from .frequency import spectral_frf as spectral_frf
 from .frequency import stepped_sine_frf as stepped_sine_frf
+from .identification.bootstrap import Bootstrap as Bootstrap
+from .identification.bootstrap import bootstrap as bootstrap
 from .identification.campaign import Campaign as Campaign
 from .identification.campaign_row import CampaignRow as CampaignRow
 from .identification.campaign_run import identify_campaign as identify_campaign

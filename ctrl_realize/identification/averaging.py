@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, trim_mean
+from scipy.special import chdtrc
 
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
@@ -127,7 +127,7 @@ def repeatability(
         errors=errors,
         gains=gains,
         chi_square=statistic,
-        p_value=float(chi2.sf(statistic, freedom)),
+        p_value=float(chdtrc(freedom, statistic)),
         trend=trend,
         trend_error=trend_error,
         outlying=tuple(names[i] for i in mean.left_out),
@@ -143,7 +143,9 @@ def delay_outliers(result: Repeatability, used: tuple[int, ...]) -> tuple[int, .
 
 
 def _trimmed(values: FloatArray) -> FloatArray:
-    return np.asarray(trim_mean(values, _TRIM if len(values) >= 5 else 0.0, axis=0))
+    """Mean without the largest and smallest tenth at every sample (five records or more)."""
+    cut = max(int(_TRIM * len(values)), 1) if len(values) >= 5 else 0
+    return np.asarray(np.sort(values, axis=0)[cut : len(values) - cut].mean(axis=0))
 
 
 def _groups(amplitudes: list[float]) -> list[list[int]]:

@@ -39,6 +39,7 @@ _DRAWN_BY = {
     "BalancedReduction": "design_plots:hankel_plot",
     "Campaign": "campaigns:campaign_plot",
     "DelayCheck": "diagnostics:delay_check_plot",
+    "Bootstrap": "bootstraps:bootstrap_plot",
     "DelayFit": "fits:fit_plot",
     "DelayRobustness": "design_plots:delay_robustness_plot",
     "DelayScan": "scans:delay_plot",

@@ -1,0 +1,78 @@
+"""Several records of one plant: mean, scatter, trend, outlying records."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from tests import rigs
+
+TS = rigs.TS
+
+
+def record(seed, *, delay=37.0, amplitude=16.0, name="", plant=rigs.R3):
+    made = rigs.step_record(
+        plant, delay=delay, noise=0.005, seed=seed, amplitude=amplitude, before=400, after=1300
+    )
+    return cr.Record(made.time, made.input, made.output, name=name or f"no. {seed}")
+
+
+def codes(fit):
+    return {flag.code for flag in fit.flags}
+
+
+@pytest.fixture(scope="module")
+def sixteen():
+    return cr.fit_delay([record(seed) for seed in range(16)]).fit
+
+
+def test_the_mean_of_sixteen_records_is_four_times_as_exact(sixteen):
+    assert sixteen.std / TS == pytest.approx(0.46 / 4, rel=0.25)
+    assert abs(sixteen.delay - 37) < 4 * 0.46 / 4
+    assert sixteen.at_noise_level
+    assert sixteen.gain == pytest.approx(1.0, abs=0.002)
+
+
+def test_records_that_differ_by_noise_alone_are_not_called_different(sixteen):
+    repeats = sixteen.repeatability
+    assert repeats.p_value > 0.01
+    assert not repeats.outlying
+    # standard error of a shift with known shape: 0.15 samples per 1 % noise
+    assert np.median(repeats.errors) / TS == pytest.approx(0.15 * 0.5, rel=0.3)
+    assert not codes(sixteen) & {"records_differ", "amplitude_trend", "outlying_records"}
+
+
+def test_trigger_jitter_is_seen_and_widens_the_interval():
+    jitter = np.random.default_rng(1).normal(scale=1.5, size=10)
+    fit = cr.fit_delay([record(k, delay=37 + jitter[k]) for k in range(10)]).fit
+    assert "records_differ" in codes(fit)
+    found = fit.repeatability.delays / TS
+    # every record's delay is found to its own error, a tenth of a sample
+    np.testing.assert_allclose(found - found.mean(), jitter - jitter.mean(), atol=0.5)
+    assert fit.std / TS > 0.8 * jitter.std(ddof=1) / np.sqrt(10)
+
+
+def test_an_outlying_record_is_named_and_left_out():
+    records = [record(k) for k in range(6)] + [record(6, delay=60.0, name="stuck")]
+    fit = cr.fit_delay(records).fit
+    assert fit.repeatability.outlying == ("stuck",)
+    assert abs(fit.delay - 37) < 1
+
+
+def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
+    records = [
+        record(10 * k + a, delay=36 + a / 8, amplitude=float(a))
+        for k in range(4)
+        for a in (4, 8, 16)
+    ]
+    fit = cr.fit_delay(records).fit
+    assert "amplitude_trend" in codes(fit)
+    assert fit.repeatability.trend / TS == pytest.approx(1 / 8, rel=0.3)
+
+
+def test_records_of_different_sample_times_are_refused():
+    one = record(0)
+    other = cr.Record(2 * one.time, one.input, one.output)
+    with pytest.raises(cr.errors.DataError, match="one sample time"):
+        cr.fit_delay([one, other])
