@@ -90,7 +90,7 @@ def test_beyond_the_numerical_rank_there_are_zeros(size, rank):
     assert np.count_nonzero(np.abs(pairs.vectors[0]).max(axis=1)) == rank
 
 
-@pytest.mark.parametrize("size", [50, 200])
+@pytest.mark.parametrize("size", [50, 200, 2000])  # dense, dense fallback, ARPACK
 def test_a_pulse_has_one_and_minus_one_many_times(size):
     pulse = np.zeros(2 * size)
     pulse[20] = 1.0
