@@ -3,27 +3,44 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import control as ct
 import numpy as np
 
 from ..checks import positive, whole
 from ..delayed import DelayedStateSpace
-from ..errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
+from ..errors import DataError, DelayRangeError
 from ..numerics.arrays import FloatArray, read_only
-from ..numerics.recursive import DelayBank, pole_directions, sensitivity_system
+from ..numerics.pole_moves import Core, Direction, moved_core, pole_directions, sensitivity_system
+from ..numerics.recursive import DelayBank
 from ..signals import Record
 from ..signals.record import check_complete
 from .tracked import DelayTrack, TrackedDelay
+from .tracker_checks import check_start, doubt, fraction
 
 SPEED_STD = 0.3
 """How far a pole is expected to move: prior standard deviation of its relative speed."""
-SIGNIFICANT = 16.0
-"""Fall of the misfit in noise variances below which nothing was seen: four sigma."""
-
 MOMENTS = 50
 """Estimates made in one memory."""
+RUN_IN = 2
+"""Memories that a renewed bank takes before it is asked."""
+MOVED, LEAP = 0.04, 0.5
+"""Relative move of a pole from which the bank is renewed, and the largest that is then made."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Linearised:
+    """A bank of delays about one set of poles, `moved` from those of the starting model.
+
+    Its sums begin at the sample `begin`.
+    """
+
+    bank: DelayBank
+    core: Core
+    directions: list[Direction]
+    moved: FloatArray
+    begin: int = 0
 
 
 class DelayTracker:
@@ -58,10 +75,12 @@ class DelayTracker:
     -----
     Multiple-model estimation of a delay on line in the row of Tuch, Feuer and Palmor (1994) and
     Orlov et al. (2002). The regressors are simulated, not measured, outputs, so noise does not
-    bias the dynamics. Pole moves enter to first order about the starting model (at 10 % the
-    delay is off by about one sample in a plant whose lags take 130): beyond 30 % nothing is
-    claimed. Probabilities of delays count exponential weights as whole samples
-    and correlation of the residual by its first lag, both on the safe side.
+    bias the dynamics. Pole moves enter to first order about a model that is renewed when a pole
+    has moved by 4 % or more: a second bank then runs beside the first for two memories and
+    more, and takes over. Until then the delay may be off by a tenth of the lag per tenth of a
+    pole's speed, and beyond 30 % nothing is claimed. Probabilities of delays count exponential
+    weights as whole samples, which is on the safe side, and a residual that is slower than
+    white as fewer of them.
 
     Examples
     --------
@@ -88,7 +107,7 @@ class DelayTracker:
         dynamics: bool = True,
     ) -> None:
         core = model.delay_free if isinstance(model, DelayedStateSpace) else model
-        _check_model(core)
+        check_start(core)
         low = whole(min_delay, "min_delay", 0)
         high = whole(max_delay, "max_delay", 0)
         if high <= low:
@@ -100,17 +119,20 @@ class DelayTracker:
                 f"memory={memory:g} s is {span:.4g} samples, and delays up to {high} samples are "
                 "to be seen; needed is a longer memory"
             )
-        self._core = core
-        self._directions = pole_directions(core.poles(), self.dt) if dynamics else []
-        system = sensitivity_system(
-            core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]), self._directions
-        )
-        self._bank = DelayBank(*system, low, high, float(np.exp(-1.0 / span)))
-        self._stride = max(1, round(span / MOMENTS))
+        self._low, self._high, self._span = low, high, span
         self._count = 0
+        self._zeros = np.asarray(core.zeros(), dtype=np.complex128)
+        matrices = (core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]))
+        directions = pole_directions(core.poles(), self.dt) if dynamics else []
+        self._now = self._linearised(matrices, directions, np.zeros(len(directions)))
+        self._next: _Linearised | None = None
+        self._stride = max(1, round(span / MOMENTS))
         self._first = (0.0, 0.0)
         self._variance = 0.0
-        self._residuals = (0.0, 0.0, 0.0)  # last residual, sums of e[k]^2 and e[k] e[k-1]
+        self._move_std = np.full(len(directions), np.inf)
+        # The residual summed since the last estimate; weighted sums of its squares, and of the
+        # squares of its sums from estimate to estimate.
+        self._residuals = (0.0, 0.0, 0.0)
         self._best: tuple[int, FloatArray, float] | None = None
         self._places: deque[float] = deque(maxlen=MOMENTS)
         self._told = TrackedDelay(
@@ -132,17 +154,26 @@ class DelayTracker:
             self._first = (float(u), float(y))
         self._count += 1
         moved, seen = float(u) - self._first[0], float(y) - self._first[1]
-        self._bank.update(moved, seen)
+        self._now.bank.update(moved, seen)
+        if self._next is not None:
+            self._next.bank.update(moved, seen)
+            if self._count == self._next.begin:
+                self._next.bank.restart()
+            if self._count >= self._next.begin + RUN_IN * self._span:
+                self._now, self._next, self._best = self._next, None, None
         if self._best is not None:
             delay, theta, offset = self._best
-            error = seen - offset - self._bank.predict(delay, theta)
-            last, squares, products = self._residuals
-            keep = self._bank.forgetting
-            self._residuals = (error, keep * squares + error**2, keep * products + error * last)
+            error = seen - offset - self._now.bank.predict(delay, theta)
+            keep = self._now.bank.forgetting
+            run, squares, blocks = self._residuals
+            self._residuals = (run + error, keep * squares + error**2, keep * blocks)
         if self._count % self._stride == 0:
+            run, squares, blocks = self._residuals
+            self._residuals = (0.0, squares, blocks + run**2)
             self._told = self._solve()
             told = self._told
             self._places.append(told.dead_time / self.dt if told.tells else np.nan)
+            self._follow_poles()
 
     def estimate(self) -> TrackedDelay:
         """Solve for what the samples so far say."""
@@ -150,9 +181,16 @@ class DelayTracker:
 
     @property
     def model(self) -> DelayedStateSpace:
-        """The starting model with the delay and gain of the last estimate; its `fit` is that."""
+        """Model of the last estimate, which is its `fit`; zeros as in the starting model."""
         told = self.estimate()
-        return DelayedStateSpace(self._core * told.gain_ratio, told.delay, fit=told)
+        now = self._now
+        made = None
+        if self._best is not None and told.gain_ratio:
+            moves = self._best[1][1:] / told.gain_ratio
+            made = moved_core(now.core, self._zeros, now.directions, moves, self.dt)
+        A, B, C, D = now.core if made is None else made[0]
+        core = ct.ss(A, B[:, None], told.gain_ratio * C[None], told.gain_ratio * D, self.dt)
+        return DelayedStateSpace(core, told.delay, fit=told)
 
     def run(self, record: Record) -> DelayTrack:
         """Take in a whole record, and return the course of the estimate.
@@ -189,9 +227,39 @@ class DelayTracker:
             dt=self.dt,
         )
 
+    def _linearised(
+        self, core: Core, directions: list[Direction], moved: FloatArray
+    ) -> _Linearised:
+        bank = DelayBank(
+            *sensitivity_system(*core, directions),
+            self._low,
+            self._high,
+            float(np.exp(-1.0 / self._span)),
+        )
+        return _Linearised(bank, core, directions, moved)
+
+    def _follow_poles(self) -> None:
+        """Start a bank about the moved poles, to take over when it has seen enough."""
+        now = self._now
+        if self._next is not None or self._best is None or not now.directions:
+            return
+        theta = self._best[1]
+        moves = theta[1:] / theta[0] if theta[0] else np.zeros(theta.size - 1)
+        clear = np.abs(moves) > np.maximum(MOVED, 4 * self._move_std)
+        if not np.any(clear) or self._told.reason.startswith(("nothing", "the output")):
+            return
+        step = np.clip(np.where(clear, moves, 0.0), -LEAP, LEAP)
+        made = moved_core(now.core, self._zeros, now.directions, step, self.dt)
+        if made is not None:
+            fresh = self._linearised(*made, now.moved + step)
+            wait = fresh.bank.settling()
+            if wait is not None:
+                self._next = replace(fresh, begin=self._count + wait + self._high + 1)
+
     def _solve(self) -> TrackedDelay:
-        bank = self._bank
-        q = 1 + len(self._directions)
+        now = self._now
+        bank = now.bank
+        q = 1 + len(now.directions)
         if self._count < bank.high + 10 * q:
             return replace(
                 self._told,
@@ -199,7 +267,7 @@ class DelayTracker:
                 reason=f"only {self._count} samples yet",
             )
         prior = np.eye(1, q)[0]
-        spread = np.array([1.0, *(SPEED_STD for _ in self._directions)])
+        spread = np.array([1.0, *(SPEED_STD for _ in now.directions)])
         found = bank.solve(prior, self._variance / spread**2)
         best = int(np.argmin(found.misfit))
         freedom = max(bank.weight**2 / bank.weight_squared - q - 1, 1.0)
@@ -218,19 +286,20 @@ class DelayTracker:
         gain_std = float(np.sqrt(noise * found.inverse[best, 0, 0]))
         gain = float(theta[0])
         moves = theta[1:] / gain if gain else np.zeros(q - 1)
-        ratios = tuple(
-            float(np.exp(np.clip(move, -2, 2)))
-            for (what, _, _), move in zip(self._directions, moves, strict=True)
-            if what == "speed"
-        )
+        spreads = noise * np.diag(found.inverse[best])[1:]
+        self._move_std = np.sqrt(spreads) / abs(gain) if gain else np.full(q - 1, np.inf)
+        speeds = [i for i, (what, _, _) in enumerate(now.directions) if what == "speed"]
+        ratios = tuple(float(np.exp(now.moved[i] + np.clip(moves[i], -2, 2))) for i in speeds)
         explained = float(found.power - found.misfit[best])
-        reason = self._doubt(explained, noise, best, interval, gain, gain_std)
-        place = bank.low + best + _fraction(found.misfit, best)
-        moved = max((abs(np.log(ratio)) for ratio in ratios), default=0.0)
+        reason = doubt(
+            explained / noise, gain / gain_std, bank.low + best, interval, (self._low, self._high)
+        )
+        place = bank.low + best + fraction(found.misfit, best)
+        moved = float(np.abs(moves[speeds]).max(initial=0.0))
         if not reason and moved > SPEED_STD:
             reason = (
-                f"a pole has moved by {100 * np.expm1(moved):.0f} %, too far for a first-order "
-                "change of the starting model; start again from a new one"
+                f"a pole has moved by {100 * np.expm1(moved):.0f} %, too far for the model that "
+                "changes are counted from; it is being renewed"
             )
         return TrackedDelay(
             time=(self._count - 1) * self.dt,
@@ -246,12 +315,13 @@ class DelayTracker:
         )
 
     def _inflation(self) -> float:
-        """Return by how much correlation of the residual lowers the number of samples."""
-        _, squares, products = self._residuals
-        if squares <= 0:
-            return 1.0
-        rho = float(np.clip(products / squares, 0.0, 0.99))
-        return (1 + rho) / (1 - rho)
+        """Return by how much correlation of the residual lowers the number of samples.
+
+        Sums of B white samples have B times the variance of one; slow errors of the model show
+        in the sums long before they show from sample to sample.
+        """
+        _, squares, blocks = self._residuals
+        return max(blocks / squares, 1.0) if squares > 0 else 1.0
 
     def _with_trail(self, interval: tuple[int, int], place: float) -> tuple[int, int]:
         """Widen an interval by the way that the delay has gone within one memory.
@@ -261,55 +331,5 @@ class DelayTracker:
         """
         before = self._places[0] if self._places else np.nan
         way = 0.0 if np.isnan(before) else place - before
-        low = max(interval[0] + int(np.floor(min(way, 0.0))), self._bank.low)
-        return low, min(interval[1] + int(np.ceil(max(way, 0.0))), self._bank.high)
-
-    def _doubt(
-        self,
-        explained: float,
-        noise: float,
-        best: int,
-        interval: tuple[int, int],
-        gain: float,
-        gain_std: float,
-    ) -> str:
-        """Say why the data cannot tell the delay; empty when they can."""
-        bank = self._bank
-        low, high = bank.low, bank.high
-        if explained < SIGNIFICANT * noise:
-            return "nothing moved within the memory that stands out of the noise"
-        if abs(gain) < 3 * gain_std:
-            return "the output does not follow the input"
-        if low + best == high:
-            return f"the best delay is max_delay={high}; try a larger one"
-        if best == 0 and low > 0:
-            return f"the best delay is min_delay={low}; try a smaller one"
-        if interval[1] - interval[0] > (high - low) / 2:
-            return f"any delay from {interval[0]} to {interval[1]} samples fits"
-        return ""
-
-
-def _fraction(misfit: FloatArray, best: int) -> float:
-    """Return where a parabola through the least misfit and its neighbours is lowest, -0.5...0.5."""
-    if not 0 < best < misfit.size - 1:
-        return 0.0
-    before, here, after = misfit[best - 1 : best + 2]
-    bend = before - 2 * here + after
-    return float(np.clip((before - after) / (2 * bend), -0.5, 0.5)) if bend > 0 else 0.0
-
-
-def _check_model(core: ct.StateSpace) -> None:
-    if not isinstance(core, ct.StateSpace) or not core.issiso():
-        raise UnsuitableSystemError("the model to start from must be a system of one channel")
-    if not core.isdtime(strict=True) or core.dt is True:
-        raise UnsuitableSystemError(
-            "the model to start from must be discrete, with its sample time"
-        )
-    worst = np.abs(core.poles()).max(initial=0.0)
-    if worst > 1 + 1e-9:
-        raise UnsuitableSystemError(
-            f"the model to start from is unstable (a pole at |z| = {worst:.6g}), so its output "
-            "cannot be followed by simulation"
-        )
-    if not np.any(core.C) and not np.any(core.D):
-        raise OptionError("the model to start from is zero")
+        low = max(interval[0] + int(np.floor(min(way, 0.0))), self._low)
+        return low, min(interval[1] + int(np.ceil(max(way, 0.0))), self._high)

@@ -14,6 +14,9 @@ import numpy as np
 
 from .arrays import FloatArray
 
+FORGOTTEN = 1e-6
+"""Part of its start that a settled system still shows."""
+
 
 @dataclass(frozen=True, eq=False)
 class BankSolution:
@@ -70,8 +73,31 @@ class DelayBank:
         self._gram = np.zeros((2 * depth, q, q))
         self._sums = np.zeros((2 * depth, q))
         self._cross = np.zeros((high - low + 1, q))
+        self._old_gram = np.zeros((high - low + 1, q, q))
+        self._old_sums = np.zeros((high - low + 1, q))
+        self._old_weight = 0.0
         self._last_gram = np.zeros((q, q))
         self._last_sums = np.zeros(q)
+        self.weight = self.weight_squared = self._total = self._power = 0.0
+
+    def settling(self) -> int | None:
+        """Return how many samples the system takes to forget its start; None if it never does."""
+        radius = np.abs(np.linalg.eigvals(self._step[: self._n, : self._n])).max(initial=0.0)
+        if radius >= 1 - 1e-9:
+            return None
+        return int(np.ceil(np.log(FORGOTTEN) / np.log(radius))) if radius > 0 else 0
+
+    def restart(self) -> None:
+        """Count from the next sample on; the input's past stays known.
+
+        What R_0 has summed up to now is remembered: ``R_d[k]`` is then ``R_0[k-d]`` less its
+        decayed value at the restart.
+        """
+        slot = (self._slot - 1) % self._depth
+        self._old_gram = self._past(self._gram, slot).copy()
+        self._old_sums = self._past(self._sums, slot).copy()
+        self._old_weight = 1.0
+        self._cross[:] = 0.0
         self.weight = self.weight_squared = self._total = self._power = 0.0
 
     def update(self, u: float, y: float) -> None:
@@ -93,6 +119,7 @@ class DelayBank:
         self._slot = (slot + 1) % depth
         self._cross *= keep
         self._cross += y * self._past(self._phi, slot)
+        self._old_weight *= keep
         self.weight = keep * self.weight + 1.0
         self.weight_squared = keep**2 * self.weight_squared + 1.0
         self._total = keep * self._total + y
@@ -114,8 +141,9 @@ class DelayBank:
         added to the weighted squares.
         """
         slot = (self._slot - 1) % self._depth
-        sums = self._past(self._sums, slot)
-        gram = self._past(self._gram, slot) - sums[:, :, None] * sums[:, None, :] / self.weight
+        sums = self._past(self._sums, slot) - self._old_weight * self._old_sums
+        gram = self._past(self._gram, slot) - self._old_weight * self._old_gram
+        gram -= sums[:, :, None] * sums[:, None, :] / self.weight
         cross = self._cross - sums * (self._total / self.weight)
         power = max(self._power - self._total**2 / self.weight, 0.0)
         # An input that never moved leaves zeros; the floor is far below any information.
@@ -131,73 +159,3 @@ class DelayBank:
         return BankSolution(
             theta, least, offset, np.asarray(inverse, np.float64), power, self.weight
         )
-
-
-def pole_directions(poles: FloatArray, dt: float) -> list[tuple[str, complex, complex]]:
-    """Name the ways in which stable poles can move: (what, pole, change of the pole per unit).
-
-    A real pole has its ``"speed"`` (relative change of its time constant's inverse); a pair has
-    ``"speed"`` and ``"damping"`` (change of the damping ratio), stated for the member with
-    positive imaginary part. Poles at 1, at 0 and on the negative axis have no such direction.
-    """
-    found: list[tuple[str, complex, complex]] = []
-    for p in np.asarray(poles, dtype=np.complex128):
-        if abs(p) < 1e-6 or abs(p - 1) < 1e-9 or p.imag < -1e-12:
-            continue
-        if abs(p.imag) <= 1e-12:
-            if p.real > 0:
-                found.append(("speed", complex(p.real), complex(p.real * np.log(p.real))))
-            continue
-        s = np.log(p) / dt
-        w, zeta = abs(s), -s.real / abs(s)
-        found.append(("speed", complex(p), complex(p * s * dt)))
-        if abs(zeta) < 1:
-            slope = -w - 1j * w * zeta / np.sqrt(1 - zeta**2)
-            found.append(("damping", complex(p), complex(p * slope * dt)))
-    return found
-
-
-def sensitivity_system(
-    A: FloatArray,
-    B: FloatArray,
-    C: FloatArray,
-    D: float,
-    directions: list[tuple[str, complex, complex]],
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Build the system from u to the core's output w and to its change along each direction.
-
-    Moving a pole p of the factored transfer function by dp, gain at frequency 0 kept, multiplies
-    it by ``1 + dp / (z - p) - dp / (1 - p)``; a pair moves together.
-
-    Parameters
-    ----------
-    A, B, C, D : ndarray, shapes (n, n), (n,), (n,), and float
-        Core.
-    directions : list
-        From `pole_directions`.
-
-    Returns
-    -------
-    A, B, C, D : ndarray, shapes (N, N), (N,), (q, N), (q,)
-        q = 1 + number of directions.
-    """
-    n = A.shape[0]
-    blocks = [2 if p.imag else 1 for _, p, _ in directions]
-    size = n + sum(blocks)
-    big, inward = np.zeros((size, size)), np.zeros(size)
-    out, direct = np.zeros((1 + len(directions), size)), np.zeros(1 + len(directions))
-    big[:n, :n], inward[:n] = A, B
-    out[0, :n], direct[0] = C, D
-    at = n
-    for row, ((_, p, dp), width) in enumerate(zip(directions, blocks, strict=True), start=1):
-        own = slice(at, at + width)
-        big[own, own] = [[p.real, -p.imag], [p.imag, p.real]] if width == 2 else [[p.real]]
-        big[at, :n] = C
-        inward[at] = D
-        both = float(width)  # the conjugate pole adds the conjugate
-        out[row, own] = both * np.array([dp.real, -dp.imag])[:width]
-        level = -both * (dp / (1 - p)).real
-        out[row, :n] += level * C
-        direct[row] = level * D
-        at += width
-    return big, inward, out, direct

@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.recursive import DelayBank, pole_directions, sensitivity_system
+from ctrl_realize.numerics.pole_moves import moved_core, pole_directions, sensitivity_system
+from ctrl_realize.numerics.recursive import DelayBank
 from ctrl_realize.numerics.state_space import markov, simulate
 from tests.rigs import R3, lag, pair
 
@@ -41,20 +42,23 @@ def test_sensitivities_are_the_slopes_of_the_pulse_response():
     assert_allclose(found[0], pulse(), rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize("restart", [0, 30])
 @pytest.mark.parametrize("low", [0, 3])
-def test_the_bank_solves_the_weighted_least_squares_of_every_delay(low):
+def test_the_bank_solves_the_weighted_least_squares_of_every_delay(low, restart):
     rng = np.random.default_rng(0)
     A, B, C, D = matrices(R3)
     big = sensitivity_system(A, B, C, D, pole_directions(np.linalg.eigvals(A), DT))
     u, y = rng.normal(size=120), 5 + rng.normal(size=120)
     bank = DelayBank(*big, low, 9, 0.98)
-    for pair_ in zip(u, y, strict=True):
-        bank.update(*pair_)
+    for k, sample in enumerate(zip(u, y, strict=True)):
+        if restart and k == restart:
+            bank.restart()
+        bank.update(*sample)
     q = big[2].shape[0]
     prior, precision = rng.normal(size=q), np.array([1e-4, 2e-4, 3e-4, 4e-4])
     found = bank.solve(prior, precision)
     phi = simulate(big[0], big[1][:, None], big[2], big[3][:, None], u[None])
-    weight = 0.98 ** np.arange(119, -1, -1)
+    weight = np.where(np.arange(120) < restart, 0.0, 0.98 ** np.arange(119, -1, -1))
     for i, d in enumerate(range(low, 10)):
         late = np.concatenate([np.zeros((q, d)), phi[:, : 120 - d]], axis=1)
         rows = np.vstack([late, np.ones(120)]).T * np.sqrt(weight)[:, None]
@@ -77,3 +81,32 @@ def test_poles_that_cannot_change_speed_have_no_direction():
         ("speed", 0.3 + 0.2j),
         ("damping", 0.3 + 0.2j),
     ]
+
+
+def test_a_moved_core_has_the_moved_poles_and_the_same_gain():
+    A, B, C, D = matrices(R3)
+    zeros = cr.delayed_ss(R3, delay=0, dt=DT).zeros()
+    directions = pole_directions(np.linalg.eigvals(A), DT)
+    moves = np.array(
+        [{"damping": -0.1}.get(what, 0.2 if p.imag else 0.1) for what, p, _ in directions]
+    )
+    core, fresh = moved_core((A, B, C, D), zeros, directions, moves, DT)
+    expected = lag(2.2 * np.exp(0.1)) * pair(8 * np.exp(0.2), 0.6)
+    wanted = cr.delayed_ss(expected, delay=0, dt=DT).delay_free
+    assert_allclose(
+        np.sort_complex(np.linalg.eigvals(core[0])), np.sort_complex(wanted.poles()), rtol=1e-9
+    )
+    found = markov(core[0], core[1][:, None], core[2][None], np.array([[core[3]]]), 1500)[0, 0]
+    assert_allclose(found.sum(), 1.0, rtol=1e-8)
+    # The zeros of sampling stay while they should move a little.
+    pulse = cr.DelayedStateSpace(wanted).markov(1500)
+    assert np.abs(found - pulse).max() < 2e-3 * np.abs(pulse).max()
+    assert [what for what, _, _ in fresh] == [what for what, _, _ in directions]
+    for (_, before, _), (_, after, _) in zip(directions, fresh, strict=True):
+        assert abs(after - before) < 0.1
+
+
+def test_a_core_without_simple_poles_is_not_moved():
+    twice = (np.array([[0.9, 1.0], [0.0, 0.9]]), np.array([0.0, 1.0]), np.array([1.0, 0.0]), 0.0)
+    directions = pole_directions(np.array([0.9]), DT)
+    assert moved_core(twice, np.zeros(0, complex), directions, np.array([0.1]), DT) is None
