@@ -251,3 +251,16 @@ def test_unusable_frfs_are_refused(arguments, match):
 def test_coherence_outside_0_1_is_refused():
     with pytest.raises(DataError, match=r"0\.\.\.1"):
         cr.MeasuredFRF([1.0], [1.0], coherence=[1.5])
+
+
+def test_a_bode_plot_shows_a_measurement_only_where_it_was_measured():
+    frf = cr.MeasuredFRF(1 / (1 + 1j * np.geomspace(0.1, 10, 50)), np.geomspace(0.1, 10, 50))
+    model = ct.ss(ct.tf([1], [1, 1]))
+    drawn = ct.bode_plot([model, frf], Hz=True).axes[0, 0].get_lines()
+    measured = next(line for line in drawn if "measured" in str(line.get_label()))
+    assert measured.get_xdata().min() >= 0.1 * (1 - 1e-9)
+    assert measured.get_xdata().max() <= 10 * (1 + 1e-9)
+
+
+def test_printing_a_measurement_does_not_list_its_points():
+    assert "\n" not in str(cr.MeasuredFRF(np.ones(500), np.arange(1, 501)))

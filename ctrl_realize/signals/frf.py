@@ -84,10 +84,10 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         grid = grid[order]
         values = values[..., order]
         signals = {key: given for key, given in (("inputs", inputs), ("outputs", outputs)) if given}
-        # Interpolation is what margins and products with systems need; it wants rising points.
-        rising = grid.size > 1 and bool(np.all(np.diff(grid) > 0))
+        # Not smooth: python-control would draw the interpolating splines far beyond the measured
+        # band, where they run off. Margins and products with systems do without.
         super().__init__(
-            values, 2 * np.pi * grid, dt=None, name=str(name), smooth=rising, **signals
+            values, 2 * np.pi * grid, dt=None, name=str(name), smooth=False, **signals
         )
         self._single = values.ndim == 1
         self.frequency_hz = read_only(grid)
@@ -108,6 +108,10 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             f"<MeasuredFRF {self.name!r}: {self.frequency_hz.size} points, "
             f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz>"
         )
+
+    def __str__(self) -> str:
+        # python-control's lists every point.
+        return repr(self)
 
     def _repr_html_(self) -> str | None:
         return None
