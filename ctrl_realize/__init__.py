@@ -8,6 +8,7 @@ ct.bode_plot([sys, cr.read_frf("frf.csv")])
 from . import bench as bench
 from . import design as design
 from . import paper as paper
+from . import plots as plots
 from .delayed import DelayedStateSpace as DelayedStateSpace
 from .delayed import delayed_ss as delayed_ss
 from .errors import CtrlRealizeError as CtrlRealizeError

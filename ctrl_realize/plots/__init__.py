@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 
 from ..errors import OptionError
+from .bootstraps import bootstrap_plot as bootstrap_plot
 from .campaigns import campaign_plot as campaign_plot
 from .design_plots import closed_loop_plot as closed_loop_plot
 from .design_plots import delay_robustness_plot as delay_robustness_plot
