@@ -14,11 +14,14 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray, read_only
 from ..results import Flag, Result
 from ..signals import ImpulseResponse, Record
-from .pulse_regression import through_arx, with_prior, without_prior
+from .pulse_regression import PulseRegression, through_arx, with_prior, without_prior
 
 Method = Literal["regularized", "least_squares", "okid"]
 Kernel = Literal["TC", "DC", "SS"]
 Start = Literal["unknown", "rest"]
+
+TAIL = 0.05
+"""Part of the largest Markov parameter that may be left at the end of the window."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -178,6 +181,7 @@ def impulse_from_io(
         found = without_prior(group, count, start)
     else:
         found = with_prior(group, count, start, kernel)
+    flags = found.flags + _tail_flags(found)
     siso = group[0].input.ndim == 1 and group[0].output.ndim == 1
     return ImpulseEstimate(
         found.markov[0, 0] if siso else found.markov,
@@ -186,8 +190,27 @@ def impulse_from_io(
         noise_std=found.noise_std,
         method=found.method,
         rows=found.rows,
-        flags=found.flags,
+        flags=flags,
         name=group[0].name,
+    )
+
+
+def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
+    """Flag responses that have not died away at the end of the window."""
+    count = found.markov.shape[-1]
+    tail = slice(count - max(count // 10, 1), None)
+    size = np.sqrt(np.mean(found.markov[..., tail] ** 2, axis=-1))
+    noise = np.sqrt(np.mean(found.std[..., tail] ** 2, axis=-1))
+    share = size / np.maximum(np.abs(found.markov).max(axis=-1), 1e-300)
+    if not np.any((share > TAIL) & (size > 3 * noise)):
+        return ()
+    return (
+        Flag(
+            "not_died_away",
+            f"at the end of {count} samples the response is still {100 * share.max():.0f} % of its "
+            "largest; what comes later is missing, and disturbs what is here. Choose a larger "
+            "length, or method='okid'",
+        ),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 
@@ -32,6 +32,9 @@ OKID_ORDERS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 """ARX orders among which BIC chooses."""
 SILENT = 0.01
 """Level of the tests for a response: share of false alarms."""
+
+RIDGE = 1e-9
+"""Added to the Gram matrix of an output without noise, as a share of its diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,18 +132,19 @@ def through_arx(
         top = orders[-1]
         equations = _okid_equations(group, top, start)
         excited = excited_directions(equations.gram[top * p :, top * p :])
-        if (
-            excited == m * (top + 1)
-            and excited_directions(equations.gram) == (equations.gram.shape[0])
-        ):
+        if excited == m * (top + 1):
             break
         if len(orders) == 1:
             raise DataError(
-                f"an ARX model of order {top} is not unique: the input does not excite its "
-                f"{m * (top + 1)} lags, or the output follows a smaller model without noise; "
-                "choose a smaller arx_order, another method, or a richer input"
+                f"the input does not excite {m * (top + 1) - excited} of the {m * (top + 1)} lags "
+                f"of an ARX model of order {top}; choose a smaller arx_order, or a richer input"
             )
         orders = orders[:-1]
+    if excited_directions(equations.gram) < equations.gram.shape[0]:
+        # Without noise the output follows many models of high order; any of them will do.
+        equations = replace(
+            equations, gram=equations.gram + np.diag(RIDGE * np.diag(equations.gram))
+        )
     fits = {}
     for order in orders:
         columns = [*range(order * p), *range(top * p, top * p + (order + 1) * m)]
@@ -170,7 +174,7 @@ def _okid_equations(group: tuple[Record, ...], order: int, start: str) -> Normal
         if u.shape[1] > order:
             parts.append(arx_equations(u, y, order, order + 1))
     _check_rows(parts, (order + 1) * (m + p) + 1, order + 1)
-    return reduce(add, parts)
+    return _with_moving_outputs(reduce(add, parts))
 
 
 def _fir_equations(
@@ -182,7 +186,10 @@ def _fir_equations(
         if u.shape[1] >= count:
             parts.append(normal_equations(u, y, count))
     _check_rows(parts, needed, count)
-    equations = reduce(add, parts)
+    return _with_moving_outputs(reduce(add, parts))
+
+
+def _with_moving_outputs(equations: NormalEquations) -> NormalEquations:
     if not np.all(np.diag(equations.power) > 0):
         raise DataError("an output is constant: there is no response to estimate")
     return equations

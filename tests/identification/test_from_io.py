@@ -119,6 +119,20 @@ def test_exact_data_give_the_exact_response():
     assert_allclose(g.markov, PLANT.markov(120), rtol=0, atol=1e-10)
 
 
+@pytest.mark.parametrize("arx_order", [None, 12])
+def test_okid_of_exact_data_is_one_of_the_models_that_explain_them(arx_order):
+    g = cr.impulse_from_io(record(noise=0.0, n=800), 80, method="okid", arx_order=arx_order)
+    # a ridge of 1e-9 on sums over 800 samples
+    assert_allclose(g.markov, PLANT.markov(80), rtol=0, atol=1e-5)
+
+
+def test_a_response_that_outlasts_the_window_is_flagged():
+    short = cr.impulse_from_io(record(), 10)
+    assert [flag.code for flag in short.flags] == ["not_died_away"]
+    assert "10 samples" in short.report()
+    assert cr.impulse_from_io(record(), 40).flags == ()
+
+
 @pytest.mark.parametrize("options", METHODS)
 def test_three_outputs_and_two_inputs_are_estimated_together(options):
     g = cr.impulse_from_io(record(plant=MIMO, n=900), 40, **options)
@@ -239,8 +253,9 @@ def test_records_that_do_not_belong_together_are_refused():
     with pytest.raises(DataError, match="no Record"):
         cr.impulse_from_io([], 20)
     flat = cr.Record(one.time, one.input, np.full(600, 3.0))
-    with pytest.raises(DataError, match="constant"):
-        cr.impulse_from_io(flat, 20)
+    for options in METHODS:
+        with pytest.raises(DataError, match="constant"):
+            cr.impulse_from_io(flat, 20, **options)
 
 
 def test_the_estimate_is_an_impulse_response_that_pickles_and_reports():
