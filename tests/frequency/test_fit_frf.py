@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import warnings
 
 import control as ct
 import numpy as np
@@ -199,6 +200,32 @@ def test_direct_term_is_fitted_and_its_delay_rounded_and_said():
     assert model.delay == 5
     assert model.fit.matrices[3][0, 0] == pytest.approx(1.0, rel=1e-6)
     assert model.fit.flags[0].code == "dead_time_rounded"
+
+
+def test_dead_time_as_a_parameter_beats_rational_approximation_of_the_same_order():
+    interpolate = pytest.importorskip("scipy.interpolate")
+    if not hasattr(interpolate, "AAA"):
+        pytest.skip("this SciPy has no AAA")
+
+    def plant(s):
+        return second_order(s, tau=0.2)
+
+    frf = noisy(4, plant=plant, level=1e-3)
+    fit = cr.fit_frf(frf, 2, dt=1e-3).fit
+    points = np.concatenate([S, -S])
+    values = np.concatenate([frf.complex, frf.complex.conj()])
+    # The adaptive Antoulas-Anderson algorithm, with the same number of poles and with 13 times.
+    errors = {}
+    for poles in (2, 26):
+        # It stops at its order and says that its tolerance is not reached, which is meant.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            rational = interpolate.AAA(points, values, max_terms=poles + 1, clean_up=False)
+        errors[poles] = np.sqrt(np.mean(np.abs(rational(S) - plant(S)) ** 2))
+    ours = np.sqrt(np.mean(np.abs(fit.response(S.imag) - plant(S)) ** 2))
+    assert ours < 2.5e-4  # sqrt(4 parameters / 160 values) of the noise, and half again
+    assert errors[2] > 100 * ours
+    assert errors[26] > 5 * ours
 
 
 def test_noisy_points_count_for_little():
