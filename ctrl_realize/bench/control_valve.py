@@ -51,14 +51,13 @@ class Valve:
     integration error, also for dead times that are no multiple of the sample time. The input
     of a record is the current that was asked for, held over each sample, with small noise,
     the spikes of the drive and the rounding of the converter; the spikes are too short to move
-    the valve. The output is the displacement that the LVDT shows.
+    the valve. The output is the displacement that the LVDT shows. Attributes that are not listed
+    here are the arguments of `valve`.
 
     Attributes
     ----------
     truth : ValveTruth
         The linear part: total frequency response, dead time, core.
-
-    Other attributes are the arguments of `valve`.
     """
 
     truth: ValveTruth = field(repr=False)

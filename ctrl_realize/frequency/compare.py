@@ -154,9 +154,15 @@ def compare_frf(
         coherence=None if coherence is None else read_only(coherence),
         std=None if std is None else read_only(std),
         hold=used_hold,
-        name=f"{system.name or 'model'} and {frf.name or 'measured'}",
+        name=f"{_own_name(system, 'model')} and {_own_name(frf, 'measured')}",
         flags=tuple(flags),
     )
+
+
+def _own_name(system: Any, otherwise: str) -> str:
+    """Return the name that somebody gave; python-control numbers the others, as ``sys[3]``."""
+    name = str(system.name or "")
+    return otherwise if not name or name.startswith("sys[") else name
 
 
 def _check_single(system: Any, frf: Any) -> None:

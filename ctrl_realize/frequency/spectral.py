@@ -18,6 +18,7 @@ from ..numerics.spectra import (
     segment_sums,
 )
 from ..signals import MeasuredFRF, Record
+from ..signals.record import check_complete
 
 _LONGEST_DEFAULT_SEGMENT = 8192
 _MIN_LINE_POWER = 1e-4
@@ -144,6 +145,7 @@ def _aligned(
     for record in [records] if isinstance(records, Record) else records:
         if not isinstance(record, Record):
             raise DataError(f"got a {type(record).__name__}; needed are records")
+        check_complete(record, "spectral_frf")
         if not record.issiso:
             raise DataError(
                 f"{record!r} has several signals; spectral_frf takes one input and one output"

@@ -12,6 +12,7 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.sines import SineFit, dominant_frequency, fit_sines
 from ..signals import MeasuredFRF, Record
+from ..signals.record import check_complete
 
 _BATCH_SAMPLES = 300_000
 _STEADY_RATIO = 1.5
@@ -118,6 +119,7 @@ def _as_points(records: Sweep) -> list[list[Record]]:
         for record in point:
             if not isinstance(record, Record):
                 raise DataError(f"got a {type(record).__name__} among the records")
+            check_complete(record, "stepped_sine_frf")
             if not record.issiso:
                 raise DataError(
                     f"{record!r} has several signals; stepped_sine_frf takes one input and one "

@@ -171,6 +171,12 @@ def test_simulated_valve_agrees_with_its_measured_frf_down_to_the_noise():
     assert wrong.rms_relative_error > 4 * comparison.rms_relative_error
 
 
+def test_names_are_those_that_somebody_gave():
+    assert cr.compare_frf(PLANT, measured()).name == "model and measured"
+    named = ct.tf(PLANT, name="valve")
+    assert cr.compare_frf(named, measured(name="bench")).name == "valve and bench"
+
+
 def test_comparison_is_read_only_and_pickles():
     comparison = cr.compare_frf(PLANT, measured())
     with pytest.raises(ValueError, match="read-only"):
