@@ -111,7 +111,10 @@ def identify(
             failed = False
         else:
             failed = _many(files, folder, settings, how, measured, calls, jobs)
-    say(f"\nwritten to {printable(str(output))}: model.json, report.html, figures/")
+    names = "model.json, report.html, figures/"
+    if len(files) > 1:
+        names += ", records.csv, models/"
+    say(f"\nwritten to {printable(str(output))}: {names}")
     return 1 if failed else 0
 
 

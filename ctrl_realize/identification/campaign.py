@@ -210,7 +210,8 @@ class Campaign(Result):
                     "delay": delays.mean(),
                     "std": delays.std(ddof=1) if many else np.nan,
                     "gain": gains.mean(),
-                    "gain_std": gains.std(ddof=1) if many else np.nan,
+                    # integrating plants have no gain, and inf - inf would warn
+                    "gain_std": gains.std(ddof=1) if many and np.isfinite(gains).all() else np.nan,
                 }
             )
         return pd.DataFrame(rows).set_index("amplitude")

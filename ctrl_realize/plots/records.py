@@ -18,6 +18,9 @@ from ..signals import Record, StepResponse
 from . import style
 from .dead_times import mark_dead_time
 
+_FEW_SAMPLES = 60
+"""So few samples are drawn as points as well: what lies between them is not known."""
+
 UNIT_STEP = "unit step response\n[output / input]"
 
 
@@ -199,6 +202,8 @@ def _measured_steps(
         "linewidth": 1.5 if len(steps) == 1 else 0.8,
         "alpha": 1.0 if len(steps) == 1 else 0.6,
     }
+    if sum(step.n_samples for step in steps) <= _FEW_SAMPLES:
+        looks |= {"marker": "o", "markersize": 3.5}
     looks.update(kwargs)
     lines: list[Line2D] = []
     for index, step in enumerate(steps):
