@@ -17,6 +17,7 @@ from ..numerics.sampled_fit import fit_sampled
 from ..numerics.separable_fit import KnownFactor, Structure
 from ..numerics.step_problem import StepData, bare_data, step_data
 from ..signals import Record
+from ..signals.record import check_complete
 from .averaging import aligned_steps, delay_outliers, mean_step, repeatability
 from .delay_fit_result import DelayFit, Repeatability
 from .fit_flags import fit_flags, repeat_flags, sampled_flags
@@ -189,6 +190,7 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
     if not several or not all(isinstance(record, Record) for record in several):
         raise DataError("records is empty or holds something else; needed are Record objects")
     for record in several:
+        check_complete(record, "fit_delay")
         if not record.issiso:
             raise DataError(
                 f"record {record.name!r} has {record.n_inputs} inputs and {record.n_outputs} "

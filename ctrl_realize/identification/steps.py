@@ -20,6 +20,7 @@ from ..numerics.rest import rest_line
 from ..numerics.rise import rise_time
 from ..numerics.time_axis import EXTREME
 from ..signals import FilterSpec, ImpulseResponse, Record, StepEdge, StepResponse
+from ..signals.record import check_complete
 
 BANDWIDTH_TIMES_RISE = 0.35
 """-3 dB bandwidth in Hz times the 10-90 % rise time, for a lag of any order within 5 %."""
@@ -279,6 +280,7 @@ def _differentiate(values: FloatArray, difference: str) -> FloatArray:
 
 
 def _single(signal: FloatArray, what: str, record: Record) -> FloatArray:
+    check_complete(record, "a step response")
     if signal.ndim == 2 and signal.shape[0] > 1:
         raise DataError(
             f"the record has {signal.shape[0]} {what}s ({', '.join(_labels(record, what))}); a "

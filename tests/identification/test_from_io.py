@@ -174,6 +174,27 @@ def test_a_record_with_missing_samples_is_refused_unless_asked_for():
         cr.Record(np.arange(4.0), np.ones(4), np.r_[0.0, np.inf, 1.0, 2.0], missing="keep")
 
 
+@pytest.mark.parametrize(
+    "work",
+    [
+        cr.detect_step,
+        cr.unit_step,
+        cr.fit_delay,
+        cr.spectral_frf,
+        lambda holes: cr.stepped_sine_frf([holes]),
+        cr.check_delay,
+        lambda holes: cr.check_residuals(PLANT, holes),
+        lambda holes: cr.predict(PLANT, holes, 1),
+        lambda holes: cr.DelayTracker(PLANT, max_delay=20, memory=10.0).run(holes),
+    ],
+)
+def test_what_needs_every_sample_says_that_some_are_missing(work):
+    y = record().output.copy()
+    y[7] = np.nan
+    with pytest.raises(DataError, match="1 of this record are missing"):
+        work(cr.Record(record().time, record().input, y, missing="keep"))
+
+
 def test_a_start_at_rest_uses_every_sample():
     n = 60
     u = np.zeros(n)
