@@ -44,7 +44,7 @@ def delay_profile(
     starts[:, 0] = grid
     bounds = parameter_bounds(candidate.structure.order, scales)
     _, cost = fit_batch(
-        problem, candidate.structure, starts, bounds, delay_fixed=True, most_iterations=10
+        problem, candidate.structure, starts, bounds, delay_fixed=True, most_iterations=40
     )
     delay = np.append(grid, candidate.delay)
     excess = np.append(cost, candidate.cost)

@@ -1,0 +1,49 @@
+"""Make the accuracy tables: ``python -m benchmarks.accuracy --short``."""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import time
+from datetime import date
+from pathlib import Path
+
+from .methods import METHODS
+from .study import factorial_table, measured_table, rig_table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--short", action="store_true", help="few seeds, under two minutes")
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--measured", type=Path, help="folder of measured records")
+    parser.add_argument("--output", type=Path, help="Markdown file to write")
+    arguments = parser.parse_args()
+    start = time.perf_counter()
+    seeds = 5 if arguments.short else arguments.seeds
+    noises = (0.001, 0.005) if arguments.short else (0.001, 0.005, 0.01, 0.02)
+    lines = [
+        f"*Simulated plants; {seeds} seeds a row, delay uniform in 30 to 45 samples of 1/1280 s, "
+        "any gain and offset, white noise in percent of the step. Delays and errors in samples. "
+        f"`python -m benchmarks.accuracy`, {date.today().isoformat()}, "
+        f"Python {platform.python_version()}.*",
+        "",
+        *rig_table(seeds, noises, METHODS, arguments.jobs),
+        "",
+        "### Factorial experiment",
+        "",
+        *factorial_table(max(seeds // 5, 2), arguments.jobs),
+    ]
+    if arguments.measured is not None:
+        lines += ["", "### Measured plants, defaults only", "", *measured_table(arguments.measured)]
+    lines += ["", f"*{time.perf_counter() - start:.0f} s with {arguments.jobs} processes.*", ""]
+    text = "\n".join(lines)
+    if arguments.output is None:
+        print(text)
+    else:
+        arguments.output.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

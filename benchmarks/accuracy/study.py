@@ -1,0 +1,140 @@
+"""Run the Monte Carlo and make tables of it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+import ctrl_realize as cr
+from tests import rigs
+
+from . import plants
+from .methods import METHODS, Estimate, run
+
+Cell = tuple[str, str, float, int]
+
+
+def one(cell: Cell, seed: int, coarser: int, group: str) -> tuple[float, bool, float]:
+    """Error in samples, whether the interval covers, and its width."""
+    method, name, noise, _ = cell
+    plant = (plants.RIGS if group == "rigs" else plants.FACTORIAL)[name]
+    record, truth = plants.record(plant, noise, seed, coarser)
+    estimate = run(method, record, len(plant.poles()))
+    covers = estimate.low <= truth <= estimate.high
+    return estimate.delay - truth, bool(covers), estimate.high - estimate.low
+
+
+def with_known_sensor(seed: int, noise: float) -> tuple[float, bool, float]:
+    """Measure R4 with its sensor's pole given."""
+    record, truth = plants.record(plants.RIGS["R4"], noise, seed)
+    fit = cr.fit_delay(record, known=plants.SENSOR, structures=[(3, 3)]).fit
+    estimate = Estimate(fit.delay, *fit.delay_interval)
+    covers = estimate.low <= truth <= estimate.high
+    return estimate.delay - truth, bool(covers), estimate.high - estimate.low
+
+
+def rig_table(seeds: int, noises: Iterable[float], methods: Iterable[str], jobs: int) -> list[str]:
+    """Tabulate bias, scatter, error over bound and coverage on the rigs."""
+    lines = [
+        "| plant | noise | method | bias | scatter | rms error | bound | error / bound "
+        "| coverage | median width |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, plant in plants.RIGS.items():
+        for noise in noises:
+            best = plants.bound(plant, noise)
+            for method in methods:
+                work = functools.partial(one, (method, name, noise, 0), coarser=1, group="rigs")
+                lines.append(_row(name, noise, method, best, _repeat(work, seeds, jobs)))
+            if name == "R4":
+                best = plants.bound(rigs.R3, noise, sensor_known=True)
+                work = functools.partial(with_known_sensor, noise=noise)
+                rows = _repeat(work, seeds, jobs)
+                lines.append(_row(name, noise, "output error, sensor known", best, rows))
+    return lines
+
+
+def factorial_table(seeds: int, jobs: int) -> list[str]:
+    """Tabulate a factorial experiment in the manner of Bjorklund and Ljung.
+
+    Every combination of method, plant, noise and sample time; the logarithm of the rms error
+    (in ms) is split into main effects.
+    """
+    methods = [m for m in METHODS if m != "output error, structure given"]
+    noises, coarsenesses = (0.001, 0.01), (1, 8)
+    cells = [
+        (m, p, s, c)
+        for m in methods
+        for p in plants.FACTORIAL
+        for s in noises
+        for c in coarsenesses
+    ]
+    errors = {}
+    for cell in cells:
+        work = functools.partial(one, cell, coarser=cell[3], group="factorial")
+        found = _repeat(work, seeds, jobs)[:, 0] * cell[3] * rigs.TS * 1e3
+        # A method without an answer is charged 100 ms.
+        found = np.where(np.isfinite(found), found, 100.0)
+        errors[cell] = float(np.log10(max(np.sqrt(np.mean(found**2)), 1e-3)))
+    grand = float(np.mean(list(errors.values())))
+    total = sum((value - grand) ** 2 for value in errors.values())
+    lines = ["| factor | level | rms error [ms], geometric mean |", "|---|---|---|"]
+    shares = []
+    titles = ("method", "plant", "noise", "samples per 1/1280 s")
+    for position, title in enumerate(titles):
+        levels = list(dict.fromkeys(cell[position] for cell in cells))
+        means = {
+            level: np.mean([errors[cell] for cell in cells if cell[position] == level])
+            for level in levels
+        }
+        effect = sum((means[cell[position]] - grand) ** 2 for cell in cells)
+        shares.append(f"{title} {100 * effect / total:.0f} %")
+        for level in levels:
+            label = f"1/{level}" if position == 3 else f"{level}"
+            lines.append(f"| {title} | {label} | {10 ** means[level]:.3g} |")
+    lines += ["", f"Part of the variance of log error by main effects: {', '.join(shares)}."]
+    return lines
+
+
+def measured_table(folder: Path) -> list[str]:
+    """Tabulate what `fit_delay` makes of measured step records, with its defaults."""
+    lines = [
+        "| record | delay [samples] | interval | first motion | structure | residual / noise |",
+        "|---|---|---|---|---|---|",
+    ]
+    names = ("wis_canal", "dc_motor_tacho", "air_duct", "heating_system", "rlc_zero_delay")
+    for path in sorted(p for name in names for p in (folder / name).glob("*.csv")):
+        if path.stem == "frf":
+            continue
+        data = np.loadtxt(path, delimiter=",", skiprows=1)
+        stamps = data[0, 0] + np.arange(len(data)) * np.ptp(data[:, 0]) / (len(data) - 1)
+        fit = cr.fit_delay(cr.Record(stamps, data[:, 1], data[:, 2])).fit
+        low, high = fit.delay_interval
+        level = "noise level" if fit.at_noise_level else f"{fit.misfit:.2g}"
+        lines.append(
+            f"| {path.parent.name}/{path.stem} | {fit.delay:.1f} | {low:.1f} ... {high:.1f} "
+            f"| {fit.onset / fit.dt:.1f} | {fit.order}, {fit.relative_degree} | {level} |"
+        )
+    return lines
+
+
+def _repeat(work: functools.partial, seeds: int, jobs: int) -> np.ndarray:
+    return np.array(Parallel(n_jobs=jobs)(delayed(work)(seed=k) for k in range(seeds)), float)
+
+
+def _row(name: str, noise: float, method: str, best: float, rows: np.ndarray) -> str:
+    error = rows[:, 0]
+    if not np.isfinite(error).all():
+        return f"| {name} | {100 * noise:g} % | {method} | no answer | | | {best:.3g} | | | |"
+    rms = float(np.sqrt(np.mean(error**2)))
+    has = np.isfinite(rows[:, 2]).all()
+    covered = f"{100 * rows[:, 1].mean():.0f} %" if has else ""
+    width = f"{np.median(rows[:, 2]):.3g}" if has else ""
+    return (
+        f"| {name} | {100 * noise:g} % | {method} | {error.mean():+.3g} | {error.std(ddof=1):.3g} "
+        f"| {rms:.3g} | {best:.3g} | {rms / best:.3g} | {covered} | {width} |"
+    )
