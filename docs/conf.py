@@ -72,7 +72,7 @@ PROFILE = HERE / "_build" / "ipython"
 (PROFILE / "profile_default").mkdir(parents=True, exist_ok=True)
 (PROFILE / "profile_default" / "ipython_kernel_config.py").write_text(
     'c = get_config()\nc.InlineBackend.figure_formats = {"retina"}\n'
-    'c.HistoryManager.enabled = False\n'
+    "c.HistoryManager.enabled = False\n"
 )
 os.environ["IPYTHONDIR"] = str(PROFILE)
 os.environ.pop("MPLBACKEND", None)  # the kernel brings its own

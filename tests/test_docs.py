@@ -14,15 +14,11 @@ import ctrl_realize as cr
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-PAGES = sorted(
-    path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts)
-)
+PAGES = sorted(path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts))
 
 
 def public_names():
-    spec = importlib.util.spec_from_file_location(
-        "public_names", DOCS / "_ext" / "public_names.py"
-    )
+    spec = importlib.util.spec_from_file_location("public_names", DOCS / "_ext" / "public_names.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -76,8 +72,8 @@ def test_links_inside_the_site_lead_somewhere(page: Path):
         if "generated/notebooks/" in target:
             path = str(ROOT / "notebooks" / target.split("generated/notebooks/")[1])
         found = (page.parent / path).resolve()
-        candidates = [found, found.with_name(found.name + ".md"), found.with_name(found.name + ".ipynb")]
-        assert any(candidate.exists() for candidate in candidates), target
+        endings = ("", ".md", ".ipynb")
+        assert any(found.with_name(found.name + ending).exists() for ending in endings), target
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
