@@ -135,6 +135,7 @@ def test_nothing_is_written_where_no_record_is_usable(folder, tmp_path, capsys):
         (["compare", "{folder}/frf.csv", "{folder}/frf.csv"], "model"),
         (["compare", "{folder}/nix.json", "{folder}/frf.csv"], "there is no such file"),
         (["invent"], "invent"),
+        (["identify"], "files"),
         (["demo", "-o", "{out}", "--seed", "-1"], "--seed"),
     ],
 )
@@ -220,6 +221,11 @@ def test_help_has_examples_and_exit_codes(command, capsys):
     assert "Exit codes: 0 done; 1 done, but some records failed; 2" in said
     if command:
         assert f"ctrl-realize {command[0]} " in said.split("Examples:")[1]
+
+
+def test_no_arguments_at_all_show_the_help(capsys):
+    assert main([]) == 0
+    assert "Commands:" in capsys.readouterr().out
 
 
 def test_a_folder_appears_whole_or_not_at_all(tmp_path):

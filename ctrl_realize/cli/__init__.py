@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Sequence
 
@@ -21,13 +22,12 @@ app = typer.Typer(
     name="ctrl-realize",
     help="Models with dead time from measured responses, as python-control state-space systems.",
     epilog=EXIT_CODES,
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command(epilog=EXIT_CODES, no_args_is_help=True)(identify)
-app.command(epilog=EXIT_CODES, no_args_is_help=True)(compare)
+app.command(epilog=EXIT_CODES)(identify)
+app.command(epilog=EXIT_CODES)(compare)
 app.command(epilog=EXIT_CODES)(demo)
 
 
@@ -62,17 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0: done. 1: done, but some records failed. 2: wrong usage or unusable input; nothing was
         written. 130: interrupted.
     """
+    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     command = get_command(app)
     # Our matrices are small: on a busy machine BLAS threads that wait for each other cost ten
     # times what they save. Processes are what --jobs is for.
     with threadpool_limits(limits=1), warnings.catch_warnings():
         warnings.showwarning = plain_warning
         try:
-            code = command.main(
-                None if arguments is None else list(arguments),
-                prog_name="ctrl-realize",
-                standalone_mode=False,
-            )
+            code = command.main(words, prog_name="ctrl-realize", standalone_mode=False)
         except (KeyboardInterrupt, typer.Abort):
             code = INTERRUPTED
         except BrokenPipeError:
