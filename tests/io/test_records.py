@@ -60,6 +60,8 @@ WRITTEN = {
     "comma and blank": table(", ", header="t, u, y"),
     "quoted header": table(header='"time","input","output"'),
     "quoted numbers": '"' + table('","', header='t","u","y', end='"\n"', last_end=False) + '"\n',
+    "quotes after blanks": "t, u, y\n"
+    + "".join(f'{t:g}, "{u:g}", "{y:g}"\n' for t, u, y in zip(T, U, Y, strict=True)),
     "quoted decimal commas": "t,u,y\n"
     + "".join(
         ",".join(f'"{value:g}"'.replace(".", ",") for value in row) + "\n"
@@ -236,6 +238,21 @@ def test_a_last_line_that_was_cut_is_left_out_with_a_warning(tmp_path, end):
         record = read_record(file)
     check(record, time=T[:4], input=U[:4], output=Y[:4])
     assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("header", ["t,u,y\n", ""])
+def test_a_bad_first_row_is_no_header(tmp_path, header):
+    file = tmp_path / "a.csv"
+    file.write_text(header + "0,NaN,1\n" + "".join(f"{k},1,2\n" for k in range(1, 9)))
+    line = 2 if header else 1
+    with pytest.raises(DataError, match=f"line {line}: 'NaN': a value is missing"):
+        read_record(file)
+
+
+def test_a_short_last_number_is_kept_where_others_are_short_too(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y\n0,0,10.25\n0.5,0,10.0\n1,1.5,9.75\n1.5,1.5,12.5\n2,-1.5,12")
+    check(read_record(file))
 
 
 @pytest.mark.parametrize("last", ["2,-1.5,12.0000", "2,-1.5,12.0000\n", "2,-1.5,12.0000\n\n"])
