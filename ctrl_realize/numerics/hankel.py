@@ -100,7 +100,10 @@ class HankelStack:
         The answer, shape (D, size), is a view of the workspace: it lasts
         until the next call and may be overwritten.
         """
-        np.fft.rfft(vectors, n=self.points, out=self._transform)
+        # padded by hand, NumPy's own padding is slower by a sixth of the whole product
+        self._product[:, : self.size] = vectors
+        self._product[:, self.size :] = 0.0
+        np.fft.rfft(self._product, n=self.points, out=self._transform)
         np.conjugate(self._transform, out=self._transform)
         np.multiply(self._transform, self._spectrum, out=self._transform)
         np.fft.irfft(self._transform, n=self.points, out=self._product)
