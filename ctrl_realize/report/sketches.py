@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import control as ct
+import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -84,7 +85,7 @@ def identification_sketches(
     comparison: FRFComparison | None = None,
 ) -> list[Sketch]:
     """List the figures of one identification, the most telling first."""
-    step = _step_of(record)
+    step = _step_of(record) if _from_a_step(system.fit) else None
     sketches = []
     if step is not None:
         sketches.append(
@@ -213,7 +214,7 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
         )
     ]
     system = campaign.system
-    steps = _steps_of(campaign)
+    steps = _steps_of(campaign) if _from_a_step(system.fit) else []
     if steps:
         sketches += [
             Sketch(
@@ -231,6 +232,12 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
         ]
     sketches += [one for one in fit_sketches(system, None) if one.key != "impulse"]
     return sketches
+
+
+def _from_a_step(fit: Any) -> bool:
+    """Tell whether there was rest before a step; an edge among many tells nothing by itself."""
+    onset = getattr(fit, "onset", None)
+    return not (isinstance(onset, float) and np.isnan(onset))
 
 
 def _step_of(record: Record) -> StepResponse | None:

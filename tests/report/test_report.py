@@ -12,6 +12,7 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize.report.provenance import file_sha256, record_sha256
+from ctrl_realize.report.sketches import identification_sketches
 from ctrl_realize.report.verdict import comparison_verdict, poles_of, verdict_of
 
 HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(2)>$\\frac{'
@@ -172,6 +173,15 @@ def test_a_report_that_fails_leaves_the_old_one(tmp_path, record, fitted, monkey
         report.write_identification(path, fitted, record)
     assert path.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_edge_among_many_is_not_shown_as_a_step(valve):
+    rng = np.random.default_rng(2)
+    switching = valve.record(4 + 8 * np.repeat(rng.integers(0, 2, 40), 90), rng=1, name="prbs")
+    system = cr.fit_delay(switching, structures=[(3, 3)])
+    assert np.isnan(system.fit.onset)
+    names = [sketch.key for sketch in identification_sketches(system, switching)]
+    assert names == ["fit", "record", "frf"]
 
 
 def test_a_campaign_report_lists_every_record_and_names_the_failed(tmp_path, valve):
