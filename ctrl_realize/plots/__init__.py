@@ -18,7 +18,9 @@ from .design_plots import pid_comparison_plot as pid_comparison_plot
 from .design_plots import process_model_plot as process_model_plot
 from .design_plots import robustness_plot as robustness_plot
 from .design_plots import uncertainty_plot as uncertainty_plot
+from .diagnostics import channels_plot as channels_plot
 from .diagnostics import delay_check_plot as delay_check_plot
+from .diagnostics import impulse_estimate_plot as impulse_estimate_plot
 from .diagnostics import prediction_plot as prediction_plot
 from .diagnostics import residual_plot as residual_plot
 from .fits import dead_time_plot as dead_time_plot
@@ -39,6 +41,7 @@ from .scans import singular_value_plot as singular_value_plot
 _DRAWN_BY = {
     "BalancedReduction": "design_plots:hankel_plot",
     "Campaign": "campaigns:campaign_plot",
+    "ChannelRealization": "diagnostics:channels_plot",
     "DelayCheck": "diagnostics:delay_check_plot",
     "Bootstrap": "bootstraps:bootstrap_plot",
     "DelayFit": "fits:fit_plot",
@@ -47,6 +50,7 @@ _DRAWN_BY = {
     "DelayTrack": "others:track_plot",
     "FRFComparison": "frequencies:comparison_plot",
     "FRFFit": "others:frf_fit_plot",
+    "ImpulseEstimate": "diagnostics:impulse_estimate_plot",
     "ImpulseResponse": "impulses:impulse_plot",
     "Margins": "design_plots:margins_plot",
     "MeasuredFRF": "frequencies:frf_plot",

@@ -10,11 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from ..checks import whole
+from ..identification.channels import ChannelRealization
 from ..identification.cross_check import DelayCheck
+from ..identification.from_io import ImpulseEstimate
 from ..identification.residuals import Prediction, ResidualCheck
 from ..numerics.arrays import FloatArray
 from ..signals import Record
 from . import style
+from .impulses import impulse_plot
 
 
 def residual_plot(
@@ -127,6 +130,59 @@ def delay_check_plot(
         axes[0].set_ylim(-0.6, len(names) - 0.4)
         axes[0].set_xlabel(f"dead time, or bound ◂ [{unit}]")
         return style.finished(axes, [lines], title=title, own_figure=ax is None)
+
+
+def channels_plot(
+    fit: ChannelRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the responses of all channels, with a line where the delay of each ends.
+
+    Parameters
+    ----------
+    fit : ChannelRealization
+    ax : array of Axes (outputs x inputs) or Figure, optional
+    title : str, optional
+    **kwargs
+        Passed on to `impulse_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    drawn = impulse_plot(fit.impulse, ax=ax, title=title, **kwargs)
+    factor, _ = style.time_unit(1.0, drawn.axes[-1, 0])
+    for place, axes in np.ndenumerate(drawn.axes):
+        if fit.delays[place] >= 0:
+            end = factor * fit.delays[place] * fit.impulse.dt
+            axes.axvline(end, color=style.TRUTH, linestyle=":")
+    return drawn
+
+
+def impulse_estimate_plot(estimate: ImpulseEstimate, *args: Any, **kwargs: Any) -> ct.ControlPlot:
+    """Draw an estimated impulse response in its band of two standard deviations.
+
+    Parameters
+    ----------
+    estimate : ImpulseEstimate
+    *args, **kwargs
+        As for `impulse_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+    """
+    drawn = impulse_plot(estimate, *args, **kwargs)
+    factor, _ = style.time_unit(1.0, drawn.axes[-1, 0])
+    time = factor * estimate.time
+    density = estimate.density.reshape(*drawn.axes.shape, -1)
+    spread = 2 * (estimate.std / estimate.dt).reshape(density.shape)
+    for place, axes in np.ndenumerate(drawn.axes):
+        window, middle, wide = axes.get_xlim(), density[place], spread[place]
+        axes.fill_between(
+            time, middle - wide, middle + wide, color=style.BAND, alpha=0.3, linewidth=0
+        )
+        axes.set_xlim(window)
+    return drawn
 
 
 def _signals(

@@ -54,3 +54,22 @@ def test_delay_check_plot_has_a_bar_for_each_view(agree):
     names = [label.get_text() for label in drawn.axes[0, 0].get_yticklabels()]
     assert names == ["phase slope\n(FRF)", "output error\n(record)"]
     assert (drawn.axes[0, 0].get_legend() is not None) == agree
+
+
+def test_channels_plot_marks_the_delay_of_every_channel():
+    pulse = 0.8 ** np.arange(60)
+    late = np.array([np.r_[np.zeros(d + 1), pulse][:60] for d in (3, 7)])[:, None]
+    drawn = cr.realize_channels(late, 1, dt=0.1).fit.plot()
+    assert drawn.axes.shape == (2, 1)
+    ends = [axes.get_lines()[-1].get_xdata()[0] for axes in drawn.axes[:, 0]]
+    assert_allclose(ends, [0.3, 0.7])
+
+
+def test_an_estimate_is_drawn_in_its_band(record):
+    estimate = cr.impulse_from_io(record, 40)
+    drawn = estimate.plot()
+    assert isinstance(drawn, ct.ControlPlot)
+    (band,) = drawn.axes[0, 0].collections
+    vertices = band.get_paths()[0].vertices
+    top = (estimate.density + 2 * estimate.std / estimate.dt).max()
+    assert_allclose(vertices[:, 1].max(), top)
