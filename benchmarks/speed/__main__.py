@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import platform
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,8 +23,9 @@ def conditions() -> str:
     return (
         f"One BLAS thread, CPU time of the process (median), {platform.machine()}, Python "
         f"{platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__}, "
-        f"python-control {control.__version__}. Data are simulated. Ratios are baseline over "
-        "ours, in the same run."
+        f"python-control {control.__version__}; {os.cpu_count()} cores, load average "
+        f"{os.getloadavg()[0]:.1f} at the start (wall times suffer from it, CPU times by half at "
+        "most). Data are simulated. Ratios are baseline over ours, in the same run."
     )
 
 

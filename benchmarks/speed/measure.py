@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 
 
@@ -34,16 +36,20 @@ def peak_megabytes(setup: str, work: str) -> float:
 
     Resident memory of the process, temporaries of the FFT included (Linux).
     """
+    # ru_maxrss would still hold the peak of this process: it survives fork and exec.
     code = (
-        "import os, resource\n"
         "import benchmarks.speed\n"
+        "def resident(line):\n"
+        "    text = open('/proc/self/status').read()\n"
+        "    return int(text.split(line + ':')[1].split()[0])\n"
         f"{setup}\n"
-        "held = int(open('/proc/self/statm').read().split()[1]) * os.sysconf('SC_PAGE_SIZE')\n"
+        "open('/proc/self/clear_refs', 'w').write('5')\n"
+        "held = resident('VmRSS')\n"
         f"{work}\n"
-        "print(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - held)"
+        "print(resident('VmHWM') - held)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return int(done.stdout.split()[-1]) / 1e6
+    return int(done.stdout.split()[-1]) * 1024 / 1e6
 
 
 def import_seconds(module: str, *, runs: int = 5) -> float:
@@ -55,6 +61,30 @@ def import_seconds(module: str, *, runs: int = 5) -> float:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         times.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
     return min(times[1:])
+
+
+def busiest_seconds(work: Callable[[], object]) -> tuple[float, float]:
+    """Return the CPU time of the busiest process of a parallel call, and its wall time (Linux).
+
+    The first is what the call takes on idle cores; on a busy machine the
+    wall time says more about the others.
+    """
+    before, start = _process_seconds(), time.perf_counter()
+    work()
+    wall = time.perf_counter() - start
+    spent = [now - before.get(pid, 0.0) for pid, now in _process_seconds().items()]
+    return max(spent), wall
+
+
+def _process_seconds() -> dict[int, float]:
+    """CPU time of this process and of its children."""
+    own = os.getpid()
+    children = Path(f"/proc/{own}/task/{own}/children").read_text().split()
+    seconds = {own: time.process_time()}
+    for pid in children:
+        fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+        seconds[int(pid)] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return seconds
 
 
 @dataclass(frozen=True)

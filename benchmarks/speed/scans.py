@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import control as ct
@@ -10,7 +9,7 @@ import numpy as np
 
 import ctrl_realize as cr
 
-from .measure import Line, cpu_seconds, once, seconds
+from .measure import Line, busiest_seconds, cpu_seconds, once, seconds
 from .rigs import DELAYS, MAX_DELAY, SAMPLES, pulse, record
 
 BASELINE_DELAYS = (0, 25, 50, 75, 100)
@@ -90,10 +89,9 @@ def campaign(one_record: float) -> Iterator[Line]:
         "60", "100", f"python-control, the realizations of one record scaled to {RECORDS}",
     )  # fmt: skip
     identify(2, records[:4])  # starts the workers
-    start = time.perf_counter()
-    identify(2)
-    wall = time.perf_counter() - start
+    busiest, wall = busiest_seconds(lambda: identify(2))
     yield Line(
-        f"campaign of {RECORDS} records, two processes, wall time", seconds(wall), seconds(slow),
-        slow / wall, "100", "190", "python-control, serial CPU time",
+        f"campaign of {RECORDS} records, two processes, CPU time of the busier one",
+        seconds(busiest), seconds(slow), slow / busiest, "100", "190",
+        f"python-control, serial; wall time {seconds(wall)} on this machine as it was",
     )  # fmt: skip
