@@ -8,7 +8,7 @@ import numpy as np
 
 from .arrays import FloatArray
 
-_SMOOTHINGS = (1, 8, 8)  # one after the other: 1, 8, 64 samples
+_SMOOTHINGS = (1, 8, 64)  # samples; a small step in much noise shows only in means
 
 
 @dataclass(frozen=True)
@@ -53,18 +53,18 @@ def first_motion(
     moved = level - rest
     end = max(5, (n - edge) // 50)
     span = max(abs(float(np.median(moved[-end:]))), float(np.percentile(np.abs(moved[edge:]), 80)))
+    single, noise = moved, sigma
     for smoothing in _SMOOTHINGS:
-        # A small step in much noise shows only in means.
         if smoothing > 1:
-            moved = np.convolve(moved, np.ones(smoothing) / smoothing, "same")
-            sigma = sigma / np.sqrt(smoothing)
+            moved = np.convolve(single, np.ones(smoothing) / smoothing, "same")
+            sigma = noise / np.sqrt(smoothing)
         threshold = max(5 * sigma, 1.5 * quantum, 0.005 * span)
-        crossing = _lasting_excursion(moved[edge:], threshold)
+        crossing = _lasting_excursion(moved[edge:], threshold, smoothing)
         if crossing is not None:
             break
     else:
         return None
-    stretch = moved[edge + crossing : edge + crossing + _lasting(crossing)]
+    stretch = moved[edge + crossing : edge + crossing + _lasting(crossing, smoothing)]
     sign = float(np.sign(np.mean(stretch)))
     rise = moved * sign
     width = max(1, round(0.03 * crossing))
@@ -78,15 +78,15 @@ def first_motion(
     )
 
 
-def _lasting(crossing: int) -> int:
+def _lasting(crossing: int, smoothing: int) -> int:
     """How long an excursion must last: a quarter of the time that it took to come."""
-    return max(3, int(np.ceil(0.25 * crossing)))
+    return max(3 * smoothing, int(np.ceil(0.25 * crossing)))
 
 
-def _lasting_excursion(moved: FloatArray, threshold: float) -> int | None:
+def _lasting_excursion(moved: FloatArray, threshold: float, smoothing: int) -> int | None:
     for k in np.flatnonzero(np.abs(moved) > threshold):
-        stretch = moved[k : k + _lasting(int(k))]
-        outside = np.mean(np.abs(stretch) > 0.6 * threshold) >= 0.8
+        stretch = moved[k : k + _lasting(int(k), smoothing)]
+        outside = np.mean(np.abs(stretch) > 0.6 * threshold) > 0.8
         if outside and abs(np.mean(np.sign(stretch))) > 0.7:
             return int(k)
     return None

@@ -84,7 +84,7 @@ def correlation_time(residual: FloatArray) -> float:
     """Samples that one independent sample is worth: 1 + 2 x the sum of the autocorrelation.
 
     The sum ends where a pair of neighbouring terms turns negative (Geyer's initial positive
-    sequence); what white noise scatters to, 1.3, counts as 1.
+    sequence); what white noise scatters to, 1.5, counts as 1.
     """
     n = residual.size
     centred = residual - residual.mean()
@@ -97,7 +97,7 @@ def correlation_time(residual: FloatArray) -> float:
     negative = np.flatnonzero(pairs <= 0)
     last = int(negative[0]) if negative.size else pairs.size
     time = 2 * float(pairs[:last].sum()) - 1.0
-    return time if time > 1.3 else 1.0
+    return time if time > 1.5 else 1.0
 
 
 def colouring(rest: FloatArray, sigma: float) -> float:

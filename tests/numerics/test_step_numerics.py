@@ -1,0 +1,127 @@
+"""What samples at rest tell, when an output first moves, how an input is written as moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+from ctrl_realize.numerics.first_motion import first_motion
+from ctrl_realize.numerics.input_moves import input_moves
+from ctrl_realize.numerics.noise_level import (
+    colouring,
+    correlation_time,
+    hum_frequencies,
+    quantisation_step,
+    rest_noise,
+    winsorised_sigma,
+)
+from ctrl_realize.numerics.profile_interval import profile_limits
+from tests import rigs
+
+
+def white(n, seed=0):
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+@given(st.floats(1e-6, 1e6), st.floats(-100, 100))
+def test_the_step_of_a_quantiser_is_found_in_any_unit(step, offset):
+    values = step * (np.round(5 * white(400)) + offset)
+    assert quantisation_step(values) == pytest.approx(step, rel=1e-6)
+
+
+def test_a_signal_that_is_not_quantised_has_no_step():
+    assert quantisation_step(white(2000)) == 0
+    assert quantisation_step(np.ones(50)) == 0
+
+
+def test_noise_is_found_beside_outliers_drift_and_quantisation():
+    clean = white(2000)
+    assert winsorised_sigma(clean, 0.0) == pytest.approx(1.0, rel=0.05)
+    spoiled = clean.copy()
+    spoiled[::50] += 30
+    assert winsorised_sigma(spoiled, 0.0) == pytest.approx(1.0, rel=0.12)
+    drifting = clean + 0.01 * np.arange(2000)
+    sigma, drift = rest_noise(drifting, drifting, 0.0)
+    assert sigma == pytest.approx(1.0, rel=0.05)
+    assert drift == pytest.approx(0.01, rel=0.05)
+    # a signal that rests on one level: the rounding itself, q / sqrt(12)
+    assert rest_noise(np.zeros(100), np.zeros(300), 0.5)[0] == pytest.approx(0.5 / np.sqrt(12))
+
+
+def test_without_rest_the_third_differences_tell_the_noise():
+    response = 50 * (1 - np.exp(-np.arange(800) / 60)) + white(800)
+    assert rest_noise(response[:0], response, 0.0)[0] == pytest.approx(1.0, rel=0.1)
+
+
+@pytest.mark.parametrize("pole", [0.5, 0.9])
+def test_correlation_time_of_a_first_order_process(pole):
+    process = lfilter([1], [1, -pole], white(40_000))
+    # 1 + 2 (a + a^2 + ...) = (1 + a) / (1 - a)
+    assert correlation_time(process) == pytest.approx((1 + pole) / (1 - pole), rel=0.1)
+    assert colouring(process, float(process.std())) > 1.4
+
+
+def test_white_noise_counts_sample_by_sample():
+    for seed in range(20):
+        assert correlation_time(white(2000, seed)) == 1
+        assert colouring(white(2000, seed), 1.0) == 1
+
+
+def test_hum_is_found_to_a_small_part_of_a_period_over_the_record():
+    index = np.arange(3840)
+    frequency = 50 / 1280 * 1.0007
+    found = hum_frequencies(2 * np.sin(2 * np.pi * frequency * index + 1) + white(3840))
+    assert len(found) == 1
+    # Cramer-Rao bound of the frequency: sqrt(24) / (2 pi A n^1.5) for unit noise, A = 2
+    assert abs(found[0] - frequency) < 4 * np.sqrt(24) / (2 * np.pi * 2 * 3840**1.5)
+    for seed in range(20):
+        assert not hum_frequencies(white(1000, seed))
+
+
+def test_first_motion_is_not_a_spike_and_not_a_glitch():
+    time = rigs.TS * np.arange(-400, 1200)
+    output = rigs.exact_step(rigs.R1, time - 60 * rigs.TS) + 0.002 * white(1600)
+    output[420:424] += 0.2  # 20 samples after the step, 4 samples long
+    found = first_motion(output, 400, 0.002, 0.0, 0.0)
+    assert 60 <= found.crossing <= 64
+    assert abs(found.onset - 60) < 1.5
+    assert found.sign == 1
+
+
+def test_a_small_step_in_much_noise_moves_in_means():
+    time = rigs.TS * np.arange(-400, 1200)
+    output = rigs.exact_step(rigs.R1, time - 60 * rigs.TS) + 0.4 * white(1600)
+    assert first_motion(output, 400, 0.4, 0.0, 0.0) is not None
+    assert first_motion(0.4 * white(1600), 400, 0.4, 0.0, 0.0) is None
+
+
+def test_a_clean_input_is_written_exactly_as_its_moves():
+    signal = np.zeros(100)
+    signal[10:], signal[40:], signal[41:] = 2.0, 1.5, 1.0
+    index, size = input_moves(signal, [(10, 1), (40, 2)], 100)
+    assert_allclose(index, [10, 40, 41])
+    assert_allclose(size, [2.0, -0.5, -0.5])
+
+
+def test_the_noise_of_an_input_is_left_out_and_its_droop_is_not():
+    k = np.arange(1000)
+    noisy = (k >= 100) + 0.01 * white(1000)
+    index, size = input_moves(noisy, [(100, 1)], 1000)
+    assert list(index) == [100]
+    assert size[0] == pytest.approx(1.0, abs=0.01)
+    drooping = noisy - 0.2 * (k >= 100) * (1 - np.exp(-(k - 100.0) / 150))
+    index, size = input_moves(drooping, [(100, 1)], 1000)
+    assert 5 < index.size < 24
+    assert np.sum(size) == pytest.approx(0.8, abs=0.02)
+
+
+def test_profile_limits_are_where_a_parabola_crosses():
+    delay = np.linspace(-4, 8, 13)
+    low, high = profile_limits(delay, ((delay - 2) / 1.5) ** 2)
+    # the root of the excess is linear, so that interpolation is exact
+    assert_allclose([low, high], [2 - 1.5 * np.sqrt(3.84), 2 + 1.5 * np.sqrt(3.84)])
+    assert profile_limits(delay, np.zeros(13)) == (-4, 8)
