@@ -97,6 +97,11 @@ def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
                 result, **kwargs
             )
             return drawn
+    if type(result).__name__ == "FitSummary":
+        raise OptionError(
+            "a model file keeps the report of a fit and not its curves; identify the record "
+            "again to draw them"
+        )
     raise OptionError(
         f"there is no picture of a {type(result).__name__}; there is one of "
         f"{', '.join(sorted(_DRAWN_BY))}"

@@ -153,6 +153,12 @@ def test_what_has_no_picture_is_named():
         plots.draw({})
 
 
+def test_a_loaded_model_says_why_its_fit_has_no_picture(fitted, tmp_path):
+    cr.save_model(tmp_path / "model.json", fitted)
+    with pytest.raises(OptionError, match="keeps the report of a fit and not its curves"):
+        cr.load_model(tmp_path / "model.json").fit.plot()
+
+
 def test_every_name_of_the_registry_exists():
     for target in plots._DRAWN_BY.values():
         module, function = target.split(":")
