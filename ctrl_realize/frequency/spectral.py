@@ -46,9 +46,9 @@ def spectral_frf(
     Parameters
     ----------
     records : Record or iterable of Record
-        One input and one output. An iterable is gone through once and never held in memory, so
-        it may be a generator that reads a long file piece by piece. No segment reaches from one
-        record into the next.
+        Any number of inputs and outputs (with `method` "H1"). An iterable is gone through once
+        and never held in memory, so it may be a generator that reads a long file piece by piece.
+        No segment reaches from one record into the next.
     method : {"H1", "H2", "Hv"}
         "H1" is for noise on the output, "H2" for noise on the input, "Hv" is their geometric
         mean. For periodic records all three are the ratio of the mean spectra.
@@ -73,13 +73,15 @@ def spectral_frf(
     Returns
     -------
     MeasuredFRF
-        With coherence and the standard deviation of the complex response.
+        With coherence and the standard deviation of the complex response. With several
+        channels, shape (outputs, inputs, K); the coherence is then the multiple coherence of
+        each output, the same for all its inputs.
 
     Raises
     ------
     DataError
-        Records too short for two segments or periods, with several signals, of different
-        sample time, or an input that does not excite.
+        Records too short for two segments or periods, of different sample time or channels, or
+        inputs that do not excite, or not independently.
     OptionError
         Options that make no sense.
 
@@ -141,25 +143,28 @@ def _aligned(
     records: Record | Iterable[Record], delay: int
 ) -> Iterator[tuple[FloatArray, FloatArray, float]]:
     """Yield input, output (moved earlier by `delay`) and sample time of each record."""
-    first_dt = None
+    first_dt, channels = None, None
     for record in [records] if isinstance(records, Record) else records:
         if not isinstance(record, Record):
             raise DataError(f"got a {type(record).__name__}; needed are records")
         check_complete(record, "spectral_frf")
-        if not record.issiso:
-            raise DataError(
-                f"{record!r} has several signals; spectral_frf takes one input and one output"
-            )
         if first_dt is None:
             first_dt = record.dt
         elif abs(record.dt - first_dt) > 1e-6 * first_dt:
             raise TimeAxisError(
                 f"records have sample times of {first_dt:g} s and {record.dt:g} s; one is needed"
             )
-        u, y = np.ravel(record.input), np.ravel(record.output)
-        if delay >= u.size:
+        u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
+        if channels is None:
+            channels = len(u), len(y)
+        elif channels != (len(u), len(y)):
+            raise DataError(
+                f"{record!r} has {len(u)} inputs and {len(y)} outputs, the first record "
+                f"{channels[0]} and {channels[1]}"
+            )
+        if delay >= u.shape[1]:
             raise DataError(f"delay={delay} leaves nothing of {record!r}")
-        yield u[: u.size - delay], y[delay:], record.dt
+        yield u[:, : u.shape[1] - delay], y[:, delay:], record.dt
     if first_dt is None:
         raise DataError("no records; needed is at least one")
 
@@ -176,11 +181,11 @@ def _from_segments(
     taps, hop, dt, longest = np.ones(1), 1, 0.0, 0
     for u, y, sample_time in stream:
         dt = sample_time
-        longest = max(longest, u.size)
+        longest = max(longest, u.shape[1])
         if sums is None and taps.size == 1:
-            taps = _window(segment or _default_segment(u.size), window)
+            taps = _window(segment or _default_segment(u.shape[1]), window)
             hop = max(1, round(taps.size * (1 - overlap)))
-        if u.size >= taps.size:
+        if u.shape[1] >= taps.size:
             part = segment_sums(u, y, taps, hop)
             sums = part if sums is None else sums + part
     if sums is None or sums.count < 2:
@@ -188,10 +193,25 @@ def _from_segments(
             f"records of up to {longest} samples hold {0 if sums is None else sums.count} segments "
             f"of {taps.size}; at least two are needed: state a shorter segment"
         )
-    frequency = np.fft.rfftfreq(taps.size, dt)
+    frequency = np.asarray(np.fft.rfftfreq(taps.size, dt), dtype=np.float64)
     # Zero was removed with the mean; the last line is the Nyquist frequency.
     lines = slice(1, (taps.size + 1) // 2)
-    uu, yy, yu = sums.uu[lines], sums.yy[lines], sums.yu[lines]
+    averages = independent_segments(taps, hop, sums.count)
+    several = sums.yu.shape[:2] != (1, 1)
+    if several and method != "H1":
+        raise OptionError(f"method={method!r} is for one input and one output; several take 'H1'")
+    estimate = _many_channels if several else _one_channel
+    return *estimate(sums, frequency, lines, method, averages), dt
+
+
+_Spectra = tuple[ComplexArray, FloatArray, FloatArray, FloatArray]
+
+
+def _one_channel(
+    sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
+) -> _Spectra:
+    """Divide the spectra of one input and one output."""
+    uu, yy, yu = sums.uu[0, 0, lines].real, sums.yy[0, lines], sums.yu[0, 0, lines]
     if not np.any(uu > 0):
         raise DataError("the input is constant: it does not excite the plant")
     excited = (uu > np.finfo(float).eps ** 2 * uu.max()) & (yy > 0) & (np.abs(yu) > 0)
@@ -201,9 +221,46 @@ def _from_segments(
     h1, h2 = yu / uu, yy / yu.conj()
     response = {"H1": h1, "H2": h2, "Hv": yu / np.abs(yu) * np.sqrt(yy / uu)}[method]
     coherence = np.minimum(np.abs(yu) ** 2 / (uu * yy), 1.0)
-    averages = independent_segments(taps, hop, sums.count)
     std = np.abs(h1) * np.sqrt((1 - coherence) / (coherence * averages))
-    return response, frequency[lines][excited], coherence, std, dt
+    return response, frequency[lines][excited], coherence, std
+
+
+def _many_channels(
+    sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
+) -> _Spectra:
+    """Solve ``S_yu = H S_uu`` at every frequency (H1)."""
+    uu = np.moveaxis(sums.uu[..., lines], -1, 0)
+    yu, yy = np.moveaxis(sums.yu[..., lines], -1, 0), sums.yy[:, lines].T
+    m = uu.shape[1]
+    if averages <= m:
+        raise DataError(
+            f"{averages:.3g} independent segments are too few for {m} inputs; state a shorter "
+            "segment"
+        )
+    power = np.einsum("fii->fi", uu).real
+    excited = np.all(power > np.finfo(float).eps ** 2 * power.max(), axis=1)
+    # Inputs that move together cannot be told apart: their matrix is singular.
+    scaled = uu / np.sqrt(np.maximum(power[:, :, None] * power[:, None, :], 1e-300))
+    excited &= np.linalg.eigvalsh(scaled)[:, 0] > 1e-6
+    if not excited.any():
+        raise DataError(
+            "the inputs do not excite the plant independently: at no frequency can their "
+            "shares be told apart"
+        )
+    uu, yu, yy = uu[excited], yu[excited], yy[excited]
+    inverse = np.linalg.inv(uu)
+    response = yu @ inverse
+    explained = np.einsum("fij,fij->fi", response, yu.conj()).real
+    coherence = np.clip(explained / np.maximum(yy, 1e-300), 0.0, 1.0)
+    left = yy * (1 - coherence) / (averages - m)
+    share = np.einsum("fii->fi", inverse).real
+    std = np.sqrt(left[:, :, None] * share[:, None, :])
+    return (
+        np.moveaxis(response, 0, -1),
+        frequency[lines][excited],
+        np.moveaxis(np.broadcast_to(coherence[:, :, None], response.shape), 0, -1),
+        np.moveaxis(std, 0, -1),
+    )
 
 
 def _window(length: int, window: str | tuple[str, float]) -> FloatArray:
@@ -224,8 +281,10 @@ def _from_periods(
 ) -> _Estimate:
     """Estimate by averaging whole periods."""
     inputs, outputs, dt, n_skipped = [], [], 0.0, 0
-    for u, y, sample_time in stream:
-        dt = sample_time
+    for inputs_now, outputs_now, sample_time in stream:
+        if (len(inputs_now), len(outputs_now)) != (1, 1):
+            raise DataError("period is for records with one input and one output")
+        u, y, dt = inputs_now[0], outputs_now[0], sample_time
         whole_periods = u.size // period
         n_skipped += min(skip, whole_periods)
         span = slice(skip * period, whole_periods * period)

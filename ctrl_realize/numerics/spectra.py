@@ -51,11 +51,12 @@ def unwrapped_phase(response: ComplexArray, omega: FloatArray, delay: float) -> 
 class SpectralSums:
     """Auto and cross power, summed over `count` segments.
 
-    ``uu[k] = sum |U_k|^2``, ``yy[k] = sum |Y_k|^2``, ``yu[k] = sum Y_k conj(U_k)`` with the
-    windowed discrete Fourier transforms of the segments. Sums of two sets of segments add.
+    ``uu[i, j] = sum U_i conj(U_j)`` (m, m, F), ``yu[i, j] = sum Y_i conj(U_j)`` (p, m, F) and
+    ``yy[i] = sum |Y_i|^2`` (p, F), with the windowed discrete Fourier transforms of the segments.
+    Sums of two sets of segments add.
     """
 
-    uu: FloatArray
+    uu: ComplexArray
     yy: FloatArray
     yu: ComplexArray
     count: int
@@ -72,7 +73,7 @@ def segment_sums(u: FloatArray, y: FloatArray, window: FloatArray, hop: int) -> 
 
     Parameters
     ----------
-    u, y : ndarray, shape (N,), N >= L
+    u, y : ndarray, shapes (m, N), (p, N), N >= L
     window : ndarray, shape (L,)
     hop : int
         Samples from one segment to the next.
@@ -80,21 +81,28 @@ def segment_sums(u: FloatArray, y: FloatArray, window: FloatArray, hop: int) -> 
     Returns
     -------
     SpectralSums
-        At the L // 2 + 1 frequencies of ``rfft``.
+        At the F = L // 2 + 1 frequencies of ``rfft``.
     """
     length = window.size
-    n_segments = (u.size - length) // hop + 1
+    n_segments = (u.shape[1] - length) // hop + 1
     size = length // 2 + 1
-    uu, yy = np.zeros(size), np.zeros(size)
-    yu = np.zeros(size, dtype=np.complex128)
+    m, p = u.shape[0], y.shape[0]
+    uu = np.zeros((m, m, size), dtype=np.complex128)
+    yu = np.zeros((p, m, size), dtype=np.complex128)
+    yy = np.zeros((p, size))
     # Blocks of segments: memory stays with the block, whatever the length of the record.
-    block = max(1, 2**20 // length)
+    block = max(1, 2**20 // (length * (m + p)))
     for first in range(0, n_segments, block):
         count = min(block, n_segments - first)
-        U, Y = (np.fft.rfft(_segments(x, first * hop, count, hop, window), axis=1) for x in (u, y))
-        uu += (U.real**2 + U.imag**2).sum(axis=0)
-        yy += (Y.real**2 + Y.imag**2).sum(axis=0)
-        yu += (Y * U.conj()).sum(axis=0)
+        U, Y = (
+            np.stack(
+                [np.fft.rfft(_segments(row, first * hop, count, hop, window), axis=1) for row in x]
+            )
+            for x in (u, y)
+        )
+        uu += np.einsum("isf,jsf->ijf", U, U.conj())
+        yu += np.einsum("isf,jsf->ijf", Y, U.conj())
+        yy += (Y.real**2 + Y.imag**2).sum(axis=1)
     return SpectralSums(uu, yy, yu, n_segments)
 
 

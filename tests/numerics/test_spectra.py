@@ -47,10 +47,10 @@ def test_segment_sums_are_those_of_scipys_csd():
     rng = np.random.default_rng(0)
     u, y = rng.standard_normal((2, 1000))
     window = signal.get_window("hann", 128)
-    sums = segment_sums(u, y, window, 64)
+    sums = segment_sums(u[None], y[None], window, 64)
     _, expected = signal.csd(u, y, window=window, noverlap=64, detrend="constant")
     scale = 2 / (window @ window) / sums.count  # one-sided density, fs = 1
-    assert_allclose(sums.yu[1:-1] * scale, expected[1:-1], rtol=1e-12)
+    assert_allclose(sums.yu[0, 0, 1:-1] * scale, expected[1:-1], rtol=1e-12)
     assert sums.count == (1000 - 128) // 64 + 1
 
 
@@ -58,9 +58,9 @@ def test_sums_do_not_depend_on_how_segments_are_blocked():
     rng = np.random.default_rng(1)
     u, y = rng.standard_normal((2, 2**18))
     window = np.ones(2**10)
-    whole = segment_sums(u, y, window, 2**10)  # 256 segments, block of 1024
-    parts = segment_sums(u[: 2**17], y[: 2**17], window, 2**10) + segment_sums(
-        u[2**17 :], y[2**17 :], window, 2**10
+    whole = segment_sums(u[None], y[None], window, 2**10)  # 256 segments, block of 512
+    parts = segment_sums(u[None, : 2**17], y[None, : 2**17], window, 2**10) + segment_sums(
+        u[None, 2**17 :], y[None, 2**17 :], window, 2**10
     )
     assert_allclose(whole.yu, parts.yu, rtol=1e-9)
     assert whole.count == parts.count == 256
