@@ -56,18 +56,14 @@ class DataLoop:
     def closed_loop_count(self) -> tuple[int, bool]:
         """Nyquist count between the first and the last point; see `flags` for what is assumed."""
         grid, values = self.dense()
-        # An integrator would start the curve a quarter turn away from the real axis.
-        slow = 1j * grid / (1j * grid + 0.1 * grid[-1])
-        start = values[0] * slow[0] ** self.integrators + slow[0] ** self.integrators
-        curve = (1 + values) * slow**self.integrators
-        turns = half_turns(curve)
-        if abs(start) == 0 or not np.isfinite(turns):
-            return 0, True
-        # Beyond the last point the loop is taken to be small, and 1 + L to return to 1.
-        turns -= float(np.angle(1 + values[-1]) / np.pi) + float(
-            self.integrators * np.angle(slow[-1]) / np.pi
-        )
-        return max(0, self.unstable_poles - round(turns)), False
+        # An integrator would start the curve a quarter turn away from the real axis; a stable
+        # high-pass in its place starts it there.
+        slow = (1j * grid / (1j * grid + 0.1 * grid[-1])) ** self.integrators
+        turns = half_turns((1 + values) * slow)
+        # Beyond the last point the loop is taken to be small, and the curve to return to 1.
+        turns -= float(np.angle(1 + values[-1]) + np.angle(slow[-1])) / np.pi
+        count = self.unstable_poles - turns
+        return max(0, round(count)), abs(count - round(count)) > 0.25
 
     def flags(self) -> tuple[Flag, ...]:
         """Warn of what lies outside the band."""
@@ -192,7 +188,7 @@ def data_loop(
         values, std = values * beside, None if std is None else std * np.abs(beside)
         known = loop.delay
         if integrators is None and loop.integrators():
-            integrators = loop.integrators() + _read_integrators(values / beside)
+            integrators = loop.integrators() + _read_integrators(omega, values / beside)
     wait = (
         dead_time_from_phase(omega, values)
         if known == 0
@@ -201,7 +197,9 @@ def data_loop(
     phase = unwrap_with_dead_time(omega, values, wait) + omega * wait
     x = np.log(omega)
     count = (
-        _read_integrators(values) if integrators is None else whole(integrators, "integrators", 0)
+        _read_integrators(omega, values)
+        if integrators is None
+        else whole(integrators, "integrators", 0)
     )
     return DataLoop(
         omega,
@@ -215,9 +213,14 @@ def data_loop(
     )
 
 
-def _read_integrators(values: ComplexArray) -> int:
-    """Read the number of integrators off a high gain with -90 deg each at the lowest points."""
-    start = values[: max(1, min(3, values.size))]
-    if np.median(np.abs(start)) < 3:
+def _read_integrators(omega: FloatArray, values: ComplexArray) -> int:
+    """Read the number of integrators off the slope of the gain over the lowest octave.
+
+    The phase alone does not tell: an unstable pole starts at -180 deg too.
+    """
+    lowest = np.flatnonzero((omega <= 2 * omega[0]) | (np.arange(omega.size) < 3))
+    gain = np.abs(values[lowest])
+    if np.median(gain) < 3:
         return 0
-    return int(np.mod(np.round(-np.median(np.angle(start)) / (np.pi / 2)), 4))
+    slope = np.polyfit(np.log(omega[lowest]), np.log(gain), 1)[0]
+    return int(np.clip(np.round(-slope), 0, 3))

@@ -164,8 +164,8 @@ def margins(
     unstable_poles : int, optional
         For data only: unstable poles that the loop has.
     integrators : int, optional
-        For data only: integrators in the loop; read off the phase at the lowest frequencies
-        when not given.
+        For data only: integrators in the loop; read off the slope of the gain over the lowest
+        octave when not given.
 
     Returns
     -------

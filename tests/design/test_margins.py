@@ -107,6 +107,7 @@ LOOPS = [
     ("stable", 8.0, 0.5),
     ("integrating", 2.0, 3.0),
     ("unstable", 1.0, 0.0),
+    ("unstable", 0.6, 0.0),  # closest to -1 at frequency 0
     ("resonant", 0.4, 0.4),
     ("direct", 1.5, 0.3),
 ]
@@ -216,13 +217,24 @@ def test_a_loop_at_its_own_gain_margin_is_on_the_border(valve, pi_controller):
 @pytest.mark.parametrize("kind", ["valve", "integrating", "unstable", "resonant"])
 def test_the_delay_margin_is_where_stability_is_lost(valve, cores, pi_controller, kind):
     core = valve(0).delay_free if kind == "valve" else cores[kind]
-    gain, ti = {name: pair for name, *pair in LOOPS}[kind]
+    gain, ti = {name: pair for name, *pair in reversed(LOOPS)}[kind]
     controller = pi_controller(gain, ti) if ti else gain
     found = cr.design.margins(cr.delayed_ss(core, 7), controller)
     assert found.stable
     room = int(np.floor(found.delay_margin_samples))
     assert cr.design.margins(cr.delayed_ss(core, 7 + room), controller).stable
     assert not cr.design.margins(cr.delayed_ss(core, 8 + room), controller).stable
+
+
+def test_a_negative_phase_margin_leaves_a_delay_margin_of_almost_a_turn(cores):
+    """Stable, and yet the crossover nearest to -1 lies beyond it: lag helps there at first."""
+    core = cr.delayed_ss(cores["resonant"], 0)
+    found = cr.design.margins(core, -0.4)
+    assert found.stable
+    assert found.phase_margins.min() < 0
+    room = int(np.floor(found.delay_margin_samples))
+    assert cr.design.margins(core.replace(delay=room), -0.4).stable
+    assert not cr.design.margins(core.replace(delay=room + 1), -0.4).stable
 
 
 def test_continuous_first_order_with_dead_time_has_its_closed_form():
@@ -357,3 +369,14 @@ def test_systems_are_not_changed(valve, pi_controller):
 def test_unsuitable_loops_are_refused(arguments, options, error, match):
     with pytest.raises(error, match=match):
         cr.design.margins(*arguments, **options)
+
+
+@pytest.mark.parametrize("gain", [0.3, 1.0, 300.0])
+def test_response_data_of_an_unstable_plant_need_the_number_of_its_poles(cores, gain):
+    plant = cr.delayed_ss(cores["unstable"], 7)
+    omega = np.geomspace(0.05, 0.99 * np.pi / DT, 800)
+    data = cr.MeasuredFRF(gain * plant(np.exp(1j * omega * DT)), omega / (2 * np.pi))
+    exact = cr.design.margins(plant, gain)
+    found = cr.design.margins(data, unstable_poles=1)
+    assert found.unstable_poles == exact.unstable_poles
+    assert found.stable == exact.stable == (gain == 1.0)
