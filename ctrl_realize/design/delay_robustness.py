@@ -32,7 +32,7 @@ class DelayRobustness(Result):
         Delays tried, in samples, rising.
     stable_at : ndarray of bool, shape (K,)
     modulus_margin : ndarray, shape (K,)
-        min |1 + L|; 0 where unstable.
+        ``min |1 + L|``; 0 where unstable.
     dead_time_interval : tuple of float
         In s, from the identification or as given.
     nominal : int

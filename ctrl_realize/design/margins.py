@@ -58,7 +58,7 @@ class Margins(Result):
     phase_margins, gain_margins : ndarray
         One for each gain crossover in degrees, one for each phase crossover.
     modulus_crossover : float
-        Where |1 + L| is smallest, rad/s.
+        Where ``|1 + L|`` is smallest, rad/s.
     dt : float
         Sample time in s, 0 if continuous.
     intervals : dict of str to (float, float)

@@ -24,7 +24,7 @@ GRID_POINTS = 400
 
 @dataclass(frozen=True, eq=False, repr=False)
 class UncertaintyBound(Result):
-    """Multiplicative uncertainty: every plant is ``nominal (1 + Delta)``, |Delta| <= bound.
+    """Multiplicative uncertainty: every plant is ``nominal (1 + Delta)``, ``|Delta| <= bound``.
 
     ``bound = spread + delay_part``, the largest relative difference of the given systems and the
     effect ``|exp(-j omega x) - 1|`` of the largest error x of the dead time.
@@ -89,7 +89,7 @@ class RobustnessCheck(Result):
     omega_critical : float
         Where ``|T| bound`` is largest, rad/s.
     complementary : ndarray, shape (K,)
-        |T| on the grid of the bound.
+        ``|T|`` on the grid of the bound.
     uncertainty : UncertaintyBound
     nominal : Margins
     performance : float

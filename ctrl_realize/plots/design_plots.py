@@ -241,7 +241,7 @@ def uncertainty_plot(
 def robustness_plot(
     found: RobustnessCheck, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
-    """Draw |T| under the inverse of the uncertainty bound.
+    """Draw ``|T|`` under the inverse of the uncertainty bound.
 
     Parameters
     ----------
