@@ -63,7 +63,7 @@ class FRFComparison(Result):
     flags: tuple[Flag, ...] = field(default=())
 
     @property
-    def rms_gain_errordecibels(self) -> float:
+    def rms_gain_error_db(self) -> float:
         """Root mean square of the gain error in the band, in dB."""
         return _rms(self.gain_error_db[self.trusted])
 

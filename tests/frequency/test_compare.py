@@ -78,6 +78,8 @@ def test_errors_are_those_of_the_ratio():
     assert_allclose(comparison.phase_error_deg, np.degrees(0.2), rtol=1e-9)
     assert_allclose(comparison.relative_error, abs(1.1 * np.exp(0.2j) - 1), rtol=1e-9)
     assert comparison.rms_relative_error == pytest.approx(comparison.relative_error[0])
+    assert comparison.rms_gain_error_db == pytest.approx(20 * np.log10(1.1))
+    assert comparison.rms_phase_error_deg == pytest.approx(np.degrees(0.2))
     assert comparison.hold is None
 
 

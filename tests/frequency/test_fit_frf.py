@@ -239,6 +239,27 @@ def test_noisy_points_count_for_little():
     assert abs(flat.dead_time - 0.04) > 10 * abs(weighted.dead_time - 0.04)
 
 
+def test_coherence_weights_points_that_have_no_deviation():
+    rng = np.random.default_rng(9)
+    coherence = np.where(F > 10, 0.01, 0.9999)
+    relative = np.sqrt((1 - coherence) / coherence)
+    noise = relative * (rng.standard_normal(F.size) + 1j * rng.standard_normal(F.size))
+    response = second_order(S) * (1 + noise / np.sqrt(2))
+    with_coherence = cr.MeasuredFRF(response, F, coherence=coherence)
+    known = cr.fit_frf(with_coherence, 2, relative_degree=2, dt=1e-3).fit
+    blind = cr.fit_frf(cr.MeasuredFRF(response, F), 2, relative_degree=2, dt=1e-3).fit
+    assert known.dead_time == pytest.approx(0.04, abs=2e-3)
+    assert abs(blind.dead_time - 0.04) > 3 * abs(known.dead_time - 0.04)
+    assert not known.noise_known
+
+
+def test_relative_error_is_that_of_the_fitted_points():
+    fit = cr.fit_frf(noisy(0), 2, relative_degree=2, dt=1e-3).fit
+    expected = np.abs(fit.response(2 * np.pi * fit.frequency_hz) / fit.measured - 1)
+    assert_allclose(fit.relative_error, expected)
+    assert np.median(fit.relative_error) < 0.1
+
+
 def test_result_pickles_and_tells_itself():
     model = cr.fit_frf(noisy(0), 2, dt=1e-3, name="bench")
     assert model.name == "bench"
