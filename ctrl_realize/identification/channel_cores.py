@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 
 from ..delayed import DelayedStateSpace
+from ..errors import OrderError
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.delay_models import realize_at
 from ..numerics.delay_split import Matrices, joined_columns, joined_rows
@@ -70,16 +71,16 @@ def _realized(
     moved: ImpulseResponse = ImpulseResponse(markov, data.dt, filter=data.filter, name=data.name)
     padded = options["hankel"] == "padded"
     samples = check_samples(moved, options["samples"], order, 0, padded=padded, what="delays")
-    rank = int(
-        np.count_nonzero(
-            realize_at(markov, 0, samples, order, padded=padded).singular_values[:order]
-        )
-    )
-    if rank == 0:
-        p, m, _ = markov.shape
-        direct = np.zeros((p, m)) if options["feedthrough"] is False else markov[:, :, 0]
-        return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), direct), ()
-    system = realize(moved, rank, **options)
+    try:
+        system = realize(moved, order, **options)
+    except OrderError:
+        found = realize_at(markov, 0, samples, order, padded=padded).singular_values[:order]
+        rank = int(np.count_nonzero(found))
+        if rank == 0:
+            p, m, _ = markov.shape
+            direct = np.zeros((p, m)) if options["feedthrough"] is False else markov[:, :, 0]
+            return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), direct), ()
+        system = realize(moved, rank, **options)
     core = system.delay_free
     return (core.A, core.B, core.C, core.D), system.fit.flags
 

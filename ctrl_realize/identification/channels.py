@@ -21,8 +21,8 @@ from .impulses import as_impulse, channels
 from .realization import HANKEL
 
 Structure = Literal["auto", "common", "rows", "columns"]
-NOISE_STDS = 4.0
-"""Standard deviations from which a Markov parameter counts as response."""
+NOISE_STDS = 5.0
+"""Standard deviations from which a Markov parameter counts as response: one of 2e6 by chance."""
 ALIKE, EXACT = 1.5, 1e-9
 """Models whose misfits are within this factor, or below this level, count as equally good."""
 
@@ -90,8 +90,9 @@ def channel_delays(
     ----------
     impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
     level : float, default 0.1
-        Part of a channel's largest Markov parameter that counts as response. Where standard
-        deviations are known (`impulse_from_io`), four of them are asked for as well.
+        Part of a channel's largest Markov parameter that counts as response. Five standard
+        deviations of the noise are asked for as well: those of `impulse_from_io`, or what the
+        second half of the data shows.
     dt : float, optional
         Sample time in s, where `impulse` is an array.
 
@@ -126,7 +127,12 @@ def channel_delays(
     top = size.max(axis=-1, keepdims=True)
     limit = np.maximum(share * top, 1e-12 * size.max())
     if isinstance(data, ImpulseEstimate):
-        limit = np.maximum(limit, NOISE_STDS * np.reshape(data.std, size.shape))
+        noise = np.reshape(data.std, size.shape)
+    else:
+        # Steps from sample to sample in the second half, where a response has become smooth.
+        steps = np.diff(channels(data)[..., size.shape[-1] // 2 :], axis=-1)
+        noise = np.median(np.abs(steps), axis=-1, keepdims=True) / (0.6745 * np.sqrt(2))
+    limit = np.maximum(limit, NOISE_STDS * noise)
     seen = size > limit
     return np.where(seen.any(axis=-1), np.maximum(seen.argmax(axis=-1) - 1, 0), -1).astype(np.int64)
 

@@ -111,6 +111,17 @@ def test_noise_is_not_taken_for_a_response():
     assert np.all(check.fit_percent > 97)
 
 
+def test_noise_on_a_plain_array_is_seen_in_its_second_half():
+    plant = cr.DelayedStateSpace(CORE, (4, 7), output_delay=(0, 2, 0))
+    exact = plant.markov(400)
+    noisy = exact + 2e-3 * np.random.default_rng(0).standard_normal(exact.shape)
+    for level in (0.0, 0.02):
+        assert np.array_equal(cr.channel_delays(noisy, level=level, dt=DT), plant.delay)
+    sys = cr.realize_channels(noisy, 3, level=0.0, dt=DT)
+    assert np.array_equal(sys.delay, plant.delay)
+    assert np.abs(sys.markov(400) - exact).max() < 0.02
+
+
 @pytest.mark.parametrize(
     ("options", "error", "match"),
     [
