@@ -9,6 +9,7 @@ from datetime import date
 from pathlib import Path
 
 from .methods import METHODS
+from .starts import starts_table
 from .study import factorial_table, measured_table, rig_table
 
 
@@ -34,6 +35,10 @@ def main() -> None:
         "### Factorial experiment",
         "",
         *factorial_table(max(seeds // 5, 2), arguments.jobs),
+        "",
+        "### Local minima",
+        "",
+        *starts_table(5 if arguments.short else max(seeds, 100), arguments.jobs),
     ]
     if arguments.measured is not None:
         lines += ["", "### Measured plants, defaults only", "", *measured_table(arguments.measured)]

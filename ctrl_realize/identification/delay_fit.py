@@ -82,7 +82,8 @@ def fit_delay(
     profile-likelihood intervals of all structures within 10 of the best information criterion.
     Where it is not, no likelihood knows the error: the dead time is the median of five views
     (first motion, first- and second-order lag on the first 15 % of the excursion, best model of
-    up to three poles on 63 % and on all of it) and the interval spans them but for the lowest.
+    up to three poles on 63 % and on all of it). The interval spans them and a third-order lag on
+    the first 15 %, but for the lowest.
 
     A dead time has no Fisher information in a model with more zeros than the plant: a superfluous
     zero imitates it. That is why the relative degree is chosen, not left free.
@@ -195,6 +196,11 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
             raise DataError(
                 f"record {record.name!r} has {record.n_inputs} inputs and {record.n_outputs} "
                 "outputs; choose one of each when it is made"
+            )
+        if record.n_missing:
+            raise DataError(
+                f"record {record.name!r} has {record.n_missing} missing values; an output-error "
+                "fit needs all samples (cut with `between`, or see impulse_from_io)"
             )
     return several
 

@@ -58,7 +58,8 @@ class DelayFit(Result):
     correlation : float
         Samples of the residual that one independent sample is worth.
     views : dict of str to float
-        Dead time in s as seen in five ways; empty where one model explains everything.
+        Dead time in s as seen in six ways, of which the last serves the interval only; empty
+        where one model explains everything.
     structures : tuple of StructureRow
         Everything that was fitted, best first.
     profile_delay, profile_excess : ndarray
