@@ -197,6 +197,23 @@ def test_a_model_is_compared_with_a_measured_frf(folder, first, tmp_path, capsys
     assert "written" not in capsys.readouterr().out
 
 
+def test_units_of_an_frf_can_be_said(folder, first, tmp_path, capsys):
+    frf = cr.read_frf(folder / "frf.csv")
+    response = frf.frdata[0, 0]
+    columns = {
+        "f": 2 * np.pi * frf.frequency_hz,
+        "magnitude": 20 * np.log10(np.abs(response)),
+        "phase": np.unwrap(np.angle(response)),
+    }
+    pd.DataFrame(columns).to_csv(tmp_path / "frf.csv", index=False)
+    model, file = str(first[0] / "model.json"), str(tmp_path / "frf.csv")
+    units = ["--frequency-unit", "rad/s", "--magnitude-unit", "dB", "--phase-unit", "rad"]
+    assert main(["compare", model, file, *units]) == 0
+    assert main(["compare", model, str(folder / "frf.csv")]) == 0
+    one, two = capsys.readouterr().out.split("relative error")[1:]
+    assert one.split("\n")[0] == two.split("\n")[0]
+
+
 def test_the_same_call_gives_the_same_files(folder, first, tmp_path):
     out = tmp_path / "out"
     words = [str(folder / "step_0.csv"), "-o", str(out), "--frf", str(folder / "frf.csv"), *FAST]

@@ -42,6 +42,9 @@ def compare(
     hold: Annotated[
         Hold, _OPTION(help="zoh takes the hold out of the model; auto does where it is in.")
     ] = Hold.auto,
+    frequency_unit: Annotated[str | None, _OPTION(help="Hz, kHz, MHz or rad/s.")] = None,
+    magnitude_unit: Annotated[str | None, _OPTION(help="abs or dB.")] = None,
+    phase_unit: Annotated[str | None, _OPTION(help="deg or rad.")] = None,
 ) -> int:
     """Compare a model with a measured frequency response.
 
@@ -54,12 +57,14 @@ def compare(
       ctrl-realize compare results/model.json frf.csv -o frf --band 0.1 13
     """  # noqa: D301  # \b keeps the lines of the examples apart
     check_files([model, frf])
-    system, measured = load_model(model), read_frf(frf)
+    given = {"frequency": frequency_unit, "magnitude": magnitude_unit, "phase": phase_unit}
+    units: dict[str, Any] = {f"{k}_unit": unit for k, unit in given.items() if unit is not None}
+    system, measured = load_model(model), read_frf(frf, **units)
     options: dict[str, Any] = {"min_coherence": min_coherence, "band_hz": band}
     if hold is not Hold.auto:
         options["hold"] = None if hold is Hold.none else hold.value
-    given = {key: value for key, value in options.items() if value is not None or key == "hold"}
-    comparison = compare_frf(system, measured, **given)
+    chosen = {key: value for key, value in options.items() if value is not None or key == "hold"}
+    comparison = compare_frf(system, measured, **chosen)
     if output is not None:
         words = [str(model), str(frf), "--output", str(output)]
         if min_coherence is not None:
@@ -68,6 +73,8 @@ def compare(
             words += ["--band", *(f"{edge:.12g}" for edge in band)]
         if hold is not Hold.auto:
             words += ["--hold", hold.value]
+        for name, unit in units.items():
+            words += [f"--{name.replace('_', '-')}", unit]
         with appearing(output) as folder:
             write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
             write_comparison(
