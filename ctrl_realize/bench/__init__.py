@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .control_valve import Valve as Valve
-from .control_valve import valve as valve
+from .set_up import valve as valve
 from .truth import ValveTruth as ValveTruth
 
 __all__ = ["Valve", "ValveTruth", "valve"]

@@ -1,4 +1,4 @@
-"""The valve set-up of the paper, simulated."""
+"""A control valve with its instruments, simulated."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import paper
-from ..checks import one_of, positive, real, whole
+from ..checks import positive, whole
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from ..signals import Record
@@ -23,18 +23,14 @@ from .imperfections import (
 )
 from .linear import (
     Core,
-    butterworth,
-    chain,
-    lag,
     response_to_held_input,
     response_to_started_sine,
-    second_order_lag,
 )
 from .truth import ValveTruth
 
 Seed: TypeAlias = np.random.Generator | int | None
 
-_STROKE_MM = 2.0
+STROKE_MM = 2.0
 _REST_MM = 0.27
 _OVERSAMPLING = 8
 _AD_RANGE_V = 10.0
@@ -73,6 +69,7 @@ class Valve:
     hum: float
     slew_limit: float | None
     hysteresis: float
+    dead_time_scatter: float
     _before_stem: Core = field(repr=False)
     _after_stem: Core = field(repr=False)
 
@@ -202,12 +199,16 @@ class Valve:
         if not np.all(np.isfinite(held)) or held.min() < 0 or held.max() > 25:
             raise DataError("current must be finite and in 0-25 mA in every sample")
         time = self.dt * np.arange(held.size, dtype=np.float64)
+        generator = np.random.default_rng(rng)
+        dead_time = self.truth.dead_time
+        if self.dead_time_scatter:
+            dead_time = max(0.0, dead_time + self.dead_time_scatter * generator.standard_normal())
         if self.slew_limit is None and self.hysteresis == 0:
-            moved = response_to_held_input(self.truth.matrices, held, self.dt, self.truth.dead_time)
+            moved = response_to_held_input(self.truth.matrices, held, self.dt, dead_time)
         else:
-            moved = self._with_friction(held)
+            moved = self._with_friction(held, dead_time)
         rest = _REST_MM - self.truth.gain * paper.SETUP.current_range[0]
-        return self._recorded(time, held, moved + rest, np.random.default_rng(rng), name)
+        return self._recorded(time, held, moved + rest, generator, name)
 
     def stepped_sine(
         self,
@@ -304,15 +305,15 @@ class Valve:
             )
         return tuple(sweep)
 
-    def _with_friction(self, held: FloatArray) -> FloatArray:
+    def _with_friction(self, held: FloatArray, dead_time: float) -> FloatArray:
         """Simulate with slew limit and play between actuator and LVDT, on a finer grid."""
         fine = self.dt / _OVERSAMPLING
         current = np.repeat(held, _OVERSAMPLING)
-        stem = response_to_held_input(self._before_stem, current, fine, self.truth.dead_time)
+        stem = response_to_held_input(self._before_stem, current, fine, dead_time)
         if self.slew_limit is not None:
-            stem = slew_limited(stem, self.slew_limit * _STROKE_MM, fine)
+            stem = slew_limited(stem, self.slew_limit * STROKE_MM, fine)
         if self.hysteresis:
-            stem = with_play(stem, self.hysteresis * _STROKE_MM)
+            stem = with_play(stem, self.hysteresis * STROKE_MM)
         # Mean of neighbours: a held input with the area of the straight line between them.
         lines = np.append(0.5 * (stem[1:] + stem[:-1]), stem[-1])
         lines[0] = stem[0]
@@ -331,11 +332,11 @@ class Valve:
         """Pass signals through sensor, converter and everything that disturbs them."""
         n = time.size
         limited = self.anti_aliasing is not None
-        shown = displacement + band_limited_noise(n, self.noise * _STROKE_MM, rng, limited=limited)
-        shown = shown + self.drift * _STROKE_MM * time
+        shown = displacement + band_limited_noise(n, self.noise * STROKE_MM, rng, limited=limited)
+        shown = shown + self.drift * STROKE_MM * time
         if self.hum:
             phase = rng.uniform(0, 2 * np.pi)
-            shown = shown + self.hum * _STROKE_MM * np.sin(2 * np.pi * 50.0 * time + phase)
+            shown = shown + self.hum * STROKE_MM * np.sin(2 * np.pi * 50.0 * time + phase)
         range_mm, per_volt = paper.SETUP.lvdt_range_mm, paper.SETUP.lvdt_sensitivity_mm_per_v
         shown = np.clip(shown, 0.0, range_mm)
         full_range = paper.SETUP.current_range[1] - paper.SETUP.current_range[0]
@@ -350,144 +351,3 @@ class Valve:
             input_labels=["current (simulated) [mA]"],
             output_labels=["displacement (simulated) [mm]"],
         )
-
-
-def valve(
-    *,
-    dead_time: float = paper.DEAD_TIME,
-    lag_hz: float = 2.2,
-    actuator_hz: float = 8.0,
-    damping: float = 0.7,
-    lvdt_hz: float | None = paper.SETUP.lvdt_cutoff_hz,
-    noise: float = 1e-3,
-    input_noise: float = 2e-4,
-    spikes: float = 6.0,
-    bits: int | None = 16,
-    anti_aliasing: Literal["linear-phase", "analog"] | None = "linear-phase",
-    drift: float = 0.0,
-    hum: float = 0.0,
-    slew_limit: float | None = None,
-    hysteresis: float = 0.0,
-    dt: float = paper.SETTINGS.sample_time,
-    rest: float = paper.SETUP.rest,
-    hold: float = 2.0,
-) -> Valve:
-    """Set up the simulated valve of the paper's sections 2.2 and 3.1.
-
-    Current converter (10 kHz), dead time, actuator (a real pole and a pair, -3 dB at 2.2 Hz),
-    LVDT (30 Hz, 0.39 mm/V, range 2.54 mm), anti-aliasing filter at 1/2.56 of the sample rate,
-    16-bit converters. The dynamics are ours: the paper prints only a bandwidth of about 2 Hz.
-
-    Parameters
-    ----------
-    dead_time : float
-        Transport delay in s; default 37 samples. Need not be a multiple of `dt`.
-    lag_hz : float, default 2.2
-        Real pole of the actuator.
-    actuator_hz, damping : float
-        Its pair of poles.
-    lvdt_hz : float or None, default 30
-        Cut-off of the displacement sensor; None for an ideal one.
-    noise : float, default 1e-3
-        Standard deviation of the output noise, as a fraction of the stroke of 2 mm (16 mA).
-        With 4e-4 the printed method scatters as the paper's Table 1 does: variances of 1.2 to
-        2.0 in four campaigns, printed is 2.
-    input_noise : float, default 2e-4
-        The same of the measured current, as a fraction of 16 mA.
-    spikes : float, default 6
-        Mean number of drive spikes in a record.
-    bits : int or None, default 16
-        Word length of the AD converters (-+10 V); None rounds nothing.
-    anti_aliasing : {"linear-phase", "analog", None}
-        "linear-phase": the digital filter of an FFT analyser, whose delay it takes out; the
-        motion of the valve passes unchanged, the noise is band-limited. "analog": a
-        fourth-order Butterworth filter on the output, whose lag of 1.06 samples is then
-        part of the truth.
-    drift : float, default 0
-        Drift of the output per second, as a fraction of the stroke.
-    hum : float, default 0
-        Amplitude of 50 Hz hum, as a fraction of the stroke.
-    slew_limit : float, optional
-        Fastest motion of the stem, in strokes per second.
-    hysteresis : float, default 0
-        Play of the stem, as a fraction of the stroke.
-    dt : float
-        Sample time in s, 1/1280 by default.
-    rest, hold : float
-        Seconds before and after a step.
-
-    Returns
-    -------
-    Valve
-
-    Raises
-    ------
-    OptionError
-        An argument that makes no sense.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> print(cr.bench.valve().truth.report())
-    Simulated valve: truth
-      gain               0.125 mm/mA
-      poles              2.2 Hz, 8 Hz (damping 0.7), 30 Hz, 1e+04 Hz
-      dead time          28.906 ms = 37 samples
-      total delay at DC  134.42 ms
-    """
-    positive(dt, "dt", "sample time in s")
-    if real(dead_time, "dead_time", "dead time in s") < 0:
-        raise OptionError(f"dead_time={dead_time!r}; needed is >= 0 s")
-    for value, argument in (
-        (noise, "noise"),
-        (input_noise, "input_noise"),
-        (spikes, "spikes"),
-        (hysteresis, "hysteresis"),
-        (hum, "hum"),
-    ):
-        if real(value, argument, "a fraction or a count") < 0:
-            raise OptionError(f"{argument}={value!r}; needed is >= 0")
-    real(drift, "drift", "fraction of the stroke per second")
-    positive(rest, "rest", "time in s")
-    positive(hold, "hold", "time in s")
-    if bits is not None:
-        whole(bits, "bits", 2, 32)
-    if slew_limit is not None:
-        positive(slew_limit, "slew_limit", "speed in strokes per second")
-    if anti_aliasing is not None:
-        one_of(anti_aliasing, "anti_aliasing", ("linear-phase", "analog"))
-    before = [
-        lag(paper.SETUP.converter_cutoff_hz),
-        lag(positive(lag_hz, "lag_hz", "frequency in Hz")),
-        second_order_lag(
-            positive(actuator_hz, "actuator_hz", "frequency in Hz"),
-            positive(damping, "damping", "damping ratio"),
-        ),
-    ]
-    after = []
-    if lvdt_hz is not None:
-        after.append(lag(positive(lvdt_hz, "lvdt_hz", "frequency in Hz")))
-    if anti_aliasing == "analog":
-        after += butterworth(4, 1 / (2.56 * dt))
-    gain = _STROKE_MM / (paper.SETUP.current_range[1] - paper.SETUP.current_range[0])
-    # An ideal sensor still needs a state; this one is beyond anything that is sampled.
-    sensed = after or [lag(1e3 / dt)]
-    return Valve(
-        truth=ValveTruth(
-            matrices=chain(before + after, gain), dead_time=float(dead_time), dt=float(dt)
-        ),
-        dt=float(dt),
-        rest=float(rest),
-        hold=float(hold),
-        noise=float(noise),
-        input_noise=float(input_noise),
-        spikes=float(spikes),
-        bits=bits,
-        anti_aliasing=anti_aliasing,
-        drift=float(drift),
-        hum=float(hum),
-        slew_limit=slew_limit,
-        hysteresis=float(hysteresis),
-        _before_stem=chain(before, gain),
-        _after_stem=chain(sensed),
-    )

@@ -165,6 +165,18 @@ def test_play_loses_half_its_width_on_a_step_from_its_middle():
     assert exact.output[-1] - loose.output[-1] == pytest.approx(0.1 * 2.0 / 2, abs=1e-6)
 
 
+def test_dead_time_may_scatter_from_record_to_record():
+    valve = bench.valve(dead_time_scatter=2 * DT, **CLEAN)
+    records = valve.step_campaign(1, amplitudes=[8], repeats=60)
+    level = 0.27 + 0.5
+    crossings = [np.interp(level, r.output[3840:4600], r.time[3840:4600]) for r in records]
+    # Rising there all the way, so that interpolation is unique; 60 records: 9 % of scatter.
+    assert np.std(crossings) / DT == pytest.approx(2, rel=0.27)
+    exact = bench.valve(**CLEAN).step_record(8)
+    expected = np.interp(level, exact.output[3840:4600], exact.time[3840:4600])
+    assert np.mean(crossings) == pytest.approx(expected, abs=3 * 2 * DT / np.sqrt(60))
+
+
 def test_hum_is_a_line_at_50_hz():
     record = bench.valve(hum=0.01, **CLEAN).record(np.full(1280, 4.0), rng=0)
     spectrum = np.abs(np.fft.rfft(record.output - record.output.mean())) / 640
@@ -207,6 +219,7 @@ def test_valve_and_truth_pickle():
     [
         ({"dead_time": -1e-3}, "dead_time"),
         ({"noise": -1.0}, "noise"),
+        ({"dead_time_scatter": -1.0}, "dead_time_scatter"),
         ({"noise": float("nan")}, "noise"),
         ({"bits": 1}, "bits"),
         ({"dt": 0.0}, "dt"),
