@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy as np
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray, IntArray, read_only
 from ..results import Result
-from .margins import margins
-from .siso import delayed_system
+from .loops import Loop, open_loop
+from .margins import Margins, loop_margins
+from .siso import delayed_system, held_fraction
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +24,8 @@ MAX_DELAYS = 21
 class DelayRobustness(Result):
     """Stability and margins of one controller over a range of dead times.
 
-    ``stable`` is true when the loop is stable for every delay within `dead_time_interval`;
+    ``stable`` is true when the loop is stable for every delay within `dead_time_interval` (widened
+    to whole samples and to the nominal delay);
     `stable_from` and `stable_to` bound the whole range around the nominal delay that is.
 
     Attributes
@@ -40,6 +42,9 @@ class DelayRobustness(Result):
     dt : float
     stable_from, stable_to : float
         Dead times in s, in whole samples; beyond them the loop is unstable.
+    held : float
+        Time in s by which the delay overstates the dead time, where the core holds a fraction of
+        a sample: ``dead_times = delays * dt - held``.
     """
 
     delays: IntArray
@@ -50,21 +55,33 @@ class DelayRobustness(Result):
     dt: float
     stable_from: float
     stable_to: float
+    held: float = 0.0
 
     @property
     def stable(self) -> bool:
-        """Stable over the whole interval."""
-        return bool(self.stable_at[self._inside()].all())
+        """Stable over the whole interval, delays between those tried included."""
+        times = self.dead_times[self._inside()]
+        slack = 1e-6 * self.dt
+        # nan, of a loop that is unstable to begin with, compares as false.
+        return bool(
+            self.stable_from <= max(times.min(), 0.0) + slack
+            and times.max() <= self.stable_to + slack
+        )
 
     @property
     def worst_modulus_margin(self) -> float:
         """Smallest modulus margin over the interval; its inverse is the worst Ms."""
         return float(self.modulus_margin[self._inside()].min())
 
+    @property
+    def dead_times(self) -> FloatArray:
+        """Dead times in s that belong to `delays`."""
+        return np.asarray(self.delays * self.dt - self.held, dtype=np.float64)
+
     def _inside(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         low, high = self.dead_time_interval
-        inside = (self.delays >= np.floor(low / self.dt + 1e-9)) & (
-            self.delays <= np.ceil(high / self.dt - 1e-9)
+        inside = (self.delays >= np.floor((low + self.held) / self.dt + 1e-9)) & (
+            self.delays <= np.ceil((high + self.held) / self.dt - 1e-9)
         )
         return np.asarray(inside | (self.delays == self.nominal), dtype=np.bool_)
 
@@ -75,7 +92,7 @@ class DelayRobustness(Result):
         return pd.DataFrame(
             {
                 "delay": self.delays,
-                "dead_time": self.delays * self.dt,
+                "dead_time": self.dead_times,
                 "stable": self.stable_at,
                 "modulus_margin": self.modulus_margin,
             }
@@ -87,7 +104,7 @@ class DelayRobustness(Result):
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.dead_time_interval
         return [
-            ("nominal", f"{self.nominal * self.dt:.4g} s ({self.nominal} samples)"),
+            ("nominal", f"{self.nominal * self.dt - self.held:.4g} s ({self.nominal} samples)"),
             ("interval", f"{low:.4g} ... {high:.4g} s"),
             ("over the interval", "stable" if self.stable else "UNSTABLE somewhere"),
             ("worst modulus margin", f"{self.worst_modulus_margin:.4g}"),
@@ -145,50 +162,43 @@ def delay_robustness(
         raise OptionError(
             f"dead_time_interval=({low:g}, {high:g}); needed is 0 <= low <= high in s"
         )
-    nominal, dt = int(plant.delay), float(plant.dt)
-    first, last = int(np.floor(low / dt + 1e-9)), int(np.ceil(high / dt - 1e-9))
+    nominal, dt, held = int(plant.delay), float(plant.dt), held_fraction(plant)
+    first = int(np.floor((low + held) / dt + 1e-9))
+    last = int(np.ceil((high + held) / dt - 1e-9))
     step = max(1, -(-(last - first) // (MAX_DELAYS - 1)))
     delays = np.unique([*range(first, last, step), last, nominal]).astype(np.int64)
-    found = {int(d): _margin(plant, controller, int(d)) for d in delays}
-
-    def is_stable(delay: int) -> bool:
-        if delay not in found:
-            found[delay] = _margin(plant, controller, delay)
-        return found[delay] > 0
-
+    loop = open_loop(plant, controller)
+    found = [_margin(loop, int(d)) for d in delays]
+    earlier, later = _room(loop_margins(loop))
     return DelayRobustness(
         delays=delays,
-        stable_at=np.array([found[int(d)] > 0 for d in delays]),
-        modulus_margin=read_only(np.array([found[int(d)] for d in delays])),
+        stable_at=np.array(found) > 0,
+        modulus_margin=read_only(np.array(found)),
         dead_time_interval=(low, high),
         nominal=nominal,
         dt=dt,
-        stable_from=dt * _edge(is_stable, nominal, -1),
-        stable_to=dt * _edge(is_stable, nominal, +1),
+        stable_from=float(np.maximum(0.0, dt * (nominal - earlier) - held)),
+        stable_to=dt * (nominal + later) - held,
+        held=held,
     )
 
 
-def _margin(plant: Any, controller: Any, delay: int) -> float:
-    found = margins(plant.replace(delay=delay, fit=None), controller)
+def _margin(loop: Loop, delay: int) -> float:
+    # The chain of so long a delay need not exist for its response to be known.
+    plant = replace(loop.factors[0], delay=delay)
+    found = loop_margins(replace(loop, factors=(plant, *loop.factors[1:])))
     return found.modulus_margin if found.stable else 0.0
 
 
-def _edge(is_stable: Any, start: int, direction: int) -> float:
-    """Walk from a stable delay in growing strides, then bisect to the last stable one."""
-    if not is_stable(start):
-        return float("nan")
-    good, stride = start, 1
-    while True:
-        there = max(0, good + direction * stride)
-        if there == good:
-            return float(good)
-        if not is_stable(there):
-            break
-        good, stride = there, 2 * stride
-        if good > 100 * (start + 100):
-            return float("inf")
-    bad = there
-    while abs(bad - good) > 1:
-        middle = (bad + good) // 2
-        good, bad = (middle, bad) if is_stable(middle) else (good, middle)
-    return float(good)
+def _room(found: Margins) -> tuple[float, float]:
+    """Whole samples that the delay may shrink and grow by; nan from an unstable start.
+
+    The gain of the loop does not depend on the delay: stability is lost where one of its gain
+    crossovers turns to -1, and nowhere else.
+    """
+    if not found.stable:
+        return float("nan"), float("nan")
+    lag = np.mod(np.radians(found.phase_margins), 2 * np.pi)
+    waits = np.array([2 * np.pi - lag, lag]) / found.gain_crossovers / found.dt
+    earlier, later = np.ceil(waits.min(axis=1, initial=np.inf)) - 1
+    return float(earlier), float(later)

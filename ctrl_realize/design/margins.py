@@ -218,10 +218,11 @@ def margins(
             f"dead_time={wait:g} s with a discrete loop; put the delay into the plant "
             "(delayed_ss, or .replace(delay=...))"
         )
-    return _from_loop(exact)
+    return loop_margins(exact)
 
 
-def _from_loop(loop: Loop) -> Margins:
+def loop_margins(loop: Loop) -> Margins:
+    """Margins of a loop that is made already."""
     omega, values = follow(loop, loop.grid())
     count, marginal = closed_loop_count(loop, omega)
     gains, phases = _crossings(loop, omega, values)

@@ -17,7 +17,7 @@ from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..results import Result
 from .loops import open_loop
 from .margins import Margins, margins
-from .siso import delayed_system
+from .siso import delayed_system, held_fraction
 
 GRID_POINTS = 400
 
@@ -189,7 +189,8 @@ def uncertainty_bound(
         low, high = (real(x, "dead_time_interval", "dead time in s") for x in interval)
         if low > high:
             raise OptionError(f"dead_time_interval=({low:g}, {high:g}); needed is low <= high")
-        off = max(abs(low - plant.dead_time), abs(high - plant.dead_time))
+        wait = plant.dead_time - held_fraction(plant)
+        off = max(abs(low - wait), abs(high - wait))
         # |exp(-jx) - 1| grows to 2 at x = pi; beyond that some smaller error reaches 2.
         delay_part = 2 * np.sin(np.minimum(grid * off, np.pi) / 2)
     return UncertaintyBound(

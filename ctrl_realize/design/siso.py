@@ -70,3 +70,16 @@ def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
             "give a controller of the same sample time (a PID has .discretised(dt))"
         )
     return system
+
+
+def held_fraction(system: DelayedStateSpace) -> float:
+    """Time in s by which the delay overstates the dead time that was identified.
+
+    A dead time of (d + f) samples is held as the delay d + 1 and a direct term; an interval of
+    the dead time is around the former.
+    """
+    identified = getattr(system.fit, "dead_time", None)
+    if not isinstance(identified, (int, float)):
+        return 0.0
+    over = float(system.dead_time) - float(identified)
+    return over if 0 < over < system.dt else 0.0

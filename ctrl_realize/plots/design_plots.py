@@ -139,11 +139,13 @@ def delay_robustness_plot(
     """
     with style.context():
         (axes,) = style.axes_for(ax)
-        times = found.delays * found.dt
+        times = found.dead_times
         factor, unit = style.time_unit(float(times.max()), axes)
         low, high = found.dead_time_interval
         axes.axvspan(low * factor, high * factor, color=style.BAND, alpha=0.2, label="interval")
-        axes.axvline(found.nominal * found.dt * factor, color=style.INPUT, linewidth=1)
+        axes.axvline(
+            (found.nominal * found.dt - found.held) * factor, color=style.INPUT, linewidth=1
+        )
         lines = axes.plot(
             times * factor, found.modulus_margin, color=style.MODEL, marker="o", label="min |1 + L|"
         )

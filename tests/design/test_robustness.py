@@ -95,3 +95,24 @@ def test_wrong_arguments_are_refused(valve):
         make([ct.ss(0.5, 1, 1, 0, 0.1)], valve(4))
     with pytest.raises(OptionError, match="low <= high"):
         make([], valve(4), dead_time_interval=(2.0, 1.0))
+
+
+@dataclass(frozen=True)
+class FitWithFraction:
+    dead_time: float
+    dead_time_interval: tuple[float, float]
+
+
+def test_an_interval_is_around_the_dead_time_and_not_around_the_delay_that_holds_it(valve):
+    continuous = cr.design.to_continuous(valve(0)).core
+    truth = 36.25 * DT  # held as z^-37 and a direct term
+    fit = FitWithFraction(truth, (truth - 2 * DT, truth + 2 * DT))
+    plant = cr.delayed_ss(continuous, dead_time=truth, dt=DT, fit=fit)
+    assert plant.delay == 37
+    bound = cr.design.uncertainty_bound([], plant)
+    np.testing.assert_allclose(
+        bound.delay_part, 2 * np.sin(np.minimum(2 * DT * bound.omega, np.pi) / 2), rtol=1e-6
+    )
+    checked = cr.design.delay_robustness(plant, cr.design.PIDController(0.5, 0.2, dt=DT))
+    np.testing.assert_allclose(checked.dead_times / DT, np.arange(34.25, 38.5), rtol=1e-9)
+    np.testing.assert_allclose(checked.table()["dead_time"], checked.dead_times)
