@@ -13,6 +13,7 @@ from ..checks import positive
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.filters import butterworth, butterworth_group_delay
+from ..numerics.time_axis import EXTREME
 from .step import StepResponse
 
 Sampling = Literal["step-invariant", "impulse-invariant"]
@@ -120,6 +121,9 @@ class ImpulseResponse:
                 f"markov has shape {values.shape}; needed is (N,) or (outputs, inputs, N) "
                 "with N >= 2"
             )
+        # the quotient of a record's largest output and smallest step; its square is a double
+        if np.abs(values).max() > EXTREME**2:
+            raise DataError(f"markov goes up to {np.abs(values).max():g}, which is no measurement")
         seconds = positive(dt, "dt", "sample time in s")
         if sampling not in ("step-invariant", "impulse-invariant"):
             raise OptionError(

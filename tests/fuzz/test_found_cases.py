@@ -44,6 +44,18 @@ def test_values_near_the_end_of_the_doubles_are_refused():
         cr.Record([0, 1, 2], [1, 2, 3], [1, 1.7e308, 3])
 
 
+@pytest.mark.parametrize("largest", [8.98846567e307, 1.79769313e308])
+def test_a_response_near_the_end_of_the_doubles_is_refused(largest):
+    # sums of squares and scaling by powers of two overflowed with warnings of NumPy
+    g = np.array([0.0, largest, 0.0, 0.0])
+    for estimate in (
+        lambda: cr.realize(g, 1, dt=1.0),
+        lambda: cr.estimate_delay(g, 1, max_delay=1, dt=1.0),
+    ):
+        with pytest.raises(DataError, match="which is no measurement"):
+            estimate()
+
+
 def test_rows_of_different_lengths_are_no_array():
     # the ValueError was NumPy's
     with pytest.raises(DataError, match="time is no array"):
