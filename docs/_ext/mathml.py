@@ -9,7 +9,8 @@ from docutils.utils.math import latex2mathml
 
 
 def _markup(formula: str, *, block: bool) -> str:
-    return latex2mathml.tex2mathml(formula, as_block=block)
+    # The converter knows \ldots only, which \dots means between commas.
+    return latex2mathml.tex2mathml(formula.replace(r"\dots", r"\ldots"), as_block=block)
 
 
 def _inline(translator: Any, node: nodes.math) -> None:

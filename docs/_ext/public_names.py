@@ -131,3 +131,8 @@ def write_pages(folder: Path) -> None:
         # Unchanged pages are not touched, so that a second build has nothing to do.
         if not path.exists() or path.read_text() != text:
             path.write_text(text)
+    # Entries of names that are public no more.
+    listed = "\n".join(pages().values()).split()
+    for entry in (folder / "entries").glob("*.rst"):
+        if entry.stem not in listed:
+            entry.unlink()
