@@ -72,7 +72,7 @@ def campaign_plot(
         along(
             summary.mean,
             color=style.MODEL,
-            label=f"trimmed mean {summary.mean:.2f} = {style.in_time(summary.mean * dt)}",
+            label=f"trimmed mean {summary.mean:.2f} samples = {style.in_time(summary.mean * dt)}",
         )
         if truth is not None:
             along(truth, color=style.TRUTH, linestyle=":", label=f"truth {truth:.4g} (simulated)")
