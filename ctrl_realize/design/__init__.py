@@ -4,19 +4,19 @@ Systems in, `control` systems out. Everything works on core and delay apart, so 
 delay.
 """
 
+from .approximations import pade_ss as pade_ss
+from .approximations import thiran as thiran
 from .balanced import BalancedReduction as BalancedReduction
 from .balanced import hankel_singular_values as hankel_singular_values
 from .balanced import reduce as reduce
 from .conversions import ContinuousModel as ContinuousModel
-from .conversions import pade_ss as pade_ss
-from .conversions import thiran as thiran
 from .conversions import to_continuous as to_continuous
 from .conversions import to_discrete as to_discrete
 from .conversions import to_tf as to_tf
 from .delay_line import DelayLineController as DelayLineController
 from .delay_robustness import DelayRobustness as DelayRobustness
 from .delay_robustness import delay_robustness as delay_robustness
-from .margins import Margins as Margins
+from .margin_result import Margins as Margins
 from .margins import margins as margins
 from .performance import Performance as Performance
 from .performance import performance as performance

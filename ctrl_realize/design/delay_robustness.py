@@ -11,7 +11,8 @@ from ..errors import OptionError
 from ..numerics.arrays import FloatArray, IntArray, read_only
 from ..results import Result
 from .loops import Loop, open_loop
-from .margins import Margins, loop_margins
+from .margin_result import Margins
+from .margins import loop_margins
 from .siso import delayed_system, held_fraction
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from ..checks import one_of
 from ..errors import OptionError
 from ..results import Result
-from .margins import Margins, margins
+from .margin_result import Margins
+from .margins import margins
 from .performance import Performance, performance
 from .pid import KINDS, RULES, pid, reference_plant
 from .pid_controller import PIDController

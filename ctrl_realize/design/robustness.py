@@ -16,7 +16,8 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..results import Result
 from .loops import open_loop
-from .margins import Margins, margins
+from .margin_result import Margins
+from .margins import margins
 from .siso import delayed_system, held_fraction
 
 GRID_POINTS = 400

@@ -11,13 +11,10 @@ from ..errors import OptionError
 from .bootstraps import bootstrap_plot as bootstrap_plot
 from .campaigns import campaign_plot as campaign_plot
 from .design_plots import closed_loop_plot as closed_loop_plot
-from .design_plots import delay_robustness_plot as delay_robustness_plot
 from .design_plots import hankel_plot as hankel_plot
 from .design_plots import margins_plot as margins_plot
 from .design_plots import pid_comparison_plot as pid_comparison_plot
 from .design_plots import process_model_plot as process_model_plot
-from .design_plots import robustness_plot as robustness_plot
-from .design_plots import uncertainty_plot as uncertainty_plot
 from .diagnostics import channels_plot as channels_plot
 from .diagnostics import delay_check_plot as delay_check_plot
 from .diagnostics import impulse_estimate_plot as impulse_estimate_plot
@@ -34,6 +31,9 @@ from .others import truth_plot as truth_plot
 from .records import onset_plot as onset_plot
 from .records import record_plot as record_plot
 from .records import step_plot as step_plot
+from .robustness_plots import delay_robustness_plot as delay_robustness_plot
+from .robustness_plots import robustness_plot as robustness_plot
+from .robustness_plots import uncertainty_plot as uncertainty_plot
 from .scans import delay_plot as delay_plot
 from .scans import order_plot as order_plot
 from .scans import singular_value_plot as singular_value_plot
@@ -45,7 +45,7 @@ _DRAWN_BY = {
     "DelayCheck": "diagnostics:delay_check_plot",
     "Bootstrap": "bootstraps:bootstrap_plot",
     "DelayFit": "fits:fit_plot",
-    "DelayRobustness": "design_plots:delay_robustness_plot",
+    "DelayRobustness": "robustness_plots:delay_robustness_plot",
     "DelayScan": "scans:delay_plot",
     "DelayTrack": "others:track_plot",
     "FRFComparison": "frequencies:comparison_plot",
@@ -61,9 +61,9 @@ _DRAWN_BY = {
     "Realization": "scans:singular_value_plot",
     "Record": "records:record_plot",
     "ResidualCheck": "diagnostics:residual_plot",
-    "RobustnessCheck": "design_plots:robustness_plot",
+    "RobustnessCheck": "robustness_plots:robustness_plot",
     "StepResponse": "records:step_plot",
-    "UncertaintyBound": "design_plots:uncertainty_plot",
+    "UncertaintyBound": "robustness_plots:uncertainty_plot",
     "ValveTruth": "others:truth_plot",
 }
 """Class of a result -> module of this package and function that draws it."""

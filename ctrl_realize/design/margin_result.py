@@ -1,0 +1,122 @@
+"""What is known of the stability of a loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..numerics.arrays import ComplexArray, FloatArray
+from ..results import Flag, Result
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Margins(Result):
+    """Stability margins of a loop with negative feedback.
+
+    With L the open loop: ``gain_margin = 1/|L|`` at a phase crossover, ``phase_margin = 180 deg +
+    arg L`` at a gain crossover, ``modulus_margin = min |1 + L|``, and ``delay_margin`` is the
+    least of ``(phase margin taken in 0...360 deg) / omega`` over all gain crossovers. Of several
+    gain or phase margins the one nearest to instability is given, as python-control does; all
+    crossovers are there.
+
+    Attributes
+    ----------
+    gain_margin : float
+        Ratio; below 1 where the gain must not be *reduced* further. inf without a phase crossover.
+    phase_margin : float
+        Degrees, -180...180. inf without a gain crossover.
+    modulus_margin : float
+        Smallest distance of L to -1; its inverse is the peak of the sensitivity, `ms`.
+    delay_margin : float
+        Dead time in s that may be added before the loop is unstable; nan if it already is.
+    delay_margin_samples : float
+        The same in samples; nan for a continuous loop.
+    stable : bool
+        Closed-loop stability, from a Nyquist count that sees every pole of the factors, hidden
+        ones and those on the unit circle included.
+    unstable_poles : int
+        Closed-loop poles on or outside the stable region.
+    gain_crossovers, phase_crossovers : ndarray
+        In rad/s, rising.
+    phase_margins, gain_margins : ndarray
+        One for each gain crossover in degrees, one for each phase crossover.
+    modulus_crossover : float
+        Where ``|1 + L|`` is smallest, rad/s.
+    dt : float
+        Sample time in s, 0 if continuous.
+    intervals : dict of str to (float, float)
+        For measured responses with a standard deviation: 95 % intervals of the four margins, to
+        first order. Otherwise empty.
+    flags : tuple of Flag
+    response : tuple of ndarray
+        (omega, L) as followed by the count, for drawing.
+    """
+
+    gain_margin: float
+    phase_margin: float
+    modulus_margin: float
+    delay_margin: float
+    stable: bool
+    unstable_poles: int
+    gain_crossovers: FloatArray
+    phase_crossovers: FloatArray
+    phase_margins: FloatArray
+    gain_margins: FloatArray
+    modulus_crossover: float
+    dt: float
+    response: tuple[FloatArray, ComplexArray]
+    intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
+    flags: tuple[Flag, ...] = ()
+
+    @property
+    def delay_margin_samples(self) -> float:
+        """Delay margin in samples."""
+        return self.delay_margin / self.dt if self.dt else float("nan")
+
+    @property
+    def ms(self) -> float:
+        """Peak of the sensitivity, 1 / modulus_margin."""
+        return float(1 / self.modulus_margin) if self.modulus_margin else float("inf")
+
+    @property
+    def gain_crossover(self) -> float:
+        """Gain crossover of the phase margin, rad/s; nan without one."""
+        if self.phase_margins.size == 0:
+            return float("nan")
+        return float(self.gain_crossovers[np.argmin(np.abs(self.phase_margins))])
+
+    @property
+    def phase_crossover(self) -> float:
+        """Phase crossover of the gain margin, rad/s; nan without one."""
+        if self.gain_margins.size == 0:
+            return float("nan")
+        return float(self.phase_crossovers[np.argmin(np.abs(np.log(self.gain_margins)))])
+
+    def _title(self) -> str:
+        return "Stability margins"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        verdict = "stable" if self.stable else f"UNSTABLE ({self.unstable_poles} poles)"
+        samples = "" if not self.dt else f" = {self.delay_margin_samples:.4g} samples"
+        rows = [
+            ("closed loop", verdict),
+            ("gain margin", f"{self.gain_margin:.4g} at {self.phase_crossover:.4g} rad/s"),
+            ("phase margin", f"{self.phase_margin:.4g} deg at {self.gain_crossover:.4g} rad/s"),
+            (
+                "modulus margin",
+                f"{self.modulus_margin:.4g} at {self.modulus_crossover:.4g} rad/s "
+                f"(Ms = {self.ms:.4g})",
+            ),
+            ("delay margin", f"{self.delay_margin:.4g} s{samples}"),
+        ]
+        for name, (low, high) in self.intervals.items():
+            rows.append((f"95 % {name.replace('_', ' ')}", f"{low:.4g} ... {high:.4g}"))
+        return rows
+
+    def __repr__(self) -> str:
+        state = "stable" if self.stable else "unstable"
+        return (
+            f"<Margins {state}: gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} deg, "
+            f"modulus {self.modulus_margin:.4g}, delay {self.delay_margin:.4g} s>"
+        )
