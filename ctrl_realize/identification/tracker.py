@@ -139,6 +139,12 @@ class DelayTracker:
             0.0, low, low * self.dt, (low, high), 1.0, np.inf, (), np.inf, False, "no samples yet"
         )
 
+    def __repr__(self) -> str:
+        return (
+            f"<DelayTracker: delays {self._low}...{self._high}, {self._count} samples, "
+            f"{self._told!r}>"
+        )
+
     def update(self, u: float, y: float) -> None:
         """Take in the next sample of input and output.
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pickle
+
 import control as ct
 import numpy as np
 import pytest
@@ -146,6 +148,21 @@ def test_streaming_and_running_give_the_same():
     assert one.estimate().dead_time == other.estimate().dead_time
     assert "DelayTrack" in repr(track)
     assert "told" in track.report()
+
+
+def test_a_tracker_goes_on_after_pickling_as_if_nothing_had_happened():
+    record, _ = worn_valve(seconds=4, last=37.0)
+    one = tracker(memory=1.0)
+    samples = list(zip(record.input, record.output, strict=True))
+    for sample in samples[:3000]:
+        one.update(*sample)
+    other = pickle.loads(pickle.dumps(one))
+    for bank in (one, other):
+        for sample in samples[3000:]:
+            bank.update(*sample)
+    assert other.estimate().dead_time == one.estimate().dead_time
+    assert repr(other) == repr(one)
+    assert f"{record.n_samples} samples" in repr(one)
 
 
 @pytest.mark.parametrize("order", [2, 3])
