@@ -9,7 +9,7 @@ import numpy as np
 
 import ctrl_realize as cr
 
-from .measure import Line, cpu_seconds, import_seconds, once, seconds
+from .measure import Line, cpu_seconds, import_seconds, seconds
 from .rigs import TS, record, valve
 
 
@@ -20,7 +20,7 @@ def lines() -> Iterator[Line]:
     for delay, must, aim in ((37, "100", "190"), (300, "3000", "11000")):
         model = cr.delayed_ss(valve(), delay, dt=TS)
         plain = ct.ss(model.A, model.B, model.C, model.D, TS)
-        slow = once(lambda plain=plain: plain(points))
+        slow = cpu_seconds(lambda plain=plain: plain(points), runs=3, least=3.0)
         fast = cpu_seconds(lambda model=model: model(points))
         yield Line(
             f"frequency response, 500 points, d = {delay}", seconds(fast), seconds(slow),
@@ -34,7 +34,7 @@ def lines() -> Iterator[Line]:
     model = cr.delayed_ss(valve(), 37, dt=TS)
     plain = ct.ss(model.A, model.B, model.C, model.D, TS)
     time = TS * np.arange(4000)
-    slow = cpu_seconds(lambda: ct.step_response(plain, time), runs=3)
+    slow = cpu_seconds(lambda: ct.step_response(plain, time), runs=9)
     fast = cpu_seconds(lambda: model.step(4000))
     yield Line(
         "step response, 4000 samples, d = 37", seconds(fast), seconds(slow), slow / fast,
