@@ -8,16 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
-from ..plots.style import time_unit
-from ..results import Result
 from ..signals import Record
-from .page import Column, Page, Row, Table, pairs, write_page
-from .provenance import file_sha256, own_version, record_sha256, versions
+from .page import Page, Table, pairs, write_page
+from .provenance import own_version, versions
 from .sketches import (
     Sketch,
     campaign_sketches,
@@ -25,9 +22,16 @@ from .sketches import (
     identification_sketches,
     save_sketches,
 )
+from .tables import (
+    Paths,
+    amplitude_table,
+    campaign_table,
+    data_table,
+    fit_tables,
+    model_table,
+    settings_tables,
+)
 from .verdict import campaign_verdict, comparison_verdict, verdict_of
-
-Paths = Sequence[str | os.PathLike[str]]
 
 
 def write_identification(
@@ -94,13 +98,13 @@ def write_identification(
     """
     flags = () if comparison is None else comparison.flags
     sketches = identification_sketches(system, record, frf=frf, comparison=comparison)
-    tables = [*_fit_tables(system.fit)]
+    tables = [*fit_tables(system.fit)]
     if comparison is not None:
         tables.append(pairs("Against the measured frequency response", comparison._rows()))
     tables += [
-        _model_table(system),
-        _data_table([record], files),
-        *_settings_tables(settings),
+        model_table(system),
+        data_table([record], files),
+        *settings_tables(settings),
         pairs("Versions", versions()),
     ]
     if figures is not None:
@@ -171,13 +175,13 @@ def write_campaign(
     sketches += more_sketches
     if figures is not None:
         save_sketches(figures, sketches)
-    tables = [_campaign_table(campaign), _amplitude_table(campaign), *more_tables]
+    tables = [campaign_table(campaign), amplitude_table(campaign), *more_tables]
     if comparison is not None:
         tables.append(pairs("Against the measured frequency response", comparison._rows()))
-    tables += [*_fit_tables(system.fit), _model_table(system)]
+    tables += [*fit_tables(system.fit), model_table(system)]
     if files or records:
-        tables.append(_data_table(records, files))
-    tables += [*_settings_tables(settings), pairs("Versions", versions())]
+        tables.append(data_table(records, files))
+    tables += [*settings_tables(settings), pairs("Versions", versions())]
     page = Page(
         title=title,
         subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
@@ -235,8 +239,8 @@ def write_comparison(
         figures=[sketch.on_page() for sketch in sketches],
         tables=[
             pairs("Against the measured frequency response", comparison._rows()),
-            _model_table(system),
-            *([_data_table([], files)] if files else []),
+            model_table(system),
+            *([data_table([], files)] if files else []),
             pairs("Versions", versions()),
         ],
         calls=calls,
@@ -252,135 +256,3 @@ def _kind(system: DelayedStateSpace) -> str:
         "Realization": "approximate realization",
     }
     return names.get(type(system.fit).__name__, "model with dead time")
-
-
-def _fit_tables(fit: Any) -> list[Table]:
-    if not isinstance(fit, Result):
-        return []
-    return [pairs("How it was found", [*fit._rows(), *_choices(fit)])]
-
-
-def _choices(fit: Any) -> list[tuple[str, str]]:
-    return [("choice", str(choice)) for choice in getattr(fit, "choices", ())]
-
-
-def _model_table(system: DelayedStateSpace) -> Table:
-    core = system.delay_free
-    rows = [
-        ("x[k+1] = A x[k] + B u[k-d]", f"d = {system.delay}, dt = {system.dt!r} s"),
-        *((name, _matrix(getattr(core, name))) for name in "ABCD"),
-    ]
-    return pairs("Matrices of the model without its delay", rows, mono=True)
-
-
-def _matrix(values: Any) -> str:
-    rows = [", ".join(f"{value:.10g}" for value in row) for row in np.atleast_2d(values)]
-    return "[" + "; ".join(rows) + "]"
-
-
-def _settings_tables(settings: Mapping[str, Any] | None) -> list[Table]:
-    if not settings:
-        return []
-    return [pairs("Settings", [(str(key), str(value)) for key, value in settings.items()])]
-
-
-def _data_table(records: Sequence[Record], files: Paths) -> Table:
-    columns = (
-        Column("data"),
-        Column("samples", "number"),
-        Column("sample time [s]", "number"),
-        Column("length [s]", "number"),
-        Column("SHA-256", "mono"),
-    )
-    rows = []
-    if files:
-        known = {os.fspath(file): record for file, record in zip(files, records, strict=False)}
-        for file in files:
-            record = known.get(os.fspath(file))
-            rows.append(Row((Path(file).name, *_extent(record), file_sha256(file))))
-        note = "Checksums of the files."
-    else:
-        rows = [
-            Row((record.name or "record", *_extent(record), record_sha256(record)))
-            for record in records
-        ]
-        note = "Checksums of time, input and output as little-endian float64."
-    return Table("Data", tuple(rows), columns, note=note)
-
-
-def _extent(record: Record | None) -> tuple[str, str, str]:
-    if record is None:
-        return ("", "", "")
-    return (
-        str(record.n_samples),
-        f"{record.dt:.6g}",
-        f"{record.time[-1] - record.time[0]:.6g}",
-    )
-
-
-def _campaign_table(campaign: Campaign) -> Table:
-    waits = [row.dead_time for row in campaign.good]
-    scale, unit = time_unit(float(np.median(waits)))
-    columns = (
-        Column("record", "name"),
-        Column("step", "number"),
-        Column("delay [samples]", "number"),
-        Column(f"dead time [{unit}]", "number"),
-        Column(f"interval [{unit}]", "number"),
-        Column("order", "number"),
-        Column("misfit", "number"),
-        Column("remarks"),
-    )
-    best = campaign.best.name
-    rows = []
-    for row in campaign.rows:
-        if row.system is None:
-            cells = (row.name, _number(row.amplitude), "", "", "", "", "", row.error or "")
-            rows.append(Row(cells, "failed"))
-            continue
-        low, high = row.interval
-        remarks = [flag.code.replace("_", " ") for flag in row.flags]
-        cells = (
-            row.name,
-            _number(row.amplitude),
-            f"{row.delay:.4g}",
-            f"{scale * row.dead_time:.4g}",
-            f"{scale * low:.4g} to {scale * high:.4g}",
-            str(row.system.delay_free.nstates),
-            f"{row.misfit:.3g}",
-            ", ".join([*remarks, *row.warnings]),
-        )
-        rows.append(Row(cells, "best" if row.name == best else ""))
-    return Table("Records", tuple(rows), columns, note="In bold: the record of least misfit.")
-
-
-def _amplitude_table(campaign: Campaign) -> Table:
-    table = campaign.by_amplitude()
-    columns = (
-        Column("step", "number"),
-        Column("records", "number"),
-        Column("mean delay [samples]", "number"),
-        Column("std [samples]", "number"),
-        Column("gain", "number"),
-        Column("std of the gain", "number"),
-    )
-    rows = tuple(
-        Row(
-            (
-                _number(float(str(amplitude))),
-                str(int(line["records"])),
-                *(_number(float(line[name])) for name in ("delay", "std", "gain", "gain_std")),
-            )
-        )
-        for amplitude, line in table.iterrows()
-    )
-    return Table(
-        "By the height of the step",
-        rows,
-        columns,
-        note="Delays or gains that follow the height are the sign of a nonlinear plant.",
-    )
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else ""

@@ -1,0 +1,158 @@
+"""The tables of the reports."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..delayed import DelayedStateSpace
+from ..identification.campaign import Campaign
+from ..plots.style import time_unit
+from ..results import Result
+from ..signals import Record
+from .page import Column, Row, Table, pairs
+from .provenance import file_sha256, record_sha256
+
+Paths = Sequence[str | os.PathLike[str]]
+
+
+def fit_tables(fit: Any) -> list[Table]:
+    """Tell how a model was found, what was chosen and why."""
+    if not isinstance(fit, Result):
+        return []
+    return [pairs("How it was found", [*fit._rows(), *_choices(fit)])]
+
+
+def _choices(fit: Any) -> list[tuple[str, str]]:
+    return [("choice", str(choice)) for choice in getattr(fit, "choices", ())]
+
+
+def model_table(system: DelayedStateSpace) -> Table:
+    """List the matrices of a model's core."""
+    core = system.delay_free
+    rows = [
+        ("x[k+1] = A x[k] + B u[k-d]", f"d = {system.delay}, dt = {system.dt!r} s"),
+        *((name, _matrix(getattr(core, name))) for name in "ABCD"),
+    ]
+    return pairs("Matrices of the model without its delay", rows, mono=True)
+
+
+def _matrix(values: Any) -> str:
+    rows = [", ".join(f"{value:.10g}" for value in row) for row in np.atleast_2d(values)]
+    return "[" + "; ".join(rows) + "]"
+
+
+def settings_tables(settings: Mapping[str, Any] | None) -> list[Table]:
+    """List settings, where there are any."""
+    if not settings:
+        return []
+    return [pairs("Settings", [(str(key), str(value)) for key, value in settings.items()])]
+
+
+def data_table(records: Sequence[Record], files: Paths) -> Table:
+    """List data with their checksums: of files, where there are any, else of samples."""
+    columns = (
+        Column("data"),
+        Column("samples", "number"),
+        Column("sample time [s]", "number"),
+        Column("length [s]", "number"),
+        Column("SHA-256", "mono"),
+    )
+    rows = []
+    if files:
+        known = {os.fspath(file): record for file, record in zip(files, records, strict=False)}
+        for file in files:
+            record = known.get(os.fspath(file))
+            rows.append(Row((Path(file).name, *_extent(record), file_sha256(file))))
+        note = "Checksums of the files."
+    else:
+        rows = [
+            Row((record.name or "record", *_extent(record), record_sha256(record)))
+            for record in records
+        ]
+        note = "Checksums of time, input and output as little-endian float64."
+    return Table("Data", tuple(rows), columns, note=note)
+
+
+def _extent(record: Record | None) -> tuple[str, str, str]:
+    if record is None:
+        return ("", "", "")
+    return (
+        str(record.n_samples),
+        f"{record.dt:.6g}",
+        f"{record.time[-1] - record.time[0]:.6g}",
+    )
+
+
+def campaign_table(campaign: Campaign) -> Table:
+    """List the records of a campaign: delay, interval, misfit, or what went wrong."""
+    waits = [row.dead_time for row in campaign.good]
+    scale, unit = time_unit(float(np.median(waits)))
+    columns = (
+        Column("record", "name"),
+        Column("step", "number"),
+        Column("delay [samples]", "number"),
+        Column(f"dead time [{unit}]", "number"),
+        Column(f"interval [{unit}]", "number"),
+        Column("order", "number"),
+        Column("misfit", "number"),
+        Column("remarks"),
+    )
+    best = campaign.best.name
+    rows = []
+    for row in campaign.rows:
+        if row.system is None:
+            cells = (row.name, _number(row.amplitude), "", "", "", "", "", row.error or "")
+            rows.append(Row(cells, "failed"))
+            continue
+        low, high = row.interval
+        remarks = [flag.code.replace("_", " ") for flag in row.flags]
+        cells = (
+            row.name,
+            _number(row.amplitude),
+            f"{row.delay:.4g}",
+            f"{scale * row.dead_time:.4g}",
+            f"{scale * low:.4g} to {scale * high:.4g}",
+            str(row.system.delay_free.nstates),
+            f"{row.misfit:.3g}",
+            ", ".join([*remarks, *row.warnings]),
+        )
+        rows.append(Row(cells, "best" if row.name == best else ""))
+    return Table("Records", tuple(rows), columns, note="In bold: the record of least misfit.")
+
+
+def amplitude_table(campaign: Campaign) -> Table:
+    """List delays and gains by the height of the step."""
+    table = campaign.by_amplitude()
+    columns = (
+        Column("step", "number"),
+        Column("records", "number"),
+        Column("mean delay [samples]", "number"),
+        Column("std [samples]", "number"),
+        Column("gain", "number"),
+        Column("std of the gain", "number"),
+    )
+    rows = tuple(
+        Row(
+            (
+                _number(float(str(amplitude))),
+                str(int(line["records"])),
+                *(_number(float(line[name])) for name in ("delay", "std", "gain", "gain_std")),
+            )
+        )
+        for amplitude, line in table.iterrows()
+    )
+    return Table(
+        "By the height of the step",
+        rows,
+        columns,
+        note="Delays or gains that follow the height are the sign of a nonlinear plant.",
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else ""
