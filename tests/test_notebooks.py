@@ -49,6 +49,7 @@ def test_notebook_is_stored_as_it_should_be_read(path: Path):
     shown = [text for cell in code for text in outputs(cell)]
     assert not any(output.output_type == "error" for cell in code for output in cell.outputs)
     assert not [text for text in shown if MACHINE_PATH.search(text)]
+    assert not [text for text in shown if " at 0x" in text], "end the line with a semicolon"
     pictures = sum(
         "image/png" in output.get("data", {}) for cell in code for output in cell.outputs
     )
