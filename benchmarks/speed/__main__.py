@@ -22,10 +22,10 @@ def conditions() -> str:
     """Say on what the figures were taken."""
     return (
         "One BLAS thread, CPU time of the process (least of several calls, on both sides), "
-        f"{platform.machine()}, Python {platform.python_version()}, "
-        f"NumPy {numpy.__version__}, SciPy {scipy.__version__}, python-control {control.__version__}; {os.cpu_count()} cores, load average "
-        f"{os.getloadavg()[0]:.1f} at the start (wall times suffer from it, CPU times by half at "
-        "most). Data are simulated. Ratios are baseline over ours, in the same run."
+        f"{platform.machine()}, Python {platform.python_version()}, NumPy {numpy.__version__}, "
+        f"SciPy {scipy.__version__}, python-control {control.__version__}; {os.cpu_count()} cores, "
+        f"load average {os.getloadavg()[0]:.1f} at the start (wall times suffer from it, CPU times "
+        "by half at most). Data are simulated. Ratios are baseline over ours, in the same run."
     )
 
 
