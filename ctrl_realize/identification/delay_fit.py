@@ -29,6 +29,7 @@ from .steps import detect_step
 Loss = Literal["huber", "least_squares"]
 
 MOST_ORDER = 8
+FEWEST_SAMPLES = 20
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
 _ALONE = (
@@ -199,6 +200,11 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
         raise DataError("records is empty or holds something else; needed are Record objects")
     for record in several:
         check_complete(record, "fit_delay")
+        if record.n_samples < FEWEST_SAMPLES:
+            raise DataError(
+                f"record {record.name!r} has {record.n_samples} samples; a fit of delay, gain and "
+                f"lags needs at least {FEWEST_SAMPLES}"
+            )
         if not record.issiso:
             raise DataError(
                 f"record {record.name!r} has {record.n_inputs} inputs and {record.n_outputs} "

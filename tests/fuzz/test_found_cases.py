@@ -87,6 +87,14 @@ def test_a_response_that_underflows_behind_the_delay_makes_no_noise():
         assert np.isfinite(model.delay_free.A).all()
 
 
+@pytest.mark.parametrize("samples", [3, 4, 19])
+def test_a_handful_of_samples_is_not_fitted(samples):
+    # a division by zero at four samples, arrays that do not fit at three
+    t = np.arange(float(samples))
+    with pytest.raises(DataError, match="at least 20"):
+        cr.fit_delay(cr.Record(t, np.cos(9 * t), np.sin(t)))
+
+
 @pytest.mark.parametrize(("samples", "length"), [(12, 2), (20, 2), (20, 5)])
 def test_a_short_exact_step_gives_an_impulse_response_or_one_of_our_errors(samples, length):
     # a sum of squares rounded to below zero, and a prior too wide for the rounding of the sums

@@ -259,6 +259,15 @@ def test_a_matlab_bomb_is_refused_before_it_is_unpacked(tmp_path):
         read_record(file, max_bytes=20 * 2**20)
 
 
+def test_packed_data_that_end_too_early_are_refused(tmp_path):
+    file = tmp_path / "a.mat"
+    scipy.io.savemat(file, {"t": T, "u": U, "y": Y})
+    packed = zlib.compress(struct.pack("<II", 14, 8) + bytes(8))[:-4]
+    file.write_bytes(file.read_bytes() + struct.pack("<II", 15, len(packed)) + packed)
+    with pytest.raises(FileFormatError, match="packed data end too early"):
+        read_record(file)
+
+
 def test_hdf5_is_named_with_the_way_out(tmp_path):
     # a v7.3 file begins with a line of text, the HDF5 part comes behind it
     text = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + b"\x00\x02IM"
