@@ -103,7 +103,9 @@ def _roots(
     if low.size == 0:
         return np.zeros(0)
     found = elementwise.find_root(function, (low, high), tolerances={"xatol": 0.0, "xrtol": 1e-15})
-    return np.asarray(found.x, dtype=np.float64)
+    roots = np.asarray(found.x, dtype=np.float64)
+    # Far down, rounding alone may have made the sign change; there is no root to find then.
+    return roots[np.isfinite(roots)]
 
 
 def unit_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> FloatArray:

@@ -380,3 +380,14 @@ def test_response_data_of_an_unstable_plant_need_the_number_of_its_poles(cores, 
     found = cr.design.margins(data, unstable_poles=1)
     assert found.unstable_poles == exact.unstable_poles
     assert found.stable == exact.stable == (gain == 1.0)
+
+
+def test_crossings_that_rounding_makes_near_nyquist_do_not_hide_the_gain_margin():
+    valve = cr.bench.valve()
+    plant = cr.delayed_ss(valve.truth.core, dead_time=37 * valve.dt, dt=valve.dt)
+    loop = plant * (8 * ct.ss(ct.tf([1 + valve.dt / 0.075, -1], [1, -1], valve.dt)))
+    found = cr.design.margins(loop)
+    omega = np.geomspace(1, 100, 2000)
+    gain_margin = ct.stability_margins(ct.frd(loop(np.exp(1j * omega * valve.dt)), omega))[0]
+    assert np.all(np.isfinite(found.gain_margins))
+    assert found.gain_margin == pytest.approx(gain_margin, rel=1e-5)  # interpolation of the FRD
