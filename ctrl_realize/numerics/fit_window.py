@@ -102,7 +102,7 @@ def fit_window(
         Noise level and quantisation step.
     huber : bool
         Huber's loss by pseudo-values: the data are moved towards the model, so that their least
-        squares are Huber's. Two passes suffice from a least-squares start.
+        squares are Huber's. From a least-squares start one pass suffices, two with outliers.
     """
     sigma, quantum = noise
     problem = window.problem
@@ -115,6 +115,8 @@ def fit_window(
         best = min(candidates.values(), key=lambda c: c.cost)
         error = window.output - window.predict(problem, best)
         left = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error
+        if turn == 1 and not _wild(error):
+            break
         if turn < passes:
             problem = window.with_output(window.output - error + left)
             candidates = refine(problem, candidates, scales)
@@ -137,6 +139,11 @@ def _clipped(error: FloatArray, least: float) -> FloatArray:
     limit = _HUBER * max(mad_sigma(error), least)
     inside = float(np.mean(np.abs(error) <= limit))
     return np.asarray(np.clip(error, -limit, limit) / max(inside, 0.5))
+
+
+def _wild(error: FloatArray) -> bool:
+    """Tell whether there are more residuals beyond four sigma than Gaussian noise has."""
+    return bool(np.mean(np.abs(error) > 4 * mad_sigma(error)) > 0.002)
 
 
 def _ringing(error: FloatArray, dt: float) -> float:

@@ -75,8 +75,7 @@ def search(
     found: dict[Structure, Candidate] = {}
     for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
         starts = _neighbour_starts(structure, scales, found)
-        # A rich structure differs little from the optima next to it: they suffice.
-        if not starts or structure.zeros == 0 or structure.order <= 3:
+        if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
             starts += _pattern_starts(structure, scales)
         parameters, cost = fit_batch(
             problem, structure, np.array(starts), parameter_bounds(structure.order, scales)
@@ -84,6 +83,23 @@ def search(
         best = int(np.argmin(cost))
         found[structure] = Candidate(structure, parameters[best], float(cost[best]))
     return found
+
+
+def _worth_a_search(
+    problem: Problem, structure: Structure, found: dict[Structure, Candidate]
+) -> bool:
+    """Tell whether a rich structure may differ much from the optima next to it.
+
+    Zeros are added to the optimum without them; and where the last pole did not lower the cost
+    by more than noise does, one more will not.
+    """
+    if structure.zeros:
+        return False
+    best = [
+        min((c.cost for s, c in found.items() if s.order == order), default=np.inf)
+        for order in (structure.order - 2, structure.order - 1)
+    ]
+    return not best[1] > best[0] * (1 - 4 / problem.data.size)
 
 
 def refine(
