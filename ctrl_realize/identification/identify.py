@@ -9,12 +9,12 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of
+from ..checks import one_of, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..signals import Record, StepResponse
-from .delay_fit import fit_delay
+from .delay_fit import MOST_ORDER, fit_delay
 from .delay_scan import estimate_delay
 from .orders import scan_orders
 from .steps import impulse_from_step, unit_step
@@ -132,6 +132,7 @@ def fit_records(
     if order is not None:
         if structures is not None:
             raise OptionError("give order or structures, not both")
+        order = whole(order, "order", 1, MOST_ORDER)
         structures = [(order, degree) for degree in range(1, order + 1)]
     return fit_delay(records, structures=structures, **options)
 

@@ -65,6 +65,7 @@ def test_a_scan_returns_the_model_with_names_choices_and_every_step(method):
 
 def test_the_scan_finds_gain_and_delay_of_a_quiet_record():
     sys = cr.identify(step_record(noise=2e-4, seed=2), method="scan")
+    assert sys.delay_free.nstates == 3
     # paper.md 4.1: .3 +- .66 samples with 50 Hz; the automatic cut-off of 28 Hz is as good.
     assert abs(sys.delay - 37) <= 4
     assert_allclose(np.real(sys.dcgain()), 1.0, atol=5e-3)
@@ -103,6 +104,9 @@ def test_a_later_step_is_a_later_response_not_a_longer_delay():
         ({"method": "output_error", "samples": 5}, OptionError, "samples: not for method"),
         ({"method": "paper", "max_delay": 5000}, DelayRangeError, "need 6001 samples"),
         ({"method": "scan", "order": 0}, OptionError, ">= 1"),
+        ({"order": 0}, OptionError, "order=0"),
+        ({"order": 9}, OptionError, "order=9"),
+        ({"order": 2, "structures": [(1, 1)]}, OptionError, "not both"),
         ({"method": "scan", "max_delay": -1}, OptionError, ">= 0"),
         ({"method": "scan", "max_delay": 10**6}, DelayRangeError, "needs more than"),
     ],
