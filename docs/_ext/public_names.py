@@ -115,7 +115,7 @@ def _page(title: str, line: str, names: list[str], about: str = "") -> str:
     if about and about.rstrip(".") != line.rstrip("."):
         text += [about, ""]
     text += ["```{eval-rst}", ".. autosummary::", "   :toctree: entries", "   :nosignatures:", ""]
-    text += [f"   {name}" for name in ordered]
+    text += [f"   ~{name}" for name in ordered]
     return "\n".join([*text, "```", ""])
 
 
@@ -132,7 +132,7 @@ def write_pages(folder: Path) -> None:
         if not path.exists() or path.read_text() != text:
             path.write_text(text)
     # Entries of names that are public no more.
-    listed = "\n".join(pages().values()).split()
+    listed = "\n".join(pages().values()).replace("~", "").split()
     for entry in (folder / "entries").glob("*.rst"):
         if entry.stem not in listed:
             entry.unlink()
