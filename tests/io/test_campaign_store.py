@@ -121,7 +121,8 @@ def test_a_file_is_no_store(tmp_path):
 
 
 SCRIPT = """
-import functools, sys, time
+import functools, signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run detached
 import ctrl_realize as cr
 from tests.io.test_campaign_store import record
 
