@@ -22,7 +22,7 @@ Automatica 46 (2010), 81-93.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular, toeplitz
@@ -34,6 +34,9 @@ from .lagged import NormalEquations
 
 COARSE = 100
 """Taps up to which hyper-parameters are searched at full resolution."""
+_WORST = 1e300
+_ROUNDING = 1e-13
+"""Part of the mean square added to the squares, so that rounding leaves none below zero."""
 FLOOR = 1e-13
 """Least noise variance, as a share of the output's: what rounding leaves of the sums."""
 
@@ -73,6 +76,8 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
     KernelFit
     """
     m = equations.gram.shape[0] // lags
+    diagonal = np.full(m * lags, _ROUNDING * np.trace(equations.gram) / (m * lags))
+    equations = replace(equations, gram=equations.gram + np.diag(diagonal))
     b, power = equations.cross[:, 0], float(equations.power[0, 0])
     group = -(-lags // COARSE)
     x = _start(equations, m, lags, kernel)
@@ -207,8 +212,9 @@ def _search(
         try:
             return _likelihood(gram, cross, factor, power, freedom)[0]
         except np.linalg.LinAlgError:
-            # a prior so wide that the rounding of `gram` outweighs the identity: no better for it
-            return np.inf
+            # a prior so wide that the rounding of `gram` outweighs the identity: no better for
+            # it. Not infinity, which the search takes differences of.
+            return _WORST
 
     steps = np.tile([size] * shapes + [2 * size], m)
     inside = np.clip(start, low, high)

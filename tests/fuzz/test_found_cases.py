@@ -95,7 +95,7 @@ def test_a_handful_of_samples_is_not_fitted(samples):
         cr.fit_delay(cr.Record(t, np.cos(9 * t), np.sin(t)))
 
 
-@pytest.mark.parametrize(("samples", "length"), [(12, 2), (20, 2), (20, 5)])
+@pytest.mark.parametrize(("samples", "length"), [(12, 2), (20, 2), (20, 5), (22, 7), (52, 15)])
 def test_a_short_exact_step_gives_an_impulse_response_or_one_of_our_errors(samples, length):
     # a sum of squares rounded to below zero, and a prior too wide for the rounding of the sums
     u = (np.arange(samples) >= 1).astype(float)
