@@ -56,9 +56,13 @@ SUBMODULES = {
 
 def public(module: ModuleType) -> dict[str, Any]:
     """Names that a user may write after the module's name, modules themselves left out."""
+    # The package loads its names when they are asked for, so they are asked for one by one.
+    every = {
+        name: getattr(module, name) for name in sorted(getattr(module, "__all__", dir(module)))
+    }
     return {
         name: value
-        for name, value in sorted(vars(module).items())
+        for name, value in every.items()
         if not name.startswith("_")
         and not inspect.ismodule(value)
         and name not in ("annotations", "import_module", "Any", "Literal", "dataclass")
