@@ -59,7 +59,7 @@ def delay_error(problem: Problem, candidate: Candidate, variance: float) -> floa
     size = np.sqrt((jacobian**2).sum(axis=0))
     if size[0] <= _NOTHING * free:
         return float("inf")
-    moving = size > _NOTHING * size.max()
+    moving = size > _NOTHING * state.sensitivity[0]
     columns: FloatArray = (jacobian / np.where(moving, size, 1.0))[:, moving]
     # The delay comes last, so that the corner is what the others leave of it.
     triangle = np.linalg.qr(columns[:, ::-1])[1]

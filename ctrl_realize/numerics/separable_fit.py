@@ -217,6 +217,10 @@ def _damped_step(
     delay_fixed: bool,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Levenberg-Marquardt steps in the free directions, and which of them were not cut."""
+    # The delay counts in parts of its range: any unit of time gives the same steps.
+    unit = np.ones(x.shape[1])
+    unit[0] = max(float(bounds.high[0] - bounds.low[0]), 1e-300)
+    jacobian = jacobian * unit
     downhill = np.einsum("bmp,bm->bp", jacobian, residual)
     free = ~((x <= bounds.low) & (downhill < 0) | (x >= bounds.high) & (downhill > 0))
     if delay_fixed:
@@ -226,7 +230,7 @@ def _damped_step(
     diagonal = np.einsum("bii->bi", normal)
     scale = np.maximum(diagonal, 1e-9 * diagonal.max(axis=1, keepdims=True) + 1e-300)
     damped = normal + np.where(free, damping[:, None] * scale, 1.0)[:, :, None] * np.eye(x.shape[1])
-    step = np.linalg.solve(damped, np.where(free, downhill, 0.0)[:, :, None])[:, :, 0]
+    step = np.linalg.solve(damped, np.where(free, downhill, 0.0)[:, :, None])[:, :, 0] * unit
     excess = np.maximum(np.abs(step[:, 1:]).max(axis=1) / _LONGEST_STEP, 1.0)
     return step / excess[:, None], excess <= 1.0
 

@@ -92,6 +92,18 @@ def test_gain_offset_and_time_unit_do_not_matter():
     assert same.gain == pytest.approx(-300 * fit.gain, rel=1e-4)
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1e6])
+def test_any_unit_of_time_gives_the_same_answer_in_samples(unit):
+    record = rigs.step_record(noise=0.002, seed=3, before=300, after=900)
+    fit = cr.fit_delay(record, structures=[(3, 3)]).fit
+    scaled = cr.Record(unit * record.time, record.input, record.output)
+    same = cr.fit_delay(scaled, structures=[(3, 3)]).fit
+    # nothing but rounding: all thresholds are relative
+    assert same.delay == pytest.approx(fit.delay, rel=1e-6)
+    assert_allclose(same.delay_interval, fit.delay_interval, rtol=1e-4)
+    assert same.std / same.dt == pytest.approx(fit.std / fit.dt, rel=1e-4)
+
+
 def test_the_callers_record_is_not_changed():
     record = rigs.step_record(noise=0.002, before=200, after=600)
     before = record.output.copy(), record.input.copy()
