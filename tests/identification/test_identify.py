@@ -127,3 +127,13 @@ def test_a_dead_output_is_refused():
     dead = cr.Record(record.time, record.input, 0 * record.output)
     with pytest.raises((DataError, ValueError), match=r"zero|constant|moves"):
         cr.identify(dead, method="scan")
+
+
+@pytest.mark.parametrize("method", ["output_error", "scan", "paper"])
+def test_a_step_at_the_last_sample_is_refused_by_every_method(method):
+    t = TS * np.arange(2000)
+    u = np.zeros(2000)
+    u[-1] = 5.0
+    noise = np.random.default_rng(0).standard_normal(2000)
+    with pytest.raises(NoStepError, match="nothing was recorded after it"):
+        cr.identify(cr.Record(t, u, noise), method=method)
