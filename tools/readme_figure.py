@@ -65,7 +65,15 @@ def main() -> None:
     axes["gain"].set(ylabel="gain [dB]", title="the model beside a stepped-sine FRF")
     axes["phase"].set(xlabel="frequency [Hz]", ylabel="phase [deg]")
     axes["gain"].legend(loc="lower left", frameon=False)
-    figure.text(0.998, 0.002, "simulated valve (37 samples = 28.9 ms)", ha="right", va="bottom", size=11, color="#666666")
+    figure.text(
+        0.998,
+        0.002,
+        "simulated valve (37 samples = 28.9 ms)",
+        ha="right",
+        va="bottom",
+        size=11,
+        color="#666666",
+    )
     assert isinstance(system, ct.StateSpace)
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(TARGET, dpi=90)
