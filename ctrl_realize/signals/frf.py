@@ -86,9 +86,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         signals = {key: given for key, given in (("inputs", inputs), ("outputs", outputs)) if given}
         # Not smooth: python-control would draw the interpolating splines far beyond the measured
         # band, where they run off. Margins and products with systems do without.
-        super().__init__(
-            values, 2 * np.pi * grid, dt=None, name=str(name), smooth=False, **signals
-        )
+        super().__init__(values, 2 * np.pi * grid, dt=None, name=str(name), smooth=False, **signals)
         self._single = values.ndim == 1
         self.frequency_hz = read_only(grid)
         self.coherence = _beside(coherence, values, order, "coherence")
