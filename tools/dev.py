@@ -92,7 +92,7 @@ def main(arguments: list[str]) -> None:
     elif task == "test":
         if not rest:
             lint()
-        workers = ["-n", "2"] if not rest else []
+        workers = ["-n", "2", "--dist", "worksteal"] if not rest else []
         run(PYTHON, "-m", "pytest", *workers, *rest)
 
 
