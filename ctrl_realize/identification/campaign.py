@@ -230,7 +230,7 @@ class Campaign(Result):
                     "table tells why",
                 )
             )
-        trend = _amplitude_trend(self.good)
+        trend = _amplitude_trend(self.good, self.method)
         if trend is not None:
             flags.append(trend)
         return tuple(flags)
@@ -262,7 +262,7 @@ class Campaign(Result):
         return f"<Campaign: {len(self.rows)} records{failed}, method {self.method!r}>"
 
 
-def _amplitude_trend(rows: tuple[CampaignRow, ...]) -> Flag | None:
+def _amplitude_trend(rows: tuple[CampaignRow, ...], method: str) -> Flag | None:
     """Test whether the delay depends on the height of the step, by the rank correlation."""
     from scipy.stats import spearmanr  # scipy.stats takes a while to import
 
@@ -277,9 +277,15 @@ def _amplitude_trend(rows: tuple[CampaignRow, ...]) -> Flag | None:
     if not chance < 0.01:
         return None
     way = "longer" if correlation > 0 else "shorter"
+    # A scan's bias depends on the noise, which is larger beside a smaller step.
+    doubt = (
+        ""
+        if method == "output_error"
+        else "; or the bias of the scan, which grows with the noise: method='output_error' tells"
+    )
     return Flag(
         "amplitude_trend",
         f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, chance "
-        f"{chance:.1g}): friction, a slew limit or another nonlinearity; one linear model cannot "
-        "hold for all amplitudes",
+        f"{chance:.1g}): friction, a slew limit or another nonlinearity, for which one linear "
+        f"model cannot hold at all amplitudes{doubt}",
     )

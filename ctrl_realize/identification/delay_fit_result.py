@@ -120,6 +120,11 @@ class DelayFit(Result):
         return self.interval
 
     @property
+    def interval_label(self) -> str:
+        """What `interval` is: a confidence interval only where one model leaves only noise."""
+        return "95 % interval" if self.at_noise_level else "interval spanned by the views"
+
+    @property
     def structure(self) -> tuple[int, int]:
         """Order and relative degree."""
         return self.order, self.relative_degree
@@ -139,7 +144,7 @@ class DelayFit(Result):
         low, high = self.interval
         rows = [
             ("dead time", f"{self.dead_time:.6g} s = {self.delay:.4g} samples"),
-            ("95 % interval", f"{low:.6g} ... {high:.6g} s"),
+            (self.interval_label, f"{low:.6g} ... {high:.6g} s"),
             ("first motion", f"{self.onset:.6g} s"),
             ("total delay", f"{self.total_delay:.6g} s (dead time and lags: the firm number)"),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),

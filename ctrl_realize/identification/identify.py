@@ -39,6 +39,7 @@ def identify(
     known: ct.LTI | None = None,
     loss: Literal["huber", "least_squares"] = "huber",
     structures: Sequence[tuple[int, int]] | None = None,
+    include_known: bool = False,
     cutoff_hz: float | Literal["auto"] | None = "auto",
     samples: int | None = None,
     feedthrough: bool | None = None,
@@ -59,7 +60,7 @@ def identify(
     max_delay : int, optional
         Largest delay in samples. Default: ``"scan"`` where the step response has risen by half,
         ``"paper"`` 100, ``"output_error"`` see `fit_delay`.
-    known, loss, structures : optional
+    known, loss, structures, include_known : optional
         For ``"output_error"``, see `fit_delay`.
     cutoff_hz, samples, feedthrough : optional
         For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
@@ -95,7 +96,7 @@ def identify(
     scan_only = {"cutoff_hz": cutoff_hz != "auto", "samples": samples is not None}
     scan_only["feedthrough"] = feedthrough is not None
     fit_only = {"known": known is not None, "structures": structures is not None}
-    fit_only["loss"] = loss != "huber"
+    fit_only |= {"loss": loss != "huber", "include_known": include_known}
     strange = [
         name
         for name, given in (scan_only if method == "output_error" else fit_only).items()
@@ -114,6 +115,7 @@ def identify(
             known=known,
             loss=loss,
             structures=structures,
+            include_known=include_known,
         )
     step = unit_step(record)
     if method == "paper":

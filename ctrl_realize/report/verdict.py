@@ -117,7 +117,9 @@ def headline_of(system: DelayedStateSpace) -> str:
 def interval_name(system: DelayedStateSpace) -> str:
     """Name the interval for what it is."""
     # A scan knows how flat its curve is, and no probability.
-    return "within 5 % of the least misfit" if hasattr(system.fit, "iae") else "95 % interval"
+    if hasattr(system.fit, "iae"):
+        return "within 5 % of the least misfit"
+    return str(getattr(system.fit, "interval_label", "95 % interval"))
 
 
 def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
