@@ -54,12 +54,12 @@ def peak_megabytes(setup: str, work: str) -> float:
     return int(done.stdout.split()[-1]) * 1024 / 1e6
 
 
-def import_seconds(module: str, *, runs: int = 5) -> float:
-    """Return the least CPU time of importing a module in a fresh process."""
+def import_seconds(statement: str, *, runs: int = 5) -> float:
+    """Return the least CPU time of a fresh process that imports."""
     times = []
     for _ in range(runs + 1):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run([sys.executable, "-c", f"import {module}"], check=True)
+        subprocess.run([sys.executable, "-c", statement], check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         times.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
     return min(times[1:])
