@@ -304,6 +304,7 @@ def test_files_without_a_record_say_what_they_have(tmp_path, kind):
     elif kind == "mat":
         scipy.io.savemat(file, {"title": "nothing but words"})
     else:
+        pytest.importorskip("pyarrow")
         file.write_bytes(b"PAR1" + bytes(100) + b"PAR1")
     with pytest.raises(FileFormatError, match=r"no columns of numbers|without arrays|damaged"):
         read_record(file)
