@@ -84,9 +84,10 @@ def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -
     models = folder / "models"
     models.mkdir()
     for number, row in enumerate(campaign.rows, start=1):
-        if row.system is not None:
+        system = row.system
+        if system is not None:
             name = f"{number:03d}_{file_name(row.name)}.json"
-            save_model(models / name, row.system, settings=settings, note=f"from {row.name}")
+            save_model(models / name, system, settings=settings, note=f"from {row.name}")
 
 
 def file_name(name: str) -> str:
@@ -100,7 +101,7 @@ def campaign_table(campaign: Campaign) -> str:
     scale, unit = time_unit(float(np.median([row.dead_time for row in campaign.good])))
     rows = []
     for row in campaign.rows:
-        if row.system is None:
+        if row.model is None:
             rows.append([printable(row.name), _number(row.amplitude), "", "", "", "",
                          printable(row.error or "failed")])  # fmt: skip
             continue
@@ -113,7 +114,7 @@ def campaign_table(campaign: Campaign) -> str:
                 f"{row.delay:.4g}",
                 f"{scale * row.dead_time:.4g}",
                 f"{scale * low:.4g} ... {scale * high:.4g}",
-                str(row.system.delay_free.nstates),
+                str(row.order),
                 remarks,
             ]
         )

@@ -55,12 +55,12 @@ class Campaign(Result):
     @cached_property
     def good(self) -> tuple[CampaignRow, ...]:
         """The rows that have a model."""
-        return tuple(row for row in self.rows if row.system is not None)
+        return tuple(row for row in self.rows if row.model is not None)
 
     @property
     def failed(self) -> tuple[CampaignRow, ...]:
         """The rows that have an error instead."""
-        return tuple(row for row in self.rows if row.system is None)
+        return tuple(row for row in self.rows if row.model is None)
 
     @property
     def dt(self) -> float:
@@ -71,7 +71,7 @@ class Campaign(Result):
         DataError
             No record was identified, or the sample times differ.
         """
-        times = {row.system.dt for row in self.good if row.system is not None}
+        times = {row.dt for row in self.good}
         if not times:
             raise DataError(
                 f"none of the {len(self.rows)} records could be identified; "
@@ -127,7 +127,9 @@ class Campaign(Result):
         """
         _ = self.dt
         if self.method == "output_error":
-            return fit_records([self._record(row) for row in self.good], **self.options)
+            pairs = zip(self.rows, self.sources, strict=True)
+            good = [_read(source) for row, source in pairs if row.model is not None]
+            return fit_records(good, **self.options)
         chosen = self._identified(self.best)
         scan = chosen.fit
         final = realize(
@@ -142,16 +144,13 @@ class Campaign(Result):
             name=chosen.name, inputs=chosen.input_labels, outputs=chosen.output_labels
         )
 
-    def _record(self, row: CampaignRow) -> Record:
-        source = self.sources[self.rows.index(row)]
-        return source if isinstance(source, Record) else source()
-
     def _identified(self, row: CampaignRow) -> DelayedStateSpace:
         """The row's model with its whole fit, which a store keeps only in summary."""
-        assert row.system is not None
-        if hasattr(row.system.fit, "impulse"):
-            return row.system
-        return identify(self._record(row), method=self.method, **self.options)
+        system = row.system
+        if system is not None and hasattr(system.fit, "impulse"):
+            return system
+        source = self.sources[self.rows.index(row)]
+        return identify(_read(source), method=self.method, **self.options)
 
     def table(self) -> pd.DataFrame:
         """One row for each record, in the order given.
@@ -172,7 +171,7 @@ class Campaign(Result):
                 "dead_time": row.dead_time,
                 "low": row.interval[0],
                 "high": row.interval[1],
-                "order": np.nan if row.system is None else row.system.delay_free.nstates,
+                "order": np.nan if row.order is None else row.order,
                 "misfit": row.misfit,
                 "flags": ", ".join(flag.code for flag in row.flags),
                 "error": row.error or "",
@@ -260,6 +259,10 @@ class Campaign(Result):
     def __repr__(self) -> str:
         failed = f", {len(self.failed)} failed" if self.failed else ""
         return f"<Campaign: {len(self.rows)} records{failed}, method {self.method!r}>"
+
+
+def _read(source: RecordSource) -> Record:
+    return source if isinstance(source, Record) else source()
 
 
 def _amplitude_trend(rows: tuple[CampaignRow, ...], method: str) -> Flag | None:

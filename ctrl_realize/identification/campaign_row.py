@@ -17,6 +17,7 @@ from ..signals import Record
 from .delay_fit_result import DelayFit
 from .delay_scan import DelayScan
 from .identify import Method, identify
+from .packed_model import PackedModel
 from .steps import detect_step
 
 RecordSource = Record | Callable[[], Record]
@@ -26,7 +27,8 @@ RecordSource = Record | Callable[[], Record]
 class CampaignRow:
     """What one record gave.
 
-    Exactly one of `system` and `error` is None; without a system all numbers are NaN.
+    Exactly one of `system` and `error` is None; without a system all numbers are NaN. A campaign
+    has thousands of rows, so that each keeps its model packed, a few kB.
 
     Attributes
     ----------
@@ -43,7 +45,8 @@ class CampaignRow:
         Misfit of the model for a unit step, so that records can be compared.
     gain : float
         Gain of the model at zero frequency.
-    system : DelayedStateSpace or None
+    model : PackedModel or None
+        Core, delays and names of the model.
     error : str or None
         What stopped this record, in one line.
     flags : tuple of Flag
@@ -58,13 +61,28 @@ class CampaignRow:
     interval: tuple[float, float] = (float("nan"), float("nan"))
     misfit: float = float("nan")
     gain: float = float("nan")
-    system: DelayedStateSpace | None = field(default=None, repr=False)
+    model: PackedModel | None = field(default=None, repr=False)
     error: str | None = None
     flags: tuple[Flag, ...] = ()
     warnings: tuple[str, ...] = ()
 
+    @property
+    def system(self) -> DelayedStateSpace | None:
+        """The model, built anew on each access; None if the record failed."""
+        return None if self.model is None else self.model.unpack()
+
+    @property
+    def order(self) -> int | None:
+        """Order of the model without its delay."""
+        return None if self.model is None else self.model.order
+
+    @property
+    def dt(self) -> float:
+        """Sample time of the model in s; NaN without one."""
+        return float("nan") if self.model is None else self.model.dt
+
     def __repr__(self) -> str:
-        what = self.error if self.system is None else f"delay {self.delay:.4g} samples"
+        what = self.error if self.model is None else f"delay {self.delay:.4g} samples"
         return f"<CampaignRow {self.name!r}: {what}>"
 
 
@@ -103,7 +121,7 @@ def identify_row(
             # A failure is cheap and may be mended by then, so it is tried again on resuming.
             row = replace(row, error=f"{type(error).__name__}: {' '.join(str(error).split())}")
     row = replace(row, warnings=tuple(dict.fromkeys(str(entry.message) for entry in caught)))
-    return row if store is None or row.system is None else store.save(key, row)
+    return row if store is None or row.model is None else store.save(key, row)
 
 
 def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:
@@ -127,7 +145,7 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
         interval=(float(low), float(high)),
         misfit=_scaled_misfit(fit, row.amplitude),
         gain=_gain(system),
-        system=system,
+        model=PackedModel.of(system),
         flags=tuple(fit.flags),
     )
 

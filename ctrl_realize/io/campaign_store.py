@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import FileFormatError, OptionError
 from ..identification.campaign_row import CampaignRow
+from ..identification.packed_model import PackedModel
 from ..results import Flag
 from .atomic import write_text
 from .json_content import field
@@ -78,7 +79,8 @@ class CampaignStore:
 
     def save(self, key: str, row: CampaignRow) -> CampaignRow:
         """Keep a row that has a model; return it as `load` will, with a summary for its fit."""
-        assert row.system is not None
+        system = row.system
+        assert system is not None
         content = {
             "format": FORMAT,
             "schema": SCHEMA,
@@ -89,7 +91,7 @@ class CampaignStore:
             "interval": [repr(float(end)) for end in row.interval],
             "flags": [[flag.code, flag.message] for flag in row.flags],
             "warnings": list(row.warnings),
-            "model": json.loads(model_to_text(row.system)),
+            "model": json.loads(model_to_text(system)),
         }
         write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
         return _row_from(content, key)
@@ -106,11 +108,15 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         if name in _NUMBERS
     }
     low, high = (float(text) for text in field(content, "interval", list))
+    system = model_from_text(json.dumps(field(content, "model", dict)))
+    flags = tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list))
+    if system.fit is not None and system.fit.flags == flags:
+        flags = system.fit.flags  # once in memory
     return CampaignRow(
         name=field(content, "name", str),
         **numbers,
         interval=(low, high),
-        system=model_from_text(json.dumps(field(content, "model", dict))),
-        flags=tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list)),
+        model=PackedModel.of(system),
+        flags=flags,
         warnings=tuple(str(text) for text in field(content, "warnings", list)),
     )

@@ -251,6 +251,6 @@ def _steps_of(campaign: Campaign) -> list[StepResponse]:
     """Cut the step responses out of a campaign's records, at most as many as one can see."""
     every = max(1, -(-len(campaign.good) // MOST_DRAWN))
     pairs = zip(campaign.rows, campaign.sources, strict=True)
-    sources = [source for row, source in pairs if row.system is not None][::every]
+    sources = [source for row, source in pairs if row.model is not None][::every]
     steps = [_step_of(one if isinstance(one, Record) else one()) for one in sources]
     return [step for step in steps if step is not None]

@@ -105,7 +105,7 @@ def campaign_table(campaign: Campaign) -> Table:
     best = campaign.best.name
     rows = []
     for row in campaign.rows:
-        if row.system is None:
+        if row.model is None:
             cells = (row.name, _number(row.amplitude), "", "", "", "", "", row.error or "")
             rows.append(Row(cells, "failed"))
             continue
@@ -117,7 +117,7 @@ def campaign_table(campaign: Campaign) -> Table:
             f"{row.delay:.4g}",
             f"{scale * row.dead_time:.4g}",
             f"{scale * low:.4g} to {scale * high:.4g}",
-            str(row.system.delay_free.nstates),
+            str(row.order),
             f"{row.misfit:.3g}",
             ", ".join([*remarks, *row.warnings]),
         )
