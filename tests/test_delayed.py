@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import tracemalloc
 
 import control as ct
 import numpy as np
@@ -166,6 +167,21 @@ def test_matrices_cannot_be_written():
         S.A = np.eye(5)
     with pytest.raises(AttributeError, match="fixed"):
         S.dt = 1.0
+
+
+def test_a_long_delay_costs_memory_only_where_matrices_are_asked_for():
+    cr.delayed_ss(CONTROLLER, 5)  # imports and caches are not the system's
+    tracemalloc.start()
+    S = cr.delayed_ss(CONTROLLER, 3000)
+    assert S.step(4000)[3000] == 0.5
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # The dense A alone would be 72 MB; the labels of 3000 states are 0.3 MB.
+    assert peak < 3e6
+    # Core, delay and names are all that is pickled: no chain.
+    assert len(pickle.dumps(S)) < 1000
+    assert S.A is S.A
+    assert S.A.shape == (3001, 3001)
 
 
 def test_poles_of_the_delay_are_exactly_zero():

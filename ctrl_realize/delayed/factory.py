@@ -11,7 +11,8 @@ import numpy as np
 from ..checks import positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.sampling import sample_with_dead_time, split_dead_time
-from .system import DelayedStateSpace, check_core
+from .parts import check_core
+from .system import DelayedStateSpace
 
 
 def delayed_ss(

@@ -1,0 +1,101 @@
+"""Products that keep the delay; what cannot keep it becomes a plain system."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import control as ct
+import numpy as np
+
+from .chains import common
+from .parts import CoreAndDelays
+
+
+class DelayedAlgebra(CoreAndDelays):
+    """Operators on core and delay."""
+
+    def _around(self, core: ct.StateSpace, **changes: Any) -> Self:
+        settings: dict[str, Any] = {
+            "output_delay": self.output_delays,
+            "inputs": self.input_labels,
+            "outputs": self.output_labels,
+        }
+        settings.update(changes)
+        return type(self)(core, settings.pop("delay", self.input_delays), **settings)
+
+    def _plain(self) -> ct.StateSpace:
+        return ct.StateSpace(self)
+
+    def __neg__(self) -> Self:
+        return self._around(-self._core)
+
+    def __mul__(self, other: Any) -> Any:
+        """Series: first `other`, then this system."""
+        if _is_scalar(other):
+            return self._around(self._core * other)
+        if isinstance(other, ct.TransferFunction):
+            other = ct.ss(other)
+        if isinstance(other, np.ndarray):
+            other = np.atleast_2d(other)
+            if other.shape[0] == self.ninputs and common(self.input_delays) is not None:
+                delays = (common(self.input_delays) or 0,) * other.shape[1]
+                names = self.input_labels if other.shape[1] == self.ninputs else None
+                return self._around(self._core * other, delay=delays, inputs=names)
+            return self._plain() * other
+        if type(other) is not ct.StateSpace and not isinstance(other, CoreAndDelays):
+            return self._plain() * other
+        return self._series(self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        """Series: first this system, then `other`."""
+        if _is_scalar(other):
+            return self._around(other * self._core)
+        if isinstance(other, ct.TransferFunction):
+            other = ct.ss(other)
+        if isinstance(other, np.ndarray):
+            other = np.atleast_2d(other)
+            if other.shape[1] == self.noutputs and common(self.output_delays) is not None:
+                delays = (common(self.output_delays) or 0,) * other.shape[0]
+                names = self.output_labels if other.shape[0] == self.noutputs else None
+                # A matrix times a 1x1 system promotes it in python-control; here it does not.
+                core = ct.StateSpace(
+                    self._core.A, self._core.B, other @ self._core.C, other @ self._core.D, self.dt
+                )
+                return self._around(core, output_delay=delays, outputs=names)
+            return other * self._plain()
+        if type(other) is not ct.StateSpace:
+            return other * self._plain() if isinstance(other, ct.StateSpace) else NotImplemented
+        return self._series(other, self)
+
+    def append(self, other: Any) -> ct.StateSpace:
+        """Append `other`; a plain system, as python-control makes it."""
+        # python-control's append writes to self.dt.
+        return self._plain().append(other)
+
+    def minreal(self, tol: float = 0.0) -> Self:
+        """Minimal realization of the core; the chain stays as it is."""
+        return self._around(self._core.minreal(tol))
+
+    def _series(self, second: ct.StateSpace, first: ct.StateSpace) -> ct.StateSpace:
+        """Product second * first, with delays kept where the delays between them are common."""
+        behind = getattr(first, "output_delays", (0,) * first.noutputs)
+        before = getattr(second, "input_delays", (0,) * second.ninputs)
+        fits = second.ninputs == first.noutputs
+        between = (
+            common(tuple(a + b for a, b in zip(behind, before, strict=True))) if fits else None
+        )
+        if between is None:
+            return ct.StateSpace(second) * ct.StateSpace(first)
+        core = getattr(second, "delay_free", second) * getattr(first, "delay_free", first)
+        entry = getattr(first, "input_delays", (0,) * first.ninputs)
+        return self._around(
+            core,
+            delay=tuple(d + between for d in entry),
+            output_delay=getattr(second, "output_delays", (0,) * second.noutputs),
+            inputs=first.input_labels,
+            outputs=second.output_labels,
+        )
+
+
+def _is_scalar(value: Any) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, np.complexfloating)

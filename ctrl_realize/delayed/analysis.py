@@ -1,0 +1,85 @@
+"""What is read off a system: poles, zeros, bandwidth, transfer function."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from scipy.optimize import brentq
+
+from ..checks import real
+from ..numerics.arrays import ComplexArray
+from .parts import CoreAndDelays
+
+
+class DelayedAnalysis(CoreAndDelays):
+    """Properties found on the core, where the augmented matrices would be slow or inexact."""
+
+    def poles(self) -> ComplexArray:
+        """Poles: those of the core, and exact zeros for the delay."""
+        chain = np.zeros(sum(self.input_delays) + sum(self.output_delays), dtype=np.complex128)
+        return np.concatenate([self._core.poles(), chain])
+
+    def zeros(self) -> ComplexArray:
+        """Finite zeros; for one input and output those of the core."""
+        if self.issiso() or isinstance(self.delay, int):
+            return np.asarray(self._core.zeros(), dtype=np.complex128)
+        return np.asarray(super().zeros(), dtype=np.complex128)
+
+    def damp(self) -> Any:
+        """Natural frequency, damping and poles; delay poles have infinite frequency."""
+        # log(0) of the poles at 0 is meant here, and python-control would warn of each.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return super().damp()
+
+    def bandwidth(self, dbdrop: float = -3) -> float:
+        """Lowest frequency in rad/s where the gain is `dbdrop` dB below that at 0.
+
+        python-control 0.10.2 raises here for every discrete system: it looks for the crossing
+        at G(jw) instead of G(exp(jw dt)).
+        """
+        if not self.issiso():
+            raise TypeError("system should be a SISO system")
+        drop = real(dbdrop, "dbdrop", "drop of the gain in dB, below 0")
+        if drop >= 0:
+            raise ValueError("expecting dbdrop be a negative scalar in dB")
+        level = abs(complex(self(1.0, warn_infinite=False))) * 10 ** (drop / 20)
+        if not np.isfinite(level):
+            return float("nan")
+        nyquist = np.pi / self.dt
+        grid = np.concatenate(
+            [np.geomspace(nyquist * 1e-7, nyquist, 2000), np.linspace(0, nyquist, 2000)[1:]]
+        )
+        grid.sort()
+        gain = np.abs(self._core(np.exp(1j * grid * self.dt)))
+        below = np.flatnonzero(gain < level)
+        if below.size == 0:
+            return float("inf")
+        first = int(below[0])
+        if first == 0:
+            return float(grid[0])
+        return float(
+            brentq(
+                lambda w: abs(complex(self._core(np.exp(1j * w * self.dt)))) - level,
+                grid[first - 1],
+                grid[first],
+                xtol=1e-14 * nyquist,
+            )
+        )
+
+    def to_tf(self, *args: Any, **kwargs: Any) -> ct.TransferFunction:
+        """Transfer function: that of the core, with the delay as d zeros behind den.
+
+        python-control's ``ct.tf(sys)`` goes through the polynomial of the augmented matrix,
+        which is noise from d = 50 on. Several channels give a matrix of transfer functions.
+        """
+        core = ct.tf(self._core, *args, **kwargs)
+        total = np.add.outer(self.output_delays, self.input_delays)
+        den = [
+            [np.concatenate([core.den[i][j], np.zeros(total[i, j])]) for j in range(core.ninputs)]
+            for i in range(core.noutputs)
+        ]
+        return ct.TransferFunction(
+            core.num, den, self.dt, inputs=self.input_labels, outputs=self.output_labels
+        )

@@ -1,0 +1,113 @@
+"""Core, delays, and the augmented matrices, which are made when somebody asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..errors import UnsuitableSystemError
+from ..numerics.arrays import FloatArray, IntArray
+from .chains import Matrices, augment
+
+
+class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+    """What a system with dead time is made of.
+
+    ``A, B, C, D`` follow from core and delays. They are dense, (n + d)^2 numbers, and most uses
+    never look at them: they are made at the first look.
+    """
+
+    _core: ct.StateSpace
+    input_delays: tuple[int, ...]
+    output_delays: tuple[int, ...]
+    _augmented: Matrices | None
+
+    def _matrices(self) -> Matrices:
+        if self._augmented is None:
+            core = self._core
+            made = augment((core.A, core.B, core.C, core.D), self.input_delays, self.output_delays)
+            for M in made:
+                M.flags.writeable = False
+            self._augmented = made
+        return self._augmented
+
+    def _next_state(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
+        A, B, _, _ = self._matrices()
+        return np.asarray(A @ np.atleast_1d(x) + B @ np.atleast_1d(u))
+
+    def _output(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
+        _, _, C, D = self._matrices()
+        return np.asarray(C @ np.atleast_1d(x) + D @ np.atleast_1d(u))
+
+    @property
+    def A(self) -> FloatArray:
+        """Dynamics matrix of ``[core; chains]``, read-only."""
+        return self._matrices()[0]
+
+    @property
+    def B(self) -> FloatArray:
+        """Input matrix, read-only."""
+        return self._matrices()[1]
+
+    @property
+    def C(self) -> FloatArray:
+        """Output matrix, read-only."""
+        return self._matrices()[2]
+
+    @property
+    def D(self) -> FloatArray:
+        """Direct term, read-only."""
+        return self._matrices()[3]
+
+    def __setattr__(self, attribute: str, value: Any) -> None:
+        # Core and chain would fall out of step, and python-control's `append` is known to do it.
+        if attribute in ("A", "B", "C", "D", "dt") and self.__dict__.get("_locked", False):
+            raise AttributeError(
+                f"{attribute} of a DelayedStateSpace is fixed; build a new one with delayed_ss, "
+                "or take a plain copy with ct.ss(sys)"
+            )
+        super().__setattr__(attribute, value)
+
+    @property
+    def delay_free(self) -> ct.StateSpace:
+        """The core, a plain `control.StateSpace`."""
+        return self._core
+
+    @property
+    def delay(self) -> Any:
+        """Dead time in samples: an int, or an array (outputs, inputs) where channels differ."""
+        total: IntArray = np.add.outer(
+            np.array(self.output_delays, dtype=np.int64),
+            np.array(self.input_delays, dtype=np.int64),
+        )
+        return int(total[0, 0]) if np.all(total == total[0, 0]) else total
+
+    @property
+    def dead_time(self) -> Any:
+        """Dead time in s: ``delay * dt``."""
+        return self.delay * self.dt
+
+
+def check_core(core: Any) -> None:
+    """Refuse what is not a discrete state-space system with a sample time."""
+    if not isinstance(core, ct.StateSpace):
+        raise UnsuitableSystemError(
+            f"core is a {type(core).__name__}; needed is a discrete control.StateSpace "
+            "(delayed_ss also takes transfer functions)"
+        )
+    if core.dt is None or core.dt is True or not core.dt > 0:
+        raise UnsuitableSystemError(
+            f"the core's dt is {core.dt!r}; needed is a sample time in s "
+            "(delayed_ss samples a continuous core)"
+        )
+
+
+def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter: str) -> list[str]:
+    """Name signals: as given, as those of the core, or by one letter if the core has no names."""
+    if given is not None:
+        return [given] if isinstance(given, str) else list(given)
+    generic = [f"{letter}[{i}]" for i in range(len(core))]
+    return [letter] if list(core) == generic and len(generic) == 1 else list(core)

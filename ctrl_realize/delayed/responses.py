@@ -1,0 +1,104 @@
+"""Responses in frequency and time, from core and delay."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import whole
+from ..errors import DataError
+from ..numerics import state_space
+from ..numerics.arrays import ComplexArray, FloatArray
+from .chains import later, powers
+from .parts import CoreAndDelays
+
+
+class DelayedResponses(CoreAndDelays):
+    """Responses whose cost does not grow with the delay."""
+
+    _schur: tuple[ComplexArray, ComplexArray] | None
+
+    def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
+        """Evaluate the transfer matrix: core(x) x^-d, shape (outputs, inputs, K).
+
+        See `control.StateSpace.horner`; the cost does not grow with the delay.
+        """
+        points = np.atleast_1d(np.asarray(x, dtype=np.complex128))
+        if points.ndim > 1:
+            raise ValueError("input list must be 1D")
+        if self._schur is None:
+            self._schur = state_space.schur_form(self._core.A)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            out = state_space.frequency_response(
+                self._schur, self._core.B, self._core.C, self._core.D, points
+            )
+            if any(self.input_delays):
+                out = out * powers(points, self.input_delays)[None, :, :]
+            if any(self.output_delays):
+                out = out * powers(points, self.output_delays)[:, None, :]
+        # The Schur form leaves rounding in the imaginary part, and dcgain() would be complex.
+        on_axis = points.imag == 0
+        out[..., on_axis] = out[..., on_axis].real
+        lost = ~np.isfinite(out)
+        if lost.any():
+            if warn_infinite:
+                # The class and words of python-control, whose callers look for them.
+                warnings.warn("singular matrix in frequency response", RuntimeWarning, stacklevel=3)
+            out[lost] = complex(np.inf, np.nan)
+        return out
+
+    def markov(self, count: int) -> FloatArray:
+        """Compute the unit-pulse response, delay included.
+
+        Returns
+        -------
+        ndarray, shape (count,) or (outputs, inputs, count)
+        """
+        return self._with_delay(state_space.markov, whole(count, "count", 1))
+
+    def step(self, count: int) -> FloatArray:
+        """Compute the response to a unit step on each input, delay included.
+
+        The chain is not simulated, so the cost does not grow with the delay.
+
+        Returns
+        -------
+        ndarray, shape (count,) or (outputs, inputs, count)
+        """
+        return self._with_delay(state_space.step_response, whole(count, "count", 1))
+
+    def simulate(self, inputs: ArrayLike) -> FloatArray:
+        """Compute the response from rest to any input, delay included.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (N,) or (inputs, N)
+
+        Returns
+        -------
+        ndarray, shape (N,) or (outputs, N)
+        """
+        given = np.asarray(inputs, dtype=np.float64)
+        rows = np.atleast_2d(given)
+        if rows.ndim != 2 or rows.shape[0] != self.ninputs:
+            raise DataError(
+                f"inputs has shape {given.shape}; needed is ({self.ninputs}, N)"
+                + (" or (N,)" if self.ninputs == 1 else "")
+            )
+        held = np.stack([later(u, d) for u, d in zip(rows, self.input_delays, strict=True)])
+        core = self._core
+        out = state_space.simulate(core.A, core.B, core.C, core.D, held)
+        out = np.stack([later(y, q) for y, q in zip(out, self.output_delays, strict=True)])
+        return out[0] if self.issiso() and given.ndim == 1 else out
+
+    def _with_delay(self, response: Any, count: int) -> FloatArray:
+        core = self._core
+        free: FloatArray = response(core.A, core.B, core.C, core.D, count)
+        out = np.zeros_like(free)
+        for i, behind in enumerate(self.output_delays):
+            for j, before in enumerate(self.input_delays):
+                out[i, j] = later(free[i, j], before + behind)
+        return np.asarray(out[0, 0] if self.issiso() else out, dtype=np.float64)
