@@ -1,4 +1,4 @@
-"""What samples at rest tell, when an output first moves, how an input is written as moves."""
+"""What samples at rest tell, when an output first moves, how far a profile reaches."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from ctrl_realize.numerics.first_motion import first_motion
-from ctrl_realize.numerics.input_moves import input_moves
 from ctrl_realize.numerics.noise_level import (
     colouring,
     correlation_time,
@@ -97,26 +96,6 @@ def test_a_small_step_in_much_noise_moves_in_means():
     output = rigs.exact_step(rigs.R1, time - 60 * rigs.TS) + 0.4 * white(1600)
     assert first_motion(output, 400, 0.4, 0.0, 0.0) is not None
     assert first_motion(0.4 * white(1600), 400, 0.4, 0.0, 0.0) is None
-
-
-def test_a_clean_input_is_written_exactly_as_its_moves():
-    signal = np.zeros(100)
-    signal[10:], signal[40:], signal[41:] = 2.0, 1.5, 1.0
-    index, size = input_moves(signal, [(10, 1), (40, 2)], 100)
-    assert_allclose(index, [10, 40, 41])
-    assert_allclose(size, [2.0, -0.5, -0.5])
-
-
-def test_the_noise_of_an_input_is_left_out_and_its_droop_is_not():
-    k = np.arange(1000)
-    noisy = (k >= 100) + 0.01 * white(1000)
-    index, size = input_moves(noisy, [(100, 1)], 1000)
-    assert list(index) == [100]
-    assert size[0] == pytest.approx(1.0, abs=0.01)
-    drooping = noisy - 0.2 * (k >= 100) * (1 - np.exp(-(k - 100.0) / 150))
-    index, size = input_moves(drooping, [(100, 1)], 1000)
-    assert 5 < index.size < 24
-    assert np.sum(size) == pytest.approx(0.8, abs=0.02)
 
 
 def test_profile_limits_are_where_a_parabola_crosses():
