@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[1] / "ctrl_realize"
+import ctrl_realize as cr
+
+PACKAGE = Path(cr.__file__).parent
 
 FLOORS = {
     "errors": 0,

@@ -253,4 +253,4 @@ def test_templates_are_in_the_package():
 def _pyproject():
     from pathlib import Path
 
-    return (Path(report.__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    return (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
