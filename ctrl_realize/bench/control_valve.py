@@ -14,27 +14,15 @@ from ..checks import positive, whole
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from ..signals import Record
-from .imperfections import (
-    band_limited_noise,
-    converted,
-    drive_spikes,
-    slew_limited,
-    with_play,
-)
-from .linear import (
-    Core,
-    response_to_held_input,
-    response_to_started_sine,
-)
+from .imperfections import slew_limited, with_play
+from .instruments import STROKE_MM, recorded
+from .linear import Core, response_to_held_input, response_to_started_sine
 from .truth import ValveTruth
 
 Seed: TypeAlias = np.random.Generator | int | None
 
-STROKE_MM = 2.0
 _REST_MM = 0.27
 _OVERSAMPLING = 8
-_AD_RANGE_V = 10.0
-_VOLT_PER_MA = 0.25
 _SINE_SAMPLES = 640
 _SINE_MEAN_MA = 12.0
 
@@ -208,7 +196,7 @@ class Valve:
         else:
             moved = self._with_friction(held, dead_time)
         rest = _REST_MM - self.truth.gain * paper.SETUP.current_range[0]
-        return self._recorded(time, held, moved + rest, generator, name)
+        return recorded(self, time, held, moved + rest, generator, name)
 
     def stepped_sine(
         self,
@@ -292,7 +280,8 @@ class Valve:
             moved = amplitude * response_to_started_sine(core, omega, time, dead_time)
             sweep.append(
                 tuple(
-                    self._recorded(
+                    recorded(
+                        self,
                         time,
                         current,
                         mean_mm + moved,
@@ -318,36 +307,3 @@ class Valve:
         lines = np.append(0.5 * (stem[1:] + stem[:-1]), stem[-1])
         lines[0] = stem[0]
         return response_to_held_input(self._after_stem, lines, fine, 0.0)[::_OVERSAMPLING]
-
-    def _recorded(
-        self,
-        time: FloatArray,
-        current: FloatArray,
-        displacement: FloatArray,
-        rng: np.random.Generator,
-        name: str,
-        *,
-        spikes: bool = True,
-    ) -> Record:
-        """Pass signals through sensor, converter and everything that disturbs them."""
-        n = time.size
-        limited = self.anti_aliasing is not None
-        shown = displacement + band_limited_noise(n, self.noise * STROKE_MM, rng, limited=limited)
-        shown = shown + self.drift * STROKE_MM * time
-        if self.hum:
-            phase = rng.uniform(0, 2 * np.pi)
-            shown = shown + self.hum * STROKE_MM * np.sin(2 * np.pi * 50.0 * time + phase)
-        range_mm, per_volt = paper.SETUP.lvdt_range_mm, paper.SETUP.lvdt_sensitivity_mm_per_v
-        shown = np.clip(shown, 0.0, range_mm)
-        full_range = paper.SETUP.current_range[1] - paper.SETUP.current_range[0]
-        asked = current + band_limited_noise(n, self.input_noise * full_range, rng, limited=limited)
-        if spikes and self.spikes:
-            asked = asked + drive_spikes(n, self.spikes, 0.4 * full_range, rng)
-        return Record(
-            time,
-            converted(asked * _VOLT_PER_MA, self.bits, _AD_RANGE_V) / _VOLT_PER_MA,
-            converted(shown / per_volt, self.bits, _AD_RANGE_V) * per_volt,
-            name=name,
-            input_labels=["current (simulated) [mA]"],
-            output_labels=["displacement (simulated) [mm]"],
-        )

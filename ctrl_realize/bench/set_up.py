@@ -7,7 +7,8 @@ from typing import Literal
 from .. import paper
 from ..checks import one_of, positive, real, whole
 from ..errors import OptionError
-from .control_valve import STROKE_MM, Valve
+from .control_valve import Valve
+from .instruments import STROKE_MM
 from .linear import butterworth, chain, lag, second_order_lag
 from .truth import ValveTruth
 

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from ..checks import one_of, positive
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
-from ..numerics.time_axis import EXTREME, axis_fault, sample_time
+from ..numerics.time_axis import axis_fault, sample_time
+from .record_checks import check_finite, check_shape, check_size, labelled, numbers
 
 MIN_SAMPLES = 3
 MAX_DENSER = 100
@@ -92,18 +93,18 @@ class Record:
         output_labels: Sequence[str] | None = None,
         missing: Literal["refuse", "keep"] = "refuse",
     ) -> None:
-        stamps = _numbers(time, "time")
+        stamps = numbers(time, "time")
         if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
             raise DataError(
                 f"time has shape {stamps.shape}; a record needs shape (N,) with N >= {MIN_SAMPLES}"
             )
-        signals = {"input": _numbers(input, "input"), "output": _numbers(output, "output")}
+        signals = {"input": numbers(input, "input"), "output": numbers(output, "output")}
         for what, values in signals.items():
-            _check_shape(values, what, stamps.size)
-        _check_finite(stamps, "time")
+            check_shape(values, what, stamps.size)
+        check_finite(stamps, "time")
         for what, values in signals.items():
-            _check_finite(values, what, allow_nan=one_of(missing, "missing", MISSING) == "keep")
-            _check_size(values, what)
+            check_finite(values, what, allow_nan=one_of(missing, "missing", MISSING) == "keep")
+            check_size(values, what)
         fault = axis_fault(stamps)
         if fault is not None:
             raise TimeAxisError(
@@ -117,8 +118,8 @@ class Record:
         fix(self, "dt", sample_time(stamps))
         fix(self, "name", str(name))
         fix(self, "missing", str(missing))
-        fix(self, "input_labels", _labels(input_labels, self.n_inputs, "u", "input_labels"))
-        fix(self, "output_labels", _labels(output_labels, self.n_outputs, "y", "output_labels"))
+        fix(self, "input_labels", labelled(input_labels, self.n_inputs, "u", "input_labels"))
+        fix(self, "output_labels", labelled(output_labels, self.n_outputs, "y", "output_labels"))
 
     def __setattr__(self, attribute: str, value: Any) -> None:
         raise AttributeError(f"a Record does not change; make a new one with another {attribute}")
@@ -225,11 +226,11 @@ class Record:
         TimeAxisError
             Time that repeats or runs back, or a gap.
         """
-        stamps = _numbers(time, "time")
+        stamps = numbers(time, "time")
         if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
             raise DataError(f"time has shape {stamps.shape}; needed is (N,), N >= {MIN_SAMPLES}")
-        _check_finite(stamps, "time")
-        _check_size(stamps, "time")
+        check_finite(stamps, "time")
+        check_size(stamps, "time")
         steps = np.diff(stamps)
         fault = axis_fault(stamps) if np.any(steps <= 0) else None
         if fault is not None:
@@ -252,9 +253,9 @@ class Record:
         uniform = stamps[0] + step * np.arange(count)
         moved = []
         for what, given in (("input", input), ("output", output)):
-            values = _numbers(given, what)
-            _check_shape(values, what, stamps.size)
-            _check_finite(values, what)
+            values = numbers(given, what)
+            check_shape(values, what, stamps.size)
+            check_finite(values, what)
             rows = np.atleast_2d(values)
             fresh = np.stack([np.interp(uniform, stamps, row) for row in rows])
             moved.append(fresh[0] if values.ndim == 1 else fresh)
@@ -320,59 +321,6 @@ def _rebuild(
         output_labels=output_labels,
         missing=missing,
     )
-
-
-def _numbers(values: ArrayLike, what: str) -> FloatArray:
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise DataError(f"{what} is no array: its rows have different lengths") from error
-    if array.dtype.kind not in "biuf":
-        raise DataError(
-            f"{what} holds {array.dtype} values; needed are real numbers (a ragged list, text or "
-            "complex values cannot be used)"
-        )
-    return np.asarray(array, dtype=np.float64)
-
-
-def _check_shape(values: FloatArray, what: str, samples: int) -> None:
-    if values.ndim not in (1, 2) or values.size == 0:
-        raise DataError(f"{what} has shape {values.shape}; needed is ({samples},) or (signals, N)")
-    if values.shape[-1] != samples:
-        turned = values.ndim == 2 and values.shape[0] == samples
-        hint = f"; it looks transposed, pass {what}.T" if turned else ""
-        raise DataError(f"{what} has {values.shape[-1]} samples, time has {samples}{hint}")
-
-
-def _check_finite(values: FloatArray, what: str, *, allow_nan: bool = False) -> None:
-    bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
-    if bad.any():
-        first = int(np.flatnonzero(bad.any(axis=0) if values.ndim == 2 else bad)[0])
-        count = int(bad.sum())
-        raise DataError(
-            f"{what} has {count} non-finite sample{'s' if count > 1 else ''}, "
-            f"the first at index {first}"
-        )
-
-
-def _check_size(values: FloatArray, what: str) -> None:
-    """Refuse numbers that no instrument shows and whose squares overflow."""
-    # NaN stands for a missing sample here, and is not larger than anything
-    large = np.abs(values) > EXTREME
-    if large.any():
-        first = int(np.flatnonzero(large.any(axis=0) if values.ndim == 2 else large)[0])
-        raise DataError(
-            f"{what} is beyond {EXTREME:g} at index {first}; is the file damaged, or a unit wrong?"
-        )
-
-
-def _labels(given: Sequence[str] | None, count: int, letter: str, argument: str) -> tuple[str, ...]:
-    if given is None:
-        return (letter,) if count == 1 else tuple(f"{letter}[{i}]" for i in range(count))
-    labels = (given,) if isinstance(given, str) else tuple(str(label) for label in given)
-    if len(labels) != count or len(set(labels)) != count:
-        raise OptionError(f"{argument}={labels!r}; needed are {count} different names")
-    return labels
 
 
 def _count(number: int, noun: str) -> str:
