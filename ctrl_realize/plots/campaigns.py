@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import control as ct
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -65,22 +66,26 @@ def campaign_plot(
             lines = _by_name(axes, campaign.good, dt, looks)
         else:
             lines = _by_amplitude(axes, groups, dt, looks)
+        room = _room_for_legend(axes, 1 if truth is None else 2)
         along = axes.axvline if listed else axes.axhline
         band = axes.axvspan if listed else axes.axhspan
+        # Lines across the names end below the legend; those across the heights pass it by.
+        reach = {"ymax": 1 - room} if listed else {}
         if np.isfinite(summary.std_error):
-            band(*summary.interval, color=style.BAND, alpha=0.25, linewidth=0)
+            band(*summary.interval, color=style.BAND, alpha=0.25, linewidth=0, **reach)
         along(
             summary.mean,
             color=style.MODEL,
             label=f"trimmed mean {summary.mean:.2f} samples = {style.in_time(summary.mean * dt)}",
+            **reach,
         )
         if truth is not None:
-            along(truth, color=style.TRUTH, linestyle=":", label=f"truth {truth:.4g} (simulated)")
+            name = f"truth {truth:.4g} (simulated)"
+            along(truth, color=style.TRUTH, linestyle=":", label=name, **reach)
         name = f"{len(campaign.good)} records, method {campaign.method}"
-        _legend_outside(axes)
         return style.finished(
             [axes], [lines], title=name if title is None else title, own_figure=ax is None,
-            legends=(),
+            loc="upper left",
         )  # fmt: skip
 
 
@@ -129,5 +134,10 @@ def _by_name(
     return list(axes.plot([row.delay for row in rows], range(len(rows)), **looks))
 
 
-def _legend_outside(axes: Axes) -> None:
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)
+def _room_for_legend(axes: Axes, lines: int) -> float:
+    """Leave the top of the axes to the legend, so that it hides no record; return its share."""
+    tall = axes.get_window_extent().height * 72 / axes.figure.dpi
+    share = min(1.7 * mpl.rcParams["legend.fontsize"] * lines / max(tall, 1.0), 0.5)
+    low, high = axes.get_ylim()  # names are listed downwards
+    axes.set_ylim(low, high + (high - low) * share / (1 - share))
+    return float(share)

@@ -276,6 +276,22 @@ def test_many_records_are_grouped_by_the_height_of_their_step(valve):
     axes = plots.campaign_plot(many, ax=Figure()).axes[0, 0]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["8", "16"]
     assert axes.get_ylabel() == "delay [samples]"
+    legend_hides_no_record(many)
+
+
+def test_the_legend_of_a_campaign_hides_no_record(campaign):
+    legend_hides_no_record(campaign)
+
+
+def legend_hides_no_record(campaign):
+    axes = plots.campaign_plot(campaign, truth=37).axes[0, 0]
+    axes.figure.draw_without_rendering()
+    legend = axes.get_legend().get_window_extent()
+    assert axes.get_window_extent().y1 + 1 >= legend.y1  # and not on the title
+    for line in axes.get_lines():
+        if line.get_label().startswith("_"):  # records carry no name in the legend
+            ends = line.get_transform().transform(line.get_xydata())
+            assert (ends[:, 1] < legend.y0).all()
 
 
 def test_a_second_plot_keeps_the_time_unit_of_the_axes(scanned):
