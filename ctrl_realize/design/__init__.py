@@ -16,6 +16,9 @@ from .conversions import to_tf as to_tf
 from .delay_line import DelayLineController as DelayLineController
 from .delay_robustness import DelayRobustness as DelayRobustness
 from .delay_robustness import delay_robustness as delay_robustness
+from .estimator import KalmanPredictor as KalmanPredictor
+from .estimator import kalman_predictor as kalman_predictor
+from .lqg import lqg as lqg
 from .margin_result import Margins as Margins
 from .margins import margins as margins
 from .performance import Performance as Performance
@@ -25,14 +28,11 @@ from .pid import pid as pid
 from .pid_controller import PIDController as PIDController
 from .pid_table import PIDComparison as PIDComparison
 from .pid_table import compare_pid as compare_pid
-from .predictor import KalmanPredictor as KalmanPredictor
-from .predictor import PredictorLQR as PredictorLQR
-from .predictor import kalman_predictor as kalman_predictor
-from .predictor import lqg as lqg
-from .predictor import predictor_lqr as predictor_lqr
 from .process_model import ProcessModel as ProcessModel
 from .reduction import reduce_fopdt as reduce_fopdt
 from .reduction import reduce_sopdt as reduce_sopdt
+from .regulator import PredictorLQR as PredictorLQR
+from .regulator import predictor_lqr as predictor_lqr
 from .robustness import RobustnessCheck as RobustnessCheck
 from .robustness import UncertaintyBound as UncertaintyBound
 from .robustness import robust_stability as robust_stability
