@@ -169,7 +169,7 @@ def state():
         "print": np.get_printoptions(),
         "random": random.getstate(),
         "rcParams": dict(matplotlib.rcParams),
-        "backend": matplotlib.get_backend(auto_select=False),
+        "backend": matplotlib.rcParams._get_backend_or_none(),
         "filters": [str(f) for f in warnings.filters],
         "logging": (logging.root.level, len(logging.root.handlers)),
         "control": dict(control.config.defaults),
