@@ -82,7 +82,8 @@ def find_edges(values: FloatArray, spike_samples: int, min_share: float) -> list
         inner_span = _significant_range(inner, noise)
         if inner_span > 0.0:
             clean, span = inner, inner_span
-    threshold = max(min_share * span, 5 * noise)
+    # An edge of just the share counts, however it is rounded: a ramp is not cut to pieces.
+    threshold = max(min_share * span, 5 * noise) * (1 - 1e-9)
     width = spike_samples + 1
     # Level before and after each sample; an edge is where they differ.
     before, after = _side_medians(clean, width)

@@ -1,0 +1,89 @@
+"""The level and the drift of an output before its step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from ctrl_realize.numerics.rest import FEW, MIN_DRIFT_SAMPLES, rest_line
+
+
+def white(n, seed=0):
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+AFTER = np.linspace(5, 9, 40)
+
+
+@pytest.mark.parametrize("remove", [None, False])
+def test_a_steady_output_has_its_mean_as_level(remove):
+    before = 3 + 0.1 * white(400)
+    assert rest_line(before, AFTER, remove) == (pytest.approx(before.mean()), 0)
+
+
+@pytest.mark.parametrize("remove", [None, True])
+def test_a_drift_is_continued_to_the_step(remove):
+    k = np.arange(-400, 0)
+    level, slope = rest_line(3 + 0.002 * k + 0.01 * white(400), AFTER, remove)
+    # standard errors of a line through 400 samples: sigma sqrt(12 / n^3) and sigma sqrt(4 / n)
+    assert slope == pytest.approx(0.002, abs=4 * 0.01 * np.sqrt(12 / 400**3))
+    assert level == pytest.approx(3, abs=4 * 0.01 * np.sqrt(4 / 400))
+
+
+def test_a_drift_stays_where_it_is_to_stay():
+    before = 3 + 0.002 * np.arange(-400, 0)
+    assert rest_line(before, AFTER, False) == (pytest.approx(before.mean()), 0)
+
+
+def test_an_exact_line_is_a_drift_and_a_constant_is_none():
+    k = np.arange(-100, 0)
+    assert rest_line(2 + 0.5 * k, AFTER, None) == (pytest.approx(2), pytest.approx(0.5))
+    assert rest_line(np.full(100, 2.0), AFTER, None) == (2, 0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("pole", [0.0, 0.95])
+def test_noise_is_no_drift_white_or_coloured(seed, pole):
+    before = lfilter([1], [1, -pole], white(600, seed))
+    assert rest_line(before, AFTER, None)[1] == 0
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.8])
+def test_a_slope_of_ten_standard_errors_is_one(pole):
+    n = 600
+    noise = lfilter([1], [1, -pole], white(n, 3))
+    # white noise of the same density at zero frequency: sigma / (1 - pole)
+    error = 1 / (1 - pole) * np.sqrt(12 / n**3)
+    assert rest_line(noise + 10 * error * np.arange(-n, 0), AFTER, None)[1] > 5 * error
+    assert rest_line(noise + 2 * error * np.arange(-n, 0), AFTER, None)[1] == 0
+
+
+def test_few_samples_tell_no_drift_unless_it_is_asked_for():
+    line = 2 + 0.5 * np.arange(-(MIN_DRIFT_SAMPLES - 1), 0)
+    assert rest_line(line, AFTER, None) == (pytest.approx(line.mean()), 0)
+    assert rest_line(line, AFTER, True) == (pytest.approx(2), pytest.approx(0.5))
+    line = 2 + 0.5 * np.arange(-MIN_DRIFT_SAMPLES, 0)
+    assert rest_line(line, AFTER, None)[1] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("remove", [None, True, False])
+def test_with_fewer_samples_than_few_those_that_still_rest_are_added(remove):
+    before, after = np.full(FEW - 1, 2.0), np.r_[2.0, 3.0, 2.0, 2.0]
+    assert rest_line(before, after, remove) == (2, 0)
+    # the first sample that has moved ends it, and those behind do not come back
+    assert rest_line(np.full(2, 2.0), np.r_[2.0, 9.0, 2.0, 2.0], remove) == (2, 0)
+    assert rest_line(np.empty(0), np.r_[1.0, 40.0, 50.0, 61.0], remove) == (1, 0)
+
+
+def test_noise_at_rest_is_averaged_over_the_first_five():
+    values = 1 + 0.1 * white(50, 2)
+    level, slope = rest_line(np.empty(0), values, None)
+    assert (level, slope) == (pytest.approx(values[:5].mean()), 0)
+    assert rest_line(values[: FEW - 1], values[FEW - 1 :], None) == (pytest.approx(level), 0)
+
+
+def test_few_is_enough_for_a_mean():
+    before = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    assert before.size == FEW
+    assert rest_line(before, AFTER, None) == (3, 0)
