@@ -140,8 +140,8 @@ def run(row: Row, python: str, wheel: Path, copy: Path, workers: int, log: Path 
     if not Path(where).is_relative_to(environment):
         return Outcome("FAIL", f"imported from {where}", versions)
     done = call(
-        inside, "-m", "pytest", "-q", "-n", workers, "--dist", "worksteal",
-        "-p", "no:cacheprovider", "--durations", "25", "tests", "--pyargs", "ctrl_realize", cwd=copy,
+        inside, "-m", "pytest", "-q", "-n", workers, "--dist", "worksteal", "--durations", "25",
+        "-p", "no:cacheprovider", "tests", "--pyargs", "ctrl_realize", cwd=copy,
     )  # fmt: skip
     if log is not None:
         log.mkdir(parents=True, exist_ok=True)
