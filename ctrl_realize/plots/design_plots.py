@@ -7,6 +7,8 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from ..checks import positive
@@ -18,7 +20,6 @@ from ..design.pid_table import PIDComparison
 from ..design.process_model import ProcessModel
 from . import style
 
-HERTZ = 2 * np.pi
 NYQUIST_SPAN = 2.5
 """Half width of the Nyquist plot, in units of the distance from 0 to -1."""
 
@@ -41,7 +42,7 @@ def margins_plot(
     control.ControlPlot
     """
     omega, values = found.response
-    frequency = omega / HERTZ
+    frequency = omega / style.HERTZ
     phase = np.degrees(np.unwrap(np.angle(values)))
     with style.context():
         gain_ax, phase_ax, nyquist = style.axes_for(
@@ -64,7 +65,7 @@ def margins_plot(
         shown = omega <= top
         low_end = max(float(omega[0]), top / 1e4)
         for axes in (gain_ax, phase_ax):
-            axes.set_xlim(low_end / HERTZ, min(top, float(omega[-1])) / HERTZ)
+            axes.set_xlim(low_end / style.HERTZ, min(top, float(omega[-1])) / style.HERTZ)
         phase_ax.set_ylim(float(phase[shown].min()) - 20, float(phase[shown].max()) + 20)
         verdict = "stable" if found.stable else "UNSTABLE"
         return style.finished(
@@ -79,7 +80,7 @@ def margins_plot(
 
 def _mark_gain_margin(axes: Any, found: Margins) -> None:
     if np.isfinite(found.phase_crossover) and found.phase_crossover > 0:
-        at = found.phase_crossover / HERTZ
+        at = found.phase_crossover / style.HERTZ
         level = float(style.decibel(np.array([1 / found.gain_margin]))[0])
         label = f"gain margin {found.gain_margin:.3g}"
         axes.plot([at, at], [0, level], color=style.TRUTH, marker="o", label=label)
@@ -88,7 +89,7 @@ def _mark_gain_margin(axes: Any, found: Margins) -> None:
 def _mark_phase_margin(axes: Any, found: Margins, frequency: Any, phase: Any) -> None:
     if not np.isfinite(found.gain_crossover):
         return
-    at = found.gain_crossover / HERTZ
+    at = found.gain_crossover / style.HERTZ
     here = float(np.interp(at, frequency, phase))
     level = here - found.phase_margin
     label = f"phase margin {found.phase_margin:.3g}°"
@@ -135,8 +136,8 @@ def pid_comparison_plot(
     -------
     control.ControlPlot
     """
-    with style.context():
-        (axes,) = style.axes_for(ax)
+
+    def draw(axes: Axes) -> list[Line2D]:
         lines = []
         kinds = sorted({c.kind for c in found.controllers})
         for number, kind in enumerate(kinds):
@@ -162,9 +163,9 @@ def pid_comparison_plot(
         axes.set(xlabel="sensitivity peak Ms", ylabel="integrated absolute load error [s]")
         axes.margins(x=0.15)
         axes.set_ylim(bottom=0)
-        return style.finished(
-            [axes], [lines], title=title or "Tuning rules on this plant", own_figure=ax is None
-        )
+        return lines
+
+    return style.in_one(ax, title or "Tuning rules on this plant", draw)
 
 
 def hankel_plot(
@@ -182,8 +183,8 @@ def hankel_plot(
     -------
     control.ControlPlot
     """
-    with style.context():
-        (axes,) = style.axes_for(ax)
+
+    def draw(axes: Axes) -> list[Line2D]:
         number = np.arange(1, found.singular_values.size + 1)
         values = np.maximum(found.singular_values, 1e-300)
         kept = found.order - found.kept_unstable
@@ -192,9 +193,9 @@ def hankel_plot(
         lines += axes.semilogy(number[kept:], values[kept:], "o", color=style.NOISE, label=label)
         axes.set(xlabel="number", ylabel="Hankel singular value")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        return style.finished(
-            [axes], [lines], title=title or "Balanced truncation", own_figure=ax is None
-        )
+        return lines
+
+    return style.in_one(ax, title or "Balanced truncation", draw)
 
 
 def process_model_plot(
@@ -212,8 +213,8 @@ def process_model_plot(
     -------
     control.ControlPlot
     """
-    with style.context():
-        (axes,) = style.axes_for(ax)
+
+    def draw(axes: Axes) -> list[Line2D]:
         span = model.dead_time + 6 * (model.lag + model.second_lag) + (model.lag == 0)
         time = np.linspace(0, span, 600)
         factor, unit = style.time_unit(span, axes)
@@ -224,9 +225,9 @@ def process_model_plot(
             label=style.plain(repr(model)[14:-1]),
         )
         axes.set(xlabel=f"time [{unit}]", ylabel="step response")
-        return style.finished(
-            [axes], [lines], title=title or "Process model", own_figure=ax is None
-        )
+        return lines
+
+    return style.in_one(ax, title or "Process model", draw)
 
 
 def closed_loop_plot(

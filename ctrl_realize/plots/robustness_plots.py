@@ -6,12 +6,12 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from ..design.delay_robustness import DelayRobustness
 from ..design.robustness import RobustnessCheck, UncertaintyBound
 from . import style
-
-HERTZ = 2 * np.pi
 
 
 def delay_robustness_plot(
@@ -29,8 +29,8 @@ def delay_robustness_plot(
     -------
     control.ControlPlot
     """
-    with style.context():
-        (axes,) = style.axes_for(ax)
+
+    def draw(axes: Axes) -> list[Line2D]:
         times = found.dead_times
         factor, unit = style.time_unit(float(times.max()), axes)
         low, high = found.dead_time_interval
@@ -48,9 +48,9 @@ def delay_robustness_plot(
             )
         axes.set(xlabel=f"dead time of the plant [{unit}]", ylabel="modulus margin")
         axes.set_ylim(bottom=0)
-        return style.finished(
-            [axes], [lines], title=title or "Robustness to the dead time", own_figure=ax is None
-        )
+        return lines
+
+    return style.in_one(ax, title or "Robustness to the dead time", draw)
 
 
 def uncertainty_plot(
@@ -68,9 +68,9 @@ def uncertainty_plot(
     -------
     control.ControlPlot
     """
-    with style.context():
-        (axes,) = style.axes_for(ax)
-        hertz = found.omega / HERTZ
+
+    def draw(axes: Axes) -> list[Line2D]:
+        hertz = found.omega / style.HERTZ
         lines = _positive_loglog(axes, hertz, found.bound, color=style.MODEL, label="bound")
         lines += _positive_loglog(
             axes, hertz, found.spread, color=style.MEASURED, label="spread of the systems"
@@ -80,9 +80,9 @@ def uncertainty_plot(
         )
         axes.axhline(1, color=style.INPUT, linewidth=1)
         axes.set(xlabel="frequency [Hz]", ylabel="relative error")
-        return style.finished(
-            [axes], [lines], title=title or "Multiplicative uncertainty", own_figure=ax is None
-        )
+        return lines
+
+    return style.in_one(ax, title or "Multiplicative uncertainty", draw)
 
 
 def robustness_plot(
@@ -100,10 +100,10 @@ def robustness_plot(
     -------
     control.ControlPlot
     """
-    with style.context():
-        (axes,) = style.axes_for(ax)
+
+    def draw(axes: Axes) -> list[Line2D]:
         bound = found.uncertainty
-        hertz = bound.omega / HERTZ
+        hertz = bound.omega / style.HERTZ
         lines = _positive_loglog(axes, hertz, found.complementary, color=style.MODEL, label="|T|")
         with np.errstate(divide="ignore"):
             ceiling = 1 / bound.bound
@@ -111,12 +111,14 @@ def robustness_plot(
         lines += _positive_loglog(
             axes, hertz[keep], ceiling[keep], color=style.BAND, label="1 / uncertainty"
         )
-        at = found.omega_critical / HERTZ
+        at = found.omega_critical / style.HERTZ
         axes.axvline(at, color=style.INPUT, linewidth=1, label=f"margin {found.margin:.3g}")
         axes.set(xlabel="frequency [Hz]", ylabel="magnitude")
         axes.set_ylim(bottom=max(1e-4, float(found.complementary.min())))
-        word = "Robustly stable" if found.robust else "Robust stability not guaranteed"
-        return style.finished([axes], [lines], title=title or word, own_figure=ax is None)
+        return lines
+
+    word = "Robustly stable" if found.robust else "Robust stability not guaranteed"
+    return style.in_one(ax, title or word, draw)
 
 
 def _positive_loglog(axes: Any, x: Any, y: Any, **style_: Any) -> list[Any]:

@@ -6,7 +6,7 @@ with any kind of colour vision tell apart; models are dashed as well, for print 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from textwrap import wrap
 from typing import Any
@@ -35,6 +35,9 @@ INK = "#1f2328"
 GRID = "#d9dde2"
 PAPER = "#fefefe"
 """INK, GRID and PAPER are used for nothing else, so that a report can swap them in the dark."""
+
+HERTZ = 2 * np.pi
+"""rad/s in one Hz."""
 
 DASHES = ((0, (5, 1.6)), (0, (2, 1.2)), (0, (7, 1.5, 1.5, 1.5)), (0, (1, 1)), (0, (9, 2)))
 """Line styles of models, the first for the first model."""
@@ -192,6 +195,22 @@ def finished(
         axes[0].figure,
         legend=legend_array.reshape(shape),
     )
+
+
+def in_one(ax: AxesLike, title: str, draw: Callable[[Axes], Sequence[Line2D]]) -> ct.ControlPlot:
+    """Draw a plot that needs a single pair of axes: those given, or new ones.
+
+    Parameters
+    ----------
+    ax : None, Axes or Figure
+    title : str
+        Put on only where the figure is new.
+    draw : callable
+        Takes the axes and returns the lines of the plot.
+    """
+    with context():
+        (axes,) = axes_for(ax)
+        return finished([axes], [draw(axes)], title=title, own_figure=ax is None)
 
 
 def time_unit(largest: float, axes: Axes | None = None) -> tuple[float, str]:

@@ -1,0 +1,84 @@
+"""The toolbox's style: on its own figures, and nowhere else."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import ctrl_realize as cr
+from ctrl_realize.errors import OptionError
+from ctrl_realize.plots import style
+
+
+@pytest.fixture(autouse=True)
+def settings_of_the_session():
+    with mpl.rc_context():
+        yield
+    plt.close("all")
+
+
+@pytest.fixture
+def comparison():
+    plant = cr.delayed_ss(cr.bench.valve().truth.core, 37, dt=7.8125e-4)
+    return cr.design.compare_pid(plant, ["simc"])
+
+
+def test_the_style_holds_inside_and_the_users_settings_are_back_behind():
+    mine = {"font.size": 7.5, "lines.linewidth": 0.3, "axes.grid": False, "text.color": "#123456"}
+    mpl.rcParams.update(mine)
+    before = dict(mpl.rcParams)
+    with style.context():
+        assert mpl.rcParams["font.size"] == 12
+        assert mpl.rcParams["axes.grid"]
+    assert {key: mpl.rcParams[key] for key in mine} == mine
+    assert dict(mpl.rcParams) == before
+
+
+def test_the_users_settings_are_back_after_an_error():
+    before = dict(mpl.rcParams)
+
+    def fails(axes):
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        style.in_one(None, "never", fails)
+    assert dict(mpl.rcParams) == before
+
+
+def test_what_others_switch_inside_stays_switched():
+    # A notebook's backend becomes interactive with the first figure, and must stay so.
+    mpl.rcParams["interactive"] = False
+    with style.context():
+        mpl.rcParams["interactive"] = True
+    assert mpl.rcParams["interactive"]
+
+
+def test_a_figure_of_the_user_after_a_plot_looks_as_before_it(comparison):
+    mpl.rcParams.update({"lines.linewidth": 0.7, "axes.labelsize": 5.0})
+    comparison.plot()
+    axes = plt.figure().subplots()
+    (line,) = axes.plot([0, 1])
+    axes.set_xlabel("mine")
+    assert line.get_linewidth() == 0.7
+    assert axes.xaxis.label.get_size() == 5.0
+    assert axes.spines["top"].get_visible()
+
+
+def test_a_plot_of_one_axes_goes_where_it_is_told():
+    def draw(axes):
+        return axes.plot(np.arange(3.0), label="line")
+
+    new = style.in_one(None, "title", draw)
+    assert new.axes[0, 0].get_title(loc="left") == "title"
+    figure = Figure()
+    given = figure.subplots()
+    inside = style.in_one(given, "title", draw)
+    # The title of a figure that the user made is the user's.
+    assert inside.figure is figure
+    assert inside.axes[0, 0].get_title(loc="left") == ""
+    assert [line.get_label() for line in inside.lines[0, 0]] == ["line"]
+    with pytest.raises(OptionError, match="needs 1"):
+        style.in_one([given, given], "title", draw)
