@@ -4,6 +4,7 @@
     python3 tools/matrix.py                            every row
     python3 tools/matrix.py oldest-3.11 slycot-3.11    only these
     python3 tools/matrix.py --list                     which rows there are, and their Pythons
+    python3 tools/matrix.py --quick                    without fuzz lane, notebooks, slow tests
 
 A row is a set of packages on one Python. The wheel is built once; the package's sources are then
 taken out of the copy that holds the tests, so what passes is what a user installs. A Python is
@@ -25,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+QUICK = ("-m", "not slow", "--ignore", "tests/fuzz", "--ignore", "tests/test_notebooks.py")
 OLDEST = ROOT / "tools" / "oldest.txt"
 RUNNERS = ["pytest>=8.2", "pytest-xdist", "hypothesis", "mpmath", "nbclient", "ipykernel"]
 GENERATED = shutil.ignore_patterns(
@@ -122,14 +124,16 @@ def install(row: Row, python: str, wheel: Path, folder: Path) -> tuple[Path, str
     if made.returncode:
         return inside, made.stdout + made.stderr
     done = call(
-        inside, "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
+        inside, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile",
         f"{wheel}{row.extras}", *row.packages, cwd=wheel.parent,
     )  # fmt: skip
     return inside, done.stderr if done.returncode else ""
 
 
-def run(row: Row, python: str, wheel: Path, copy: Path, workers: int, log: Path | None) -> Outcome:
-    """Install the wheel, check that it is the one that is imported, run the tests."""
+def run(
+    row: Row, python: str, wheel: Path, copy: Path, options: tuple[object, ...], log: Path | None
+) -> Outcome:
+    """Install the wheel, check that it is the one that is imported, run pytest with options."""
     started = time.monotonic()
     environment = wheel.parent / row.name
     inside, trouble = install(row, python, wheel, environment)
@@ -140,7 +144,7 @@ def run(row: Row, python: str, wheel: Path, copy: Path, workers: int, log: Path 
     if not Path(where).is_relative_to(environment):
         return Outcome("FAIL", f"imported from {where}", versions)
     done = call(
-        inside, "-m", "pytest", "-q", "-n", workers, "--dist", "worksteal", "--durations", "25",
+        inside, "-m", "pytest", "-q", *options, "--dist", "worksteal", "--durations", "25",
         "-p", "no:cacheprovider", "tests", "--pyargs", "ctrl_realize", cwd=copy,
     )  # fmt: skip
     if log is not None:
@@ -173,6 +177,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("rows", nargs="*", help="names of rows; all without")
     parser.add_argument("--list", action="store_true", help="name the rows and their Pythons")
+    parser.add_argument("--quick", action="store_true", help="leave the longest tests out")
     parser.add_argument("--workers", type=int, default=2, help="test processes (2)")
     parser.add_argument("--log", type=Path, help="folder for the full output of each row")
     asked = parser.parse_args()
@@ -185,6 +190,7 @@ def main() -> None:
         for row in rows:
             print(f"{row.name:12} {pythons[row.minor] or 'absent'}")
         return
+    options = ("-n", asked.workers, *(QUICK if asked.quick else ()))
     outcomes: dict[str, Outcome] = {}
     with tempfile.TemporaryDirectory() as temporary:
         wheel, copy = snapshot(Path(temporary))
@@ -193,7 +199,7 @@ def main() -> None:
             if python is None:
                 outcomes[row.name] = Outcome("skip", f"Python 3.{row.minor} is absent")
             else:
-                outcomes[row.name] = run(row, python, wheel, copy, asked.workers, asked.log)
+                outcomes[row.name] = run(row, python, wheel, copy, options, asked.log)
             print(f"{outcomes[row.name].word}  {row.name}: {outcomes[row.name].text}", flush=True)
     print(f"\n{table(outcomes)}")
     sys.exit(any(outcome.word == "FAIL" for outcome in outcomes.values()))
