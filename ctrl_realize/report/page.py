@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -83,12 +85,17 @@ def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) ->
 def render(page: Page) -> str:
     """Write a page as HTML; all text of it is escaped."""
     folder = resources.files("ctrl_realize.report") / "templates"
-    template = (folder / "report.html.j2").read_text(encoding="utf-8")
-    environment = Environment(
-        loader=DictLoader({"report": template}), autoescape=True, undefined=StrictUndefined
+    html, css, js = (
+        (folder / name).read_text(encoding="utf-8")
+        for name in ("report.html.j2", "report.css", "report.js")
     )
-    css = Markup((folder / "report.css").read_text(encoding="utf-8"))
-    return environment.get_template("report").render(page=page, css=css) + "\n"
+    environment = Environment(
+        loader=DictLoader({"report": html}), autoescape=True, undefined=StrictUndefined
+    )
+    # The page allows this script and no other, whatever came with the data.
+    digest = base64.b64encode(hashlib.sha256(js.encode("utf-8")).digest()).decode("ascii")
+    template = environment.get_template("report")
+    return template.render(page=page, css=Markup(css), js=Markup(js), js_digest=digest) + "\n"
 
 
 def write_page(path: str | os.PathLike[str], page: Page) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import warnings
 from collections.abc import Callable, Iterator
@@ -11,7 +12,9 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator
 
 from ..numerics.arrays import FloatArray
 from ..plots import style
@@ -130,10 +133,42 @@ def inline_svg(figure: Figure, key: str, description: str) -> str:
         figure.savefig(
             buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None}
         )
-    return _at_home(buffer.getvalue(), key, description)
+    return _at_home(buffer.getvalue(), key, description, scales(figure))
 
 
-def _at_home(document: str, key: str, description: str) -> str:
+def scales(figure: Figure) -> str:
+    """Write where the axes of a figure are and what they show, for reading values off: JSON.
+
+    For each axes its box (left, top, width, height in the drawing's points), and for x and y the
+    values at its ends, whether the scale is logarithmic, and the unit; None where an axis carries
+    names instead of values.
+    """
+    wide, high = 72 * figure.get_figwidth(), 72 * figure.get_figheight()
+    found = []
+    for axes in figure.axes:
+        part = axes.get_position()
+        box = (part.x0 * wide, (1 - part.y1) * high, part.width * wide, part.height * high)
+        across = axes.get_shared_x_axes().get_siblings(axes)
+        found.append(
+            {
+                "box": [round(float(length), 2) for length in box],
+                "x": _scale(axes.xaxis, axes.get_xlim(), [one.get_xlabel() for one in across]),
+                "y": _scale(axes.yaxis, axes.get_ylim(), [axes.get_ylabel()]),
+            }
+        )
+    return json.dumps(found)
+
+
+def _scale(axis: Axis, ends: tuple[float, float], labels: list[str]) -> list[Any] | None:
+    if isinstance(axis.get_major_locator(), FixedLocator):
+        return None
+    units = [re.search(r"\[([^\]]*)\]$", label) for label in labels]
+    unit = next((found[1] for found in units if found), "")
+    low, high = (float(f"{end:.9g}") for end in ends)
+    return [low, high, axis.get_scale() == "log", unit]
+
+
+def _at_home(document: str, key: str, description: str, data: str) -> str:
     body = document[document.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, count=1, flags=re.DOTALL)
@@ -146,7 +181,10 @@ def _at_home(document: str, key: str, description: str) -> str:
     # Hundredths of a point are finer than any printer.
     body = re.sub(r'(?<= )(d|x|y|transform)="[^"]*"', _rounded, body)
     body = re.sub(r"\s*\n\s*", " ", body)
-    head = f'<svg role="img" aria-label="{_attribute(description)}" class="plot" '
+    head = (
+        f'<svg role="img" aria-label="{_attribute(description)}" class="plot" '
+        f'data-axes="{_attribute(data)}" '
+    )
     return re.sub(
         r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" ', head, body, count=1
     ).replace('xmlns="http://www.w3.org/2000/svg" ', "", 1)

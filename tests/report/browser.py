@@ -111,6 +111,32 @@ class Browser:
         """Run a script that returns something."""
         return self._ask("POST", "/execute/sync", {"script": script, "args": []})
 
+    def click(self, selector: str) -> None:
+        """Click on the first element that fits, as a hand would."""
+        found = self._ask("POST", "/element", {"using": "css selector", "value": selector})
+        (element,) = found.values()
+        self._ask("POST", f"/element/{element}/click", {})
+
+    def press(self, *keys: str) -> None:
+        """Press keys one after the other, for what has the focus."""
+        strokes = [{"type": kind, "value": key} for key in keys for kind in ("keyDown", "keyUp")]
+        source = {"type": "key", "id": "keyboard", "actions": strokes}
+        self._ask("POST", "/actions", {"actions": [source]})
+
+    def drag(self, start: tuple[int, int], end: tuple[int, int]) -> None:
+        """Drag with the mouse from one point of the window to another."""
+        to_start, to_end = (
+            {"type": "pointerMove", "x": x, "y": y, "duration": 0} for x, y in (start, end)
+        )
+        press, release = ({"type": f"pointer{way}", "button": 0} for way in ("Down", "Up"))
+        mouse = {
+            "type": "pointer",
+            "id": "mouse",
+            "parameters": {"pointerType": "mouse"},
+            "actions": [to_start, press, to_end, release],
+        }
+        self._ask("POST", "/actions", {"actions": [mouse]})
+
     def complaints(self) -> list[str]:
         """Everything that the console has been told since the last call."""
         return [entry["message"] for entry in self._ask("POST", "/se/log", {"type": "browser"})]

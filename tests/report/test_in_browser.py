@@ -52,8 +52,11 @@ def pages(tmp_path_factory):
     return {"one": (one, 7), "many": (many, 4)}
 
 
+in_a_browser = pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing()))
+
+
 @pytest.mark.browser
-@pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing()))
+@in_a_browser
 @pytest.mark.parametrize(
     ("width", "height", "dark"), [(1280, 900, False), (375, 800, False), (375, 800, True)]
 )
@@ -77,3 +80,56 @@ def test_a_report_shows_every_figure_without_overflow_or_error(
             light = "rgb(255, 255, 255)"
             assert (seen["background"] == light) is not dark
             assert seen["ink"] != seen["background"]
+
+
+VIEW = "return document.querySelector('svg.plot').getAttribute('viewBox').split(' ').map(Number);"
+MIDDLE = """
+const svg = document.querySelector('svg.plot');
+svg.scrollIntoView({block: 'center'});
+const box = svg.getBoundingClientRect();
+return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)];
+"""
+READ = "return document.querySelector('.tools output').textContent;"
+ARROW_RIGHT = "\ue014"
+
+
+@pytest.mark.browser
+@in_a_browser
+def test_figures_zoom_by_button_key_and_hand_and_are_whole_on_paper(tmp_path, pages):
+    with browser.Browser(tmp_path, 1280, 900) as window:
+        window.open(pages["one"][0])
+        whole = window.run(VIEW)
+        assert whole[2] > 300
+        window.click(".tools button[aria-label=closer]")
+        near = window.run(VIEW)
+        assert near[2] == pytest.approx(whole[2] / 1.5)
+        assert near[3] / near[2] == pytest.approx(whole[3] / whole[2])
+        window.press(ARROW_RIGHT)  # the button that was clicked has the focus
+        assert window.run(VIEW)[0] == pytest.approx(near[0] + near[2] / 8)
+        before = window.run(VIEW)
+        x, y = window.run(MIDDLE)
+        window.drag((x, y), (x + 60, y))
+        assert window.run(VIEW)[0] < before[0]
+        window.press("-", "-")
+        assert window.run(VIEW) == pytest.approx(whole)
+        window.press("+")
+        window.run("dispatchEvent(new Event('beforeprint')); return 0;")
+        assert window.run(VIEW) == pytest.approx(whole)
+        # Where the pointer is, a time and a value are read off.
+        window.drag((x, y), (x + 1, y + 1))
+        assert " ms, " in window.run(READ)
+        assert window.complaints() == []
+
+
+@pytest.mark.browser
+@in_a_browser
+def test_the_page_runs_its_own_script_and_no_other(tmp_path, pages):
+    text = pages["one"][0].read_text(encoding="utf-8")
+    foreign = tmp_path / "foreign.html"
+    script = "<script>document.title = 'taken'</script></body>"
+    foreign.write_text(text.replace("</body>", script), encoding="utf-8")
+    with browser.Browser(tmp_path, 800, 600) as window:
+        window.open(foreign)
+        assert window.run("return document.title;") != "taken"
+        assert any("Content Security Policy" in line for line in window.complaints())
+        assert window.run("return document.querySelectorAll('.tools').length;") == 7
