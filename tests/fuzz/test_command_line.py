@@ -7,40 +7,42 @@ import io
 import shutil
 from pathlib import Path
 
+import control as ct
+import numpy as np
 import pytest
-from hypothesis import event, given
-from hypothesis import strategies as st
 
+import ctrl_realize as cr
 from ctrl_realize.cli import main
-from tests.fuzz.lane import fuzz, good_end
-from tests.fuzz.test_text_files import mutations, tables
+from tests.fuzz.draws import any_bytes, any_text, generator, some, sometimes
+from tests.fuzz.lane import ends, fuzz, good_end
+from tests.fuzz.test_text_files import any_table, frf_table, mutated
 
-WORDS = st.one_of(
-    st.sampled_from(
+ODD_WORDS = (
         ["", "-", "--", "-x", "0", "-1", "1e999", "nan", "999999999999", "auto", "ms", "..", "a b",
          "--method", "scan", "paper", "--help", "--version", "identify", "compare", "\ud800",
          "{x}", "%s", "$HOME", "*.csv", "record.csv", "model.json", "/dev/zero", "\0", "ü" * 300]
-    ),
-    st.text(max_size=6),
 )  # fmt: skip
-OPTIONS = st.lists(
-    st.one_of(
-        st.tuples(st.just("--method"), st.sampled_from(["scan", "paper", "none"])),
-        st.tuples(st.just("--order"), st.sampled_from(["1", "0", "-3", "50", "x", "1.5"])),
-        st.tuples(st.just("--max-delay"), st.sampled_from(["1", "0", "99999", "-1", "inf"])),
-        st.tuples(st.just("--dt"), st.sampled_from(["1", "0", "-1", "nan", "1e-320", "inf"])),
-        st.tuples(st.just("--time"), WORDS),
-        st.tuples(st.just("--input"), WORDS),
-        st.tuples(st.just("--delimiter"), WORDS),
-        st.tuples(st.just("--decimal"), WORDS),
-        st.tuples(st.just("--skip-rows"), st.sampled_from(["0", "3", "10000000000"])),
-        st.tuples(st.just("--jobs"), st.sampled_from(["1", "0", "x"])),
-        st.tuples(st.just("--frf"), st.sampled_from(["record.csv", "nothing.csv", "."])),
-        st.tuples(st.just("--resample")),
-        st.tuples(st.just("--separate")),
-    ),
-    max_size=3,
-)
+
+
+def any_word(rng):
+    return rng.choice(ODD_WORDS) if rng.randrange(2) else any_text(rng, 6)
+
+
+OPTIONS = [
+    lambda rng: ("--method", rng.choice(["scan", "paper", "none"])),
+    lambda rng: ("--order", rng.choice(["1", "0", "-3", "50", "x", "1.5"])),
+    lambda rng: ("--max-delay", rng.choice(["1", "0", "99999", "-1", "inf"])),
+    lambda rng: ("--dt", rng.choice(["1", "0", "-1", "nan", "1e-320", "inf"])),
+    lambda rng: ("--time", any_word(rng)),
+    lambda rng: ("--input", any_word(rng)),
+    lambda rng: ("--delimiter", any_word(rng)),
+    lambda rng: ("--decimal", any_word(rng)),
+    lambda rng: ("--skip-rows", rng.choice(["0", "3", "10000000000"])),
+    lambda rng: ("--jobs", rng.choice(["1", "0", "x"])),
+    lambda rng: ("--frf", rng.choice(["record.csv", "nothing.csv", "."])),
+    lambda rng: ("--resample",),
+    lambda rng: ("--separate",),
+]
 
 
 def run(arguments: list[str]) -> tuple[int, str]:
@@ -52,7 +54,7 @@ def run(arguments: list[str]) -> tuple[int, str]:
 
 
 def check(code: int, complaints: str, output: Path) -> None:
-    event(f"exit code {code}")
+    ends[f"exit code {code}"] += 1
     assert code in (0, 1, 2)
     assert "Traceback" not in complaints
     if code == 2:
@@ -67,39 +69,60 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("cli")
 
 
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    file = tmp_path_factory.mktemp("model") / "model.json"
+    cr.save_model(file, cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.05), 3))
+    return file.read_bytes()
+
+
+def step_table(rng) -> bytes:
+    """Sixty good samples of a step, one cell of them out of order at times."""
+    k = np.arange(60)
+    y = 1 - 0.8 ** np.clip(k - 15 - rng.randint(0, 5), 0, None)
+    y = y + rng.choice([0.0, 1e-3]) * generator(rng).standard_normal(60)
+    rows = [f"{t / 10:g},{float(t >= 15):g},{v:.6f}" for t, v in zip(k, y, strict=True)]
+    if sometimes(rng, 3):
+        rows[rng.randrange(60)] = any_text(rng, 8)
+    return "\n".join(["t,u,y", *rows]).encode()
+
+
 @fuzz(40)
-@given(st.one_of(tables(), mutations(), st.binary(max_size=60)), OPTIONS)
-def test_identify_ends_in_an_exit_code_and_one_complaint(folder, content, options):
+def test_identify_ends_in_an_exit_code_and_one_complaint(rng, folder):
+    content = rng.choice([any_table, mutated, lambda r: any_bytes(r, 60), step_table])(rng)
     (folder / "record.csv").write_bytes(content)
     output = folder / "out"
     shutil.rmtree(output, ignore_errors=True)
-    arguments = [word for option in options for word in option]
-    with contextlib.chdir(folder), good_end(seconds=60) as ends:
+    arguments = [word for option in some(rng, rng.choice(OPTIONS), 3) for word in option]
+    with contextlib.chdir(folder), good_end(seconds=60) as codes:
         method = [] if "--method" in arguments else ["--method", "scan"]
-        ends.append(run(["identify", "record.csv", "-o", "out", *method, *arguments]))
-    assert ends, "an error was not caught"
-    check(*ends[0], output)
+        codes.append(run(["identify", "record.csv", "-o", "out", *method, *arguments]))
+    assert codes, "an error was not caught"
+    check(*codes[0], output)
     assert {path.name for path in folder.iterdir()} <= {"record.csv", "out"}
 
 
 @fuzz(40)
-@given(st.binary(max_size=80), st.binary(max_size=80), st.lists(WORDS, max_size=3))
-def test_compare_ends_in_an_exit_code_and_one_complaint(folder, model, frf, words):
-    (folder / "model.json").write_bytes(model)
-    (folder / "frf.csv").write_bytes(frf)
-    with contextlib.chdir(folder), good_end(seconds=60) as ends:
-        ends.append(run(["compare", "model.json", "frf.csv", *words]))
-    assert ends, "an error was not caught"
-    assert ends[0][0] in (0, 2)
+def test_compare_ends_in_an_exit_code_and_one_complaint(rng, folder, model):
+    good = rng.randrange(4)
+    (folder / "model.json").write_bytes(model if good else any_bytes(rng, 80))
+    (folder / "frf.csv").write_bytes(rng.choice([frf_table, lambda r: any_bytes(r, 80)])(rng))
+    words = some(rng, any_word, 1 if good else 3)
+    with contextlib.chdir(folder), good_end(seconds=60) as codes:
+        codes.append(run(["compare", "model.json", "frf.csv", *words]))
+    assert codes, "an error was not caught"
+    ends[f"exit code {codes[0][0]}"] += 1
+    assert codes[0][0] in (0, 2)
     for name in ("model.json", "frf.csv"):
         (folder / name).unlink()
 
 
 @fuzz(60)
-@given(st.lists(WORDS, max_size=4))
-def test_any_words_end_in_an_exit_code(folder, words):
+def test_any_words_end_in_an_exit_code(rng, folder):
     # "demo" is not among the words: it has nothing to refuse, and takes its time
-    with contextlib.chdir(folder), good_end(seconds=60) as ends:
-        ends.append(run(words))
-    assert ends, "an error was not caught"
-    assert ends[0][0] in (0, 2)
+    words = some(rng, any_word, 4)
+    with contextlib.chdir(folder), good_end(seconds=60) as codes:
+        codes.append(run(words))
+    assert codes, "an error was not caught"
+    ends[f"exit code {codes[0][0]}"] += 1
+    assert codes[0][0] in (0, 2)
