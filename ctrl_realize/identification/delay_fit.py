@@ -14,7 +14,7 @@ from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.output_error import OutputErrorFit, fit_output_error
-from ..numerics.sampled_fit import fit_sampled
+from ..numerics.sampled_fit import MOST_SAMPLES, fit_sampled
 from ..numerics.separable_fit import KnownFactor, Structure
 from ..numerics.step_problem import StepData, bare_data, step_data
 from ..signals import Record, StepEdge
@@ -39,6 +39,7 @@ _ALONE = (
     "them together in impulse_from_io"
 )
 _DWELL = 3  # times the first motion: steps that follow faster hide each other's onset
+_LEAST_MOVE = 1e-70  # squares of less underflow
 
 
 def fit_delay(
@@ -150,6 +151,13 @@ def _fit_one(
         flags = fit_flags(data, fit, limit)
         return summarise(fit, data, record.time, (record,), flags), fit
     signal, output = np.ravel(record.input), np.ravel(record.output)
+    for name, values in (("input", signal), ("output", output)):
+        moves = float(np.ptp(values[:MOST_SAMPLES]))
+        if moves < _LEAST_MOVE:
+            raise DataError(
+                f"the {name} of record {record.name!r} moves by {moves:.3g} in its first "
+                f"{MOST_SAMPLES} samples: there is nothing to fit"
+            )
     fit = fit_sampled(output, signal, record.dt, latest=latest, **settings)
     n = fit.fitted.size
     flags = sampled_flags(fit, record.dt, n * record.dt, limit)
@@ -204,6 +212,12 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
             raise DataError(
                 f"record {record.name!r} has {record.n_samples} samples; a fit of delay, gain and "
                 f"lags needs at least {FEWEST_SAMPLES}"
+            )
+        moves = float(np.ptp(record.output))
+        if moves < _LEAST_MOVE:
+            raise DataError(
+                f"the output of record {record.name!r} does not leave its rest level: it moves by "
+                f"{moves:.3g} in all"
             )
         if not record.issiso:
             raise DataError(

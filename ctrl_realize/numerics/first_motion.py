@@ -98,6 +98,8 @@ def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:
     if not higher.size:
         return float(crossing)
     second = crossing + max(int(higher[0]), 1)
+    if second >= rise.size:
+        return float(crossing)
     low, high = float(rise[crossing]), float(rise[second])
     if high <= low:
         return float(crossing)

@@ -74,7 +74,8 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     if before.size < _MANY:
         # A dozen samples tell sigma to a factor of two: the settled half of the record helps.
         settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
-        sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
+        if settled.size:
+            sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
     error = sigma * np.sqrt(12 / before.size**3)
     known = before.size > 0.05 * (record.size - before.size)
     return sigma, float(slope) if known and abs(slope) > 5 * error else 0.0

@@ -104,3 +104,40 @@ def test_a_short_exact_step_gives_an_impulse_response_or_one_of_our_errors(sampl
         results.append(cr.impulse_from_io(cr.Record(np.arange(float(samples)), u, y), length))
     for impulse in results:
         assert np.isfinite(impulse.markov).all()
+
+
+@pytest.mark.parametrize("level", [0.0, 5.0, 1e6])
+@pytest.mark.parametrize("height", [0.0, 1e-200])
+def test_an_output_that_stays_where_it_is_is_not_fitted(level, height):
+    # a misfit relative to a noise level of 0: ZeroDivisionError, for any input that is no step
+    u = np.random.default_rng(0).choice([-1.0, 1.0], 100)
+    y = level + height * np.cumsum(u)
+    with pytest.raises(DataError, match="does not leave its rest level: it moves by"):
+        cr.identify(cr.Record(np.arange(100.0), u, y))
+
+
+@pytest.mark.parametrize("still", ["input", "output"])
+def test_what_stays_for_as_long_as_the_fit_looks_is_not_fitted(still):
+    # the fit takes the first 4000 samples: what they do not move in is as good as constant
+    u = np.random.default_rng(0).choice([-1.0, 1.0], 4500)
+    y = np.convolve(u, 0.1 * 0.9 ** np.arange(50))[: u.size]
+    {"input": u, "output": y}[still][:4200] = 0.0
+    with pytest.raises(DataError, match=f"the {still} of record 'r' moves by 0 in its first 4000"):
+        cr.identify(cr.Record(np.arange(4500.0), u, y, name="r"))
+
+
+def test_an_output_that_moves_at_its_last_sample_alone_is_fitted_or_refused():
+    # the line back to the rest level was drawn through a sample behind the end
+    u = (np.arange(60) >= 44).astype(float)
+    y = np.where(np.arange(60) == 59, 1.0, 0.0)
+    with good_end() as models:
+        models.append(cr.identify(cr.Record(np.arange(60.0), u, y)))
+
+
+@pytest.mark.parametrize("edge", [18, 19, 20, 21])
+def test_a_step_near_the_end_of_a_short_record_is_fitted_or_refused(edge):
+    # the noise of the settled half was asked of a half without a sample
+    u = (np.arange(23) >= edge).astype(float)
+    y = np.random.default_rng(0).standard_normal(23)
+    with good_end() as models:
+        models.append(cr.identify(cr.Record(np.arange(23.0), u, y)))
