@@ -49,8 +49,11 @@ def test_members_that_are_taken_keep_their_matrix(rng):
 
 
 @pytest.mark.parametrize(("p", "m"), [(1, 1), (3, 2), (2, 5)])
-@pytest.mark.parametrize(("rows", "columns", "length"), [(30, 30, 59), (20, 41, 60), (30, 30, 40)])
+@pytest.mark.parametrize(
+    ("rows", "columns", "length"), [(30, 30, 59), (20, 41, 60), (30, 30, 40), (13, 13, 25)]
+)
 def test_block_products_are_the_dense_products(rng, p, m, rows, columns, length):
+    # 25 samples are transformed with 25 points, an odd number
     h = rng.standard_normal((p, m, length))
     H, fast = hankel_matrix(h, rows, columns), BlockHankel(h, rows, columns)
     x, y = rng.standard_normal(H.shape[1]), rng.standard_normal(H.shape[0])

@@ -178,3 +178,29 @@ def test_tail_bound_is_exact_for_equal_values_and_never_too_small():
         values = np.sort(rng.exponential(size=30) ** 3)[::-1]
         assert tail_bound(float(values @ values), values[:4], 30) >= 2 * values[4:].sum()
     assert tail_bound(1.0, np.ones(1), 1) == 0
+    assert tail_bound(1.25, np.ones(1), 2) == pytest.approx(2 * 0.5)  # a single value is left
+
+
+def test_tail_bound_never_falls_below_the_rounding_of_the_norm():
+    # leading values that make up the whole norm, by 1e-16 of it
+    for scale in (1e-20, 1.0, 1e20):
+        values = scale * np.array([3.0, 4.0])
+        bound = tail_bound(float(values @ values), values, 7)
+        assert bound == pytest.approx(2 * 5 * scale * np.sqrt(5 * 4e-16))
+
+
+def test_signs_of_singular_vectors_do_not_matter():
+    g = exact(4, 2, 3, 81, 2)
+    U, values, Vt = np.linalg.svd(hankel_matrix(g[:, :, 1:], 40, 40))
+    last = g[:, :, 41:81].transpose(0, 2, 1).reshape(2, -1)
+    models = []
+    for turn in (np.ones(4), -np.ones(4), np.array([1, -1, -1, 1])):
+        models.append(
+            realize_block(turn * U[:, :4], values[:4], (turn[:, None] * Vt[:4]).T, (2, 3), last)
+        )
+    for other in models[1:]:
+        for one, two in zip(models[0], other, strict=True):
+            assert_allclose(one, two, atol=1e-13)
+    # the input that moves a state most moves it up
+    B = models[0][1]
+    assert np.all(B[np.arange(4), np.abs(B).argmax(axis=1)] > 0)
