@@ -45,7 +45,7 @@ def test_defective_matrices_are_no_special_case():
     assert_allclose(response[0], expected, atol=1e-13 * expected.max())
 
 
-@pytest.mark.parametrize("delays", [[0, 3, 17, 40], [5], [0], [40, 0]])
+@pytest.mark.parametrize("delays", [[0, 3, 17, 40], [5], [0], [40, 0], [3, 4, 5, 6], [4, 3]])
 def test_misfit_is_the_sum_over_one_window_for_all_delays(delays):
     A, B, C = stack(len(delays), 3)
     rng = np.random.default_rng(1)
