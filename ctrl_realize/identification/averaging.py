@@ -116,9 +116,7 @@ def repeatability(
     centre = float(np.sum(weight * shifts[kept]) / np.sum(weight))
     statistic = float(np.sum(weight * (shifts[kept] - centre) ** 2))
     freedom = max(kept.size - 1, 1)
-    trend, trend_error = _trend(
-        np.abs(amplitudes[kept]), shifts[kept], errors[kept], max(statistic / freedom, 1.0)
-    )
+    trend, trend_error = _trend(np.abs(amplitudes[kept]), shifts[kept], errors[kept])
     names = tuple(step.name or f"record {i}" for i, step in enumerate(steps))
     return Repeatability(
         names=names,
@@ -194,14 +192,19 @@ def _shift(step: StepResponse, mean: MeanStep, model: FloatArray) -> tuple[float
     return shift * mean.dt, max(error, 1e-12) * mean.dt, gain
 
 
-def _trend(
-    amplitudes: FloatArray, shifts: FloatArray, errors: FloatArray, inflation: float
-) -> tuple[float, float]:
-    """Slope of the delays over the amplitudes and its standard error; zeros if there is none."""
+def _trend(amplitudes: FloatArray, shifts: FloatArray, errors: FloatArray) -> tuple[float, float]:
+    """Slope of the delays over the amplitudes and its standard error; zeros if there is none.
+
+    Scatter beyond the errors is taken about the line: about the mean the trend itself would
+    widen its own error, and ten records or fewer could never show one.
+    """
     weight = errors**-2
     centre = float(np.sum(weight * amplitudes) / np.sum(weight))
     spread = float(np.sum(weight * (amplitudes - centre) ** 2))
     if np.ptp(amplitudes) <= _SAME_AMPLITUDE * float(np.max(amplitudes)) or amplitudes.size < 3:
         return 0.0, 0.0
+    mean = float(np.sum(weight * shifts) / np.sum(weight))
     slope = float(np.sum(weight * (amplitudes - centre) * shifts)) / spread
+    left = shifts - mean - slope * (amplitudes - centre)
+    inflation = max(float(np.sum(weight * left**2)) / (amplitudes.size - 2), 1.0)
     return slope, float(np.sqrt(inflation / spread))

@@ -71,6 +71,15 @@ def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
     assert fit.repeatability.trend / TS == pytest.approx(1 / 8, rel=0.3)
 
 
+@pytest.mark.parametrize("count", [4, 6])
+def test_a_trend_shows_in_few_records_too(count):
+    heights = [16.0] * (count // 2) + [8.0] * (count - count // 2)
+    alike = [record(k, delay=37, amplitude=a) for k, a in enumerate(heights)]
+    apart = [record(k, delay=37 + 2 * (a == 8), amplitude=a) for k, a in enumerate(heights)]
+    assert "amplitude_trend" not in codes(cr.fit_delay(alike).fit)
+    assert "amplitude_trend" in codes(cr.fit_delay(apart).fit)
+
+
 def test_records_of_different_sample_times_are_refused():
     one = record(0)
     other = cr.Record(2 * one.time, one.input, one.output)
