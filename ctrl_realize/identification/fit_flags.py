@@ -74,6 +74,7 @@ def model_flags(
     return [
         _bound(dt, fit, max_delay),
         _nothing(dt, fit),
+        _many_lags(fit),
         _slow(fit, length),
         _inverse(fit),
     ]
@@ -133,6 +134,16 @@ def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
         return None
     return Flag(
         "no_delay_resolved", f"a model without dead time fits as well (up to {fit.high:.4g} s)"
+    )
+
+
+def _many_lags(fit: OutputErrorFit) -> Flag | None:
+    if not fit.endless:
+        return None
+    return Flag(
+        "many_lags",
+        "chains of lags fit the better the longer they are, up to the longest that was tried: any "
+        "part of the dead time may be more of such lags; only the total delay is firm",
     )
 
 

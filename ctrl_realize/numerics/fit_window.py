@@ -12,7 +12,15 @@ from .delayed_modes import HeldInput
 from .noise_level import correlation_time, mad_sigma
 from .response_bins import Bins
 from .separable_fit import Problem, Structure, evaluate, respond
-from .structure_search import Candidate, Scales, choose, criteria, refine, search
+from .structure_search import (
+    Candidate,
+    Scales,
+    choose,
+    criteria,
+    parameter_charge,
+    refine,
+    search,
+)
 
 _HUBER = 1.345
 _PASSES = 2
@@ -77,6 +85,11 @@ class WindowFit:
     def variance(self) -> float:
         """Variance per sample, colour included."""
         return self.sigma**2 * self.correlation
+
+    @property
+    def penalty(self) -> float:
+        """What the criterion charges for a parameter: log of the independent samples."""
+        return parameter_charge((self.window.output.size - self.window.start) / self.correlation)
 
     @property
     def best(self) -> Candidate:

@@ -5,7 +5,8 @@ The rule:
 1. All structures are fitted to the whole record; the one with the lowest information criterion
    is the model, and what its residual leaves is compared with the noise before the step.
 2. Where the residual is noise, the delay is that of the model, and its interval spans the
-   95 % profile-likelihood intervals of all structures that the data cannot rule out.
+   95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
+   four to eight equal lags among them where lags show.
 3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
    first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
    of up to three poles for the first 63 % and for all of it. The delay is their median.
@@ -17,26 +18,31 @@ The rule:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .arrays import ComplexArray, FloatArray
 from .fit_window import WindowFit, fit_window
+from .lag_chains import LagChain, chain_profile, fit_chains, still_improving
 from .profile_interval import delay_profile, profile_limits
 from .separable_fit import KnownFactor, Structure, evaluate, fit_batch
 from .step_problem import StepData, step_scales, stop_at, window
 from .structure_search import (
     ALL_STRUCTURES,
+    PLAUSIBLE,
     SIMPLE_STRUCTURES,
     Candidate,
     choose,
+    needless_charge,
     parameter_bounds,
     plausible,
 )
 
 ADEQUATE = 1.3
 """Residual over noise, in means over bins, up to which a model is taken for right."""
+
+_LAGS_OF_A_CHAIN = 3  # poles from which on there may be more lags than show
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +67,8 @@ class OutputErrorFit:
 
     ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
     The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
-    are the roots of the monic a. `misfit` is residual over noise in means over bins.
+    are the roots of the monic a. `misfit` is residual over noise in means over bins. `endless`:
+    chains of lags fit the better the longer they are, so that all of the delay may be lags.
     """
 
     delay: float
@@ -80,6 +87,7 @@ class OutputErrorFit:
     fitted: FloatArray
     profile: tuple[FloatArray, FloatArray]
     latest: float
+    endless: bool = False
 
 
 def fit_output_error(
@@ -110,24 +118,60 @@ def fit_output_error(
     tried = ALL_STRUCTURES if structures is None else tuple(structures)
     whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
     adequate = whole.misfit <= ADEQUATE * data.colour
-    if adequate or structures is not None:
+    if structures is not None:
         return likelihood_fit(whole, adequate=adequate)
+    if adequate:
+        return likelihood_fit(whole, adequate=True, chains=_chains(whole))
     simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
     chosen = whole.candidates[choose(simple)]
     return _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
 
 
-def likelihood_fit(whole: WindowFit, *, adequate: bool) -> OutputErrorFit:
+def likelihood_fit(
+    whole: WindowFit, *, adequate: bool, chains: Sequence[LagChain] = ()
+) -> OutputErrorFit:
     """Take delay and interval from the likelihood (points 1 and 2 of the rule)."""
     chosen = whole.best
-    kept = plausible(whole.candidates, whole.criterion, whole.variance, chosen.structure)
-    profiles = _profiles(whole, kept)
-    limits = [profile_limits(*profile) for profile in profiles.values()]
-    low = min(chosen.delay, *(ends[0] for ends in limits), chosen.delay)
-    high = max(chosen.delay, *(ends[1] for ends in limits), chosen.delay)
+    level = whole.criterion[chosen.structure] + needless_charge(chosen.structure)
+    better = min(chains, key=lambda chain: chain.criterion, default=None)
+    if better is not None and better.criterion < level:
+        chosen, level = better.candidate, better.criterion
+    free = plausible(whole.candidates, whole.criterion, whole.variance, chosen, level)
+    profiles = {s: _profile(whole, whole.candidates[s]) for s in free}
+    curves = list(profiles.values())
+    curves += [
+        chain_profile(chain, whole.scales)
+        for chain in chains
+        if chain.criterion <= level + PLAUSIBLE
+    ]
+    if better is not None and chosen is better.candidate:
+        whole = _with_chain(whole, better)
+        profiles[chosen.structure] = chain_profile(better, whole.scales)
+    limits = [profile_limits(*curve) for curve in curves]
+    low = min(chosen.delay, *(ends[0] for ends in limits))
+    high = max(chosen.delay, *(ends[1] for ends in limits))
     own = profile_limits(*profiles[chosen.structure])
+    if endless := still_improving(chains):
+        low = whole.scales.earliest
     interval = (low, high, (own[1] - own[0]) / 3.92)
-    return _result(whole, chosen, adequate, (), profiles, interval)
+    return replace(_result(whole, chosen, adequate, (), profiles, interval), endless=endless)
+
+
+def _chains(whole: WindowFit) -> list[LagChain]:
+    """Chains of lags, where so many lags show that there may be more than were tried."""
+    best = whole.best
+    if best.structure.order < _LAGS_OF_A_CHAIN:
+        return []
+    return fit_chains(whole.problem, best, whole.scales, whole.variance, whole.penalty)
+
+
+def _with_chain(whole: WindowFit, chain: LagChain) -> WindowFit:
+    structure = chain.candidate.structure
+    return replace(
+        whole,
+        candidates=whole.candidates | {structure: chain.candidate},
+        criterion=whole.criterion | {structure: chain.criterion},
+    )
 
 
 def _robust_fit(
@@ -137,7 +181,7 @@ def _robust_fit(
     delay = float(np.median([at for _, at in views[:-1]]))
     delays = np.sort([at for _, at in views])
     low, high = float(delays[1]), float(delays[-1])
-    profiles = _profiles(whole, [chosen.structure])
+    profiles = {chosen.structure: _profile(whole, chosen)}
     fixed = _with_delay(whole, chosen, delay)
     return _result(whole, fixed, False, views, profiles, (low, high, (high - low) / 3.92))
 
@@ -178,13 +222,8 @@ def _views(
     )
 
 
-def _profiles(
-    whole: WindowFit, kept: list[Structure]
-) -> dict[Structure, tuple[FloatArray, FloatArray]]:
-    return {
-        s: delay_profile(whole.problem, whole.candidates[s], whole.variance, whole.scales)
-        for s in kept
-    }
+def _profile(whole: WindowFit, candidate: Candidate) -> tuple[FloatArray, FloatArray]:
+    return delay_profile(whole.problem, candidate, whole.variance, whole.scales)
 
 
 def _table(

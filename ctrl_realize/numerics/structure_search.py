@@ -145,41 +145,48 @@ def criteria(
     `variance` is that of the noise, colour included; `samples` how many independent ones there
     are.
     """
-    penalty = np.log(max(samples, 3.0))
+    penalty = parameter_charge(samples)
     return {s: c.cost / variance + (s.order + s.zeros + 2) * penalty for s, c in candidates.items()}
+
+
+def parameter_charge(samples: float) -> float:
+    """What a parameter costs in the criterion: log of the number of independent samples."""
+    return float(np.log(max(samples, 3.0)))
 
 
 def choose(criterion: dict[Structure, float]) -> Structure:
     """Structure of the lowest criterion, where zeros and a fourth pole must be worth it."""
-    return min(criterion, key=lambda s: criterion[s] + _needless(s))
+    return min(criterion, key=lambda s: criterion[s] + needless_charge(s))
 
 
 def plausible(
     candidates: dict[Structure, Candidate],
     criterion: dict[Structure, float],
     variance: float,
-    chosen: Structure,
+    chosen: Candidate,
+    level: float,
 ) -> list[Structure]:
     """List what the data cannot rule out.
 
-    That is what is within 10 of the best criterion, or of the chosen with its simplicity
-    counted; and chains of up to three lags that fit no worse, for noise hides lags, but does not
-    remove them.
+    That is what is within 10 of the best criterion, or of `level`, that of the chosen with its
+    simplicity counted; and chains of up to three lags that fit no worse, for noise hides lags,
+    but does not remove them.
     """
-    limit = min(criterion.values()) + PLAUSIBLE
-    weighed = criterion[chosen] + _needless(chosen) + PLAUSIBLE
-    fits = candidates[chosen].cost + PLAUSIBLE * variance
+    limit = min(*criterion.values(), level) + PLAUSIBLE
+    weighed = level + PLAUSIBLE
+    fits = chosen.cost + PLAUSIBLE * variance
     return [
         s
         for s, value in criterion.items()
         if value <= limit
-        or value + _needless(s) <= weighed
-        or s == chosen
+        or value + needless_charge(s) <= weighed
+        or candidates[s] is chosen
         or (s.zeros == 0 and s.order <= 3 and candidates[s].cost <= fits)
     ]
 
 
-def _needless(structure: Structure) -> float:
+def needless_charge(structure: Structure) -> float:
+    """What zeros, and poles beyond the third, must be worth before a structure is chosen."""
     return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
 
 

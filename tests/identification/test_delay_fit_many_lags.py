@@ -1,0 +1,64 @@
+"""fit_delay on simulated plants of more lags than its free structures have poles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.special import gammainc
+
+import ctrl_realize as cr
+from tests import rigs
+
+TS = rigs.TS
+
+
+def chain_record(lags: int, hz: float, noise: float, *, delay: float = 37.0, seed: int = 0):
+    """Step record of equal lags in a row: the incomplete gamma function."""
+    k = np.arange(-2000, 2600)
+    after = np.clip((k - delay) * TS, 0, None)
+    y = 16 * gammainc(lags, 2 * np.pi * hz * after)
+    y += noise * 16 * np.random.default_rng(seed).standard_normal(k.size)
+    return cr.Record(k * TS, 16.0 * (k >= 0), y)
+
+
+@pytest.mark.parametrize(("lags", "hz"), [(5, 8.0), (6, 10.0), (8, 12.0)])
+def test_the_delay_before_many_equal_lags_is_found_and_covered(lags, hz):
+    fit = cr.fit_delay(chain_record(lags, hz, 0.005)).fit
+    low, high = fit.delay_interval
+    assert fit.structure == (lags, lags)
+    # Free structures of up to five poles are 6, 12 and 13 samples late here.
+    assert abs(fit.delay - 37) < 1.5
+    assert low <= 37 <= high
+
+
+def test_lags_that_are_not_spread_evenly_are_covered():
+    plant = rigs.lag(3) * rigs.lag(4) * rigs.lag(5) * rigs.lag(7) * rigs.lag(9)
+    for noise in (0.001, 0.005):
+        fit = cr.fit_delay(rigs.step_record(plant, noise=noise)).fit
+        low, high = fit.delay_interval
+        assert fit.structure == (5, 5)
+        assert low <= 37 <= high
+        assert high - low < 20  # without chains: 32 and 45 samples
+
+
+def test_more_lags_than_were_tried_are_flagged_and_no_delay_is_promised():
+    fit = cr.fit_delay(chain_record(12, 20.0, 0.005)).fit
+    assert "many_lags" in {flag.code for flag in fit.flags}
+    assert fit.interval[0] == 0.0
+    # 37 samples and twelve lags of 10.2, less the half sample of the hold.
+    assert fit.total_delay / TS == pytest.approx(37 + 12 / (2 * np.pi * 20 * TS) - 0.5, abs=1.0)
+
+
+def test_three_lags_need_no_chain():
+    fit = cr.fit_delay(rigs.step_record(noise=0.005)).fit
+    assert fit.structure == (3, 3)
+    assert "many_lags" not in {flag.code for flag in fit.flags}
+
+
+def test_a_model_of_eight_lags_responds_as_its_fit():
+    record = chain_record(8, 12.0, 0.001)
+    model = cr.fit_delay(record)
+    response = model.simulate(record.input)
+    # Eight poles within 10 %: the coefficients of their polynomial lose six digits.
+    assert_allclose(response + model.fit.fitted[0], model.fit.fitted, rtol=0, atol=1e-5 * 16)

@@ -1,0 +1,123 @@
+"""Chains of nearly equal lags."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import gammainc
+
+from ctrl_realize.numerics.lag_chains import (
+    LONGEST,
+    SHORTEST,
+    LagChain,
+    chain_profile,
+    fit_chains,
+    still_improving,
+)
+from ctrl_realize.numerics.pole_factors import parameters_from_poles
+from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, fit_batch
+from ctrl_realize.numerics.step_problem import step_data, step_scales, window
+from ctrl_realize.numerics.structure_search import Candidate, parameter_bounds
+
+SIGMA = 1e-3
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """Six equal lags of 12 samples behind a dead time of 20, and a third-order fit of them."""
+    k = np.arange(-300, 600, dtype=float)
+    y = gammainc(6, np.clip(k - 20, 0, None) / 12)
+    y += SIGMA * np.random.default_rng(3).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(300, 1)])
+    scales = step_scales(data, k.size, None)
+    problem = window(data, k.size, KnownFactor()).problem
+    structure = Structure(3, 3)
+    start = np.append(40.0, parameters_from_poles(-np.array([0.04, 0.05, 0.06], complex)))
+    bounds = parameter_bounds(3, scales)
+    parameters, cost = fit_batch(problem, structure, start[None], bounds)
+    return problem, Candidate(structure, parameters[0], float(cost[0])), scales
+
+
+def fitted(problem, penalty: float = 7.0) -> list[LagChain]:
+    data, like, scales = problem
+    return fit_chains(data, like, scales, SIGMA**2, penalty)
+
+
+def test_the_chain_of_the_right_length_fits_best_and_has_the_delay(problem):
+    chains = fitted(problem)
+    best = min(chains, key=lambda chain: chain.criterion)
+    assert best.candidate.structure == Structure(6, 6)
+    assert abs(best.candidate.delay - 20) < 3 * best.error
+    assert best.error < 0.5
+    rates = -best.candidate.poles.real
+    assert np.mean(1 / rates) == pytest.approx(12.0, rel=0.02)
+
+
+def test_a_longer_chain_needs_less_delay(problem):
+    delays = [chain.candidate.delay for chain in fitted(problem)]
+    assert np.all(np.diff(delays) < 0)
+    assert len(delays) <= LONGEST - SHORTEST + 1
+
+
+def test_the_search_stays_within_the_bounds_of_the_delay(problem):
+    data, like, scales = problem
+    held = replace(scales, earliest=25.0, latest=30.0)
+    for chain in fit_chains(data, like, held, SIGMA**2, 7.0):
+        assert 25.0 <= chain.candidate.delay <= 30.0
+
+
+def test_the_criterion_charges_four_parameters(problem):
+    cheap, dear = fitted(problem, 5.0), fitted(problem, 7.0)
+    for a, b in zip(cheap, dear, strict=False):
+        assert b.criterion - a.criterion == pytest.approx(8.0)
+
+
+def test_a_model_without_spread_starts_no_chain(problem):
+    data, _, scales = problem
+    ringing = -0.001 + 0.1j * np.array([1, -1])
+    like = Candidate(
+        Structure(2, 2), np.append(20.0, parameters_from_poles(ringing.astype(complex))), 1.0
+    )
+    assert fit_chains(data, like, scales, SIGMA**2, 7.0) == []
+
+
+def test_noise_widens_the_error_and_uneven_lags_keep_it_from_zero(problem):
+    data, like, scales = problem
+    quiet, loud, louder = (
+        fit_chains(data, like, scales, (part * SIGMA) ** 2, 7.0)[1].error for part in (0.01, 1, 2)
+    )
+    assert 0 < quiet < loud < louder
+
+
+def made(criteria: list[float]) -> list[LagChain]:
+    return [
+        LagChain(Candidate(Structure(n, n), np.zeros(n + 1), 0.0), value, 1.0)
+        for n, value in enumerate(criteria, SHORTEST)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("criteria", "more"),
+    [
+        ([700, 500, 350, 250, 180], True),
+        ([2100, 1600, 1050, 520, 2], True),  # straight down: no end in sight
+        ([900, 300, 60, 20, 30], False),  # rises again
+        ([5000, 2500, 900, 200, 2], False),  # the bottom of a parabola
+        ([900, 300, 60], False),  # ended before the longest
+        ([], False),
+    ],
+)
+def test_chains_are_open_ended_while_they_improve_up_to_the_longest(criteria, more):
+    assert still_improving(made(criteria)) is more
+
+
+def test_the_profile_of_a_chain_is_the_parabola_of_its_error(problem):
+    _, _, scales = problem
+    chain = min(fitted(problem), key=lambda chain: chain.criterion)
+    delay, excess = chain_profile(chain, scales)
+    assert np.all(np.diff(delay) > 0)
+    assert excess[delay == chain.candidate.delay] == 0
+    at = np.interp(chain.candidate.delay + 2 * chain.error, delay, excess)
+    assert at == pytest.approx(4.0, rel=1e-6)
