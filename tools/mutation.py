@@ -38,7 +38,7 @@ MODULES = {
     "numerics/iae": "tests/numerics/test_iae.py",
     "numerics/differences": "tests/numerics/test_differences.py",
     "numerics/filters": "tests/numerics/test_filters.py",
-    "numerics/sampling": "tests/numerics/test_state_space.py",
+    "numerics/sampling": "tests/numerics/test_sampling.py",
     "numerics/edges": "tests/numerics/test_edges.py",
     "numerics/rest": "tests/numerics/test_rest.py",
     "numerics/input_moves": "tests/numerics/test_input_moves.py",

@@ -55,6 +55,12 @@ def test_the_causal_filter_looks_only_back_and_starts_at_rest():
     assert delay == pytest.approx(butterworth_group_delay(5, 50.0, DT), rel=1e-9)
 
 
+def test_rest_is_the_first_value_and_not_the_second():
+    filtered = low_pass(np.r_[0.0, np.ones(50)], 5, 50.0, DT, zero_phase=False)
+    assert filtered[0] == 0
+    assert filtered[1] < 0.01
+
+
 def test_forward_and_backward_is_symmetric_and_halves_the_power():
     pulse = np.zeros(4001)
     pulse[2000] = 1.0
