@@ -170,10 +170,11 @@ def test_delays_that_grow_with_the_amplitude_are_a_trend():
     mean = mean_step(made)
     found = repeatability(made, mean, model_of(mean, 43.0), 43 * TS)
     assert found.trend / TS == pytest.approx(0.5, abs=0.05)
-    # straight line, weighted, widened by what the constant leaves
+    # straight line, weighted, widened by what the line leaves
     weight, size = found.errors**-2, np.abs(np.array(amplitudes))
     spread = np.sum(weight * (size - np.sum(weight * size) / weight.sum()) ** 2)
-    inflation = max(found.chi_square / 4, 1)
+    line = np.polynomial.Polynomial.fit(size, found.delays, 1, w=1 / found.errors)
+    inflation = max(np.sum(weight * (found.delays - line(size)) ** 2) / 3, 1)
     assert found.trend_error == pytest.approx(np.sqrt(inflation / spread), rel=1e-9)
 
 
