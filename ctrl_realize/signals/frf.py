@@ -42,7 +42,13 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     Raises
     ------
     DataError
-        Shapes that do not match, values that are not finite, negative frequencies.
+        Shapes that do not match, values that are not finite, negative frequencies; also when
+        indexing chooses no channel.
+
+    Notes
+    -----
+    ``frf[output, input]`` takes channels by number, name or slice, with their coherence and
+    standard deviation.
 
     Examples
     --------
@@ -114,6 +120,38 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     def _repr_html_(self) -> str | None:
         return None
 
+    def __getitem__(self, key: Any) -> Any:
+        """Take channels as python-control does, ``frf[output, input]`` by number, name or slice.
+
+        Coherence and standard deviation come along. One channel comes as from one record, with
+        arrays of shape (K,).
+        """
+        taken = super().__getitem__(key)
+        if not isinstance(taken, ct.FrequencyResponseData):
+            return taken
+        # python-control reads the key a second time, for an FRF whose values are the places.
+        p, m = self.noutputs, self.ninputs
+        places = ct.FrequencyResponseData(
+            np.arange(p * m, dtype=np.complex128).reshape(p, m, 1),
+            [1.0],
+            inputs=self.input_labels,
+            outputs=self.output_labels,
+        )[key].frdata[:, :, 0]
+        chosen = places.real.astype(int)
+        if chosen.size == 0:
+            raise DataError(
+                f"[{key}] chooses no channel of {p} outputs and {m} inputs; count from 0"
+            )
+        return MeasuredFRF(
+            _channels(self.frdata, chosen),
+            self.frequency_hz,
+            coherence=None if self.coherence is None else _channels(self.coherence, chosen),
+            std=None if self.std is None else _channels(self.std, chosen),
+            name=taken.name,
+            inputs=taken.input_labels,
+            outputs=taken.output_labels,
+        )
+
     def between_hz(self, low: float, high: float) -> MeasuredFRF:
         """Cut out the points with low <= frequency <= high, in Hz."""
         return self._select(
@@ -147,6 +185,12 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             inputs=self.input_labels,
             outputs=self.output_labels,
         )
+
+
+def _channels(values: np.ndarray[Any, Any], places: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Take the entries at `places`, counted along rows; one entry comes without its two axes."""
+    taken = values.reshape(-1, values.shape[-1])[places]
+    return np.asarray(taken[0, 0] if places.size == 1 else taken)
 
 
 def _beside(
