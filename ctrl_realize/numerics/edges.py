@@ -88,9 +88,8 @@ def find_edges(values: FloatArray, spike_samples: int, min_share: float) -> list
     # Level before and after each sample; an edge is where they differ.
     before, after = _side_medians(clean, width)
     jump = after - before
-    candidates = _peaks(jump, threshold, width)
     edges: list[Edge] = []
-    for k in candidates:
+    for k in _peaks(jump, threshold):
         edge = _measure(clean, jump, k, noise)
         if edge is not None and abs(edge.amplitude) >= threshold:
             edges.append(edge)
@@ -123,7 +122,7 @@ def _side_medians(values: FloatArray, width: int) -> tuple[FloatArray, FloatArra
     return medians[: values.size], medians[width : width + values.size]
 
 
-def _peaks(jump: FloatArray, threshold: float, width: int) -> list[int]:
+def _peaks(jump: FloatArray, threshold: float) -> list[int]:
     """Positions of the largest jump in each run of jumps of one sign."""
     found: list[int] = []
     above = np.abs(jump) >= threshold

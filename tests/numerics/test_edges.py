@@ -159,6 +159,31 @@ def test_edges_do_not_depend_on_the_unit(scale, offset, spike, up):
     )
 
 
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_the_ends_of_a_ramp_do_not_depend_on_the_unit(scale):
+    ramp = np.clip((np.arange(400) - 199) / 100, 0, 1)
+    plain, moved = find_edges(ramp, 20, 0.1)[0], find_edges(scale * ramp, 20, 0.1)[0]
+    assert (moved.index, moved.samples) == (plain.index, plain.samples)
+
+
+def test_a_change_in_the_last_digits_is_rounding_and_no_edge():
+    assert find_edges(levels((1e6, 50), (1e6 + 1e-5, 50)), 3, 0.5) == []
+    assert len(find_edges(levels((1e6, 50), (1e6 + 1e-2, 50)), 3, 0.5)) == 1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_median_filter_takes_noise_away_so_smaller_steps_are_found(seed):
+    # seven samples leave 0.47 sigma: ten of that are less than a step of five sigma
+    (found,) = find_edges(white(600, seed) + 5.0 * (np.arange(600) >= 300), 3, 0.5)
+    assert abs(found.index - 300) <= 2
+
+
+@pytest.mark.parametrize("length", [5, 6, 8, 12])
+def test_a_pulse_longer_than_a_spike_goes_up_and_down_or_not_at_all(length):
+    found = find_edges(levels((0, 50), (5, length), (0, 50)), 3, 0.5)
+    assert [e.index for e in found] in ([], [50, 50 + length])
+
+
 def test_overshoot_of_the_drive_is_part_of_its_edge():
     values = levels((0, 60), (14, 2), (10, 60))
     (found,) = find_edges(values, 3, 0.5)
