@@ -17,8 +17,6 @@ from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
 from ..results import Flag
 from .loops import open_loop
 
-TWO_SIGMA = 1.959963984540054
-
 
 @dataclass(frozen=True)
 class DataLoop:
@@ -87,67 +85,6 @@ class DataLoop:
                 )
             )
         return tuple(found)
-
-    def intervals(self, plain: Any) -> dict[str, tuple[float, float]]:
-        """95 % intervals of the margins, to first order in the standard deviation."""
-        found = {}
-        if plain.phase_margins.size:
-            w = plain.gain_crossover
-            shift = self._phase_deviation(w)
-            pm = plain.phase_margin
-            found["phase_margin"] = _around(pm, np.degrees(shift))
-        if plain.gain_margins.size:
-            w = plain.phase_crossover
-            spread = self._gain_deviation(w)
-            gm = plain.gain_margin
-            found["gain_margin"] = (
-                float(gm * np.exp(-TWO_SIGMA * spread)),
-                float(gm * np.exp(TWO_SIGMA * spread)),
-            )
-        found["modulus_margin"] = _around(
-            plain.modulus_margin, self._sigma(plain.modulus_crossover), 0.0
-        )
-        if plain.stable and np.isfinite(plain.delay_margin):
-            pm = np.radians(np.mod(plain.phase_margins, 360))
-            w = plain.gain_crossovers[np.argmin(pm / plain.gain_crossovers)]
-            found["delay_margin"] = _around(
-                plain.delay_margin, self._delay_deviation(w, plain.delay_margin), 0.0
-            )
-        return found
-
-    def _sigma(self, omega: float) -> float:
-        """Standard deviation of one component of L (of any direction in the plane)."""
-        assert self.std is not None
-        return float(np.interp(np.log(omega), np.log(self.omega), self.std) / np.sqrt(2))
-
-    def _slopes(self, omega: float) -> tuple[float, float]:
-        """Slope of log gain and of phase against omega."""
-        x = np.log(omega)
-        gain = float(self.log_gain(x, 1)) / omega
-        phase = float(self.phase(x, 1)) / omega - self.dead_time
-        return gain, phase
-
-    def _phase_deviation(self, omega: float) -> float:
-        # An error in gain moves the crossover by -e_g / slope, and the phase with it.
-        relative = self._sigma(omega) / abs(self(np.array([omega]))[0])
-        gain, phase = self._slopes(omega)
-        return float(relative * np.hypot(1.0, phase / gain if gain else 0.0))
-
-    def _gain_deviation(self, omega: float) -> float:
-        relative = self._sigma(omega) / abs(self(np.array([omega]))[0])
-        gain, phase = self._slopes(omega)
-        return float(relative * np.hypot(1.0, gain / phase if phase else 0.0))
-
-    def _delay_deviation(self, omega: float, wait: float) -> float:
-        # delay = (pi + phase) / omega: d delay = (e_p - (e_g/gain)(phase' - delay)) / omega
-        relative = self._sigma(omega) / abs(self(np.array([omega]))[0])
-        gain, phase = self._slopes(omega)
-        return float(relative * np.hypot(1.0, (phase - wait) / gain if gain else 0.0) / omega)
-
-
-def _around(value: float, sigma: float, floor: float | None = None) -> tuple[float, float]:
-    low, high = value - TWO_SIGMA * sigma, value + TWO_SIGMA * sigma
-    return float(low if floor is None else max(floor, low)), float(high)
 
 
 def data_loop(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import control as ct
@@ -20,6 +21,7 @@ from ..numerics.crossovers import (
 from ..results import Flag
 from .data_loops import DataLoop, data_loop
 from .loops import Loop, open_loop
+from .margin_intervals import margin_intervals
 from .margin_result import Margins
 
 MARGINAL = 1e-9
@@ -124,7 +126,7 @@ def loop_margins(loop: Loop) -> Margins:
     stable = count == 0 and not marginal and distance > MARGINAL
     return _collect(
         gains, loop(gains), phases, loop(phases), distance, at, stable, count, loop.dt, flags,
-        (omega, values), {},
+        (omega, values),
     )  # fmt: skip
 
 
@@ -196,7 +198,6 @@ def _collect(
     dt: float,
     flags: tuple[Flag, ...],
     response: tuple[FloatArray, ComplexArray],
-    intervals: dict[str, tuple[float, float]],
 ) -> Margins:
     # -1 is half a turn away: the angle of -L is the margin itself, in -180...180.
     pm = np.degrees(np.angle(-at_gains))
@@ -219,7 +220,6 @@ def _collect(
         modulus_crossover=closest,
         dt=dt,
         response=(read_only(omega), kept),
-        intervals=intervals,
         flags=flags,
     )
 
@@ -234,11 +234,12 @@ def _from_data(loop: DataLoop) -> Margins:
     flags = (*_stability_flags(count, marginal), *loop.flags())
     plain = _collect(
         gains, loop(gains), phases, loop(phases), distance, at, stable, count, 0.0, flags,
-        (omega, values), {},
+        (omega, values),
     )  # fmt: skip
     if loop.std is None:
         return plain
-    return _collect(
-        gains, loop(gains), phases, loop(phases), distance, at, stable, count, 0.0, flags,
-        (omega, values), loop.intervals(plain),
-    )  # fmt: skip
+    intervals = margin_intervals(loop, plain)
+    if stable and intervals["modulus_margin"][0] == 0:
+        flags = (*flags, Flag("within_noise", "-1 lies within the noise of the response: another "
+                              "measurement may find the closed loop unstable"))  # fmt: skip
+    return replace(plain, intervals=intervals, flags=flags)
