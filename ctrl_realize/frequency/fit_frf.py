@@ -15,14 +15,20 @@ from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import read_only
 from ..numerics.rational import chain_state_space
 from ..numerics.rational_fit import FRFData, RationalFit, covariance, profile_interval
-from ..numerics.rational_search import dead_time_bound, fit_structures, residual_variance
+from ..numerics.rational_search import (
+    DEFAULT_ORDERS,
+    dead_time_bound,
+    fit_structures,
+    information_criterion,
+    residual_variance,
+    smallest_cost,
+)
 from ..numerics.spectra import hold_response
 from ..numerics.statistics import mixture_quantile
 from ..results import Flag
 from .frf_fit import FRFFit, FRFStructure
 from .points import FRFPoints, frf_points
 
-_DEFAULT_ORDERS = range(1, 5)
 _NEAR_BIC = 8.0
 _SMALL_WIDTH = 1e-3
 _SAMPLES_PER_SHORTEST_PERIOD = 20
@@ -52,7 +58,8 @@ def fit_frf(
     frf : MeasuredFRF
         One input, one output. Any `control.FrequencyResponseData` will do.
     order : int or sequence of int, optional
-        Number of poles, or candidates; default 1 to 4.
+        Number of poles, or candidates; default 1 to 4, and beyond (to 10) as long as the largest
+        is the best.
     relative_degree : int or sequence of int, optional
         Poles minus zeros, or candidates; default 1 to the order. With 0 the dead time is rounded
         to whole samples of the model.
@@ -125,20 +132,9 @@ def fit_frf(
     frequency, response, sigma = points.frequency_hz, points.response, points.sigma
     if hold is not None and step is not None:
         response = response / hold_response(2 * np.pi * frequency, step)
-    orders = _candidates(order, "order", 1, tuple(_DEFAULT_ORDERS))
-    degrees = _candidates(relative_degree, "relative_degree", 0, None)
-    pairs = [(n, r) for n in orders for r in (degrees or range(1, n + 1)) if r <= n]
-    if not pairs:
-        raise OrderError(
-            f"relative_degree={relative_degree!r} is above order={order!r}; needed is at most the "
-            "order"
-        )
-    needed = max(2 * n + 2 - r for n, r in pairs)
-    if frequency.size < needed:
-        raise DataError(
-            f"{frequency.size} points are too few for order {max(orders)}; "
-            f"{needed} are needed, or a lower order"
-        )
+    orders = _candidates(order, "order", 1)
+    degrees = _candidates(relative_degree, "relative_degree", 0)
+    _check_structures(orders, degrees, frequency.size)
     sample_time = (
         1 / (_SAMPLES_PER_SHORTEST_PERIOD * float(frequency[-1])) if step is None else step
     )
@@ -157,17 +153,15 @@ def fit_frf(
         weight=size / sigma,
         max_dead_time=longest * unit,
     )
-    fits = fit_structures(data, pairs)
+    fits = fit_structures(data, orders, degrees)
     used = replace(points, response=response)
     return _result(frf, data, fits, used, unit, size, sample_time, name)
 
 
-def _candidates(
-    given: int | Sequence[int] | None, name: str, low: int, default: tuple[int, ...] | None
-) -> tuple[int, ...]:
+def _candidates(given: int | Sequence[int] | None, name: str, low: int) -> tuple[int, ...] | None:
     """Return the whole numbers to try."""
     if given is None:
-        return default or ()
+        return None
     try:
         values = tuple(given)  # type: ignore[arg-type]
     except TypeError:
@@ -178,6 +172,25 @@ def _candidates(
         return tuple(sorted({whole(value, name, low, 30) for value in values}))
     except OptionError as error:
         raise OrderError(str(error)) from error
+
+
+def _check_structures(
+    orders: tuple[int, ...] | None, degrees: tuple[int, ...] | None, n_points: int
+) -> None:
+    """Refuse degrees above all orders, and more parameters than there are points."""
+    tried = orders or DEFAULT_ORDERS
+    pairs = [(n, r) for n in tried for r in (degrees or range(1, n + 1)) if r <= n]
+    if not pairs:
+        raise OrderError(
+            f"relative_degree={degrees} is above order={orders or tuple(tried)}; needed is at "
+            "most the order"
+        )
+    needed = max(2 * n + 2 - r for n, r in pairs)
+    if n_points < needed:
+        raise DataError(
+            f"{n_points} points are too few for order {max(tried)}; {needed} are needed, or a "
+            "lower order"
+        )
 
 
 def _result(
@@ -193,18 +206,14 @@ def _result(
     """Choose the structure, state the uncertainty and build the model."""
     frequency, noise_known = points.frequency_hz, points.noise_known
     n_values = 2 * frequency.size
-    floor = n_values * (1e-13 * np.max(np.abs(data.response) * data.weight)) ** 2
     rows, scales = [], {}
     for (n, r), fit in fits.items():
         n_parameters = 2 * n + 2 - r
-        cost = max(fit.cost, floor)
-        bic = n_values * np.log(cost) + n_parameters * np.log(n_values)
+        cost, bic = smallest_cost(data, fit), information_criterion(data, fit, n, r)
         scales[n, r] = residual_variance(data, fit, n_values - n_parameters, noise_known)
         spread = covariance(data, fit, scales[n, r])[n, n]
         rows.append(
-            FRFStructure(
-                n, r, float(fit.theta[n]) / unit, float(np.sqrt(spread)) / unit, cost, float(bic)
-            )
+            FRFStructure(n, r, float(fit.theta[n]) / unit, float(np.sqrt(spread)) / unit, cost, bic)
         )
     rows.sort(key=lambda row: row.bic)
     best = rows[0]

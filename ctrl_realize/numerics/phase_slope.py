@@ -55,19 +55,31 @@ def dead_time_from_phase(omega: FloatArray, values: ComplexArray) -> float:
     # The widest gap sets how finely the delay must be tried; the total band how far it matters.
     count = int(np.clip(8 * longest * gaps.max() / (2 * np.pi), 64, 20_000))
     tried = np.linspace(0, min(longest, count * np.pi / (4 * gaps.max())), count)
-    left = _roughness(steps, gaps, tried)
+    left = phase_roughness(steps, gaps, tried)
     best = float(tried[np.argmin(left)])
     width = tried[1] - tried[0]
     for _ in range(30):
         near = np.linspace(max(0.0, best - width), best + width, 9)
-        best = float(near[np.argmin(_roughness(steps, gaps, near))])
+        best = float(near[np.argmin(phase_roughness(steps, gaps, near))])
         width /= 3
     # A plain lag also slopes; where no delay at all is nearly as smooth, there is none to take.
     turned = best * gaps.max()
     return best if turned > 0.5 else 0.0
 
 
-def _roughness(steps: FloatArray, gaps: FloatArray, delays: FloatArray) -> FloatArray:
+def phase_roughness(steps: FloatArray, gaps: FloatArray, delays: FloatArray) -> FloatArray:
+    """Sum the absolute phase steps that are left when each delay is taken out.
+
+    Parameters
+    ----------
+    steps, gaps : ndarray, shape (K - 1,)
+        Phase from point to point, any number of turns off, and distance in rad/s.
+    delays : ndarray, shape (D,)
+
+    Returns
+    -------
+    ndarray, shape (D,)
+    """
     left = np.empty(delays.size)
     for start in range(0, delays.size, 512):
         part = delays[start : start + 512, None]

@@ -98,40 +98,19 @@ def basis_functions(
     basis : ndarray, shape (K, count)
     derivatives : ndarray, shape (order, K, count)
     """
-    sections, slopes, owners = [], [], []
-    ranks = []
-    for i in range(0, order - order % 2, 2):
-        a0, a1 = np.exp(theta[i]), np.exp(theta[i + 1])
-        q = 1 + (a1 * s + s * s) / a0
-        sections.append((q, np.sqrt(a0)))
-        slopes.append(((1 - q) / q, (a1 / a0) * s / q))
-        owners.append(i)
-        ranks.append(theta[i] / 2)
-    if order % 2:
-        w = np.exp(theta[order - 1])
-        f = 1 + s / w
-        sections.append((f, 0.0))
-        slopes.append(((1 - f) / f, f))
-        owners.append(order - 1)
-        ranks.append(theta[order - 1])
-    sequence = np.argsort(ranks, kind="stable")
-
+    factors = _factors(s, theta, order)
     product = np.ones_like(s)
-    for k in sequence:
-        product = product / sections[k][0]
     # logs[i] = d log(current product) / d theta_i for the sections still in it
     logs = np.zeros((order, s.size), dtype=np.complex128)
-    for k in sequence:
-        i = owners[k]
-        logs[i] = -slopes[k][0]
-        if sections[k][1]:
-            logs[i + 1] = -slopes[k][1]
+    for i, factor, root in factors:
+        product = product / factor
+        logs[i] = (factor - 1) / factor
+        if root:
+            logs[i + 1] = -(np.exp(theta[i + 1]) / root**2) * s / factor
     basis = np.empty((s.size, count), dtype=np.complex128)
     derivatives = np.zeros((order, s.size, count), dtype=np.complex128)
     column = 0
-    for k in sequence:
-        factor, root = sections[k]
-        i = owners[k]
+    for i, factor, root in factors:
         if column < count:
             basis[:, column] = product
             derivatives[:, :, column] = logs * product
@@ -149,6 +128,36 @@ def basis_functions(
     if column < count:
         basis[:, column] = product
     return basis, derivatives
+
+
+def _factors(
+    s: ComplexArray, theta: FloatArray, order: int
+) -> list[tuple[int, ComplexArray, float]]:
+    """Evaluate the sections, slow ones first: place in `theta`, values, and sqrt(a0) or 0."""
+    found = []
+    for i in range(0, order - order % 2, 2):
+        a0, a1 = np.exp(theta[i]), np.exp(theta[i + 1])
+        found.append((theta[i] / 2, i, 1 + (a1 * s + s * s) / a0, float(np.sqrt(a0))))
+    if order % 2:
+        found.append((theta[order - 1], order - 1, 1 + s / np.exp(theta[order - 1]), 0.0))
+    found.sort(key=lambda section: section[0])
+    return [(i, values, root) for _, i, values, root in found]
+
+
+def _basis(s: ComplexArray, theta: FloatArray, order: int, count: int) -> ComplexArray:
+    """Evaluate the basis alone."""
+    factors = _factors(s, theta, order)
+    product = np.ones_like(s)
+    for _, factor, _ in factors:
+        product = product / factor
+    columns = []
+    for _, factor, root in factors:
+        columns.append(product)
+        if root:
+            columns.append(product * s / root)
+        product = product * factor
+    columns.append(product)
+    return np.stack(columns[:count], axis=1)
 
 
 def project(
@@ -175,19 +184,38 @@ def project(
     basis, derivatives = basis_functions(s, theta[:order], order, count)
     turn = weight * np.exp(-s * theta[order])
     design = turn[:, None] * basis
-    stacked = _stack(design)
+    stacked = stacked_parts(design)
     scale = np.linalg.norm(stacked, axis=0)
     scale[scale == 0] = 1.0
     Q, R = np.linalg.qr(stacked / scale)
-    target = _stack((weight * response)[:, None])[:, 0]
+    target = stacked_parts((weight * response)[:, None])[:, 0]
     projected = Q.T @ target
     numerator = np.linalg.lstsq(R, projected, rcond=None)[0] / scale
     residual = target - Q @ projected
     moved = turn[None, :] * (derivatives @ numerator)
     moved = np.vstack([moved, (-s * (design @ numerator))[None]])
-    slopes = -_stack(moved.T)
+    slopes = -stacked_parts(moved.T)
     slopes -= Q @ (Q.T @ slopes)
     return Projection(numerator=numerator, residual=residual, jacobian=slopes)
+
+
+def projected_cost(
+    s: ComplexArray,
+    response: ComplexArray,
+    weight: FloatArray,
+    theta: FloatArray,
+    order: int,
+    count: int,
+) -> float:
+    """Return the weighted misfit that `project` leaves, without its derivatives."""
+    basis = _basis(s, theta[:order], order, count)
+    design = stacked_parts((weight * np.exp(-s * theta[order]))[:, None] * basis)
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0] = 1.0
+    Q, _ = np.linalg.qr(design / scale)
+    target = stacked_parts((weight * response)[:, None])[:, 0]
+    residual = target - Q @ (Q.T @ target)
+    return float(residual @ residual)
 
 
 def full_jacobian(
@@ -203,7 +231,7 @@ def full_jacobian(
     design = turn[:, None] * basis
     moved = turn[:, None] * (derivatives @ numerator).T
     delayed = (-s * (design @ numerator))[:, None]
-    return _stack(np.hstack([moved, delayed, design]))
+    return stacked_parts(np.hstack([moved, delayed, design]))
 
 
 def chain_state_space(
@@ -242,69 +270,6 @@ def chain_state_space(
     return A, B, C, D
 
 
-def _stack(values: NDArray[Any]) -> FloatArray:
+def stacked_parts(values: NDArray[Any]) -> FloatArray:
+    """Stack real parts on top of imaginary parts."""
     return np.concatenate([values.real, values.imag])
-
-
-def trial_poles(low: float, high: float, order: int, *, resonant: bool) -> ComplexArray:
-    """Spread stable poles logarithmically over a band in rad/s."""
-    if order == 1:
-        return np.array([-np.sqrt(low * high)], dtype=np.complex128)
-    if not resonant:
-        return -np.geomspace(low, high, order).astype(np.complex128)
-    centres = np.geomspace(low, high, order // 2 + order % 2)
-    pairs = centres[order % 2 :]
-    poles = np.ravel([(-0.05 + 1j) * pairs, (-0.05 - 1j) * pairs])
-    return np.concatenate([poles, -centres[: order % 2].astype(np.complex128)])
-
-
-def relocate_poles(
-    s: ComplexArray, response: ComplexArray, weight: FloatArray, poles: ComplexArray
-) -> ComplexArray:
-    """Move poles towards those of the response: one step of vector fitting.
-
-    The linear problem ``N(s) - sigma(s) H(s) = H(s)`` is that of Sanathanan and Koerner, written
-    in partial fractions (Gustavsen and Semlyen 1999); the zeros of ``1 + sigma`` are the new
-    poles. Unstable ones are mirrored.
-
-    Parameters
-    ----------
-    s, response : ndarray, shape (K,)
-    weight : ndarray, shape (K,)
-    poles : ndarray, shape (n,)
-        Stable; conjugates need not be adjacent.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-    """
-    n = poles.size
-    real: NDArray[np.bool_] = poles.imag == 0
-    upper = poles[poles.imag > 0]
-    A = np.zeros((n, n))
-    b = np.zeros(n)
-    columns = []
-    place = 0
-    for p in poles[real]:
-        A[place, place], b[place] = p.real, 1.0
-        columns.append(1 / (s - p))
-        place += 1
-    for p in upper:
-        block = [[p.real, p.imag], [-p.imag, p.real]]
-        A[place : place + 2, place : place + 2] = block
-        b[place] = 2.0
-        columns.append(1 / (s - p) + 1 / (s - p.conjugate()))
-        columns.append(1j / (s - p) - 1j / (s - p.conjugate()))
-        place += 2
-    fractions = np.stack(columns, axis=1)
-    design = np.hstack([fractions, -response[:, None] * fractions]) * weight[:, None]
-    stacked = _stack(design)
-    scale = np.linalg.norm(stacked, axis=0)
-    solution = np.linalg.lstsq(
-        stacked / scale, _stack((weight * response)[:, None])[:, 0], rcond=1e-12
-    )[0]
-    sigma = (solution / scale)[n:]
-    moved = np.linalg.eigvals(A - np.outer(b, sigma)).astype(np.complex128)
-    # Keep away from the axis: a pole on it would make the next problem singular.
-    floor = 1e-4 * np.abs(moved) + 1e-12 * np.abs(s).max()
-    return np.asarray(-np.maximum(np.abs(moved.real), floor) + 1j * moved.imag)

@@ -5,19 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import ComplexArray, FloatArray
-from .rational import (
-    factor_parameters,
-    full_jacobian,
-    project,
-    relocate_poles,
-    trial_poles,
-)
+from .rational import full_jacobian, project
 
-_RELOCATIONS = 8
 _MAX_ITERATIONS = 60
-_MAX_STARTS = 4
 _CHI2_95 = 3.841458820694124
 
 
@@ -42,6 +35,12 @@ class FRFData:
     weight: FloatArray
     max_dead_time: float
 
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """Points whose phase is known; all where the weights do not tell."""
+        clear = np.asarray(np.abs(self.response) * self.weight > 1 / 0.3)
+        return clear if clear.sum() >= 4 else np.ones(clear.size, dtype=np.bool_)
+
 
 @dataclass(frozen=True, eq=False)
 class RationalFit:
@@ -55,41 +54,6 @@ class RationalFit:
     theta: FloatArray
     numerator: FloatArray
     cost: float
-
-
-def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[FloatArray]:
-    """Find poles for each candidate dead time, and keep the candidates worth refining.
-
-    With the dead time fixed the problem is linear but for a few pole relocations, which need no
-    start. The minima of the misfit over the grid of dead times come first; this is what spares
-    the maximum-likelihood fit its good initial guess.
-    """
-    omega = np.abs(data.s)
-    low, high = omega.min(), omega.max()
-    costs, found = [], []
-    for delay in delays:
-        turned = data.response * np.exp(data.s * delay)
-        best_cost, best = np.inf, np.zeros(0)
-        for resonant in (False, True):
-            poles = trial_poles(low, high, order, resonant=resonant)
-            for _ in range(_RELOCATIONS):
-                before, poles = poles, relocate_poles(data.s, turned, data.weight, poles)
-                moved = np.sort_complex(poles) - np.sort_complex(before)
-                if np.max(np.abs(moved) / np.abs(poles)) < 1e-3:
-                    break
-            theta = _inside(np.append(factor_parameters(poles), delay), data, order)
-            cost = _cost(project(data.s, data.response, data.weight, theta, order, order).residual)
-            if cost < best_cost:
-                best_cost, best = cost, theta
-            if order == 1:
-                break
-        costs.append(best_cost)
-        found.append(best)
-    curve = np.array(costs)
-    padded = np.concatenate([[np.inf], curve, [np.inf]])
-    minima = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
-    ranked = minima[np.argsort(curve[minima])][:_MAX_STARTS]
-    return [found[k] for k in ranked]
 
 
 def refine(
@@ -106,7 +70,7 @@ def refine(
     frozen_delay : bool
         Keep the dead time of the start.
     """
-    theta = _inside(start, data, order)
+    theta = inside_limits(start, data, order)
     now = project(data.s, data.response, data.weight, theta, order, count)
     cost = _cost(now.residual)
     damping = 1e-3
@@ -122,7 +86,7 @@ def refine(
             step = np.linalg.solve(gram + np.diag(damping * size), -slope)
             # A factor of e in one step is as far as the linear picture goes.
             step[:order] = np.clip(step[:order], -1.0, 1.0)
-            trial = _inside(theta + step, data, order)
+            trial = inside_limits(theta + step, data, order)
             moved = project(data.s, data.response, data.weight, trial, order, count)
             trial_cost = _cost(moved.residual)
             if trial_cost < cost:
@@ -206,15 +170,7 @@ def profile_interval(
     return float(ends[0]), float(ends[1])
 
 
-def delay_grid(data: FRFData, order: int) -> FloatArray:
-    """Spread candidate dead times, close enough that no minimum is missed."""
-    # The misfit has a minimum about every half turn of the phase at the highest frequency.
-    turns = data.max_dead_time * np.abs(data.s).max() / (2 * np.pi)
-    count = int(np.clip(np.ceil(4 * turns), 6, 200))
-    return np.linspace(0.0, data.max_dead_time, count + 1)
-
-
-def _inside(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
+def inside_limits(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
     """Keep poles near the band, dampings sane and the dead time in its range."""
     omega = np.abs(data.s)
     low, high = np.log(omega.min() / 100), np.log(omega.max() * 100)

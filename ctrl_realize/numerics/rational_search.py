@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .arrays import ComplexArray, FloatArray
 from .rational import chain_state_space, factor_parameters, poles_of
-from .rational_fit import FRFData, RationalFit, delay_grid, refine, starting_points
+from .rational_fit import FRFData, RationalFit, refine
+from .rational_starts import delay_grid, grown_starts, starting_points
+
+DEFAULT_ORDERS = range(1, 5)
+"""Tried where none is given; larger ones where the largest of these is the best."""
+_LARGEST_ORDER = 10
+_LARGEST_FROM_GRID = 3
+_STEPS_OF_ONE = 8
+_KEPT = 2
 
 
 def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
@@ -36,32 +46,114 @@ def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray
 
 
 def fit_structures(
-    data: FRFData, pairs: list[tuple[int, int]]
+    data: FRFData,
+    orders: Sequence[int] | None,
+    degrees: Sequence[int] | None,
 ) -> dict[tuple[int, int], RationalFit]:
     """Fit every structure, each from its own starts and from its neighbours' solutions.
 
     Parameters
     ----------
     data : FRFData
-    pairs : list of tuple of int
-        (order, relative degree), smaller ones first.
+    orders : sequence of int or None
+        Rising. None: from 1 on, until an order is no longer better than the one before.
+    degrees : sequence of int or None
+        Relative degrees, rising; None: 1 to the order.
+
+    Returns
+    -------
+    dict
+        By (order, relative degree), for relative degrees up to the order.
     """
+    ladder = _Ladder(data)
     fits: dict[tuple[int, int], RationalFit] = {}
-    starts: dict[int, list[FloatArray]] = {}
-    fastest = np.abs(data.s).max()
-    for n, r in pairs:
-        if n not in starts:
-            starts[n] = starting_points(data, n, delay_grid(data, n))
-        tried = list(starts[n])
-        if (n, r - 1) in fits:
-            tried.append(fits[n, r - 1].theta)
-        if (n - 1, r - 1) in fits:
-            smaller = fits[n - 1, r - 1]
-            poles = np.append(poles_of(smaller.theta, n - 1), -3.0 * fastest)
-            tried.append(np.append(factor_parameters(poles), smaller.theta[n - 1]))
-        attempts = [refine(data, n, n + 1 - r, start) for start in tried]
-        fits[n, r] = min(attempts, key=lambda fit: fit.cost)
+    for n in orders if orders is not None else DEFAULT_ORDERS:
+        for r in degrees if degrees is not None else range(1, n + 1):
+            if r <= n:
+                fits[n, r] = _fit_one(data, ladder, fits, n, r)
+    if orders is not None:
+        return fits
+    # An order is believed when a larger one was tried and found no better.
+    points = data.s.size
+    while fits:
+        n, r = min(fits, key=lambda key: information_criterion(data, fits[key], *key))
+        largest = max(key[0] for key in fits)
+        if n < largest or n >= _LARGEST_ORDER or 4 * n > points:
+            break
+        for near in range(max(r - 1, 0), min(r + 1, n + 1) + 1):
+            if near in (degrees if degrees is not None else range(1, n + 2)):
+                fits[n + 1, near] = _fit_one(data, ladder, fits, n + 1, near)
+        if max(key[0] for key in fits) == largest:
+            break
     return fits
+
+
+def information_criterion(data: FRFData, fit: RationalFit, order: int, degree: int) -> float:
+    """Return the Bayesian information criterion of a structure, for noise of unknown size."""
+    count = 2 * data.s.size
+    return float(
+        count * np.log(smallest_cost(data, fit)) + (2 * order + 2 - degree) * np.log(count)
+    )
+
+
+def smallest_cost(data: FRFData, fit: RationalFit) -> float:
+    """Return the misfit, or what rounding leaves of exact data."""
+    largest = float(np.max(np.abs(data.response) * data.weight))
+    return max(fit.cost, 2 * data.s.size * (1e-13 * largest) ** 2)
+
+
+def _fit_one(
+    data: FRFData,
+    ladder: _Ladder,
+    fits: dict[tuple[int, int], RationalFit],
+    n: int,
+    r: int,
+) -> RationalFit:
+    tried = list(ladder.starts(n))
+    if (n, r - 1) in fits:
+        tried.append(fits[n, r - 1].theta)
+    if (n - 1, r - 1) in fits:
+        smaller = fits[n - 1, r - 1]
+        poles = np.append(poles_of(smaller.theta, n - 1), -3.0 * np.abs(data.s).max())
+        tried.append(np.append(factor_parameters(poles), smaller.theta[n - 1]))
+    attempts = [refine(data, n, n + 1 - r, start) for start in tried]
+    return min(attempts, key=lambda fit: fit.cost)
+
+
+class _Ladder:
+    """Starts for every order; beyond a few, each order's grow out of the one or two below."""
+
+    def __init__(self, data: FRFData) -> None:
+        self._data = data
+        self._starts: dict[int, list[FloatArray]] = {}
+        self._fits: dict[int, list[RationalFit]] = {}
+
+    def starts(self, order: int) -> list[FloatArray]:
+        """Return what to refine for this order, whatever the relative degree."""
+        if order not in self._starts:
+            found = []
+            if order <= _LARGEST_FROM_GRID:
+                found = starting_points(self._data, order, delay_grid(self._data, order))
+            else:
+                for below in (order - 1, order - 2):
+                    if order <= _STEPS_OF_ONE or below % 2 == order % 2:
+                        for smaller in self._best(below):
+                            found += grown_starts(self._data, smaller, order)
+            self._starts[order] = found
+        return self._starts[order]
+
+    def _best(self, order: int) -> list[RationalFit]:
+        """Fit with a free numerator, the best first, of different dead times."""
+        if order not in self._fits:
+            fits = [refine(self._data, order, order, start) for start in self.starts(order)]
+            fits.sort(key=lambda fit: fit.cost)
+            apart = np.pi / (4 * np.abs(self._data.s).max())
+            kept: list[RationalFit] = []
+            for fit in fits:
+                if all(abs(fit.theta[order] - other.theta[order]) > apart for other in kept):
+                    kept.append(fit)
+            self._fits[order] = kept[:_KEPT]
+        return self._fits[order]
 
 
 def residual_variance(data: FRFData, fit: RationalFit, freedom: int, noise_known: bool) -> float:

@@ -15,9 +15,8 @@ from ctrl_realize.numerics.rational import (
     full_jacobian,
     poles_of,
     project,
-    relocate_poles,
-    trial_poles,
 )
+from ctrl_realize.numerics.vector_fitting import relocate_poles, trial_poles
 
 S = 1j * np.geomspace(0.05, 20, 60)
 POLES = {

@@ -1,0 +1,133 @@
+"""Starts for transfer functions with dead time, found without a guess; see `rational_fit`.
+
+Low orders come from a grid of dead times, at each of which the poles are found by a linear
+problem. Higher orders grow out of the lower ones by a pole or a resonance at a time, put where
+it explains most of what was left: over decades of frequency and many resonances the linear
+problem alone ends in poor local minima, above all in noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import FloatArray
+from .phase_slope import phase_roughness
+from .rational import (
+    factor_parameters,
+    poles_of,
+    project,
+    projected_cost,
+)
+from .rational_fit import FRFData, RationalFit, inside_limits
+from .vector_fitting import relocate_poles, trial_poles
+
+_RELOCATIONS = 8
+_MAX_STARTS = 4
+_MAX_DELAYS = 64
+_DAMPINGS = (0.01, 0.1, 0.6)
+_GRID = 16
+_PEAKS = 8
+_KEPT = 2
+
+
+def delay_grid(data: FRFData, order: int) -> FloatArray:
+    """Spread candidate dead times, close enough that no minimum is missed.
+
+    The misfit has a minimum about every half turn of the phase at the highest frequency. Where
+    the band is wide, a slow lag allows a dead time of hundreds of turns; but a dead time that is
+    wrong by many turns leaves a phase that turns far more than poles and zeros can, and such
+    candidates are left out.
+    """
+    top = float(np.abs(data.s).max())
+    turns = data.max_dead_time * top / (2 * np.pi)
+    count = int(np.clip(np.ceil(4 * turns), 6, 4000))
+    delays = np.linspace(0.0, data.max_dead_time, count + 1)
+    if delays.size <= _MAX_DELAYS:
+        return delays
+    clear = data.clear
+    omega, values = np.abs(data.s[clear]), data.response[clear]
+    left = phase_roughness(np.angle(values[1:] / values[:-1]), np.diff(omega), delays)
+    possible = np.flatnonzero(left <= left.min() + np.pi * (2 * order + 2))
+    ranked = possible[np.argsort(left[possible], kind="stable")][:_MAX_DELAYS]
+    return np.asarray(delays[np.sort(ranked)])
+
+
+def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[FloatArray]:
+    """Find poles for each candidate dead time, and keep the candidates worth refining.
+
+    With the dead time fixed the problem is linear but for a few pole relocations, which need no
+    start. The minima of the misfit over the grid of dead times come first; this is what spares
+    the maximum-likelihood fit its good initial guess.
+    """
+    omega = np.abs(data.s)
+    low, high = omega.min(), omega.max()
+    costs, found = [], []
+    for delay in delays:
+        turned = data.response * np.exp(data.s * delay)
+        best_cost, best = np.inf, np.zeros(0)
+        for resonant in (False, True):
+            poles = trial_poles(low, high, order, resonant=resonant)
+            for _ in range(_RELOCATIONS):
+                before, poles = poles, relocate_poles(data.s, turned, data.weight, poles)
+                moved = np.sort_complex(poles) - np.sort_complex(before)
+                if np.max(np.abs(moved) / np.abs(poles)) < 1e-3:
+                    break
+            theta = inside_limits(np.append(factor_parameters(poles), delay), data, order)
+            cost = projected_cost(data.s, data.response, data.weight, theta, order, order)
+            if cost < best_cost:
+                best_cost, best = cost, theta
+            if order == 1:
+                break
+        costs.append(best_cost)
+        found.append(best)
+    curve = np.array(costs)
+    padded = np.concatenate([[np.inf], curve, [np.inf]])
+    minima = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
+    ranked = minima[np.argsort(curve[minima])][:_MAX_STARTS]
+    return [found[k] for k in ranked]
+
+
+def grown_starts(data: FRFData, smaller: RationalFit, order: int) -> list[FloatArray]:
+    """Add one or two poles to a fit, where they take away most of its misfit.
+
+    Parameters
+    ----------
+    data : FRFData
+    smaller : RationalFit
+        Of one or two poles less than `order`.
+    order : int
+    """
+    omega = np.abs(data.s)
+    left = project(
+        data.s, data.response, data.weight, smaller.theta, smaller.order, smaller.numerator.size
+    ).residual
+    places = np.concatenate([np.geomspace(omega.min(), omega.max(), _GRID), _peaks(omega, left)])
+    added: list[list[complex]]
+    if order - smaller.order == 1:
+        added = [[-w] for w in places]
+    else:
+        turned = [w * complex(-z, np.sqrt(1 - z * z)) for w in places for z in _DAMPINGS]
+        added = [[p, p.conjugate()] for p in turned]
+    poles = poles_of(smaller.theta, smaller.order)
+    trials = []
+    for more in added:
+        theta = np.append(
+            factor_parameters(np.concatenate([poles, np.array(more, dtype=np.complex128)])),
+            smaller.theta[smaller.order],
+        )
+        trials.append(inside_limits(theta, data, order))
+    costs = [
+        projected_cost(data.s, data.response, data.weight, theta, order, order) for theta in trials
+    ]
+    return [trials[k] for k in np.argsort(costs, kind="stable")[:_KEPT]]
+
+
+def _peaks(omega: FloatArray, residual: FloatArray) -> FloatArray:
+    """Return the frequencies around which most of the misfit is left."""
+    power = residual[: omega.size] ** 2 + residual[omega.size :] ** 2
+    width = min(5, omega.size)
+    smooth = np.convolve(power, np.ones(width), mode="same")
+    rising = np.concatenate([[True], smooth[1:] >= smooth[:-1]])
+    falling = np.concatenate([smooth[:-1] >= smooth[1:], [True]])
+    tops = np.flatnonzero(rising & falling)
+    return np.asarray(omega[tops[np.argsort(smooth[tops])[::-1][:_PEAKS]]])
