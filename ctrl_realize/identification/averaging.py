@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import correlation_time, mad_sigma
+from ..numerics.output_error import OutputErrorFit
 from ..signals import Record, StepResponse
 from .delay_fit_result import Repeatability
 from .steps import unit_step
@@ -50,6 +51,12 @@ def aligned_steps(records: tuple[Record, ...]) -> tuple[StepResponse, ...]:
     DataError
         Records of different sample times.
     """
+    common_sample_time(records)
+    return tuple(unit_step(record) for record in records)
+
+
+def common_sample_time(records: tuple[Record, ...]) -> float:
+    """Return the sample time of all records in s; `DataError` where it is not the same."""
     first = records[0].dt
     for record in records:
         if abs(record.dt - first) > 1e-6 * first:
@@ -57,7 +64,7 @@ def aligned_steps(records: tuple[Record, ...]) -> tuple[StepResponse, ...]:
                 f"record {record.name!r} has dt={record.dt:g} s, the first has {first:g} s; "
                 "records that are fitted together need one sample time"
             )
-    return tuple(unit_step(record) for record in records)
+    return first
 
 
 def mean_step(steps: tuple[StepResponse, ...], skip: tuple[int, ...] = ()) -> MeanStep:
@@ -110,14 +117,42 @@ def repeatability(
     shifts, errors, gains = np.array(
         [_shift(step, mean, model) for step in steps], dtype=np.float64
     ).T
-    amplitudes = np.array([step.amplitude for step in steps])
-    kept = np.array(mean.used)
+    return compared(
+        tuple(step.name or f"record {i}" for i, step in enumerate(steps)),
+        np.array([step.amplitude for step in steps]),
+        (shifts, errors, gains),
+        mean.used,
+        delay,
+    )
+
+
+def compared(
+    names: tuple[str, ...],
+    amplitudes: FloatArray,
+    own: tuple[FloatArray, FloatArray, FloatArray],
+    used: tuple[int, ...],
+    delay: float,
+) -> Repeatability:
+    """Say how much the delays of several records differ, beyond the noise inside each.
+
+    Parameters
+    ----------
+    names : tuple of str
+    amplitudes : ndarray, shape (R,)
+    own : tuple of three ndarray, shape (R,)
+        Shift of every record against the common model and its standard error, in s, and gain.
+    used : tuple of int
+        Positions of the records that count.
+    delay : float
+        Dead time of the common model, in s.
+    """
+    shifts, errors, gains = own
+    kept = np.array(used)
     weight = errors[kept] ** -2
     centre = float(np.sum(weight * shifts[kept]) / np.sum(weight))
     statistic = float(np.sum(weight * (shifts[kept] - centre) ** 2))
     freedom = max(kept.size - 1, 1)
     trend, trend_error = _trend(np.abs(amplitudes[kept]), shifts[kept], errors[kept])
-    names = tuple(step.name or f"record {i}" for i, step in enumerate(steps))
     return Repeatability(
         names=names,
         amplitudes=amplitudes,
@@ -128,7 +163,20 @@ def repeatability(
         p_value=float(chdtrc(freedom, statistic)),
         trend=trend,
         trend_error=trend_error,
-        outlying=tuple(names[i] for i in mean.left_out),
+        outlying=tuple(name for i, name in enumerate(names) if i not in used),
+    )
+
+
+def widened(fit: OutputErrorFit, repeats: Repeatability, used: tuple[int, ...]) -> OutputErrorFit:
+    """Add the scatter of the mean where records differ by more than their noise."""
+    if repeats.p_value >= 0.01:
+        return fit
+    between = float(repeats.delays[list(used)].std(ddof=1)) / np.sqrt(len(used))
+    return replace(
+        fit,
+        low=max(fit.low - 1.96 * between, 0.0),
+        high=fit.high + 1.96 * between,
+        std=float(np.hypot(fit.std, between)),
     )
 
 

@@ -14,14 +14,14 @@ from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.output_error import OutputErrorFit, fit_output_error
-from ..numerics.sampled_fit import MOST_SAMPLES, fit_sampled
 from ..numerics.separable_fit import KnownFactor, Structure
-from ..numerics.step_problem import StepData, bare_data, step_data
+from ..numerics.step_problem import StepData, step_data
 from ..signals import Record, StepEdge
 from ..signals.record import check_complete
-from .averaging import aligned_steps, delay_outliers, mean_step, repeatability
-from .delay_fit_result import DelayFit, Repeatability
-from .fit_flags import fit_flags, repeat_flags, sampled_flags
+from .any_input_fit import LEAST_MOVE, fit_any_input
+from .averaging import aligned_steps, delay_outliers, mean_step, repeatability, widened
+from .delay_fit_result import DelayFit
+from .fit_flags import fit_flags, repeat_flags
 from .fit_summary import fitted_core, summarise
 from .known_dynamics import known_factor
 from .steps import detect_step
@@ -34,12 +34,7 @@ MOST_ORDER = 8
 FEWEST_SAMPLES = 20
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
-_ALONE = (
-    "several records are averaged at their steps; fit records of other inputs one by one, or take "
-    "them together in impulse_from_io"
-)
 _DWELL = 3  # times the first motion: steps that follow faster hide each other's onset
-_LEAST_MOVE = 1e-70  # squares of less underflow
 
 
 def fit_delay(
@@ -51,13 +46,14 @@ def fit_delay(
     loss: Loss = "huber",
     include_known: bool = False,
 ) -> DelayedStateSpace:
-    """Fit a transfer function with dead time to raw step records.
+    """Fit a transfer function with dead time to raw records.
 
     Parameters
     ----------
     records : Record or sequence of Record
-        One input, one output. Several records of one plant are aligned at their steps,
-        averaged, and fitted together.
+        One input, one output, any input that moves. Several records of one plant are fitted
+        together: steps are aligned and averaged; with other inputs poles, gain and dead time are
+        common, and every record has a level, a drift and an initial state of its own.
     structures : sequence of (order, relative_degree), optional
         Models to try. Default: orders 1 to 5 with relative degrees 1 to the order. With
         structures given the delay is that of the best of them, adequate or not.
@@ -117,8 +113,8 @@ def fit_delay(
     several = _records(records)
     settings: _Settings = {"structures": tried, "known": factor, "huber": loss == "huber"}
     if len(several) > 1:
-        _check_steps(several)
-        result, fit = _fit_mean(several, limit, settings)
+        way = _fit_mean if _all_step(several) else fit_any_input
+        result, fit = way(several, limit, settings)
     else:
         result, fit = _fit_one(several[0], limit, settings)
     core = fitted_core(fit, result.poles)
@@ -145,24 +141,12 @@ def _fit_one(
     record: Record, limit: float | None, settings: _Settings
 ) -> tuple[DelayFit, OutputErrorFit]:
     data = _step_data(record)
+    if data is None:
+        return fit_any_input((record,), limit, settings)
     latest = None if limit is None else limit * record.dt
-    if data is not None:
-        fit = fit_output_error(data, latest=latest, **settings)
-        flags = fit_flags(data, fit, limit)
-        return summarise(fit, data, record.time, (record,), flags), fit
-    signal, output = np.ravel(record.input), np.ravel(record.output)
-    for name, values in (("input", signal), ("output", output)):
-        moves = float(np.ptp(values[:MOST_SAMPLES]))
-        if moves < _LEAST_MOVE:
-            raise DataError(
-                f"the {name} of record {record.name!r} moves by {moves:.3g} in its first "
-                f"{MOST_SAMPLES} samples: there is nothing to fit"
-            )
-    fit = fit_sampled(output, signal, record.dt, latest=latest, **settings)
-    n = fit.fitted.size
-    flags = sampled_flags(fit, record.dt, n * record.dt, limit)
-    rest = bare_data(output[:n], signal[:n], record.dt, fit.residual)
-    return summarise(fit, rest, record.time[:n], (record,), flags), fit
+    fit = fit_output_error(data, latest=latest, **settings)
+    flags = fit_flags(data, fit, limit)
+    return summarise(fit, data, record.time, (record,), flags), fit
 
 
 def _fit_mean(
@@ -182,24 +166,11 @@ def _fit_mean(
         if not apart:
             break
         skip = apart
-    fit = _widened(fit, repeats, mean.used)
+    fit = widened(fit, repeats, mean.used)
     flags = fit_flags(data, fit, limit) + repeat_flags(repeats)
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
     result = summarise(fit, data, time, records, flags)
     return replace(result, repeatability=repeats), fit
-
-
-def _widened(fit: OutputErrorFit, repeats: Repeatability, used: tuple[int, ...]) -> OutputErrorFit:
-    """Add the scatter of the mean where records differ by more than their noise."""
-    if repeats.p_value >= 0.01:
-        return fit
-    between = float(repeats.delays[list(used)].std(ddof=1)) / np.sqrt(len(used))
-    return replace(
-        fit,
-        low=max(fit.low - 1.96 * between, 0.0),
-        high=fit.high + 1.96 * between,
-        std=float(np.hypot(fit.std, between)),
-    )
 
 
 def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -214,7 +185,7 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
                 f"lags needs at least {FEWEST_SAMPLES}"
             )
         moves = float(np.ptp(record.output))
-        if moves < _LEAST_MOVE:
+        if moves < LEAST_MOVE:
             raise DataError(
                 f"the output of record {record.name!r} does not leave its rest level: it moves by "
                 f"{moves:.3g} in all"
@@ -291,14 +262,17 @@ def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
     return bool(np.quantile(np.concatenate(away), 0.9) <= _HOLDS * largest)
 
 
-def _check_steps(records: tuple[Record, ...]) -> None:
-    """Several records are averaged at their steps: refuse those that have none, or many."""
+def _all_step(records: tuple[Record, ...]) -> bool:
+    """Tell whether every record is a step experiment, so that they can be averaged at it."""
     for record in records:
+        signal = np.ravel(record.input)
         try:
             edges = detect_step(record).edges
-        except NoStepError as missing:
-            raise NoStepError(f"{missing} ({_ALONE})") from None
-        if len(edges) > _MOST_EDGES or not _holds_between(np.ravel(record.input), edges):
-            raise NoStepError(
-                f"the input of record {record.name!r} is no step, but moves all the time; {_ALONE}"
-            )
+        except NoStepError:
+            if np.ptp(signal[:-_LAST]) == 0:
+                # It moves at the very end, if at all: there is nothing to fit.
+                raise
+            return False
+        if len(edges) > _MOST_EDGES or not _holds_between(signal, edges):
+            return False
+    return True

@@ -169,7 +169,7 @@ class Repeatability:
     names : tuple of str
         Of the records.
     amplitudes : ndarray, shape (R,)
-        Height of the step of each.
+        Height of the step of each, or how far its input goes from lowest to highest.
     delays, errors : ndarray, shape (R,)
         Delay of each against the common model, and its standard error from the noise, in s.
     gains : ndarray, shape (R,)

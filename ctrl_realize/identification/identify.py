@@ -31,7 +31,7 @@ PAPER_ORDER, PAPER_SAMPLES, PAPER_MAX_DELAY, PAPER_CUTOFF_HZ = 3, 1000, 100, 50.
 
 
 def identify(
-    record: Record,
+    record: Record | Sequence[Record],
     *,
     method: Method = "output_error",
     order: int | None = None,
@@ -44,12 +44,13 @@ def identify(
     samples: int | None = None,
     feedthrough: bool | None = None,
 ) -> DelayedStateSpace:
-    """Identify a model with dead time from one record.
+    """Identify a model with dead time from one record, or from several of one plant.
 
     Parameters
     ----------
-    record : Record
-        One input, one output. The scan and the paper's method need a step in the input.
+    record : Record or sequence of Record
+        One input, one output. The scan and the paper's method need one record with a step in its
+        input; the output-error fit takes several, and any input (see `fit_delay`).
     method : {"output_error", "scan", "paper"}, optional
         ``"output_error"``: fit of the raw record with a continuous delay; the most accurate, and
         the only one whose interval is a confidence interval. ``"scan"``: the realization scan
@@ -116,6 +117,11 @@ def identify(
             loss=loss,
             structures=structures,
             include_known=include_known,
+        )
+    if not isinstance(record, Record):
+        raise OptionError(
+            f"method={method!r} takes one record; several go together with method='output_error', "
+            "or one by one through identify_campaign"
         )
     step = unit_step(record)
     if method == "paper":

@@ -158,3 +158,30 @@ class SampledInput:
                 mode[b, whole:, j] = gain * sums
                 slope[b, whole:, j] = gain * (weighted + rest * sums)
         return static, mode, slope
+
+
+@dataclass(frozen=True, eq=False)
+class SeveralInputs:
+    """Sampled inputs of several records one after the other, each without its first samples.
+
+    Attributes
+    ----------
+    parts : tuple of SampledInput
+    starts : tuple of int
+        First sample of every part at which the response is wanted.
+    """
+
+    parts: tuple[SampledInput, ...]
+    starts: tuple[int, ...]
+
+    def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
+        """Evaluate H, E and T at every sample wanted; see `HeldInput`."""
+        found = [part.modes(tau, poles) for part in self.parts]
+        static, mode, slope = (
+            np.concatenate(
+                [modes[i][:, start:] for modes, start in zip(found, self.starts, strict=True)],
+                axis=1,
+            )
+            for i in range(3)
+        )
+        return static, mode, slope

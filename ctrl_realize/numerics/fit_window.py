@@ -59,6 +59,9 @@ class Window:
     def predict(self, problem: Problem, candidate: Candidate) -> FloatArray:
         """Model at every sample, with the linear terms of the problem."""
         state = evaluate(problem, candidate.structure, candidate.parameters[None])
+        if self.bins is None:
+            # The samples are the data of the problem, all of weight 1.
+            return np.asarray(problem.data - state.residual[0])
         model = respond(self.drive, problem.known, state.numerator[0], candidate.parameters)
         return np.asarray(model + self.columns @ state.regression[0])
 
@@ -135,12 +138,15 @@ def fit_window(
             candidates = refine(problem, candidates, scales)
     after = left[window.start :]
     lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
+    lost += problem.own_count(best.structure.order)
     level = float(np.sqrt(np.sum(after**2) / max(after.size - lost, 1)))
     # Far below the noise the residual is rounding, and its correlation says nothing.
     floor = 0.3 * sigma
     correlation = correlation_time(after) if level > floor else 1.0
     level = max(level, floor)
     criterion = criteria(candidates, level**2 * correlation, after.size / correlation)
+    # One initial value more for a pole fits noise alone by one variance.
+    criterion = {s: value + problem.own_count(s.order) for s, value in criterion.items()}
     chosen = candidates[choose(criterion)]
     freedom = max(problem.data.size - lost, 1)
     misfit = float(np.sqrt(chosen.cost / freedom)) / sigma

@@ -1,22 +1,31 @@
-"""Output-error fit for inputs that are no steps: random, pseudo-random, sweeps, operation."""
+"""Output-error fit for inputs that are no steps: random, pseudo-random, sweeps, operation.
+
+One record or several of one plant: poles, numerator and delay are common, level, drift and initial
+state are each record's own (see `own_terms`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import FloatArray
-from .delayed_modes import SampledInput
-from .fit_window import Window, fit_window
-from .noise_level import quantisation_step
+from .arrays import FloatArray, IntArray
+from .delayed_modes import SampledInput, SeveralInputs
+from .fit_window import Window, WindowFit, fit_window
+from .noise_level import correlation_time, quantisation_step, winsorised_sigma
 from .output_error import OutputErrorFit, likelihood_fit
-from .separable_fit import KnownFactor, Problem, Structure
+from .own_terms import OwnTerms, Stretches
+from .pole_factors import parameters_from_poles, poles_from_parameters
+from .separable_fit import KnownFactor, Problem, Structure, respond
 from .structure_search import Candidate, Scales, search
 
 MOST_SAMPLES = 4000
 """Longer records are cut: every sample counts, so that time grows with the length."""
+
+MOST_IN_ALL = 12000
+"""Samples of all records together; beyond that every record is cut to its share."""
 
 WHITE = 3.0
 """Correlation time of the residual, in samples, up to which a model is taken for right."""
@@ -25,53 +34,209 @@ ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 _RISES = (2.0, 10.0, 50.0)
 _ONSETS = (1.0, 5.0, 20.0)
 _SMALLEST = 1e-4
+_UNLIKE = 1.3  # ratio of noise levels from which records are weighted
+_BEYOND = 1.5  # of a first-order model's delay: no model's delay is later
+_TURNS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class SampledData:
+    """Records with any input, cut, without the samples that depend on unknown input.
+
+    Attributes
+    ----------
+    inputs, outputs : tuple of ndarray
+        Of every record, from its first sample on; the mean of the input is taken out.
+    starts : tuple of int
+        Samples before these are reached by input from before the record.
+    scales : tuple of float
+        Noise level of every record over the mean one. A linear plant is the same for input and
+        output divided by it, and the records then count as they should.
+    dt : float
+        Sample time in s.
+    """
+
+    inputs: tuple[FloatArray, ...]
+    outputs: tuple[FloatArray, ...]
+    starts: tuple[int, ...]
+    scales: tuple[float, ...]
+    dt: float
+
+    @property
+    def counts(self) -> list[int]:
+        """Samples of every record that are fitted."""
+        return [y.size - start for y, start in zip(self.outputs, self.starts, strict=True)]
+
+    @property
+    def edges(self) -> IntArray:
+        """Bounds of the records in what is fitted, one after the other."""
+        return np.concatenate([[0], np.cumsum(self.counts)]).astype(np.int64)
+
+    def problem(self, known: KnownFactor) -> Problem:
+        """Set up the fit of all records together."""
+        clocks = [self.dt * np.arange(count, dtype=np.float64) for count in self.counts]
+        shapes = [_own_shapes(clock, known) for clock in clocks]
+        m = int(self.edges[-1])
+        drive = SeveralInputs(
+            tuple(
+                SampledInput(u / scale, self.dt)
+                for u, scale in zip(self.inputs, self.scales, strict=True)
+            ),
+            self.starts,
+        )
+        joined = np.concatenate(
+            [
+                y[start:] / scale
+                for y, start, scale in zip(self.outputs, self.starts, self.scales, strict=True)
+            ]
+        )
+        stretches = Stretches(self.edges, np.concatenate(clocks), np.concatenate(shapes))
+        return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, stretches)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnDelay:
+    """One record against the common model: shift in s, ratio of gains, and standard errors."""
+
+    shift: float
+    error: float
+    gain: float
+    gain_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class SampledFit:
+    """Fit of records with any input.
+
+    `fitted` has one entry for each record, from its start on. `explained` is how much the input
+    lowers the sum of squares, over the variance of the residual: a chi-square.
+    """
+
+    fit: OutputErrorFit
+    data: SampledData
+    fitted: tuple[FloatArray, ...]
+    explained: float
+    known: KnownFactor
+
+    def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnDelay:
+        """Shift and scale the common model to fit one record best, seen before or not."""
+        one = _cut([output], [signal], self.data.dt)
+        start = min(max(self.data.starts), output.size // 2)
+        return _own_delay(replace(one, starts=(start,)), self.fit, self.known)
 
 
 def fit_sampled(
-    output: FloatArray,
-    signal: FloatArray,
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
     dt: float,
     *,
     structures: Sequence[Structure] | None = None,
     latest: float | None = None,
     known: KnownFactor | None = None,
     huber: bool = True,
-) -> OutputErrorFit:
-    """Estimate the dead time of a record with any input that moves.
+) -> SampledFit:
+    """Estimate the dead time of one plant from records with any input that moves.
 
     Parameters
     ----------
-    output, signal : ndarray, shape (N,)
+    outputs, inputs : sequence of ndarray
+        One of each for every record.
     dt : float
         Sample time in s.
     structures, latest, known, huber
-        See `fit_output_error`; orders up to 3 by default, `latest` a quarter of the record.
+        See `fit_output_error`; orders up to 3 by default, `latest` a quarter of the longest
+        record.
 
     Notes
     -----
-    The model starts from rest at the mean of the input. What was before the record decays
-    during the first samples, which are left out: three times the lags of a first-order model,
-    at most a fifth of the record.
+    What was before a record is an initial state, which is eliminated with level and drift. What
+    was on its way through the dead time is not known: the first samples are left out, as many as
+    one and a half delays of the first-order model that fits best, half the record at most.
     """
-    n = min(output.size, MOST_SAMPLES)
-    output, signal = output[:n], signal[:n] - float(np.mean(signal[:n]))
     factor = known or KnownFactor()
+    data = _cut(outputs, inputs, dt)
+    n = max(y.size for y in data.outputs)
     limit = 0.25 * n * dt if latest is None else latest
-    drive = SampledInput(signal, dt)
-    columns = np.ones((n, 1))
-    weight = np.ones(n)
-    weight[: n // 20] = 0.0
-    problem = Problem(output, weight, drive, columns, factor)
-    rough = _first_order(problem, n, dt, limit)
+    data = replace(data, starts=tuple(y.size // 20 for y in data.outputs))
+    rough = _first_order(data.problem(factor), n, dt, limit)
     lag = float(-1.0 / rough.poles[0].real)
-    weight[: int(min(3 * (lag + rough.delay) / dt, n // 5))] = 0.0
-    start = int(np.argmax(weight > 0))
-    window = Window(start, output, replace(problem, root_weight=weight), drive, columns, None)
-    scales = Scales(max(rough.delay, 0.5 * dt), max(lag, 2 * dt), (n - start) * dt, dt, limit)
-    noise = _SMALLEST * float(np.ptp(output)), quantisation_step(output)
+    late = int(np.ceil(_BEYOND * rough.delay / dt))
+    data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
+    scales = Scales(max(rough.delay, 0.5 * dt), max(lag, 2 * dt), max(data.counts) * dt, dt, limit)
     tried = ORDERS if structures is None else tuple(structures)
-    whole = fit_window(window, tried, scales, noise, huber)
-    return likelihood_fit(whole, adequate=whole.correlation <= WHITE)
+    whole = _fit(data, factor, tried, scales, huber)
+    levels = _noise_levels(data, whole)
+    if levels.max() > _UNLIKE * levels.min():
+        mean = float(np.exp(np.mean(np.log(levels))))
+        data = replace(data, scales=tuple(float(level) / mean for level in levels))
+        whole = _fit(data, factor, tried, scales, huber)
+    fit = likelihood_fit(whole, adequate=whole.correlation <= WHITE)
+    # The noise is not known from a rest; correlation is what shows in means over bins.
+    fit = replace(fit, misfit=float(np.sqrt(whole.correlation)))
+    parts = np.split(fit.fitted, data.edges[1:-1])
+    return SampledFit(
+        fit,
+        data,
+        tuple(part * scale for part, scale in zip(parts, data.scales, strict=True)),
+        _explained(whole),
+        factor,
+    )
+
+
+def _cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) -> SampledData:
+    """Cut long records; the shortest keep all they have."""
+    lengths = np.minimum([y.size for y in outputs], MOST_SAMPLES)
+    share = MOST_SAMPLES
+    while np.minimum(lengths, share).sum() > MOST_IN_ALL and share > MOST_IN_ALL // len(lengths):
+        share = max(int(0.9 * share), MOST_IN_ALL // len(lengths))
+    lengths = np.minimum(lengths, share)
+    return SampledData(
+        tuple(u[:n] - float(np.mean(u[:n])) for u, n in zip(inputs, lengths, strict=True)),
+        tuple(y[:n] for y, n in zip(outputs, lengths, strict=True)),
+        (0,) * len(lengths),
+        (1.0,) * len(lengths),
+        dt,
+    )
+
+
+def _own_shapes(clock: FloatArray, known: KnownFactor) -> FloatArray:
+    """Level, drift, and the free responses of what is known, shape (m, q)."""
+    shapes = [np.ones_like(clock), clock / max(float(clock[-1]), 1e-300)]
+    for pole in known.poles[known.poles.imag >= 0]:
+        wave = np.exp(pole * clock)
+        shapes += [wave.real] if pole.imag == 0 else [wave.real, wave.imag]
+    return np.stack(shapes, axis=1)
+
+
+def _fit(
+    data: SampledData,
+    known: KnownFactor,
+    structures: Sequence[Structure],
+    scales: Scales,
+    huber: bool,
+) -> WindowFit:
+    problem = data.problem(known)
+    window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
+    noise = _SMALLEST * float(np.ptp(problem.data)), max(map(quantisation_step, data.outputs))
+    return fit_window(window, structures, scales, noise, huber)
+
+
+def _noise_levels(data: SampledData, whole: WindowFit) -> FloatArray:
+    """Residual of the best model in every record, in its own unit."""
+    error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+    floor = _SMALLEST * float(np.ptp(whole.window.output))
+    return np.array(
+        [max(winsorised_sigma(part, 0.0), floor) for part in np.split(error, data.edges[1:-1])]
+    )
+
+
+def _explained(whole: WindowFit) -> float:
+    """Chi-square of the forced response: own terms alone against own terms and input."""
+    problem, best = whole.problem, whole.best
+    assert problem.stretches is not None
+    own = OwnTerms(problem.stretches, problem.root_weight, best.poles[None])
+    alone = float(np.sum(own.without(problem.data[None, :, None]) ** 2))
+    return (alone - best.cost) / max(whole.variance, 1e-300)
 
 
 def _first_order(problem: Problem, n: int, dt: float, limit: float) -> Candidate:
@@ -86,3 +251,37 @@ def _first_order(problem: Problem, n: int, dt: float, limit: float) -> Candidate
         for onset in _ONSETS
     ]
     return min(tries, key=lambda candidate: candidate.cost)
+
+
+def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> OwnDelay:
+    """Gauss-Newton steps for gain and delay, everything else of the model being common."""
+    problem = data.problem(known)
+    pole_parameters = parameters_from_poles(fit.poles)
+    poles, _ = poles_from_parameters(pole_parameters[None])
+    assert problem.stretches is not None
+    own = OwnTerms(problem.stretches, problem.root_weight, poles)
+
+    def response(delay: float) -> FloatArray:
+        parameters = np.concatenate([[max(delay, 0.0)], pole_parameters])
+        return respond(problem.drive, known, fit.numerator, parameters)
+
+    shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
+    target = own.without(problem.data[None, :, None])[0, :, 0]
+    h = 0.25 * data.dt
+    for _ in range(_TURNS):
+        at = max(fit.delay + shift, h)
+        slope = (response(at + h) - response(at - h)) / (2 * h)
+        columns = own.without(np.stack([response(at), slope], axis=1)[None])[0]
+        solution = np.linalg.lstsq(columns, target, rcond=None)[0]
+        left = target - columns @ solution
+        gain = float(solution[0]) or 1.0
+        move = float(solution[1]) / gain
+        freedom = max(left.size - 2 - problem.own_count(poles.shape[1]), 1)
+        variance = float(left @ left) / freedom * correlation_time(left)
+        spread = np.linalg.pinv(columns.T @ columns)
+        gain_error = float(np.sqrt(variance * spread[0, 0]))
+        error = float(np.sqrt(variance * spread[1, 1])) / abs(gain)
+        shift = at - fit.delay + float(np.clip(move, -20 * data.dt, 20 * data.dt))
+        if abs(move) < 1e-3 * data.dt:
+            break
+    return OwnDelay(shift, max(error, 1e-12 * data.dt), gain, max(gain_error, 1e-12))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from .arrays import ComplexArray, FloatArray, IntArray
 from .delayed_modes import HeldInput
+from .own_terms import OwnTerms, Stretches, solve_upper
 from .pole_factors import poles_from_parameters
 
 _LONGEST_STEP = 1.5  # of a logarithmic parameter, in one iteration
@@ -39,13 +40,24 @@ class KnownFactor:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is fitted: data (m,), root weights (m,), input, fixed regressors (m, q)."""
+    """What is fitted: data (m,), root weights (m,), input, fixed regressors (m, q).
+
+    With `stretches` each of them has an initial state and regressors of its own besides.
+    """
 
     data: FloatArray
     root_weight: FloatArray
     drive: HeldInput
     regressors: FloatArray
     known: KnownFactor
+    stretches: Stretches | None = None
+
+    def own_count(self, order: int) -> int:
+        """Linear terms that all stretches have for themselves, of a model of an order."""
+        if self.stretches is None:
+            return 0
+        per_stretch = int(self.stretches.regressors.shape[1]) + order
+        return per_stretch * (int(self.stretches.edges.size) - 1)
 
 
 @dataclass(frozen=True)
@@ -107,13 +119,18 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     fixed = np.broadcast_to(problem.regressors, (batch, *problem.regressors.shape))
     weight = problem.root_weight
     columns = np.concatenate([basis, fixed], axis=2) * weight[:, None]
+    data = np.tile(weight * problem.data, (batch, 1))
+    own = None
+    if problem.stretches is not None:
+        own = OwnTerms(problem.stretches, weight, free)
+        forced, whole = columns, data
+        columns, data = own.without(columns), own.without(data[:, :, None])[:, :, 0]
     norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
     norm[norm == 0] = 1.0
     q, r = np.linalg.qr(columns / norm[:, None])
-    data = weight * problem.data
-    inside = np.einsum("bmk,m->bk", q, data)
+    inside = np.einsum("bmk,bm->bk", q, data)
     residual = data - np.einsum("bmk,bk->bm", q, inside)
-    linear = _back_substitute(r, inside) / norm
+    linear = solve_upper(r, inside) / norm
     numerator = linear[:, :count] / size
 
     derivative = np.empty((batch, weight.size, 1 + n))
@@ -127,8 +144,13 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     derivative[:, :, 1:] = (mode @ moved + slope @ stretch).real
     derivative[:, :, 1:] += static[:, :, None] * level[:, None]
     derivative *= weight[:, None]
-    jacobian = derivative - q @ (np.swapaxes(q, 1, 2) @ derivative)
+    if own is not None:
+        rest = whole - np.einsum("bmk,bk->bm", forced, linear)
+        derivative[:, :, 1:] += own.moved(rest, dfree)
     sensitivity = np.sqrt(np.einsum("bmp,bmp->bp", derivative, derivative))
+    if own is not None:
+        derivative = own.without(derivative)
+    jacobian = derivative - q @ (np.swapaxes(q, 1, 2) @ derivative)
     return Evaluation(residual, jacobian, sensitivity, numerator, linear[:, count:])
 
 
@@ -272,13 +294,3 @@ def _moved_amplitudes(
     crowd = np.where(own, 0.0, inverse).sum(axis=2)
     moved[:, own] = np.einsum("bjk,bk->bj", dresidues, numerator) - amplitudes * crowd
     return np.asarray(moved)
-
-
-def _back_substitute(r: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve R x = b for a batch; directions that the columns do not resolve get 0."""
-    x = np.zeros_like(right)
-    for i in range(right.shape[1] - 1, -1, -1):
-        rest = right[:, i] - np.einsum("bj,bj->b", r[:, i, i + 1 :], x[:, i + 1 :])
-        resolved = np.abs(r[:, i, i]) > 1e-12
-        x[:, i] = np.where(resolved, rest / np.where(resolved, r[:, i, i], 1.0), 0.0)
-    return x

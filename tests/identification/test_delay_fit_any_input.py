@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import NoStepError
-from tests.rigs import R1, R3
+from ctrl_realize.errors import DataError
+from tests.rigs import R1, R3, lag, pair
 
 DT = 0.01
 DELAY = 12.4
@@ -47,7 +47,25 @@ def test_an_input_that_never_holds_is_no_step(shared_data):
     assert cr.check_residuals(model, second).fit_percent[0] > 35
 
 
-def test_records_without_a_step_are_not_averaged_at_one():
-    records = [cut_from_operation("prbs", R1, seed) for seed in (0, 1)]
-    with pytest.raises(NoStepError, match="impulse_from_io"):
-        cr.fit_delay(records)
+@pytest.mark.parametrize(("plant", "structure"), [(pair(1.5, 0.05), (2, 2)), (lag(0.05), (1, 1))])
+def test_what_was_before_the_record_may_ring_or_creep_through_all_of_it(plant, structure):
+    # decay times of 2.1 s and 3.2 s, in a record of 12 s that starts in the middle of motion
+    fit = cr.fit_delay(cut_from_operation("prbs", plant, seed=2)).fit
+    assert fit.structure == structure
+    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std / DT
+    assert fit.std / DT < 0.06
+    assert fit.measured.shape == fit.fitted.shape == fit.time.shape
+
+
+def test_an_output_that_does_not_follow_the_input_gets_no_answer():
+    good = cut_from_operation("prbs", R1, seed=0, n=600)
+    for seed in range(3):
+        y = np.random.default_rng(seed).standard_normal(600)
+        with pytest.raises(DataError, match="does not follow the input"):
+            cr.fit_delay(cr.Record(good.time, good.input, y))
+
+
+def test_a_long_record_is_cut_and_says_so():
+    fit = cr.fit_delay(cut_from_operation("prbs", R1, seed=0, n=4500), structures=[(1, 1)]).fit
+    assert fit.time.size < 4000
+    assert "cut" in [flag.code for flag in fit.flags]

@@ -1,0 +1,173 @@
+"""Output-error fit of records whose input is no step: one, or several of one plant together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtrc
+
+from ..errors import DataError
+from ..numerics.arrays import FloatArray
+from ..numerics.noise_level import mad_sigma
+from ..numerics.output_error import OutputErrorFit
+from ..numerics.sampled_fit import MOST_SAMPLES, OwnDelay, SampledFit, fit_sampled
+from ..numerics.step_problem import bare_data
+from ..results import Flag
+from ..signals import Record
+from .averaging import common_sample_time, compared, delay_outliers, widened
+from .delay_fit_result import DelayFit, Repeatability
+from .fit_flags import repeat_flags, sampled_flags
+from .fit_summary import summarise
+
+FOLLOWS = 36.0
+"""Least chi-square of the response to the input: six standard deviations. White noise that has
+nothing to do with the input reached 23 in 25 records, with the best of all delays and lags."""
+LEAST_MOVE = 1e-70
+"""Least move of a signal that is fitted: squares of less underflow."""
+_APART = 5.0  # standard deviations by which a record's gain may lie from the others'
+
+
+def fit_any_input(
+    records: tuple[Record, ...], limit: float | None, settings: Mapping[str, Any]
+) -> tuple[DelayFit, OutputErrorFit]:
+    """Fit one model to all records, each with its own level, drift and initial state.
+
+    A record whose delay lies apart from the others' is left out, as among step records.
+    """
+    dt = common_sample_time(records)
+    latest = None if limit is None else limit * dt
+    used = tuple(range(len(records)))
+    if len(records) == 1:
+        found = _fit(records, dt, latest, settings)
+        return _summary(found, found.fit, records, used, limit, ()), found.fit
+    for _ in range(2):
+        found = _fit(tuple(records[i] for i in used), dt, latest, settings)
+        own = [found.own_delay(*_signals(record)) for record in records]
+        repeats = _repeatability(own, records, used, found.fit.delay)
+        apart = {*delay_outliers(repeats, used), *_gain_outliers(own, used)}
+        if not apart:
+            break
+        used = tuple(i for i in used if i not in apart)
+    fit = widened(found.fit, repeats, used)
+    flags = repeat_flags(repeats) + _gain_flags(own, used)
+    result = _summary(found, fit, records, used, limit, flags)
+    return replace(result, repeatability=repeats), fit
+
+
+def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
+    return np.ravel(record.output), np.ravel(record.input)
+
+
+def _fit(
+    records: tuple[Record, ...], dt: float, latest: float | None, settings: Mapping[str, Any]
+) -> SampledFit:
+    for record in records:
+        _check_moves(record)
+    outputs, inputs = zip(*map(_signals, records), strict=True)
+    found = fit_sampled(outputs, inputs, dt, latest=latest, **settings)
+    if found.explained < FOLLOWS:
+        raise DataError(
+            f"{_named(records)}: the output does not follow the input (the best of all models "
+            f"lowers the squares by {found.explained:.3g} variances of the noise, {FOLLOWS:g} are "
+            "needed); are the channels right, does the input excite the plant?"
+        )
+    return found
+
+
+def _check_moves(record: Record) -> None:
+    for name, values in zip(("output", "input"), _signals(record), strict=True):
+        moves = float(np.ptp(values[:MOST_SAMPLES]))
+        if moves < LEAST_MOVE:
+            raise DataError(
+                f"the {name} of record {record.name!r} moves by {moves:.3g} in its first "
+                f"{MOST_SAMPLES} samples: there is nothing to fit"
+            )
+
+
+def _named(records: tuple[Record, ...]) -> str:
+    if len(records) > 1:
+        return f"{len(records)} records"
+    return f"record {records[0].name!r}"
+
+
+def _repeatability(
+    own: list[OwnDelay], records: tuple[Record, ...], used: tuple[int, ...], delay: float
+) -> Repeatability:
+    return compared(
+        tuple(record.name or f"record {i}" for i, record in enumerate(records)),
+        np.array([float(np.ptp(record.input)) for record in records]),
+        (
+            np.array([one.shift for one in own]),
+            np.array([one.error for one in own]),
+            np.array([one.gain for one in own]),
+        ),
+        used,
+        delay,
+    )
+
+
+def _gain_outliers(own: list[OwnDelay], used: tuple[int, ...]) -> tuple[int, ...]:
+    """Positions of records whose gain lies apart from the others': another plant, or none."""
+    gains = np.array([own[i].gain for i in used])
+    centre, scatter = float(np.median(gains)), mad_sigma(gains)
+    return tuple(
+        i for i in used if abs(own[i].gain - centre) > _APART * max(scatter, own[i].gain_error)
+    )
+
+
+def _gain_flags(own: list[OwnDelay], used: tuple[int, ...]) -> tuple[Flag, ...]:
+    """Say so where the gains of the records differ by more than their noise."""
+    gains, errors = (np.array([getattr(own[i], k) for i in used]) for k in ("gain", "gain_error"))
+    weight = errors**-2
+    statistic = float(np.sum(weight * (gains - np.sum(weight * gains) / np.sum(weight)) ** 2))
+    chance = float(chdtrc(max(gains.size - 1, 1), statistic))
+    if chance >= 0.01:
+        return ()
+    return (
+        Flag(
+            "gains_differ",
+            f"the gain differs from record to record by more than its noise, {gains.min():.3g} to "
+            f"{gains.max():.3g} times the common one (chi-square {statistic:.3g}, p = "
+            f"{chance:.2g}): the plant is not linear, or not the same",
+        ),
+    )
+
+
+def _summary(
+    found: SampledFit,
+    fit: OutputErrorFit,
+    records: tuple[Record, ...],
+    used: tuple[int, ...],
+    limit: float | None,
+    flags: tuple[Flag, ...],
+) -> DelayFit:
+    """Lay what was fitted out record after record, on one time axis."""
+    data = found.data
+    times: list[FloatArray] = []
+    for i, start, output in zip(used, data.starts, data.outputs, strict=True):
+        time = records[i].time[start : output.size]
+        times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
+    measured = [y[start:] for y, start in zip(data.outputs, data.starts, strict=True)]
+    signal = [u[start:] for u, start in zip(data.inputs, data.starts, strict=True)]
+    length = max(y.size for y in data.outputs) * data.dt
+    flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
+    joined = bare_data(np.concatenate(measured), np.concatenate(signal), data.dt, fit.residual)
+    fit = replace(fit, fitted=np.concatenate(found.fitted))
+    return summarise(fit, joined, np.concatenate(times), records, flags)
+
+
+def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:
+    """Say where only the beginning of long records was used."""
+    taken = [output.size for output in found.data.outputs]
+    if all(records[i].n_samples <= size for i, size in zip(used, taken, strict=True)):
+        return ()
+    return (
+        Flag(
+            "cut",
+            f"of records longer than {max(taken)} samples the first {max(taken)} were fitted; give "
+            "the best part with `between`, or pieces of them as several records",
+        ),
+    )

@@ -1,0 +1,138 @@
+"""Linear terms that belong to one stretch of the data only: its level, drift and initial state.
+
+Several records of one plant share poles, numerator and delay. What each of them has for itself
+enters linearly and touches only its own samples, so it is projected out of them, stretch by
+stretch; a hundred records cost no more than one of the same length.
+
+An initial state of the plant is a free response, a sum of exp(p_j t) with free amplitudes. As
+poles of a pair may be real, complex, or almost equal, its columns are
+
+    (exp(p t) + exp(q t)) / 2    and    (exp(p t) - exp(q t)) / (p - q),
+
+which are real and independent in every case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from .arrays import ComplexArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """Parts of the data with an initial state each.
+
+    Attributes
+    ----------
+    edges : ndarray of int, shape (R + 1,)
+        Stretch r has the rows ``edges[r]...edges[r + 1] - 1``.
+    clock : ndarray, shape (m,)
+        Time since the first sample of the own stretch, in s.
+    regressors : ndarray, shape (m, q)
+        Known shapes, which enter every stretch with coefficients of its own.
+    """
+
+    edges: IntArray
+    clock: FloatArray
+    regressors: FloatArray
+
+    @property
+    def rows(self) -> list[slice]:
+        """Rows of every stretch."""
+        edges = [int(edge) for edge in self.edges]
+        return [slice(a, b) for a, b in pairwise(edges)]
+
+
+class OwnTerms:
+    """Own terms of all stretches at B sets of poles, ready to be taken out.
+
+    Parameters
+    ----------
+    stretches : Stretches
+    root_weight : ndarray, shape (m,)
+    poles : ndarray, shape (B, n)
+        Of the plant; conjugates are neighbours, an odd one comes first.
+    """
+
+    def __init__(self, stretches: Stretches, root_weight: FloatArray, poles: ComplexArray) -> None:
+        self._rows = stretches.rows
+        self._poles = poles
+        self._weight = root_weight
+        self._clock = stretches.clock
+        self._decay = np.exp(stretches.clock[:, None] * poles[:, None, :])
+        fixed = np.broadcast_to(stretches.regressors, (poles.shape[0], *stretches.regressors.shape))
+        self._known = stretches.regressors.shape[1]
+        columns = np.concatenate([fixed, self._free_columns()], axis=2) * root_weight[:, None]
+        self._bases: list[FloatArray] = []
+        self._triangles: list[FloatArray] = []
+        self._norms: list[FloatArray] = []
+        for rows in self._rows:
+            own = columns[:, rows]
+            norm = np.sqrt(np.einsum("bmk,bmk->bk", own, own))
+            norm[norm == 0] = 1.0
+            q, r = np.linalg.qr(own / norm[:, None])
+            self._bases.append(q)
+            self._triangles.append(r)
+            self._norms.append(norm)
+
+    def without(self, columns: FloatArray) -> FloatArray:
+        """Take the own terms out of weighted columns (B, m, k)."""
+        left = np.empty_like(columns)
+        for rows, q in zip(self._rows, self._bases, strict=True):
+            part = columns[:, rows]
+            left[:, rows] = part - q @ (np.swapaxes(q, 1, 2) @ part)
+        return left
+
+    def moved(self, rest: FloatArray, dpoles: ComplexArray) -> FloatArray:
+        """Derivative of the free responses by the pole parameters, weighted, shape (B, m, n).
+
+        Parameters
+        ----------
+        rest : ndarray, shape (B, m)
+            Weighted data less the forced response; the own terms are fitted to it.
+        dpoles : ndarray, shape (B, n, n)
+            Poles (rows) by their parameters (columns).
+        """
+        out = np.empty((*rest.shape, dpoles.shape[2]))
+        for i, rows in enumerate(self._rows):
+            inside = np.einsum("bmk,bm->bk", self._bases[i], rest[:, rows])
+            weights = solve_upper(self._triangles[i], inside) / self._norms[i]
+            amplitudes = self._amplitudes(weights[:, self._known :])
+            slope = self._clock[rows, None] * self._decay[:, rows]
+            out[:, rows] = (slope @ (amplitudes[:, :, None] * dpoles)).real
+        return out * self._weight[:, None]
+
+    def _free_columns(self) -> FloatArray:
+        n = self._poles.shape[1]
+        out = np.empty(self._decay.shape)
+        if n % 2:
+            out[:, :, 0] = self._decay[:, :, 0].real
+        for i in range(n % 2, n, 2):
+            first, second = self._decay[:, :, i], self._decay[:, :, i + 1]
+            gap = self._poles[:, i] - self._poles[:, i + 1]
+            out[:, :, i] = (first + second).real / 2
+            out[:, :, i + 1] = ((first - second) / gap[:, None]).real
+        return out
+
+    def _amplitudes(self, weights: FloatArray) -> ComplexArray:
+        """Turn weights of the columns into amplitudes of the exponentials."""
+        n = self._poles.shape[1]
+        out = weights.astype(np.complex128)
+        for i in range(n % 2, n, 2):
+            half = weights[:, i + 1] / (self._poles[:, i] - self._poles[:, i + 1])
+            out[:, i], out[:, i + 1] = weights[:, i] / 2 + half, weights[:, i] / 2 - half
+        return out
+
+
+def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve R x = b for a batch, R from columns of norm 1; what they do not resolve gets 0."""
+    x = np.zeros_like(right)
+    for i in range(right.shape[1] - 1, -1, -1):
+        rest = right[:, i] - np.einsum("bj,bj->b", r[:, i, i + 1 :], x[:, i + 1 :])
+        resolved = np.abs(r[:, i, i]) > 1e-12
+        x[:, i] = np.where(resolved, rest / np.where(resolved, r[:, i, i], 1.0), 0.0)
+    return x

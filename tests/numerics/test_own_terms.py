@@ -1,0 +1,83 @@
+"""Level, drift and initial state of every stretch of the data are taken out, and only they."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from ctrl_realize.numerics.delayed_modes import SampledInput, SeveralInputs
+from ctrl_realize.numerics.own_terms import OwnTerms, Stretches
+from ctrl_realize.numerics.pole_factors import poles_from_parameters
+from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure, evaluate
+
+CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
+EDGES = np.array([0, 70, 180])
+SHAPES = np.stack([np.ones(180), CLOCK], axis=1)
+STRETCHES = Stretches(EDGES, CLOCK, SHAPES)
+# real; a ringing pair; the same pair just on either side of critical damping; all of them
+THETA = {
+    "real": [-3.0],
+    "ringing": [np.log(0.3), np.log(0.1)],
+    "below critical": [np.log(0.1), -1e-9],
+    "above critical": [np.log(0.1), 1e-9],
+    "three": [-3.0, np.log(0.3), np.log(0.1)],
+}
+
+
+@pytest.mark.parametrize("theta", THETA.values(), ids=THETA.keys())
+def test_what_a_record_has_for_itself_disappears(theta):
+    poles, _ = poles_from_parameters(np.array([theta]))
+    rng = np.random.default_rng(0)
+    own = OwnTerms(STRETCHES, np.ones(180), poles)
+    data = np.zeros(180)
+    for rows in STRETCHES.rows:
+        # every real free response: with conjugate amplitudes
+        amplitudes = rng.normal(size=poles.shape[1]) + 1j * rng.normal(size=poles.shape[1])
+        free = (np.exp(CLOCK[rows, None] * poles[0]) @ amplitudes).real
+        data[rows] = free + rng.normal() + rng.normal() * CLOCK[rows]
+    left = own.without(data[None, :, None])[0, :, 0]
+    assert_allclose(left, 0.0, atol=1e-9 * np.abs(data).max())
+
+
+def test_nothing_else_disappears_and_records_do_not_mix():
+    poles, _ = poles_from_parameters(np.array([THETA["three"]]))
+    own = OwnTerms(STRETCHES, np.ones(180), poles)
+    data = np.zeros(180)
+    data[:70] = np.random.default_rng(0).normal(size=70)
+    left = own.without(data[None, :, None])[0, :, 0]
+    assert np.all(left[70:] == 0)
+    # five own terms of the first stretch, three of them of the plant
+    columns = np.concatenate([SHAPES[:70], np.exp(CLOCK[:70, None] * poles[0])], axis=1)
+    expected = data[:70] - (columns @ np.linalg.lstsq(columns, data[:70] + 0j, rcond=None)[0]).real
+    assert_allclose(left[:70], expected, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("n", "r"), [(1, 1), (2, 1), (3, 3)])
+def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, r):
+    theta = {1: [np.log(0.05)], 2: np.log([0.05, 0.7]), 3: np.log([0.03, 0.2, 0.3])}[n]
+    rng = np.random.default_rng(n)
+    parts = tuple(SampledInput(rng.normal(size=size // 10).repeat(10), 1.0) for size in (90, 130))
+    drive = SeveralInputs(parts, (20, 20))
+    walk = rng.normal(size=180).cumsum()
+    nothing = np.empty((180, 0))
+    x = np.concatenate([[7.3], theta])[None]
+
+    def problem(data):
+        return Problem(data, np.ones(180), drive, nothing, KnownFactor(), STRETCHES)
+
+    structure = Structure(n, r)
+    data = walk - evaluate(problem(walk), structure, x).residual[0]
+    exact = problem(data)
+    state = evaluate(exact, structure, x)
+    assert np.abs(state.residual).max() < 1e-9 * np.abs(data).max()
+    for q in range(n + 1):
+        step = np.zeros_like(x)
+        step[0, q] = 1e-5
+        ahead = evaluate(exact, structure, x + step).residual
+        behind = evaluate(exact, structure, x - step).residual
+        derivative = (behind - ahead)[0] / 2e-5
+        # central differences of step 1e-5: 1e-10 from curvature, 1e-7 from rounding
+        scale = np.abs(derivative).max()
+        assert_allclose(state.jacobian[0, :, q], derivative, rtol=0, atol=5e-6 * scale)
+    assert exact.own_count(n) == 2 * (2 + n)
