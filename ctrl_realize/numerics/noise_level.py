@@ -61,8 +61,9 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     -------
     sigma : float
     drift : float
-        Slope per sample, 0 unless it is five standard errors. A slope seen over less than a
-        twentieth of the record is not extrapolated over the rest of it.
+        Slope per sample, 0 unless it is five standard errors, which slow noise has larger ones
+        of. A slope seen over less than a twentieth of the record is not extrapolated over the
+        rest of it.
     """
     floor = quantum / np.sqrt(12)
     if before.size < _FEW:
@@ -70,13 +71,14 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
         return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0
     index = np.arange(before.size) - before.size
     slope, level = np.polyfit(index, before, 1)
-    sigma = max(winsorised_sigma(before - level - slope * index, quantum, lost=2), floor)
+    left = before - level - slope * index
+    sigma = max(winsorised_sigma(left, quantum, lost=2), floor)
     if before.size < _MANY:
         # A dozen samples tell sigma to a factor of two: the settled half of the record helps.
         settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
         if settled.size:
             sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
-    error = sigma * np.sqrt(12 / before.size**3)
+    error = sigma * np.sqrt(12 * correlation_time(left) / before.size**3)
     known = before.size > 0.05 * (record.size - before.size)
     return sigma, float(slope) if known and abs(slope) > 5 * error else 0.0
 
