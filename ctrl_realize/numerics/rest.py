@@ -64,7 +64,7 @@ def _slope_is_real(residual: FloatArray, slope: float) -> bool:
 
 def _level_from_start(values: FloatArray) -> float:
     """Level of a record that starts at its step: the samples that have not moved yet."""
-    start = values[: max(FEW, 3)]
+    start = values[:FEW]
     noise = difference_noise(values)
     still = [float(start[0])]
     for value in start[1:]:

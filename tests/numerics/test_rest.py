@@ -59,6 +59,34 @@ def test_a_slope_of_ten_standard_errors_is_one(pole):
     assert rest_line(noise + 2 * error * np.arange(-n, 0), AFTER, None)[1] == 0
 
 
+def standard_error(noise):
+    """Of the slope of a line through `noise`, correlation counted up to its first zero."""
+    n = noise.size
+    correlation = np.correlate(noise, noise, "full")[n - 1 :] / (noise @ noise)
+    first = np.flatnonzero(correlation <= 0)[0]
+    return noise.std() * np.sqrt(12 * max(2 * correlation[:first].sum() - 1, 1) / n**3)
+
+
+@pytest.mark.parametrize("pole", [-0.5, 0.0, 0.6, 0.9])
+@pytest.mark.parametrize("seed", range(4))
+def test_five_standard_errors_decide(pole, seed):
+    k = np.arange(-300, 0)
+    noise = lfilter([1], [1, -pole], white(300, seed))
+    noise -= np.polyval(np.polyfit(k, noise, 1), k)  # its own line taken off
+    error = standard_error(noise)
+    assert rest_line(7 + noise + 4.99 * error * k, AFTER, None)[1] == 0
+    assert rest_line(7 + noise + 5.01 * error * k, AFTER, None)[1] == pytest.approx(5.01 * error)
+
+
+def test_a_drift_may_be_as_small_as_it_is_exact():
+    line = 2 + 1e-4 * np.arange(-100, 0)
+    assert rest_line(line, AFTER, None) == (pytest.approx(2), pytest.approx(1e-4))
+
+
+def test_a_start_is_left_by_less_than_its_own_size():
+    assert rest_line(np.empty(0), np.r_[10.0, 12.0, 12.0, 12.0, 12.0, 12.0], None) == (10, 0)
+
+
 def test_few_samples_tell_no_drift_unless_it_is_asked_for():
     line = 2 + 0.5 * np.arange(-(MIN_DRIFT_SAMPLES - 1), 0)
     assert rest_line(line, AFTER, None) == (pytest.approx(line.mean()), 0)
