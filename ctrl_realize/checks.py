@@ -46,3 +46,8 @@ def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:
     if value not in choices:
         raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
     return str(value)
+
+
+def spelled_out(text: str) -> str:
+    """Spell out what no encoding takes: file names that are no UTF-8 hold lone surrogates."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")

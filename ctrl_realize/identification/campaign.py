@@ -19,8 +19,7 @@ from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ..results import Flag, Result
-from ..signals import Record
-from .campaign_row import CampaignRow, RecordSource
+from .campaign_row import CampaignRow, RecordSource, read_source
 from .identify import Method, fit_records, identify
 from .realization import realize
 
@@ -128,7 +127,7 @@ class Campaign(Result):
         _ = self.dt
         if self.method == "output_error":
             pairs = zip(self.rows, self.sources, strict=True)
-            good = [_read(source) for row, source in pairs if row.model is not None]
+            good = [read_source(source) for row, source in pairs if row.model is not None]
             return fit_records(good, **self.options)
         chosen = self._identified(self.best)
         scan = chosen.fit
@@ -150,7 +149,7 @@ class Campaign(Result):
         if system is not None and hasattr(system.fit, "impulse"):
             return system
         source = self.sources[self.rows.index(row)]
-        return identify(_read(source), method=self.method, **self.options)
+        return identify(read_source(source), method=self.method, **self.options)
 
     def table(self) -> pd.DataFrame:
         """One row for each record, in the order given.
@@ -213,7 +212,8 @@ class Campaign(Result):
                     "gain_std": gains.std(ddof=1) if many and np.isfinite(gains).all() else np.nan,
                 }
             )
-        return pd.DataFrame(rows).set_index("amplitude")
+        columns = ["amplitude", "records", "delay", "std", "gain", "gain_std"]
+        return pd.DataFrame(rows, columns=columns).set_index("amplitude")
 
     @property
     def flags(self) -> tuple[Flag, ...]:
@@ -259,10 +259,6 @@ class Campaign(Result):
     def __repr__(self) -> str:
         failed = f", {len(self.failed)} failed" if self.failed else ""
         return f"<Campaign: {len(self.rows)} records{failed}, method {self.method!r}>"
-
-
-def _read(source: RecordSource) -> Record:
-    return source if isinstance(source, Record) else source()
 
 
 def _amplitude_trend(rows: tuple[CampaignRow, ...], method: str) -> Flag | None:

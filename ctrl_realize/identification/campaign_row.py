@@ -10,8 +10,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..checks import spelled_out
 from ..delayed import DelayedStateSpace
-from ..errors import CtrlRealizeError
+from ..errors import CtrlRealizeError, DataError
 from ..results import Flag
 from ..signals import Record
 from .delay_fit_result import DelayFit
@@ -21,6 +22,8 @@ from .packed_model import PackedModel
 from .steps import detect_step
 
 RecordSource = Record | Callable[[], Record]
+
+_LONGEST_ERROR = 1000  # characters; a text of megabytes would fill table and report
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,22 +109,38 @@ def identify_row(
     store: RowStore | None,
 ) -> CampaignRow:
     """Identify one record; what stops it becomes the row's error."""
-    row = CampaignRow(_source_name(source, position))
+    row = CampaignRow(spelled_out(_source_name(source, position)))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            record = source if isinstance(source, Record) else source()
+            record = read_source(source)
             row = replace(row, name=record.name or row.name, amplitude=_amplitude(record))
             key = fingerprint(record, method, options)
             kept = store.load(key) if store is not None else None
             if kept is not None:
                 return replace(kept, name=row.name)
             row = _with_model(row, identify(record, method=method, **options))
-        except (CtrlRealizeError, OSError, ArithmeticError, np.linalg.LinAlgError) as error:
-            # A failure is cheap and may be mended by then, so it is tried again on resuming.
-            row = replace(row, error=f"{type(error).__name__}: {' '.join(str(error).split())}")
+        except Exception as error:
+            # Whatever it is, also in a function of the caller's that reads files, the other
+            # records go on. It is cheap and may be mended by then: tried again on resuming.
+            text = spelled_out(" ".join(str(error).split())[:_LONGEST_ERROR])
+            row = replace(row, error=f"{type(error).__name__}: {text}")
     row = replace(row, warnings=tuple(dict.fromkeys(str(entry.message) for entry in caught)))
-    return row if store is None or row.model is None else store.save(key, row)
+    if store is None or row.model is None:
+        return row
+    try:
+        return store.save(key, row)
+    except CtrlRealizeError:
+        # Names or labels that no file takes: the result is there, and will be made again.
+        return row
+
+
+def read_source(source: RecordSource) -> Record:
+    """Return a source's record, read if it is a function."""
+    record = source if isinstance(source, Record) else source()
+    if not isinstance(record, Record):
+        raise DataError(f"the function gave a {type(record).__name__}; needed is a Record")
+    return record
 
 
 def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:

@@ -70,4 +70,5 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
         If the folder is missing or cannot be written; `path` is then as it was.
     """
     with replaced_when_complete(path) as temporary:
-        temporary.write_bytes(text.encode("utf-8"))
+        # names of files that are no UTF-8 are spelled out
+        temporary.write_bytes(text.encode("utf-8", "backslashreplace"))

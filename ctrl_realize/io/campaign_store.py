@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -16,7 +17,7 @@ from .json_content import field
 from .model_files import MAX_MODEL_BYTES, model_from_text, model_to_text
 
 FORMAT = "ctrl_realize campaign row"
-SCHEMA = 1
+SCHEMA = 2
 _NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain")
 
 
@@ -24,9 +25,9 @@ class CampaignStore:
     """Folder that keeps the result of each record of a campaign as it is finished.
 
     Each row is one JSON file, written whole or not at all, named by the SHA-256 of the record's
-    samples and of the settings; processes and machines that share the folder can write to it at
-    once. A file that is damaged is made anew. Only this package's files are ever read, and none
-    is deleted.
+    samples and of the settings, and holding that of its own content; processes and machines that
+    share the folder can write to it at once. A file that is damaged is made anew. Only this
+    package's files are ever read, and none is deleted.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ class CampaignStore:
             if path.stat().st_size > 2 * MAX_MODEL_BYTES:
                 return None
             return _row_from(json.loads(path.read_text(encoding="utf-8")), key)
-        except (OSError, ValueError, RecursionError):
+        except (OSError, ValueError, TypeError, RecursionError):
             # FileFormatError is a ValueError: whatever is wrong, the record is identified anew.
             return None
 
@@ -93,6 +94,7 @@ class CampaignStore:
             "warnings": list(row.warnings),
             "model": json.loads(model_to_text(system)),
         }
+        content["sha256"] = _checksum(content)
         write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
         return _row_from(content, key)
 
@@ -102,6 +104,8 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         raise FileFormatError("not a row of a campaign")
     if content.get("schema") != SCHEMA or content.get("key") != key:
         raise FileFormatError("a row of another version, or under another name")
+    if content.get("sha256") != _checksum(content):
+        raise FileFormatError("the checksum does not fit the content")
     numbers: dict[str, Any] = {
         name: float(text)
         for name, text in field(content, "numbers", dict).items()
@@ -120,3 +124,9 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         flags=flags,
         warnings=tuple(str(text) for text in field(content, "warnings", list)),
     )
+
+
+def _checksum(content: dict[str, Any]) -> str:
+    """SHA-256 of a row in one canonical spelling, without the checksum itself."""
+    rest = {name: value for name, value in content.items() if name != "sha256"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode("ascii")).hexdigest()

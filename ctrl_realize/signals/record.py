@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import one_of, positive
+from ..checks import one_of, positive, spelled_out
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.time_axis import axis_fault, sample_time
@@ -116,7 +116,7 @@ class Record:
         fix(self, "input", read_only(signals["input"]))
         fix(self, "output", read_only(signals["output"]))
         fix(self, "dt", sample_time(stamps))
-        fix(self, "name", str(name))
+        fix(self, "name", spelled_out(str(name)))
         fix(self, "missing", str(missing))
         fix(self, "input_labels", labelled(input_labels, self.n_inputs, "u", "input_labels"))
         fix(self, "output_labels", labelled(output_labels, self.n_outputs, "y", "output_labels"))

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+import os
+
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from ctrl_realize.cli import main
 from ctrl_realize.errors import DataError, FileFormatError, NoStepError, OptionError, TimeAxisError
 from tests.fuzz.lane import good_end
 
@@ -141,3 +145,53 @@ def test_a_step_near_the_end_of_a_short_record_is_fitted_or_refused(edge):
     y = np.random.default_rng(0).standard_normal(23)
     with good_end() as models:
         models.append(cr.identify(cr.Record(np.arange(23.0), u, y)))
+
+
+def test_a_file_name_that_is_no_utf8_does_not_lose_a_campaign(tmp_path):
+    # model files and pandas refuse the lone surrogates that such a name comes with
+    k = np.arange(60)
+    rows = np.column_stack([0.1 * k, k >= 15, 1 - 0.8 ** np.clip(k - 17, 0, None)])
+    names = [b"\xff<b>.csv", b"broken \xfe.csv"]
+    paths = [os.fsdecode(os.path.join(os.fsencode(tmp_path), name)) for name in names]
+    try:
+        np.savetxt(paths[0], rows, delimiter=",", header="t,u,y", comments="")
+        with open(paths[1], "w") as broken:
+            broken.write("no table")
+    except OSError:
+        pytest.skip("this file system takes no such names")
+    sources = [functools.partial(cr.read_record, path) for path in paths]
+    store = cr.CampaignStore(tmp_path / "rows")
+    campaign = cr.identify_campaign(sources, method="scan", order=1, max_delay=9, store=store)
+    assert (len(campaign.good), len(store)) == (1, 1)
+    assert "udcff" in campaign.table().index[0]
+    assert "udcfe" in campaign.table().index[1]
+    assert "udcff" in cr.identify_campaign(sources, method="scan", order=1, max_delay=9).report()
+    # the report's list of calls holds the names as well
+    out = tmp_path / "out"
+    assert main(["identify", *paths, "-o", str(out), "--method", "scan", "--order", "1"]) == 1
+    assert r"\udcff" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("fault", [ValueError("x"), KeyError("x"), MemoryError(), RuntimeError()])
+def test_whatever_a_reading_function_raises_is_a_row(fault):
+    # a reader of the caller's raised what identify_campaign did not wait for: all rows were lost
+    def broken():
+        raise fault
+
+    campaign = cr.identify_campaign([broken, lambda: None], method="scan")
+    assert campaign.rows[0].error.startswith(type(fault).__name__)
+    assert campaign.rows[1].error == "DataError: the function gave a NoneType; needed is a Record"
+    # pandas missed the columns of a table without rows
+    assert len(campaign.by_amplitude()) == 0
+
+
+def test_an_edited_number_in_a_store_is_not_believed(tmp_path):
+    # the model was signed, the numbers beside it were not
+    record = cr.bench.valve().step_record(16.0, 0)
+    store = cr.CampaignStore(tmp_path)
+    first = cr.identify_campaign([record], method="paper", store=store)
+    (path,) = tmp_path.glob("row-*.json")
+    path.write_text(path.read_text().replace('"delay": "', '"delay": "9'))
+    again = cr.identify_campaign([record], method="paper", store=store)
+    assert again.delays == first.delays
+    assert '"delay": "9' not in path.read_text()
