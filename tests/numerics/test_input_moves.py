@@ -29,6 +29,26 @@ def test_a_clean_input_is_written_exactly_as_its_moves():
     assert_allclose(size, [2.0, -0.5, -0.5], rtol=0)
 
 
+def test_a_record_that_starts_at_its_step_moves_at_its_second_sample():
+    assert_array_equal(input_moves(np.r_[0.0, np.ones(99)], [(1, 1)], 100)[0], [1])
+    noisy = 1 + NOISE * np.random.default_rng(0).standard_normal(100)
+    noisy[0] = 0.0
+    index, size = input_moves(noisy, [(1, 1)], 100)
+    assert_array_equal(index, [1])
+    assert size[0] == pytest.approx(np.median(noisy[1:]))
+
+
+def test_noise_that_is_no_spike_counts_with_its_mean():
+    # skewed noise: its median is 0.25, its mean 1 / 3
+    skewed = (K >= 100) * (20 + np.minimum(K - 100, 400) / 10) + np.random.default_rng(0).random(
+        N
+    ) ** 2
+    index, size = input_moves(skewed, [(100, 1)], N)
+    level = written(index, size) + np.median(skewed[:100])
+    for start, stop in zip(index, [*index[1:], N], strict=True):
+        assert level[start] == pytest.approx(skewed[start:stop].mean(), rel=1e-12)
+
+
 def test_moves_from_stop_on_do_not_count():
     signal = np.zeros(100)
     signal[10:], signal[40:] = 2.0, 1.5
