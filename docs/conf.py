@@ -53,6 +53,7 @@ _notebooks_into_source()
 TABLES = {
     "performance": ("docs/performance_table.md", "python -m benchmarks.speed"),
     "accuracy": ("docs/accuracy_table.md", "python -m benchmarks.accuracy"),
+    "honesty": ("docs/honesty_table.md", "python -m benchmarks.honesty"),
     "peers": ("docs/peers_table.md", "python -m benchmarks.peers"),
 }
 (GENERATED / "tables").mkdir(exist_ok=True)

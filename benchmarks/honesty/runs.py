@@ -1,0 +1,152 @@
+"""Run cases in parallel, keep each as it finishes, stop when the time is over."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from joblib import Parallel, delayed
+
+import ctrl_realize as cr
+
+from . import driven_intervals, flag_other_cases, flag_step_cases, single, step_intervals
+from .flag_case import FlagCase
+from .trial import Seen, Trial, quietly
+from .worlds import KINDS, NOISES
+
+Task = tuple[str, str, str, float, int]
+"""Study, kind of noise (or position of the flag case), plant, noise level, seed."""
+
+FLAG_CASES: list[FlagCase] = flag_step_cases.CASES + flag_other_cases.CASES
+
+
+@dataclass(frozen=True)
+class Study:
+    """A trial and what part of the seeds it is given; `by_plant` draws the plant with the seed."""
+
+    trial: Trial
+    share: float
+    by_plant: bool = True
+
+
+STUDIES: dict[str, Study] = {
+    "given": Study(step_intervals.given, 1.0),
+    "scans": Study(step_intervals.scans, 2.0),
+    "views": Study(step_intervals.views, 0.5),
+    "several": Study(step_intervals.several, 0.5),
+    "redrawn": Study(step_intervals.redrawn, 0.2),
+    "tracked": Study(step_intervals.tracked, 2.0),
+    "pulses": Study(driven_intervals.pulses, 2.0, by_plant=False),
+    "any input": Study(driven_intervals.any_input, 0.5, by_plant=False),
+    "responses": Study(driven_intervals.responses, 0.4, by_plant=False),
+    "noise spectra": Study(driven_intervals.noise_spectra, 2.0, by_plant=False),
+    "sines": Study(driven_intervals.sines, 2.0, by_plant=False),
+}
+
+
+def main_tasks(seeds: int) -> list[Task]:
+    """Single fits, seed by seed, so that a run that is stopped has seen all worlds alike."""
+    return [("fit", kind, *single.cell(kind, k), k) for k in range(seeds) for kind in KINDS]
+
+
+def interval_tasks(seeds: int) -> list[Task]:
+    """Other intervals: at every noise level and kind as many seeds as the study's share says."""
+    tasks = []
+    for k in range(2 * seeds):
+        for name, study in STUDIES.items():
+            if k >= max(round(study.share * seeds), 1):
+                continue
+            for kind in KINDS:
+                for noise in NOISES:
+                    plant = single.cell(kind, k)[0] if study.by_plant else "two lags"
+                    tasks.append((name, kind, plant, noise, k))
+    return tasks
+
+
+def world(position: int, side: str) -> int:
+    """Position of the first flag case with the same world: it is run once for all of them."""
+    words = [(case.result, case.due if side == "due" else case.not_due) for case in FLAG_CASES]
+    return words.index(words[position])
+
+
+def flag_tasks(seeds: int) -> list[Task]:
+    """Worlds in which a flag is due, and worlds in which it is not."""
+    return [
+        ("flag", str(position), side, 0.0, k)
+        for k in range(seeds)
+        for position, case in enumerate(FLAG_CASES)
+        for side in ("due", "not due")
+        if k < max(seeds // case.heavy, 1) and world(position, side) == position
+    ]
+
+
+def family(task: Task) -> str:
+    """Study of a case, or what reports the flag."""
+    return FLAG_CASES[int(task[1])].result if task[0] == "flag" else task[0]
+
+
+def run_task(task: Task) -> Seen:
+    """Run one case; an error of the toolbox is an answer too."""
+    study, kind, plant, noise, seed = task
+    try:
+        if study == "fit":
+            return single.fit_once(kind, plant, noise, seed)
+        if study == "flag":
+            case = FLAG_CASES[int(kind)]
+            with quietly():
+                found = (case.raising if plant == "due" else case.quiet)(seed)
+            return Seen(study, kind, plant, noise, seed, flags=sorted(found))
+        with quietly():
+            return STUDIES[study].trial(kind, plant, noise, seed)
+    except cr.CtrlRealizeError as error:
+        return Seen(study, kind, plant, noise, seed, failed=f"{type(error).__name__}: {error}")
+
+
+class Store:
+    """Cases that are finished, one line of JSON each."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self.seen: dict[Task, Seen] = {}
+        if path is not None and path.exists():
+            for line in path.read_text(encoding="utf-8").splitlines():
+                found = Seen(**json.loads(line))
+                self.seen[found.key] = found
+
+    def add(self, found: list[Seen]) -> None:
+        self.seen |= {one.key: one for one in found}
+        if self.path is not None:
+            with self.path.open("a", encoding="utf-8") as file:
+                file.writelines(json.dumps(one.as_dict()) + "\n" for one in found)
+
+
+def _blocks(tasks: list[Task], size: int) -> Iterator[list[Task]]:
+    rest = iter(tasks)
+    while block := list(islice(rest, size)):
+        yield block
+
+
+def run(
+    tasks: list[Task],
+    store: Store,
+    jobs: int,
+    deadline: float = float("inf"),
+    only: Collection[str] = (),
+) -> list[Seen]:
+    """Run what the store does not have yet, until `deadline` (of time.monotonic).
+
+    With `only` nothing but these families is run; what the store has is returned in any case.
+    """
+    missing = [
+        task for task in tasks if task not in store.seen and (not only or family(task) in only)
+    ]
+    with Parallel(n_jobs=jobs) as parallel:
+        for block in _blocks(missing, 8 * jobs):
+            if time.monotonic() > deadline:
+                break
+            store.add(parallel(delayed(run_task)(task) for task in block))
+    return [store.seen[task] for task in tasks if task in store.seen]

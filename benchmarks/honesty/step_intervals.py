@@ -1,0 +1,190 @@
+"""What else reports an interval from step records: scans, several records, campaigns, redraws."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+import ctrl_realize as cr
+from tests import rigs
+
+from .single import STRUCTURES
+from .trial import Seen, inside, quietly
+from .worlds import DT, PLANTS, noise_of, rounded, step_case
+
+SENSOR = rigs.lag(30.0)
+
+
+def given(kind: str, plant: str, noise: float, seed: int) -> Seen:
+    """fit_delay with the plant's structure given, and with its sensor given where it has one."""
+    case = step_case(kind, plant, noise, seed)
+    truth = case.delay * DT
+    structure = STRUCTURES.get(plant, (3, 3))
+    fit = cr.fit_delay(case.record, structures=[structure]).fit
+    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    covered = {
+        "fit_delay, structure given: interval": inside(fit.interval, truth),
+        "fit_delay, structure given: -+ 1.96 std": inside(near, truth),
+    }
+    if plant == "R4":
+        fit = cr.fit_delay(case.record, known=SENSOR).fit
+        covered["fit_delay, sensor known: interval"] = inside(fit.interval, truth)
+    return Seen("given", kind, plant, noise, seed, covered)
+
+
+def scans(kind: str, plant: str, noise: float, seed: int) -> Seen:
+    """Flat sets of the scan over delays, and of that over orders."""
+    case = step_case(kind, plant, noise, seed)
+    truth = case.delay * DT
+    with quietly():
+        fit = cr.identify(case.record, method="scan").fit
+        orders = cr.scan_orders(fit.impulse, 5, max_delay=fit.max_delay)
+    low, high = orders.intervals[orders.orders.index(orders.order)]
+    covered = {
+        "identify(method='scan'): flat set": inside(fit.dead_time_interval, truth),
+        "scan_orders: flat set of the suggested order": inside((low, high), case.delay),
+    }
+    return Seen("scans", kind, plant, noise, seed, covered, flags=[f.code for f in fit.flags])
+
+
+def views(kind: str, plant: str, noise: float, seed: int) -> Seen:
+    """Views of check_delay on a step."""
+    case = step_case(kind, plant, noise, seed)
+    with quietly():
+        check = cr.check_delay(case.record)
+    return Seen(
+        "views",
+        kind,
+        plant,
+        noise,
+        seed,
+        view_coverage(check, case.delay * DT),
+        {"disagree": float(not check.agree)},
+    )
+
+
+def view_coverage(check: cr.DelayCheck, truth: float) -> dict[str, float]:
+    """Whether each view, and what they have in common, holds the truth."""
+    covered = {
+        f"check_delay: {view.method}": float(
+            (view.kind == "upper bound" or view.low <= truth) and truth <= view.high
+        )
+        for view in check.views
+        if view.method != "output error"
+    }
+    if check.common is not None:
+        covered["check_delay: what all views share"] = inside(check.common, truth)
+    return covered
+
+
+def several(kind: str, plant: str, noise: float, seed: int) -> Seen:
+    """One fit of six records, and the mean of a campaign of them by the scan."""
+    cases = [
+        step_case(kind, plant, noise, 6 * seed + i, delay=_shared_delay(seed), amplitude=height)
+        for i, height in enumerate((16.0, 16.0, 16.0, 8.0, 8.0, 8.0))
+    ]
+    # One plant: its gain is the first one's, the noise of each record its own.
+    records = [
+        cr.Record(c.record.time, c.record.input, np.ravel(c.record.output) / c.gain, name=f"r{i}")
+        for i, c in enumerate(cases)
+    ]
+    truth = _shared_delay(seed) * DT
+    with quietly():
+        fit = cr.fit_delay(records).fit
+        campaign = cr.identify_campaign(records, method="scan")
+    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    repeats = fit.repeatability
+    deviation = np.abs(repeats.delays - np.mean(repeats.delays)) / repeats.errors
+    covered = {
+        "fit_delay, six records: interval": inside(fit.interval, truth),
+        "fit_delay, six records: -+ 1.96 std": inside(near, truth),
+        "fit_delay, six records: delay of each -+ 1.96 errors, about their mean": float(
+            np.mean(deviation <= 1.96 * np.sqrt(5 / 6))
+        ),
+    }
+    if repeats.trend_error > 0:
+        covered["fit_delay, six records: no trend within 1.96 errors"] = float(
+            abs(repeats.trend) <= 1.96 * repeats.trend_error
+        )
+    if len(campaign.good) == 6:
+        ends = campaign.statistics().interval
+        covered["campaign by the scan: interval of the mean"] = inside(ends, _shared_delay(seed))
+    return Seen("several", kind, plant, noise, seed, covered, flags=[f.code for f in fit.flags])
+
+
+def _shared_delay(seed: int) -> float:
+    return float(np.random.default_rng([seed, 77]).uniform(30, 45))
+
+
+def redrawn(kind: str, plant: str, noise: float, seed: int) -> Seen:
+    """Bootstrap of the residual of one record, structure given."""
+    case = step_case(kind, plant, noise, seed)
+    structure = STRUCTURES.get(plant, (3, 3))
+    estimator = partial(cr.fit_delay, structures=[structure])
+    with quietly():
+        drawn = cr.bootstrap(case.record, estimator, repeats=50, seed=seed)
+    truth = case.delay * DT
+    middle = float(np.median(drawn.dead_times))
+    covered = {
+        "bootstrap: dead time, middle 95 %": inside(drawn.interval, truth),
+        "bootstrap: dead time -+ 1.96 std": float(abs(middle - truth) <= 1.96 * drawn.std),
+    }
+    ends = np.quantile(drawn.gains, [0.025, 0.975])
+    covered["bootstrap: gain, middle 95 %"] = inside((ends[0], ends[1]), case.gain)
+    if plant in PLANTS:
+        exact = cr.delayed_ss(case.gain * PLANTS[plant], dead_time=truth, dt=DT)
+        covered |= _bands(drawn, exact)
+    return Seen("redrawn", kind, plant, noise, seed, covered)
+
+
+def _bands(drawn: cr.Bootstrap, exact: cr.DelayedStateSpace) -> dict[str, float]:
+    """Part of the step, gain and phase bands that holds the plant."""
+    low, high = drawn.step_band(600)
+    step = np.cumsum(np.ravel(exact.markov(600)))[50:]
+    omega = 2 * np.pi * np.geomspace(0.2, 13, 30)
+    response = np.ravel(exact(np.exp(1j * omega * DT)))
+    magnitude = drawn.magnitude_band(omega)
+    phase = drawn.phase_band(omega)
+    # The first sample of the step that moves; before it all models are zero.
+    covered = {
+        "bootstrap: step band, points": np.mean((low[50:] <= step) & (step <= high[50:])),
+        "bootstrap: gain band, points": np.mean(
+            (magnitude[0] <= abs(response)) & (abs(response) <= magnitude[1])
+        ),
+    }
+    angle = np.unwrap(np.angle(response))
+    covered["bootstrap: phase band, points"] = np.mean((phase[0] <= angle) & (angle <= phase[1]))
+    return {name: float(value) for name, value in covered.items()}
+
+
+def tracked(kind: str, plant: str, noise: float, seed: int) -> Seen:
+    """DelayTracker on a plant that stays, started 8 samples off."""
+    rng = np.random.default_rng([seed, 5])
+    coarse = 4 * DT
+    delay = int(rng.integers(8, 13))
+    lags = PLANTS.get(plant, PLANTS["R2"])
+    exact = cr.delayed_ss(lags, delay=delay, dt=coarse)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0, 2.0], 50), 60).astype(float)
+    y = np.ravel(exact.simulate(u - u[0]))
+    y = _disturbed(kind, y, noise, rng)
+    start = exact.replace(delay=3)
+    tracker = cr.DelayTracker(start, max_delay=25, memory=1000 * coarse)
+    for pair in zip(u, y, strict=True):
+        tracker.update(float(pair[0]), float(pair[1]))
+    told = tracker.estimate()
+    if not told.tells:
+        return Seen("tracked", kind, plant, noise, seed, {}, {"untold": 1.0})
+    near = (told.gain_ratio - 1.96 * told.gain_std, told.gain_ratio + 1.96 * told.gain_std)
+    covered = {
+        "DelayTracker: interval": inside(told.interval, delay),
+        "DelayTracker: gain -+ 1.96 std": inside(near, 1.0),
+    }
+    return Seen("tracked", kind, plant, noise, seed, covered, {"untold": 0.0})
+
+
+def _disturbed(kind: str, y: np.ndarray, noise: float, rng: np.random.Generator) -> np.ndarray:
+    span = float(np.ptp(y))
+    bent = y + 0.1 * y**2 / span if kind == "wrong structure" else y
+    noisy = bent + noise * span * noise_of(kind, y.size, rng)
+    return rounded(noisy, span) if kind == "quantised" else noisy
