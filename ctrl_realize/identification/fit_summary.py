@@ -86,9 +86,14 @@ def fitted_core(fit: OutputErrorFit, poles: ComplexArray) -> ct.StateSpace:
 def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
     s = fit.structure
     simple = " with up to three poles" if fit.views else ""
+    kind = (
+        f"chain of {s.order} nearly equal lags"
+        if fit.chain
+        else (f"order {s.order}, relative degree {s.relative_degree}")
+    )
     reasons = [
-        f"order {s.order}, relative degree {s.relative_degree}: lowest information criterion of "
-        f"{len(fit.structures)} structures{simple}, where zeros and a fourth pole must be worth it"
+        f"{kind}: lowest information criterion of {len(fit.structures)} structures{simple}, where "
+        "zeros and a fourth pole must be worth it"
     ]
     if fit.views:
         reasons.append("dead time: median of five views, as no model leaves only noise")

@@ -67,8 +67,8 @@ class OutputErrorFit:
 
     ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
     The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
-    are the roots of the monic a. `misfit` is residual over noise in means over bins. `endless`:
-    chains of lags fit the better the longer they are, so that all of the delay may be lags.
+    are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
+    the model is a chain of nearly equal lags; `endless`: chains of lags fit the better the longer they are, so that all of the delay may be lags.
     """
 
     delay: float
@@ -87,6 +87,7 @@ class OutputErrorFit:
     fitted: FloatArray
     profile: tuple[FloatArray, FloatArray]
     latest: float
+    chain: bool = False
     endless: bool = False
 
 
@@ -144,7 +145,8 @@ def likelihood_fit(
         for chain in chains
         if chain.criterion <= level + PLAUSIBLE
     ]
-    if better is not None and chosen is better.candidate:
+    chain = better is not None and chosen is better.candidate
+    if better is not None and chain:
         whole = _with_chain(whole, better)
         profiles[chosen.structure] = chain_profile(better, whole.scales)
     limits = [profile_limits(*curve) for curve in curves]
@@ -154,7 +156,8 @@ def likelihood_fit(
     if endless := still_improving(chains):
         low = whole.scales.earliest
     interval = (low, high, (own[1] - own[0]) / 3.92)
-    return replace(_result(whole, chosen, adequate, (), profiles, interval), endless=endless)
+    found = _result(whole, chosen, adequate, (), profiles, interval)
+    return replace(found, chain=chain, endless=endless)
 
 
 def _chains(whole: WindowFit) -> list[LagChain]:
