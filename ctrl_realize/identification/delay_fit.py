@@ -86,12 +86,13 @@ def fit_delay(
     -----
     Where the residual of the best structure is noise, the interval spans the 95 %
     profile-likelihood intervals of all structures within 10 of the best information criterion.
-    Where three or more poles are needed, chains of four to eight nearly equal lags compete with
-    them by the same criterion, so that many lags are not read as dead time.
     Where it is not, no likelihood knows the error: the dead time is the median of five views
     (first motion, first- and second-order lag on the first 15 % of the excursion, best model of
     up to three poles on 63 % and on all of it). The interval spans them and a third-order lag on
     the first 15 %, but for the lowest.
+
+    Where three or more poles are needed, chains of four to eight nearly equal lags compete with
+    the structures by the same criterion, so that many lags are not read as dead time.
 
     A dead time has no Fisher information in a model with more zeros than the plant: a superfluous
     zero imitates it. That is why the relative degree is chosen, not left free.
