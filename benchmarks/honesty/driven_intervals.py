@@ -49,6 +49,22 @@ def any_input(kind: str, plant: str, noise: float, seed: int) -> Seen:
     )
 
 
+def joined(kind: str, plant: str, noise: float, seed: int) -> Seen:
+    """One fit of three records behind moving inputs."""
+    delay = float(np.random.default_rng([seed, 8]).uniform(5, 12))
+    cases = [driven_case(kind, noise, 3 * seed + i, samples=600, delay=delay) for i in range(3)]
+    with quietly():
+        fit = cr.fit_delay([case.record for case in cases]).fit
+    truth = delay * DRIVEN_DT
+    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    covered = {
+        "fit_delay, three records of moving input: interval": inside(fit.interval, truth),
+        "fit_delay, three records of moving input: -+ 1.96 std": inside(near, truth),
+    }
+    flags = [flag.code for flag in fit.flags]
+    return Seen("joined", kind, plant, noise, seed, covered, {}, flags)
+
+
 def controller() -> ct.StateSpace:
     return ct.ss(ct.tf([1.0, -0.97], [1.0, -1.0], DRIVEN_DT))
 

@@ -30,6 +30,16 @@ def ordinary(seed: int) -> Codes:
     return fit(driven(seed))
 
 
+def together(seed: int, *, gains: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Codes:
+    """Fit three records of one plant, their outputs scaled."""
+    cases = [driven(3 * seed + i, samples=700, delay=8.3) for i in range(len(gains))]
+    records = [
+        cr.Record(c.record.time, c.record.input, gain * np.ravel(c.record.output), name=f"r{i}")
+        for i, (c, gain) in enumerate(zip(cases, gains, strict=True))
+    ]
+    return codes(cr.fit_delay(records).fit)
+
+
 def pulses(case: DrivenCase, length: int = 120) -> Codes:
     return codes(cr.impulse_from_io(case.record, length))
 
@@ -236,6 +246,11 @@ CASES: list[FlagCase] = [
     _driven("inverse_response", "zero at +1 Hz",
             lambda s: fit(driven(s, core=rigs.lag(0.8) * rigs.lag(4.0)
                                  * ct.tf([-1 / (2 * np.pi), 1], [1])))),
+    FlagCase("fit_delay, moving inputs", "gains_differ", "gains of three records 0.9, 1 and 1.1",
+             lambda s: together(s, gains=(0.9, 1.0, 1.1)), "three records alike", together,
+             heavy=3),
+    FlagCase("fit_delay, moving input", "cut", "6000 samples",
+             lambda s: fit(driven(s, samples=6000)), DRIVEN, ordinary, heavy=10),
     FlagCase("impulse_from_io", "not_died_away", "30 lags of a response of 100",
              lambda s: pulses(driven(s, held=3), 30), "120 lags",
              lambda s: pulses(driven(s, held=3))),
@@ -255,6 +270,8 @@ CASES: list[FlagCase] = [
              lambda s: frf_fit(_r2(s, _noise(s)), 2, relative_degree=0, dt=0.002)),
     _fit_frf("delay_at_bound", "max_dead_time 20 ms, delay 28.9 ms",
              lambda s: frf_fit(_r2(s, _noise(s)), max_dead_time=0.02)),
+    _fit_frf("phase_leads", "0.2 s of lead",
+             lambda s: frf_fit(_r2(s, _noise(s), delay=-0.2))),
     _fit_frf("structures_disagree", "R4 to 5 Hz, noise 1 and 2 %",
              lambda s: frf_fit(frf_of(rigs.R4, s, _noise(s, HIGH), band=(0.1, 5.0))),
              "R1 to 40 Hz, noise 0.1 %", lambda s: frf_fit(frf_of(rigs.R1, s, 0.001))),

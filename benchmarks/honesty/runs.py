@@ -42,6 +42,7 @@ STUDIES: dict[str, Study] = {
     "tracked": Study(step_intervals.tracked, 2.0),
     "pulses": Study(driven_intervals.pulses, 2.0, by_plant=False),
     "any input": Study(driven_intervals.any_input, 0.5, by_plant=False),
+    "joined": Study(driven_intervals.joined, 0.3, by_plant=False),
     "responses": Study(driven_intervals.responses, 0.4, by_plant=False),
     "noise spectra": Study(driven_intervals.noise_spectra, 2.0, by_plant=False),
     "sines": Study(driven_intervals.sines, 2.0, by_plant=False),
