@@ -43,7 +43,7 @@ MODULES = {
     "numerics/rest": "tests/numerics/test_rest.py",
     "numerics/input_moves": "tests/numerics/test_input_moves.py",
     "numerics/first_motion": "tests/numerics/test_first_motion.py",
-    "numerics/noise_level": "tests/numerics/test_step_numerics.py",
+    "numerics/noise_level": "tests/numerics/test_noise_level.py",
     "numerics/onset": "tests/numerics/test_onset.py",
     "numerics/process_step": "tests/numerics/test_process_step.py",
     "numerics/pole_factors": "tests/numerics/test_separable_fit.py",

@@ -135,6 +135,8 @@ def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
         if peak < 4 or around.size < 6 or power[peak] < 20 * np.median(around) / np.log(2):
             break
         frequency = _refine(left, peak / n)
+        if frequency * n < 3.5:
+            break  # slower than it looked: too few periods to go on like this
         wave = sine_pair(np.arange(n), frequency)
         fitted = wave @ np.linalg.lstsq(wave, left, rcond=None)[0]
         if float(fitted @ fitted) < float(left @ left) / 3:

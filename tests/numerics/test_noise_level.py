@@ -1,0 +1,205 @@
+"""Noise at rest: its level, steps, colour and lines, at the places where the rules decide."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+from ctrl_realize.numerics.noise_level import (
+    colouring,
+    correlation_time,
+    hum_frequencies,
+    mad_sigma,
+    quantisation_step,
+    rest_noise,
+    sine_pair,
+    winsorised_sigma,
+)
+
+
+def white(n, seed=0):
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+@pytest.mark.parametrize("step", [1e-12, 1e-3, 1e9])
+def test_the_step_is_found_however_small_the_unit(step):
+    assert quantisation_step(step * np.round(5 * white(400))) == pytest.approx(step)
+
+
+def test_most_differences_have_to_be_multiples():
+    levels = np.arange(40.0)
+    assert quantisation_step(levels) == 1
+    # eleven more levels off the grid: two gaps of 51 for each of them are no whole numbers
+    spoiled = np.concatenate([levels, np.arange(11) + 0.37])
+    assert quantisation_step(spoiled) == 0
+    # a random signal has one smallest gap, and the others are no multiples of it
+    assert quantisation_step(np.round(white(60), 9)) == 0
+
+
+def test_a_step_far_below_the_usual_difference_is_rounding():
+    steps = np.arange(30)
+    assert quantisation_step(np.r_[49.0 * steps, 1.0]) == 1
+    assert quantisation_step(np.r_[51.0 * steps, 1.0]) == 0
+
+
+def test_four_differences_are_needed():
+    assert quantisation_step(np.array([0.0, 1, 2, 3])) == 0
+    assert quantisation_step(np.array([0.0, 1, 2, 3, 4])) == 1
+
+
+def test_the_median_deviation_is_that_of_gaussian_noise():
+    assert mad_sigma(3 + 2 * white(100_000)) == pytest.approx(2, rel=0.02)
+    assert mad_sigma(np.array([1.0, 2.0, 4.0])) == pytest.approx(1.4826)
+
+
+@pytest.mark.parametrize("offset", [0.0, 100.0, -7.0])
+def test_clipping_is_about_the_median(offset):
+    values = offset + 2 * white(50_000)
+    assert winsorised_sigma(values, 0.0) == pytest.approx(2, rel=0.02)
+    # 1 % of outliers: with all of them at the limit, two more hundredths of it squared
+    values[::100] += 1000
+    assert winsorised_sigma(values, 0.0) == pytest.approx(2, rel=0.04)
+
+
+def test_lost_degrees_of_freedom_are_counted_off():
+    values = white(12)
+    ratio = winsorised_sigma(values, 0.0, lost=4) / winsorised_sigma(values, 0.0)
+    assert ratio == pytest.approx(np.sqrt(12 / 8))
+    assert np.isfinite(winsorised_sigma(values[:2], 0.0, lost=2))
+
+
+def test_a_signal_on_two_levels_has_the_noise_of_its_step():
+    # nine tenths on one level: the median deviation is zero, half a step is the limit
+    values = np.where(np.arange(1000) % 10 == 0, 0.1, 0.0)
+    assert winsorised_sigma(values, 0.1) == pytest.approx(np.sqrt(0.1) * 0.1 / 0.96)
+    assert winsorised_sigma(values, 0.0) == 0
+
+
+def test_seven_samples_before_a_step_ask_the_record_and_eight_tell():
+    k = np.arange(600.0)
+    record = 40 * (1 - np.exp(-np.maximum(k - 20, 0) / 80)) + 0.3 * white(600)
+    assert rest_noise(record[:7], record, 0.0)[0] == pytest.approx(0.3, rel=0.15)
+    assert rest_noise(record[:7], record, 0.0)[1] == 0
+    # a coarse smooth record: the rounding is all
+    smooth = 0.5 * np.round(2 * (k / 60))
+    assert rest_noise(smooth[:5], smooth, 0.5)[0] < 0.5
+    before = np.array([0.0, 9, 0, 9, 0, 9, 0, 9])
+    flat = np.r_[before, np.zeros(100)]
+    assert rest_noise(before, flat, 0.0)[0] > 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_dozen_samples_at_rest_are_helped_by_the_settled_half(seed):
+    # hardly any noise before the step by chance, plenty in the record
+    record = 5 * (np.arange(800) >= 20) + white(800, seed)
+    record[:20] *= 0.1
+    assert rest_noise(record[:20], record, 0.0)[0] == pytest.approx(1, rel=0.15)
+    # with fifty samples they are believed
+    record[:50] *= 0.1
+    assert rest_noise(record[:50], record, 0.0)[0] < 0.3
+
+
+def test_only_the_settled_half_helps():
+    record = white(900)
+    record[:20] *= 0.01
+    record[:440] *= 30.0  # before the middle of what follows
+    assert rest_noise(record[:20], record, 0.0)[0] == pytest.approx(1, rel=0.15)
+    record[440:] += 5 * np.sin(np.arange(460) / 30)  # and what is smooth does not
+    assert rest_noise(record[:20], record, 0.0)[0] == pytest.approx(1, rel=0.15)
+
+
+def test_a_record_that_ends_at_its_step_has_no_half_to_help():
+    values = white(20)
+    assert rest_noise(values, np.r_[values, values[:1]], 0.0)[0] == pytest.approx(
+        rest_noise(values, values, 0.0)[0], rel=0.5
+    )
+
+
+def line_in_noise(n, errors, seed):
+    """White noise without a line of its own, and a line of so many standard errors."""
+    k = np.arange(n) - float(n)
+    noise = white(n, seed)
+    noise -= np.polyval(np.polyfit(k, noise, 1), k)
+    sigma = winsorised_sigma(noise, 0.0, lost=2)
+    return noise + errors * sigma * np.sqrt(12 / n**3) * k, errors * sigma * np.sqrt(12 / n**3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_five_standard_errors_make_a_drift(seed):
+    below, _ = line_in_noise(400, 4.98, seed)
+    above, slope = line_in_noise(400, 5.02, seed)
+    assert rest_noise(below, np.tile(below, 3), 0.0)[1] == 0
+    assert rest_noise(above, np.tile(above, 3), 0.0)[1] == pytest.approx(slope)
+
+
+@pytest.mark.parametrize(("after", "seen"), [(1990, True), (2010, False)])
+def test_a_drift_seen_over_less_than_a_twentieth_is_not_continued(after, seen):
+    before = 0.01 * np.arange(100) + 1e-4 * white(100)
+    drift = rest_noise(before, np.r_[before, np.ones(after)], 0.0)[1]
+    assert (drift > 0) == seen
+
+
+@pytest.mark.parametrize("pole", [0.4, 0.7, 0.95])
+def test_the_correlation_time_of_a_lag(pole):
+    found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))
+    # summed over some ten times its length: known to sqrt(20 time / 60 000), 12 % for the slowest
+    assert found == pytest.approx((1 + pole) / (1 - pole), rel=0.2)
+
+
+def test_what_cannot_be_coloured_counts_sample_by_sample():
+    assert correlation_time(np.full(100, 3.0)) == 1
+    assert correlation_time(np.repeat(white(3), 2)) == 1
+    assert correlation_time(np.resize([1.0, -1.0], 100)) == 1
+    assert correlation_time(lfilter([1], [1, -0.1], white(5000))) == 1  # 1.2: as white
+
+
+def test_means_tell_colour_at_four_and_at_sixteen_samples():
+    short = np.repeat(white(400), 4)  # means of 4 keep all, 2 times white
+    assert colouring(short, float(short.std())) == pytest.approx(2, rel=0.1)
+    long = np.repeat(white(400), 16)
+    assert colouring(long, float(long.std())) == pytest.approx(4, rel=0.1)
+    # twelve means are needed
+    few = np.repeat(white(40), 4)
+    assert colouring(few[:48], float(few.std())) > 1
+    assert colouring(few[:47], float(few.std())) == 1
+    assert colouring(short, 0.0) == 1
+
+
+def test_lines_are_found_strongest_first_and_not_more_than_asked_for():
+    index = np.arange(4000)
+    frequencies = [0.0513, 0.1207, 0.2004, 0.3101]
+    signal = 0.1 * white(4000)
+    for i, f in enumerate(frequencies):
+        signal += 3.0 ** (4 - i) * np.cos(2 * np.pi * f * index + i)
+    found = hum_frequencies(signal + 50)
+    # resolution 1 / n, improved to a small part of it
+    assert_allclose(found, frequencies[:3], atol=0.02 / 4000)
+    assert_allclose(hum_frequencies(signal, most=1), frequencies[:1], atol=0.02 / 4000)
+
+
+@pytest.mark.parametrize(("amplitude", "seen"), [(1.2, True), (0.8, False)])
+def test_a_line_carries_a_third_of_the_variance(amplitude, seen):
+    # a^2 / 2 of a^2 / 2 + 1: 42 % and 24 %
+    signal = amplitude * np.cos(2 * np.pi * 0.11 * np.arange(4000)) + white(4000)
+    assert bool(hum_frequencies(signal)) == seen
+
+
+def test_fewer_than_four_periods_and_fewer_than_sixtyfour_samples_are_no_line():
+    index = np.arange(1000)
+    for slow in (0.7, 1.5, 2.5, 3.2):
+        assert not hum_frequencies(np.cos(2 * np.pi * slow / 1000 * index) + 0.01 * white(1000))
+    assert hum_frequencies(np.cos(2 * np.pi * 8e-3 * index) + 0.01 * white(1000))
+    line = np.cos(2 * np.pi * 0.2 * index)
+    assert not hum_frequencies(line[:63])
+    assert hum_frequencies(line[:64] + 1e-3 * white(64))
+
+
+def test_a_pair_has_the_frequency_it_is_asked_for():
+    index = np.arange(40.0)
+    assert_allclose(
+        sine_pair(index, 0.05),
+        np.stack([np.cos(0.1 * np.pi * index), np.sin(0.1 * np.pi * index)], axis=1),
+        atol=1e-12,
+    )
