@@ -27,6 +27,7 @@ extensions = [
     "myst_nb",
     "sphinx_copybutton",
     "mathml",
+    "glossary_links",
 ]
 exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints", "*_table.md", "generated/tables"]
 templates_path = ["_templates"]

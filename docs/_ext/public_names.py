@@ -48,7 +48,7 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
 
 SUBMODULES = {
     "design": "Controllers for plants with dead time.",
-    "plots": "Pictures of results; each returns a `control.ControlPlot`.",
+    "plots": "Plots of results; each returns a `control.ControlPlot`.",
     "bench": "Simulated set-ups with known truth.",
     "paper": "Every number that the paper prints.",
 }
@@ -115,9 +115,10 @@ def pages() -> dict[str, str]:
 
 def _page(title: str, line: str, names: list[str], about: str = "") -> str:
     ordered = sorted(names, key=lambda name: (_is_class(name), name.lower()))
-    text = [f"# {title}", "", line, ""]
-    if about and about.rstrip(".") != line.rstrip("."):
-        text += [about, ""]
+    # The module's own first sentence often says the same, and more.
+    lines = [about] if about.startswith(line.rstrip(".")) else [line, about]
+    text = [f"# {title}", ""]
+    text += [part for said in lines if said for part in (said, "")]
     text += ["```{eval-rst}", ".. autosummary::", "   :toctree: entries", "   :nosignatures:", ""]
     text += [f"   ~{name}" for name in ordered]
     return "\n".join([*text, "```", ""])
