@@ -50,6 +50,7 @@ SUBMODULES = {
     "design": "Controllers for plants with dead time.",
     "plots": "Plots of results; each returns a `control.ControlPlot`.",
     "bench": "Simulated set-ups with known truth.",
+    "report": "HTML reports: one self-contained file, the verdict first.",
     "paper": "Every number that the paper prints.",
 }
 
@@ -103,6 +104,9 @@ def pages() -> dict[str, str]:
             full = f"{module_name}.{name}"
             if getattr(value, "__module__", "") == module_name and not hasattr(package, name):
                 sorted_names["errors"].append(full)
+    for name, value in public(import_module("ctrl_realize.io")).items():
+        if not hasattr(package, name):
+            sorted_names[group_of(value)].append(f"ctrl_realize.io.{name}")
     texts = {
         page: _page(title, line, sorted_names[page]) for page, (title, line, _) in GROUPS.items()
     }
