@@ -11,7 +11,8 @@ from .step_intervals import view_coverage
 from .trial import Seen, inside, quietly
 from .worlds import DRIVEN_DT, driven_case, noise_of, rounded
 
-LENGTH = 120
+LENGTH = 180
+"""Lags, after which the response has fallen to a ten-thousandth."""
 PERIOD = 500
 METHODS = ("regularized", "least_squares", "okid")
 
