@@ -37,11 +37,15 @@ def main() -> None:
     low, high = fit.interval
     axes["step"].axvspan(1e3 * low, 1e3 * high, color=SHADE, lw=0)
     axes["step"].axvline(1e3 * fit.dead_time, color=MODEL, lw=1.5)
+    truth = 1e3 * valve.truth.dead_time
+    axes["step"].axvline(
+        truth, color="k", lw=1.5, ls=":", label=f"truth (simulated valve): {truth:.1f} ms"
+    )
     axes["step"].set(
         xlabel="time after the step [ms]",
         ylabel="unit step response [mm/mA]",
         title=f"dead time {1e3 * fit.dead_time:.1f} ms = {fit.delay:.1f} samples, "
-        f"95 %: {1e3 * low:.1f}...{1e3 * high:.1f} ms",
+        f"95 %: {1e3 * low:.1f} to {1e3 * high:.1f} ms",
     )
     axes["step"].legend(loc="center right", frameon=False)
 
@@ -65,15 +69,8 @@ def main() -> None:
     axes["gain"].set(ylabel="gain [dB]", title="the model beside a stepped-sine FRF")
     axes["phase"].set(xlabel="frequency [Hz]", ylabel="phase [deg]")
     axes["gain"].legend(loc="lower left", frameon=False)
-    figure.text(
-        0.998,
-        0.002,
-        "simulated valve (37 samples = 28.9 ms)",
-        ha="right",
-        va="bottom",
-        size=11,
-        color="#666666",
-    )
+    for name in ("gain", "phase"):
+        axes[name].xaxis.set_major_formatter("{x:g}")
     assert isinstance(system, ct.StateSpace)
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(TARGET, dpi=90)
