@@ -46,7 +46,7 @@ MODULES = {
     "numerics/noise_level": "tests/numerics/test_noise_level.py",
     "numerics/onset": "tests/numerics/test_onset.py",
     "numerics/process_step": "tests/numerics/test_process_step.py",
-    "numerics/pole_factors": "tests/numerics/test_separable_fit.py",
+    "numerics/pole_factors": "tests/numerics/test_pole_factors.py",
     "numerics/separable_fit": "tests/numerics/test_separable_fit.py",
     "numerics/structure_search": "tests/numerics/test_separable_fit.py",
     "numerics/delay_bound": "tests/numerics/test_delay_bound.py",

@@ -27,7 +27,6 @@ def process_step(
     t = np.maximum(time - dead_time, 0.0)
     big, small = max(lag, second_lag), min(lag, second_lag)
     if big == 0:
-        rest = np.zeros_like(t)
         return t if integrating else np.where(time >= dead_time, 1.0, 0.0)
     slow = np.exp(-t / big)
     if small < 1e-9 * big:

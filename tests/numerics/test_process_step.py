@@ -11,7 +11,7 @@ from ctrl_realize.numerics.process_step import process_step
 TIME = np.linspace(0, 20, 41)
 
 
-@pytest.mark.parametrize(("lag", "second"), [(2.0, 0.0), (2.0, 0.5), (0.5, 2.0), (2.0, 2.0)])
+@pytest.mark.parametrize(("lag", "second"), [(3.0, 0.0), (3.0, 0.5), (0.5, 3.0), (3.0, 3.0)])
 @pytest.mark.parametrize("integrating", [False, True])
 def test_the_response_obeys_its_differential_equation(lag, second, integrating):
     # T1 T2 y'' + (T1 + T2) y' + y = u, or its integral, by differences of a fine grid
@@ -62,6 +62,15 @@ def test_a_negligible_lag_is_the_limit_of_small_ones(integrating, small):
     one = process_step(TIME, 2.0, 0.0, 1.0, integrating=integrating)
     two = process_step(TIME, 2.0, 2.0 * small, 1.0, integrating=integrating)
     assert_allclose(two, one, atol=2 * 2.0 * small)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+@pytest.mark.parametrize(("lag", "second"), [(2.0, 0.0), (2.0, 1e-5), (2.0, 0.5), (2.0, 2.0)])
+def test_the_unit_of_time_does_not_matter(unit, lag, second):
+    for integrating, size in ((False, 1.0), (True, unit)):
+        plain = process_step(TIME, lag, second, 1.0, integrating=integrating)
+        other = process_step(unit * TIME, unit * lag, unit * second, unit, integrating=integrating)
+        assert_allclose(other, size * plain, rtol=1e-9, atol=1e-9 * size)
 
 
 def test_it_ends_at_its_gain_or_lags_the_ramp_by_both_lags():
