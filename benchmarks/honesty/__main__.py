@@ -90,8 +90,24 @@ def sections(made: dict[str, list[Seen]]) -> list[str]:
     lines = []
     for part, title, table, words in tables:
         if made[part]:
-            lines += [f"### {title}", "", *([words, ""] if words else []), *table(made[part]), ""]
-    return lines[:-1]
+            lines += [f"### {title}", "", *([words, ""] if words else [])]
+            lines += folded(table(made[part]))
+    return lines
+
+
+def folded(table: list[str]) -> list[str]:
+    """Fold what is longer than a screen; a page shows its heading."""
+    rows = sum(line.startswith("| ") for line in table)
+    if rows < 20:
+        return [*table, ""]
+    return [
+        f'<details class="long"><summary>{rows} rows</summary>',
+        "",
+        *table,
+        "",
+        "</details>",
+        "",
+    ]
 
 
 if __name__ == "__main__":

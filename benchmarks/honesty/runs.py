@@ -19,7 +19,7 @@ from .trial import Seen, Trial, quietly
 from .worlds import KINDS, NOISES
 
 Task = tuple[str, str, str, float, int]
-"""Study, kind of noise (or position of the flag case), plant, noise level, seed."""
+"""Study, kind of noise, plant, noise level, seed; of a flag its world, and which side it is."""
 
 FLAG_CASES: list[FlagCase] = flag_step_cases.CASES + flag_other_cases.CASES
 
@@ -68,26 +68,35 @@ def interval_tasks(seeds: int) -> list[Task]:
     return tasks
 
 
-def world(position: int, side: str) -> int:
-    """Position of the first flag case with the same world: it is run once for all of them."""
-    words = [(case.result, case.due if side == "due" else case.not_due) for case in FLAG_CASES]
-    return words.index(words[position])
+def world(case: FlagCase, side: str) -> str:
+    """Name of the world of a flag case; cases that share one share its runs."""
+    return f"{case.result}: {case.due if side == 'due' else case.not_due}"
+
+
+def _flag_worlds() -> dict[tuple[str, str], FlagCase]:
+    found: dict[tuple[str, str], FlagCase] = {}
+    for case in FLAG_CASES:
+        for side in ("due", "not due"):
+            found.setdefault((world(case, side), side), case)
+    return found
+
+
+FLAG_WORLDS = _flag_worlds()
 
 
 def flag_tasks(seeds: int) -> list[Task]:
     """Worlds in which a flag is due, and worlds in which it is not."""
     return [
-        ("flag", str(position), side, 0.0, k)
+        ("flag", name, side, 0.0, k)
         for k in range(seeds)
-        for position, case in enumerate(FLAG_CASES)
-        for side in ("due", "not due")
-        if k < max(seeds // case.heavy, 1) and world(position, side) == position
+        for (name, side), case in FLAG_WORLDS.items()
+        if k < max(seeds // case.heavy, 1)
     ]
 
 
 def family(task: Task) -> str:
     """Study of a case, or what reports the flag."""
-    return FLAG_CASES[int(task[1])].result if task[0] == "flag" else task[0]
+    return FLAG_WORLDS[task[1], task[2]].result if task[0] == "flag" else task[0]
 
 
 def run_task(task: Task) -> Seen:
@@ -97,7 +106,7 @@ def run_task(task: Task) -> Seen:
         if study == "fit":
             return single.fit_once(kind, plant, noise, seed)
         if study == "flag":
-            case = FLAG_CASES[int(kind)]
+            case = FLAG_WORLDS[kind, plant]
             with quietly():
                 found = (case.raising if plant == "due" else case.quiet)(seed)
             return Seen(study, kind, plant, noise, seed, flags=sorted(found))

@@ -164,9 +164,9 @@ def flag_table(seen: list[Seen]) -> list[str]:
     """Misses and false alarms of every flag."""
     groups = _groups(seen, "kind", "plant")
     lines = _head("flag", "of", "due", "missed", "not due", "false alarms", "seeds")
-    for position, case in enumerate(FLAG_CASES):
-        due = groups.get((str(world(position, "due")), "due"), [])
-        quiet = groups.get((str(world(position, "not due")), "not due"), [])
+    for case in FLAG_CASES:
+        due = groups.get((world(case, "due"), "due"), [])
+        quiet = groups.get((world(case, "not due"), "not due"), [])
         if not due:
             continue
         missed = sum(case.code not in one.flags for one in due)
