@@ -276,4 +276,7 @@ def closed_loop_plot(
         axes[1].axhline(0, color=style.INPUT, linewidth=1)
         axes[0].set_ylabel("output, set-point step")
         axes[1].set(ylabel="output, load step", xlabel=f"time [{unit}]")
-        return style.finished(axes, drawn, title=title or "Closed loop", own_figure=ax is None)
+        # The set-point response ends at 1: the corner below it is free.
+        return style.finished(
+            axes, drawn, title=title or "Closed loop", own_figure=ax is None, loc="lower right"
+        )
