@@ -284,6 +284,53 @@ def test_too_little_after_the_step_is_refused():
         cr.unit_step(record_of(step_input(103, 100)))
 
 
+def test_an_edge_knows_its_time_and_a_response_its_name():
+    record = cr.Record(5.0 + 0.01 * np.arange(400), step_input(), np.zeros(400), name="valve")
+    edge = cr.detect_step(record)
+    assert edge.time == pytest.approx(5.0 + 0.01 * 100)
+    assert cr.unit_step(record).name == "valve"
+    assert cr.impulse_from_step(cr.unit_step(record), cutoff_hz=None).name == "valve"
+
+
+def test_a_record_of_one_row_is_one_channel():
+    u = step_input()
+    rows = cr.Record(0.01 * np.arange(400), u[np.newaxis], 2 * u[np.newaxis])
+    step = cr.unit_step(rows)
+    assert_allclose(step.output, 2.0, atol=1e-12)
+    assert step.output.shape == (300,)
+
+
+def test_a_step_with_five_samples_behind_it_is_long_enough():
+    record = record_of(step_input(105, 100), step_input(105, 100))
+    assert cr.unit_step(record).n_samples == 5
+
+
+def test_a_record_that_starts_at_its_step_takes_its_rest_from_what_has_not_moved():
+    u = np.full(60, 20.0)
+    u[:2] = 4.0
+    y = np.where(np.arange(60) < 20, 7.0, 9.0)
+    step = cr.unit_step(record_of(u, y))
+    assert step.rest_output == 7.0
+    assert_allclose(step.output, np.where(np.arange(58) < 18, 0, 2 / 16))
+
+
+@pytest.mark.parametrize(("before", "known"), [(19, False), (20, True)])
+def test_twenty_samples_at_rest_are_kept_as_noise(before, known):
+    record = record_of(step_input(400, before), np.random.default_rng(0).standard_normal(400))
+    g = cr.impulse_from_step(cr.unit_step(record), cutoff_hz=None)
+    assert (g.noise is not None) == known
+
+
+def test_spikes_may_have_no_length_and_the_share_ends_below_one():
+    u = step_input()
+    assert cr.detect_step(record_of(u), spike_samples=0).index == 100
+    with pytest.raises(OptionError, match="spike_samples"):
+        cr.detect_step(record_of(u), spike_samples=-1)
+    for share in (0.0, 1.0):
+        with pytest.raises(OptionError, match="min_share"):
+            cr.detect_step(record_of(u), min_share=share)
+
+
 def test_measured_records_have_one_step_where_it_is(shared_data):
     from ctrl_realize import read_record
 
