@@ -96,6 +96,11 @@ def delayed_ss(
         *sampled, samples = sample_with_dead_time(
             system.A, system.B, system.C, system.D, step, wait or 0.0
         )
+        if not all(np.isfinite(M).all() for M in sampled):
+            raise UnsuitableSystemError(
+                f"sampled every {step:g} s the core has entries that are no numbers; its poles "
+                f"reach {np.abs(system.poles()).max(initial=0.0):.3g} rad/s: use a shorter dt"
+            )
         discrete = ct.StateSpace(
             *sampled,
             step,

@@ -99,7 +99,8 @@ def compare_frf(
     order = np.argsort(frequency, kind="stable")
     dt = _sample_time(system)
     flags: list[Flag] = []
-    usable = np.abs(measured[order]) > 0
+    # what is smaller is zero: nothing can be put in relation to it
+    usable = np.abs(measured[order]) > 1e-70
     if dt is not None:
         usable &= frequency[order] < 0.5 / dt
         beyond = int(np.sum(frequency >= 0.5 / dt))

@@ -152,7 +152,9 @@ class FRFComparison(Result):
 
 
 def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    # in units of the largest, so that the squares neither overflow nor vanish
+    largest = float(np.abs(values).max(initial=0.0)) or 1.0
+    return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
 
 
 def decibels(values: ComplexArray) -> FloatArray:

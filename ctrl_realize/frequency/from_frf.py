@@ -116,13 +116,15 @@ def impulse_from_frf(
             sigma = np.hypot(sigma, np.abs(response) * image**2)
     if 2 * omega.size < 16:
         raise DataError(f"{omega.size} points are too few for a pulse response; 8 are needed")
-    equations = _equations(omega * step, response, 1 / sigma, count)
+    # In a unit near the response's own; a power of two, so that nothing is rounded.
+    unit = 2.0 ** round(float(np.log2(np.median(np.abs(response)))))
+    equations = _equations(omega * step, response / unit, unit / sigma, count)
     fit = fit_kernel(equations, count, kernel)
-    markov = fit.markov[0]
+    markov = unit * fit.markov[0]
     return ImpulseEstimate(
         markov,
         step,
-        std=fit.std[0],
+        std=unit * fit.std[0],
         noise_std=np.array([np.sqrt(fit.noise_variance) * float(np.median(sigma))]),
         method=f"{kernel} kernel on {omega.size} points, {fit.effective:.0f} free parameters",
         rows=2 * omega.size,

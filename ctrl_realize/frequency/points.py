@@ -13,6 +13,9 @@ from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray
 
 _SMOOTHED_POINTS = 9
+_SIGNIFICANT = 6.0
+_LEAST = 1e-70  # what is smaller is zero: its squares vanish
+_WIDEST = 1e15
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,7 @@ def frf_points(
     order = np.argsort(frf.omega, kind="stable")
     frequency = np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi)
     response = np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order]
-    usable = (frequency > 0) & (np.abs(response) > 0) & np.isfinite(response)
+    usable = (frequency > _LEAST) & (np.abs(response) > _LEAST) & np.isfinite(response)
     usable &= frequency < below_hz
     if band_hz is not None:
         low, high = (real(edge, "band_hz", "frequency in Hz") for edge in band_hz)
@@ -66,13 +69,32 @@ def frf_points(
             f"{int(usable.sum())} usable points: above 0 Hz{limit}, not zero and inside the band; "
             "at least 3 are needed"
         )
+    span = float(frequency[usable].max() / frequency[usable].min())
+    if span > _WIDEST:
+        raise DataError(
+            f"the frequencies span a ratio of {span:.3g}; needed is at most {_WIDEST:g} (a unit "
+            "wrong, or a value damaged?)"
+        )
     std, coherence = (
         None if beside is None else np.reshape(beside, -1)[order][usable]
         for beside in (getattr(frf, "std", None), getattr(frf, "coherence", None))
     )
     frequency, response = frequency[usable], response[usable]
     sigma, known = _sigma(response, std, coherence, weighting)
+    if known:
+        _check_signal(response, sigma)
     return FRFPoints(frequency, response, sigma, known)
+
+
+def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
+    """Refuse points that are nothing but noise, as those of an input that does not excite."""
+    power = float(np.mean(np.abs(response / sigma) ** 2))
+    if power < 1 + _SIGNIFICANT / np.sqrt(response.size):
+        raise DataError(
+            f"the response is {np.sqrt(power):.2g} times its standard deviation, as noise alone "
+            "would be: the input does not excite the output at these frequencies; choose another "
+            "band or measure longer"
+        )
 
 
 def _sigma(
@@ -80,7 +102,9 @@ def _sigma(
 ) -> tuple[FloatArray, bool]:
     """Return the standard deviation of each point and whether it was measured."""
     if weighting in ("auto", "std") and std is not None and np.any(std > 0):
-        return _smoothed(np.maximum(std, 1e-3 * np.median(std[std > 0]))), True
+        # nothing is measured to the last digits
+        least = max(1e-3 * float(np.median(std[std > 0])), 1e-14 * float(np.abs(response).max()))
+        return _smoothed(np.maximum(std, least)), True
     if weighting == "std":
         raise OptionError("weighting='std', but the FRF has no standard deviation")
     if weighting == "uniform":

@@ -10,10 +10,11 @@ import numpy as np
 
 from ..checks import positive, whole
 from ..delayed import DelayedStateSpace
-from ..errors import DataError, DelayRangeError
+from ..errors import DataError, DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.pole_moves import Core, Direction, moved_core, pole_directions, sensitivity_system
 from ..numerics.recursive import DelayBank
+from ..numerics.time_axis import EXTREME
 from ..signals import Record
 from ..signals.record import check_complete
 from .tracked import DelayTrack, TrackedDelay
@@ -21,6 +22,7 @@ from .tracker_checks import check_start, doubt, fraction
 
 SPEED_STD = 0.3
 """How far a pole is expected to move: prior standard deviation of its relative speed."""
+_LONGEST = 1e12
 MOMENTS = 50
 """Estimates made in one memory."""
 RUN_IN = 2
@@ -114,6 +116,10 @@ class DelayTracker:
             raise DelayRangeError(f"delays {low}...{high} leave nothing to choose from")
         self.dt = float(core.dt)
         span = positive(memory, "memory", "time in s") / self.dt
+        if span > _LONGEST:
+            raise OptionError(
+                f"memory={memory:g} s is {span:.4g} samples; needed are at most {_LONGEST:g}"
+            )
         if span <= high:
             raise DelayRangeError(
                 f"memory={memory:g} s is {span:.4g} samples, and delays up to {high} samples are "
@@ -151,10 +157,15 @@ class DelayTracker:
         Raises
         ------
         DataError
-            A value that is not finite.
+            A value that is not finite, or beyond 1e70.
         """
         if not (np.isfinite(u) and np.isfinite(y)):
             raise DataError(f"sample {self._count} is u={u}, y={y}; needed are finite numbers")
+        if max(abs(u), abs(y)) > EXTREME:
+            raise DataError(
+                f"sample {self._count} is u={u:g}, y={y:g}; beyond {EXTREME:g}, where squares "
+                "overflow, there is no measurement"
+            )
         if self._count == 0:
             # What was before is rest; large offsets would cost digits.
             self._first = (float(u), float(y))
@@ -281,7 +292,8 @@ class DelayTracker:
         self._best = (bank.low + best, found.theta[best], float(found.offset[best]))
         # Never below what sums of squares can resolve in double precision.
         noise = max(self._variance * self._inflation(), 1e-14 * found.power, 1e-300)
-        distance = (found.misfit - found.misfit[best]) / noise
+        # beyond a thousand nothing is left of a chance, and the quotient might overflow
+        distance = np.minimum(found.misfit - found.misfit[best], 1e3 * noise) / noise
         chance = np.exp(-distance / 2)
         below = np.cumsum(chance) / chance.sum()
         interval = (
@@ -296,10 +308,9 @@ class DelayTracker:
         self._move_std = np.sqrt(spreads) / abs(gain) if gain else np.full(q - 1, np.inf)
         speeds = [i for i, (what, _, _) in enumerate(now.directions) if what == "speed"]
         ratios = tuple(float(np.exp(now.moved[i] + np.clip(moves[i], -2, 2))) for i in speeds)
+        clear = gain / gain_std if gain_std > 0 else np.inf
         explained = float(found.power - found.misfit[best])
-        reason = doubt(
-            explained / noise, gain / gain_std, bank.low + best, interval, (self._low, self._high)
-        )
+        reason = doubt(explained / noise, clear, bank.low + best, interval, (self._low, self._high))
         place = bank.low + best + fraction(found.misfit, best)
         moved = float(np.abs(moves[speeds]).max(initial=0.0))
         if not reason and moved > SPEED_STD:

@@ -106,15 +106,15 @@ def moved_core(
     -------
     core, directions
         The moved ones, directions in the same order; None where the core has no sum of simple
-        poles that reproduces it.
+        poles that reproduces it, and where a pole has gone where it cannot move from.
     """
     A, B, C, D = core
     poles = np.linalg.eigvals(A).astype(np.complex128)
     count = 4 * A.shape[0] + 50
     first = markov(A, B[:, None], C[None], np.array([[D]]), count)[0, 0]
     leading = first[poles.size - zeros.size]
-    same = _modal(zeros, poles, leading)
-    if same is None or not _alike(same, first):
+    own = _modal(zeros, poles, leading)
+    if own is None or not _alike(own, first):
         return None
     moved = poles.copy()
     fresh: list[Direction] = []
@@ -128,7 +128,11 @@ def moved_core(
         return None
     for what, pole, _ in directions:
         at = moved[int(np.abs(poles - pole).argmin())]
-        fresh.append(next(d for d in pole_directions(np.array([at]), dt) if d[0] == what))
+        same = [found for found in pole_directions(np.array([at]), dt) if found[0] == what]
+        if not same:
+            # It has come to 0, or a pair to the real axis.
+            return None
+        fresh.append(same[0])
     free = np.abs(1 - poles) > 1e-9
     gain = leading * np.prod((1 - moved[free]) / (1 - poles[free])).real
     made = _modal(zeros, moved, float(gain))
@@ -136,6 +140,8 @@ def moved_core(
 
 
 def _moved_pole(pole: complex, what: str, move: float, dt: float) -> complex:
+    if pole == 0:
+        return 0j
     s = np.log(complex(pole)) / dt
     if what == "speed":
         return complex(np.exp(s * np.exp(move) * dt))

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from .record_checks import check_size, numbers
 
 
 class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is untyped
@@ -73,8 +74,8 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         inputs: Any = None,
         outputs: Any = None,
     ) -> None:
-        values = np.asarray(response, dtype=np.complex128)
-        grid = np.asarray(frequency_hz, dtype=np.float64)
+        values = _complex_numbers(response)
+        grid = numbers(frequency_hz, "frequency_hz")
         if grid.ndim != 1 or grid.size == 0:
             raise DataError(f"frequency_hz has shape {grid.shape}; needed is (K,), K >= 1")
         if values.ndim not in (1, 3) or values.shape[-1] != grid.size:
@@ -84,6 +85,8 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             )
         _check_finite(grid, "frequency_hz")
         _check_finite(values, "response")
+        check_size(grid, "frequency_hz")
+        check_size(_largest_part(values), "response")
         if np.any(grid < 0):
             raise DataError(f"frequency_hz goes down to {grid.min():g} Hz; needed is >= 0")
         order = np.argsort(grid, kind="stable")
@@ -198,11 +201,29 @@ def _beside(
 ) -> FloatArray | None:
     if values is None:
         return None
-    array = np.asarray(values, dtype=np.float64)
+    array = numbers(values, what)
     if array.shape != response.shape:
         raise DataError(f"{what} has shape {array.shape}, response has {response.shape}")
     _check_finite(array, what)
+    check_size(array.reshape(-1, array.shape[-1]), what)
     return read_only(array[..., order])
+
+
+def _complex_numbers(response: ArrayLike) -> ComplexArray:
+    """Take real or complex numbers and nothing else."""
+    try:
+        array = np.asarray(response)
+    except ValueError as error:
+        raise DataError("response is no array: its rows have different lengths") from error
+    if array.dtype.kind not in "biufc":
+        raise DataError(f"response holds {array.dtype} values; needed are complex numbers")
+    return np.asarray(array, dtype=np.complex128)
+
+
+def _largest_part(values: ComplexArray) -> FloatArray:
+    """Return the larger of real and imaginary part, shape (channels, K); an absolute overflows."""
+    largest = np.maximum(np.abs(values.real), np.abs(values.imag))
+    return np.asarray(largest.reshape(-1, values.shape[-1]))
 
 
 def _check_finite(values: np.ndarray[Any, Any], what: str) -> None:

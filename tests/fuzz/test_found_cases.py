@@ -5,12 +5,21 @@ from __future__ import annotations
 import functools
 import os
 
+import control as ct
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.cli import main
-from ctrl_realize.errors import DataError, FileFormatError, NoStepError, OptionError, TimeAxisError
+from ctrl_realize.errors import (
+    DataError,
+    FileFormatError,
+    NoStepError,
+    OptionError,
+    TimeAxisError,
+    UnsuitableSystemError,
+)
+from ctrl_realize.numerics.pole_moves import moved_core, pole_directions
 from tests.fuzz.lane import good_end
 
 
@@ -195,3 +204,92 @@ def test_an_edited_number_in_a_store_is_not_believed(tmp_path):
     again = cr.identify_campaign([record], method="paper", store=store)
     assert again.delays == first.delays
     assert '"delay": "9' not in path.read_text()
+
+
+@pytest.mark.parametrize(
+    ("response", "frequency", "match"),
+    [
+        (["a", "b"], [1.0, 2.0], "response holds"),
+        ([[1.0], [1.0, 2.0]], [1.0, 2.0], "rows have different lengths"),
+        ([1.0, 2.0], ["1", "2"], "frequency_hz holds"),
+        ([1.0, 2.0], [1.0, 1.7e308], "frequency_hz is beyond"),
+        ([1.0, 1.7e308 + 1.7e308j], [1.0, 2.0], "response is beyond"),
+    ],
+)
+def test_what_is_no_measured_response_is_refused(response, frequency, match):
+    # errors of NumPy's, and overflow in 2 pi f: five of 100 000 damaged .npy files
+    with good_end(), pytest.raises(DataError, match=match):
+        cr.MeasuredFRF(response, frequency)
+
+
+FREQUENCY = np.linspace(0.05, 2.0, 30)
+RESPONSE = np.exp(-0.6j * FREQUENCY) / (1 + 1j * FREQUENCY)
+
+
+def test_a_model_sampled_once_in_ten_to_the_seventy_seconds_is_refused():
+    # a model of NaN came back, without a word
+    with pytest.raises(UnsuitableSystemError, match="use a shorter dt"):
+        cr.fit_frf(cr.MeasuredFRF(RESPONSE, FREQUENCY), 1, dt=1e70)
+
+
+def test_a_pulse_response_is_the_same_in_any_unit_of_the_output():
+    # 1e-40 V met a bound of the prior, and its matrix was not positive definite
+    one = cr.impulse_from_frf(cr.MeasuredFRF(RESPONSE, FREQUENCY), 0.2, 40).markov
+    for unit in (2.0**-133, 2.0**133):
+        other = cr.impulse_from_frf(cr.MeasuredFRF(unit * RESPONSE, FREQUENCY), 0.2, 40).markov
+        np.testing.assert_array_equal(other, unit * one)
+
+
+@pytest.mark.parametrize("odd", [5e-324, 1e-200])
+def test_a_response_of_almost_nothing_is_left_out_of_fit_and_comparison(odd):
+    # weights and relative errors overflowed
+    response = RESPONSE.copy()
+    response[7] = odd
+    model = cr.delayed_ss(ct.tf(1, [1 / (2 * np.pi), 1]), dead_time=0.1, dt=0.01)
+    for std in (None, np.full(response.size, 1e-3)):
+        frf = cr.MeasuredFRF(response, FREQUENCY, std=std)
+        with good_end() as ends:
+            ends.append(cr.compare_frf(model, frf).report())
+            ends.append(cr.fit_frf(frf, 1))
+        assert len(ends) == 2
+
+
+def test_frequencies_that_span_more_than_any_instrument_are_refused():
+    with pytest.raises(DataError, match="span a ratio of"):
+        cr.fit_frf(cr.MeasuredFRF(RESPONSE, np.r_[1e-50, FREQUENCY[1:]]), 1)
+
+
+CORE = ct.ss([[0.9, 0.2], [-0.2, 0.9]], [[0], [1]], [[0.3, 0]], 0.1, 0.1)
+
+
+@pytest.mark.parametrize("value", [1e71, -1.7e308])
+def test_a_sample_near_the_end_of_the_doubles_is_refused_and_changes_nothing(value):
+    # squares overflowed in the tracker's sums
+    tracker = cr.DelayTracker(CORE, max_delay=5, memory=3.0)
+    for pair in ((0.0, value), (value, 0.0)):
+        with pytest.raises(DataError, match="there is no measurement"):
+            tracker.update(*pair)
+    assert tracker.estimate().reason == "no samples yet"
+
+
+def test_an_output_of_zero_beside_a_moving_input_is_told_without_overflow():
+    tracker = cr.DelayTracker(ct.ss(0.8, 1, 0.2, 0, 0.1), max_delay=10, memory=10.0)
+    with good_end():
+        for u in 1e12 * np.repeat([0.0, 1.0, -1.0, 1.0], 30):
+            tracker.update(u, 0.0)
+        told = tracker.estimate()
+    assert not told.tells
+
+
+def test_a_memory_of_more_samples_than_can_be_counted_is_refused():
+    with pytest.raises(OptionError, match="needed are at most"):
+        cr.DelayTracker(CORE, max_delay=5, memory=1e308)
+
+
+def test_a_pole_that_is_moved_to_where_it_cannot_move_from_gives_no_core():
+    # StopIteration, and the logarithm of a pole at 0
+    directions = pole_directions(CORE.poles(), 0.1)
+    core = (CORE.A, CORE.B[:, 0], CORE.C[0], 0.1)
+    for moves in ([8.0, 0.0], [8.0, 0.5], [-40.0, 5.0]):
+        with good_end():
+            moved_core(core, CORE.zeros(), directions, np.array(moves), 0.1)

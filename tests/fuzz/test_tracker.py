@@ -1,0 +1,109 @@
+"""Samples of every kind, streamed into the delay tracker."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+
+import ctrl_realize as cr
+from tests.fuzz.draws import any_float, generator, sometimes
+from tests.fuzz.lane import ends, fuzz, good_end
+
+DT = 0.1
+CORES = [
+    ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], DT),
+    ct.ss([[0.8, 0.1], [0.0, 0.5]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], DT),
+    ct.ss([[0.9, 0.2], [-0.2, 0.9]], [[0.0], [1.0]], [[0.3, 0.0]], [[0.1]], DT),
+    ct.ss([], [], [], [[2.0]], DT),
+    ct.ss([[1.0]], [[1.0]], [[0.1]], [[0.0]], DT),
+]
+
+
+def any_stream(rng, n):
+    """Input and output: moving, constant, unrelated, jumping, of any size."""
+    noise = generator(rng)
+    kind = rng.choice(["steps", "steps", "white", "constant", "zero", "late"])
+    if kind == "steps":
+        u = np.repeat(noise.choice([-1.0, 1.0], n // 20 + 1), 20)[:n]
+    elif kind == "white":
+        u = noise.standard_normal(n)
+    else:
+        u = np.full(n, rng.choice([1.0, -3.0]) if kind == "constant" else 0.0)
+        if kind == "late":
+            u[-rng.randint(1, n) :] = 1.0
+    y = cr.DelayedStateSpace(rng.choice(CORES), rng.randint(0, 9)).simulate(u)
+    if sometimes(rng, 4):
+        y = noise.standard_normal(n) if rng.randrange(2) else np.full(n, 5.0)
+    y = y + rng.choice([0.0, 0.0, 1e-9, 0.01, 1.0]) * noise.standard_normal(n)
+    scale = rng.choice([1.0, 1.0, 1e-12, 1e12, -1e-60, 1e60])
+    u = u * rng.choice([1.0, scale]) + rng.choice([0.0, 4.0, 1e6])
+    return u, y * scale + rng.choice([0.0, 0.3, 1e6])
+
+
+@fuzz(20)
+def test_any_stream_is_followed_or_refused_sample_by_sample(rng):
+    u, y = any_stream(rng, rng.randint(2, 220))
+    bad = {rng.randrange(u.size): any_float(rng) for _ in range(rng.choice([0, 0, 1, 3]))}
+    options = {
+        "max_delay": rng.choice([5, 10, 12]),
+        "memory": rng.choice([3.0, 10.0, 1e6]),
+        "min_delay": rng.choice([0, 0, 2]),
+        "dynamics": rng.random() < 0.7,
+    }
+    tracker = cr.DelayTracker(rng.choice(CORES), **options)
+    taken = []
+    for k, (before, after) in enumerate(zip(u, y, strict=True)):
+        pair = (bad[k], after) if k in bad and k % 2 else (before, bad.get(k, after))
+        with good_end() as took:
+            tracker.update(*pair)
+            took.append(k)
+        if took:
+            assert np.isfinite(pair).all()
+            taken.append(float(pair[0]))
+        else:
+            assert not all(abs(value) <= 1e70 for value in pair)
+    for _ in range(2):
+        told = tracker.estimate()
+    assert not taken or told.time == (len(taken) - 1) * DT
+    assert options["min_delay"] <= told.delay <= options["max_delay"]
+    assert told.report()
+    assert repr(tracker)
+    if told.tells:
+        ends["tells"] += 1
+        low, high = told.interval
+        assert low <= told.delay <= high
+        assert np.isfinite([told.dead_time, told.gain_ratio, told.gain_std]).all()
+        # a constant input says nothing of the delay
+        assert np.ptp(taken) > 0
+    with good_end() as models:
+        models.append(tracker.model)
+    for model in models:
+        assert np.isfinite(model.delay_free.A).all()
+
+
+@fuzz(10)
+def test_any_start_of_a_tracker_is_taken_or_refused(rng):
+    with good_end():
+        cr.DelayTracker(
+            rng.choice([*CORES, -CORES[0], ct.tf(1, [1, 1]), ct.ss(2.0, 1, 1, 0, DT), None]),
+            max_delay=rng.choice([5, 0, -1, 2.5, None]),
+            memory=rng.choice([3.0, any_float(rng), None]),
+            min_delay=rng.choice([0, 0, 7, -1]),
+            dynamics=rng.choice([True, False]),
+        )
+
+
+@fuzz(6)
+def test_a_clean_stream_is_followed_to_its_delay(rng):
+    core, delay = rng.choice(CORES[:3]), rng.randint(0, 9)
+    u = np.repeat(generator(rng).choice([-1.0, 1.0], 30), 20) * rng.choice([1.0, 1e-6, 1e20])
+    y = cr.DelayedStateSpace(core, delay).simulate(u)
+    tracker = cr.DelayTracker(core, max_delay=delay + rng.randint(2, 6), memory=20.0)
+    with good_end():
+        for sample in zip(u, y, strict=True):
+            tracker.update(*sample)
+    told = tracker.estimate()
+    if told.tells:
+        ends["tells"] += 1
+        assert told.interval[0] <= delay <= told.interval[1]
+        assert abs(told.delay - delay) <= 1
