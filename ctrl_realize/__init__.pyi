@@ -39,13 +39,13 @@ from .identification.from_io import impulse_from_io as impulse_from_io
 from .identification.identify import identify as identify
 from .identification.orders import OrderScan as OrderScan
 from .identification.orders import scan_orders as scan_orders
+from .identification.prediction import Prediction as Prediction
+from .identification.prediction import predict as predict
 from .identification.realization import Realization as Realization
 from .identification.realization import realize as realize
-from .identification.residuals import Prediction as Prediction
 from .identification.residuals import ResidualCheck as ResidualCheck
 from .identification.residuals import check_residuals as check_residuals
 from .identification.residuals import cross_validate as cross_validate
-from .identification.residuals import predict as predict
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import control as ct
 import numpy as np
@@ -15,6 +15,8 @@ from ..numerics.arrays import FloatArray
 from ..numerics.state_space import markov, step_response
 from ..signals import Record
 from ..signals.record import check_complete
+
+Start = Literal["estimate", "rest"]
 
 PIECES = 16
 """Levels into which the unknown input within a dead time is divided at most."""

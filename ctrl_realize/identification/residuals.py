@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
@@ -14,23 +14,17 @@ from ..checks import real, whole
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.correlation import (
-    autoregression,
     correlation,
     cross_bound,
     fit_percent,
-    predict_ahead,
     whiteness,
 )
 from ..results import Flag, Result
 from ..signals import Record
-from .record_simulation import simulate_record
+from .record_simulation import Start, simulate_record
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Start = Literal["estimate", "rest"]
-NOISE_ORDER = 20
-"""Highest order of the autoregression that predicts the residual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,35 +93,6 @@ class ResidualCheck(Result):
     def __repr__(self) -> str:
         fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
         return f"<ResidualCheck: fit {fit} %, white {self.white}, independent {self.independent}>"
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction(Result):
-    """Output predicted `steps` samples ahead.
-
-    ``output[k]`` uses the input up to k and the measured output up to ``k - steps``; `fit_percent`
-    compares it with the record. The model is the system plus an autoregression of its residual
-    of the order `noise_order`, per output.
-    """
-
-    output: FloatArray
-    fit_percent: FloatArray
-    steps: int
-    noise_order: tuple[int, ...]
-    record: Record
-
-    def _title(self) -> str:
-        return f"Prediction {self.steps} samples ahead"
-
-    def _rows(self) -> list[tuple[str, str]]:
-        return [
-            ("fit", ", ".join(f"{f:.2f} %" for f in self.fit_percent)),
-            ("order of the noise", ", ".join(map(str, self.noise_order))),
-        ]
-
-    def __repr__(self) -> str:
-        fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
-        return f"<Prediction {self.steps} ahead: fit {fit} %>"
 
 
 def check_residuals(
@@ -235,64 +200,6 @@ def check_residuals(
         confidence=level,
         record=record,
         flags=tuple(flags),
-    )
-
-
-def predict(
-    system: ct.StateSpace, record: Record, steps: int, *, start: Start = "estimate"
-) -> Prediction:
-    """Predict the output of a record `steps` samples ahead.
-
-    Parameters
-    ----------
-    system, record, start
-        As for `check_residuals`.
-    steps : int
-        Samples ahead, at least 1.
-
-    Returns
-    -------
-    Prediction
-
-    Raises
-    ------
-    DataError, UnsuitableSystemError, OptionError
-        As for `check_residuals`; steps that are no whole number from 1 on.
-
-    Notes
-    -----
-    The autoregression of the residual is fitted to the same record (order 0...20 by BIC), so the
-    figure is one of description; compare models at the same `steps`.
-
-    Examples
-    --------
-    >>> import control as ct
-    >>> import numpy as np
-    >>> import ctrl_realize as cr
-    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
-    >>> rng = np.random.default_rng(0)
-    >>> u, e = rng.standard_normal((2, 500))
-    >>> slow = ct.ss([[0.95]], [[1.0]], [[1.0]], [[1.0]], 0.1)
-    >>> noise = cr.DelayedStateSpace(slow, 0).simulate(0.05 * e)
-    >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + noise)
-    >>> one, ten = (cr.predict(plant, record, k).fit_percent[0] for k in (1, 10))
-    >>> bool(one > ten)
-    True
-    """
-    ahead = whole(steps, "steps", 1)
-    simulated = simulate_record(system, record, start)
-    y = np.atleast_2d(record.output)
-    most = min(NOISE_ORDER, record.n_samples // 10)
-    models = [autoregression(row, most) for row in y - simulated]
-    output = simulated + np.stack(
-        [predict_ahead(row, c, ahead) for row, c in zip(y - simulated, models, strict=True)]
-    )
-    return Prediction(
-        output=read_only(output.reshape(record.output.shape)),
-        fit_percent=read_only(fit_percent(y, output)),
-        steps=ahead,
-        noise_order=tuple(c.size for c in models),
-        record=record,
     )
 
 

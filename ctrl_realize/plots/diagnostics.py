@@ -13,7 +13,8 @@ from ..checks import whole
 from ..identification.channels import ChannelRealization
 from ..identification.cross_check import DelayCheck
 from ..identification.from_io import ImpulseEstimate
-from ..identification.residuals import Prediction, ResidualCheck
+from ..identification.prediction import Prediction
+from ..identification.residuals import ResidualCheck
 from ..numerics.arrays import FloatArray
 from ..signals import Record
 from . import style
