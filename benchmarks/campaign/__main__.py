@@ -57,11 +57,13 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--method", default="paper")
     parser.add_argument("--output", type=Path)
+    parser.add_argument("--store", type=Path, help="folder that keeps the rows, to go on from")
     arguments = parser.parse_args()
     lines = ["| what | figure |", "|---|---|"]
     with tempfile.TemporaryDirectory() as temporary:
         ruin_files(Path(temporary))
-        store = cr.CampaignStore(Path(temporary) / "rows")
+        store = cr.CampaignStore(arguments.store or Path(temporary) / "rows")
+        found = len(store)
         sources = [functools.partial(make, seed, temporary) for seed in range(arguments.records)]
 
         def run(count: int) -> tuple[cr.Campaign, float]:
@@ -80,12 +82,13 @@ def main() -> None:
         assert again.table().equals(campaign.table())
         kinds = sorted({str(row.error).split(":")[0] for row in campaign.failed})
         size = sum(path.stat().st_size for path in store.folder.iterdir()) / 2**20
+        there = f", {found} rows found in the store" if found else ""
         lines += [
             f"| records, processes, method | {arguments.records}, {arguments.jobs}, "
             f"{arguments.method} |",
             f"| identified / corrupt, told by name | {len(campaign.good)} / "
             f"{len(campaign.failed)} ({', '.join(kinds)}) |",
-            f"| time of the last nine tenths | {first:.0f} s, "
+            f"| time of the last nine tenths{there} | {first:.0f} s, "
             f"{1e3 * first / (arguments.records - tenth):.1f} ms a record |",
             f"| the same again, from its store | {second:.0f} s, same table |",
             f"| peak memory of the main process after a tenth / all | {early[0]:.0f} MB / "

@@ -22,8 +22,9 @@ def rise_time(step: FloatArray, dt: float) -> float:
         Sample time in s.
     """
     final = float(np.median(step[-max(step.size // 10, 3) :]))
-    if final == 0.0:
-        final = float(step[np.argmax(np.abs(step))]) or 1.0
+    largest = float(step[np.argmax(np.abs(step))])
+    if abs(final) <= 1e-100 * abs(largest):
+        final = largest or 1.0
     shape = step / final
     best = float(step.size)
     window = max(step.size // 20, 1)

@@ -20,6 +20,7 @@ from ctrl_realize.errors import (
     UnsuitableSystemError,
 )
 from ctrl_realize.numerics.pole_moves import moved_core, pole_directions
+from ctrl_realize.numerics.rise import rise_time
 from tests.fuzz.lane import good_end
 
 
@@ -293,3 +294,11 @@ def test_a_pole_that_is_moved_to_where_it_cannot_move_from_gives_no_core():
     for moves in ([8.0, 0.0], [8.0, 0.5], [-40.0, 5.0]):
         with good_end():
             moved_core(core, CORE.zeros(), directions, np.array(moves), 0.1)
+
+
+def test_a_step_response_that_ends_in_almost_nothing_has_a_rise_time():
+    # relative to a final level of 1e-304 everything overflowed
+    step = np.concatenate([np.zeros(5), [3e5], np.full(40, 1e-304)])
+    with good_end() as ends:
+        ends.append(rise_time(step, 0.1))
+    assert 0 < ends[0] < step.size * 0.1

@@ -26,7 +26,7 @@ def any_signals(rng):
         bad = any_float(rng) if rng.randrange(2) else rng.uniform(-10, 10)
         rng.choice([u, y])[rng.randrange(n)] = bad
     if rng.randrange(2):
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             y = np.round(y, rng.randint(0, 3))
     return time, u, y
 
