@@ -121,7 +121,7 @@ def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
     """Frequencies, in cycles per sample, of the lines in a signal at rest.
 
     A line carries at least a third of the variance and stands 20 times above its neighbours in
-    the spectrum, over four periods or more.
+    the spectrum, over three and a half periods or more.
     """
     found: list[float] = []
     left = rest - rest.mean()

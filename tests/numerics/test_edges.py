@@ -94,6 +94,12 @@ def test_a_step_of_less_than_ten_sigma_of_the_range_is_noise():
     assert [e.index for e in find_edges(noise + 2.0 * (np.arange(400) >= 200), 0, 0.5)] == [200]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_without_a_median_filter_ten_sigma_of_the_range_are_enough(seed):
+    (found,) = find_edges(white(400, seed) + 9.0 * (np.arange(400) >= 200), 0, 0.5)
+    assert found.index == 200
+
+
 def test_spikes_at_the_ends_are_no_edges_beside_a_step():
     values = levels((9, 2), (1, 50), (4, 50), (-8, 2))
     assert [(e.index, e.amplitude) for e in find_edges(values, 3, 0.5)] == [(52, 3.0)]
