@@ -5,7 +5,8 @@ In the ordinary test command Hypothesis stands behind it, takes the same few cas
 shrinks what fails. ``FUZZ_CASES=100000 pytest tests/fuzz`` runs that many cases a target, drawn
 ten times as fast; each is repeatable by its number:
 
-FUZZ_CASES    cases a target
+FUZZ_CASES    number of the last case of a target
+FUZZ_FIRST    number of the first of them (default 0), to go on where a run was ended
 FUZZ_SEED     other seeds, other cases (default 0)
 FUZZ_SECONDS  end a target after that time, however many cases it has had
 FUZZ_CASE     run the case of this number alone
@@ -36,6 +37,7 @@ from hypothesis import strategies as st
 from ctrl_realize.errors import CtrlRealizeError, CtrlRealizeWarning
 
 CASES = int(os.environ.get("FUZZ_CASES", "0"))
+FIRST = int(os.environ.get("FUZZ_FIRST", "0"))
 SEED = os.environ.get("FUZZ_SEED", "0")
 SECONDS = float(os.environ.get("FUZZ_SECONDS", "inf"))
 CASE = os.environ.get("FUZZ_CASE")
@@ -88,7 +90,7 @@ def _short(case: Target, count: int) -> None:
 def _long(name: str, case: Target) -> None:
     """Run case after case, on after a failure, and tell of all failures at the end."""
     ends.clear()
-    numbers = [int(CASE)] if CASE else range(CASES)
+    numbers = [int(CASE)] if CASE else range(FIRST, CASES)
     start, failures, done, early = time.monotonic(), [], 0, 0.0
     for number in numbers:
         if time.monotonic() - start > SECONDS:
@@ -107,7 +109,7 @@ def _long(name: str, case: Target) -> None:
     grown = _megabytes() - early if early else 0.0
     if LOG:
         line = {
-            "target": name, "seed": SEED, "cases": done, "ends": dict(ends.most_common(12)),
+            "target": name, "seed": SEED, "first": FIRST, "cases": done, "ends": dict(ends.most_common(12)),
             "seconds": round(time.monotonic() - start), "grown_mb": round(grown),
             "failures": failures,
         }  # fmt: skip
