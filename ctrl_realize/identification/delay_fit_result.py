@@ -39,7 +39,9 @@ class DelayFit(Result):
     Attributes
     ----------
     dead_time, std : float
-        Transport delay of the model and its standard error, in s.
+        Transport delay of the model, in s, and its standard error if the chosen structure is the
+        plant's (the spread of the views where the residual is not noise). Where the structure is
+        in doubt, `interval` knows, `std` does not.
     interval : tuple of float
         95 % interval of the dead time in s: of all structures that the data cannot rule out
         where the residual is noise, of the views where it is not.

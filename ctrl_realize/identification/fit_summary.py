@@ -86,11 +86,7 @@ def fitted_core(fit: OutputErrorFit, poles: ComplexArray) -> ct.StateSpace:
 def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
     s = fit.structure
     simple = " with up to three poles" if fit.views else ""
-    kind = (
-        f"chain of {s.order} nearly equal lags"
-        if fit.chain
-        else (f"order {s.order}, relative degree {s.relative_degree}")
-    )
+    kind = fit.chain or f"order {s.order}, relative degree {s.relative_degree}"
     reasons = [
         f"{kind}: lowest information criterion of {len(fit.structures)} structures{simple}, where "
         "zeros and a fourth pole must be worth it"

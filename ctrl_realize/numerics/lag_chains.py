@@ -1,16 +1,17 @@
-"""Chains of nearly equal lags: many lags in a row, as tanks in series, by three parameters.
+"""Chains of many lags: tanks in series, and modes of diffusion, by three parameters.
 
 A response that many lags have smoothed is imitated by fewer lags and a longer dead time. The free
-structures end at five poles; the chain goes on, because its lags share one time constant, as in
-Strejc's evaluation of step responses. They are spread evenly around it. That real lags are not
-spread so evenly is in the error of the delay: without it, its interval would be narrower than
-anything that is known.
+structures end at five poles; the chain goes on, because its rates follow a law. In a row of tanks
+they are nearly equal, as in Strejc's evaluation of step responses: here, spread evenly around one
+rate. Where heat or matter diffuses they grow as (k - c)^2, c between 0 and 1/2 by the boundaries.
+That real lags do not keep to such a law is in the error of the delay: without it, its interval
+would be narrower than anything that is known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,9 +23,9 @@ from .structure_search import Candidate, Scales
 SHORTEST, LONGEST = 4, 8
 """Shorter ones have few parameters when they are free; of longer ones rounding shows."""
 
-_PARAMETERS = 2 + 2  # the lag and how many, delay and gain; the spread is bounded
-_FIRST_SPREAD, _LEAST_SPREAD, _MOST_SPREAD = 0.01, 0.0064, 0.25  # squares of half the range
-_UNEVEN = 0.15  # by which real lags are taken to stray from the even spread
+_PARAMETERS = 2 + 2  # the lag and how many, delay and gain; the shape is bounded
+_DIFFUSION_CHARGE = 8.0  # two lags far apart look like diffusion, and are more common
+_UNEVEN = 0.15  # by which real lags are taken to stray from the law
 _ITERATIONS = 12
 _SMALL = 1e-4  # step of the numerical derivatives of pole parameters
 _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
@@ -32,11 +33,46 @@ _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
 
 @dataclass(frozen=True, eq=False)
 class LagChain:
-    """Best fit of a chain of lags, with the standard error of its delay in s."""
+    """Best fit of a chain of lags, with the standard error of its delay in s.
+
+    `criterion` includes what the kind of chain must be worth. `hidden` is the sum of the lags, in
+    s, that the law goes on with beyond those fitted: faster than anything that a record shows,
+    they are in the delay.
+    """
 
     candidate: Candidate
     criterion: float
     error: float
+    hidden: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        order = self.candidate.structure.order
+        return f"{order} modes of diffusion" if self.hidden else f"{order} nearly equal lags"
+
+
+@dataclass(frozen=True)
+class _Law:
+    """How the rates of a chain grow: ``rates(order, shape)``, and the bounds of the shape."""
+
+    rates: Callable[[int, float], FloatArray]
+    low: float
+    first: float
+    high: float
+
+
+def _spread_rates(order: int, square: float) -> FloatArray:
+    # The square of half the range, for the response is even in the range itself.
+    return np.asarray(1 + np.sqrt(square) * np.linspace(-1, 1, order))
+
+
+def _diffusion_rates(order: int, shift: float) -> FloatArray:
+    return np.asarray(((np.arange(1, order + 1) - shift) / (1 - shift)) ** 2)
+
+
+_TANKS = _Law(_spread_rates, 0.08**2, 0.1**2, 0.5**2)  # partial fractions need distinct poles
+_DIFFUSION = _Law(_diffusion_rates, 0.0, 0.25, 0.5)
 
 
 def fit_chains(
@@ -62,20 +98,32 @@ def fit_chains(
     list of LagChain
         Empty where `like` has no positive spread, as with an inverse response.
     """
-    state = evaluate(problem, like.structure, like.parameters[None])
-    mean, spread = _moments(like, state.numerator[0])
     chains: list[LagChain] = []
-    if not spread > 0:
+    moments = _moments(problem, like)
+    if not moments[1] > 0:
         return chains
     for order in range(SHORTEST, LONGEST + 1):
-        lag = float(np.sqrt(spread / order))
-        start = np.array([mean - order * lag, np.log(lag), _FIRST_SPREAD])
-        candidate, x = _fit(problem, order, start, scales)
-        value = candidate.cost / variance + _PARAMETERS * penalty
-        if chains and value > chains[-1].criterion + _WORSE:
+        chain = _chain(problem, order, _TANKS, moments, scales, variance, penalty)
+        if chains and chain.criterion > chains[-1].criterion + _WORSE:
             break
-        chains.append(LagChain(candidate, value, _error(problem, candidate, x, variance)))
+        chains.append(chain)
     return chains
+
+
+def fit_diffusion(
+    problem: Problem, like: Candidate, scales: Scales, variance: float, penalty: float
+) -> list[LagChain]:
+    """Fit the first eight modes of diffusion; see `fit_chains`. One chain, or none."""
+    moments = _moments(problem, like)
+    if not moments[1] > 0:
+        return []
+    chain = _chain(problem, LONGEST, _DIFFUSION, moments, scales, variance, penalty)
+    # The sum of 1 / (k - c)^2 beyond n is that of the integral from n + 1/2 - c on.
+    slowest, second = np.sort(np.abs(chain.candidate.poles))[:2]
+    root = float(np.sqrt(second / slowest))  # (2 - c) / (1 - c)
+    first = 1 / (root - 1)  # 1 - c
+    hidden = first**2 / (LONGEST - 0.5 + first) / float(slowest)
+    return [replace(chain, criterion=chain.criterion + _DIFFUSION_CHARGE, hidden=hidden)]
 
 
 def still_improving(chains: Sequence[LagChain]) -> bool:
@@ -95,22 +143,41 @@ def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArr
     return grid, ((grid - delay) / chain.error) ** 2
 
 
-def _moments(like: Candidate, numerator: FloatArray) -> tuple[float, float]:
+def _moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     """Mean and variance in time of the impulse response, from the cumulants of poles and zeros."""
+    numerator = evaluate(problem, like.structure, like.parameters[None]).numerator[0]
     zeros = np.roots(numerator[::-1])
     mean = like.delay + float(np.sum(1 / zeros).real - np.sum(1 / like.poles).real)
     return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)
 
 
+def _chain(
+    problem: Problem,
+    order: int,
+    law: _Law,
+    moments: tuple[float, float],
+    scales: Scales,
+    variance: float,
+    penalty: float,
+) -> LagChain:
+    mean, spread = moments
+    lags = 1 / law.rates(order, law.first)
+    lag = float(np.sqrt(spread / (lags @ lags)))
+    start = np.array([mean - lag * float(lags.sum()), np.log(lag), law.first])
+    candidate, x = _fit(problem, order, law, start, scales)
+    value = candidate.cost / variance + _PARAMETERS * penalty
+    return LagChain(candidate, value, _error(problem, candidate, law, x, variance))
+
+
 def _fit(
-    problem: Problem, order: int, start: FloatArray, scales: Scales
+    problem: Problem, order: int, law: _Law, start: FloatArray, scales: Scales
 ) -> tuple[Candidate, FloatArray]:
-    """Levenberg-Marquardt in delay, logarithm of the lag, and spread."""
+    """Levenberg-Marquardt in delay, logarithm of the lag, and shape."""
     structure = Structure(order, order)
-    low = np.array([scales.earliest, -np.inf, _LEAST_SPREAD])
-    high = np.array([scales.latest, np.inf, _MOST_SPREAD])
+    low = np.array([scales.earliest, -np.inf, law.low])
+    high = np.array([scales.latest, np.inf, law.high])
     x, damping = np.clip(start, low, high), 1e-3
-    parameters, residual, jacobian = _evaluate(problem, structure, x)
+    parameters, residual, jacobian = _evaluate(problem, structure, law, x)
     cost = float(residual @ residual)
     for _ in range(_ITERATIONS):
         normal, downhill = jacobian.T @ jacobian, jacobian.T @ residual
@@ -120,7 +187,7 @@ def _fit(
         step = np.zeros(3)
         step[free] = np.linalg.solve(damped, downhill[free])
         trial = np.clip(x + step / max(1.0, abs(float(step[1]))), low, high)
-        moved = _evaluate(problem, structure, trial)
+        moved = _evaluate(problem, structure, law, trial)
         new = float(moved[1] @ moved[1])
         if not new < cost:
             damping *= 10
@@ -133,38 +200,38 @@ def _fit(
     return Candidate(structure, parameters, cost), x
 
 
-def _error(problem: Problem, candidate: Candidate, x: FloatArray, variance: float) -> float:
+def _error(
+    problem: Problem, candidate: Candidate, law: _Law, x: FloatArray, variance: float
+) -> float:
     """Standard error of the delay: what noise does to it, and what uneven lags do."""
     order = candidate.structure.order
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
-    jacobian = _evaluate(problem, candidate.structure, x)[2]
+    jacobian = _evaluate(problem, candidate.structure, law, x)[2]
     size = np.sqrt((jacobian**2).sum(axis=0))
     on_delay = np.linalg.pinv(jacobian / size)[0] / size[0]
-    rates = _rates(order, x[1], x[2])
-    uneven = rates * np.exp(_SMALL * np.eye(order))
-    moves = np.stack([parameters_from_poles(-r.astype(np.complex128)) for r in uneven], axis=1)
+    uneven = law.rates(order, x[2]) * np.exp(_SMALL * np.eye(order) - x[1])
+    moves = np.stack([_parameters(rates) for rates in uneven], axis=1)
     moves = (moves - candidate.parameters[1:, None]) * (_UNEVEN / _SMALL)
     by_lags = on_delay @ state.jacobian[0][:, 1:] @ moves
     return float(np.sqrt(variance * (on_delay @ on_delay) + by_lags @ by_lags))
 
 
 def _evaluate(
-    problem: Problem, structure: Structure, x: FloatArray
+    problem: Problem, structure: Structure, law: _Law, x: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Parameters, residual, and its derivatives by delay, logarithm of the lag, and spread."""
-    parameters = np.append(x[:1], _pole_parameters(structure.order, x[1], x[2]))
+    """Parameters, residual, and its derivatives by delay, logarithm of the lag, and shape."""
+    order = structure.order
+    rates = law.rates(order, x[2]) * np.exp(-x[1])
+    parameters = np.append(x[:1], _parameters(rates))
     state = evaluate(problem, structure, parameters[None])
     by_delay, by_poles = state.jacobian[0][:, :1], state.jacobian[0][:, 1:]
-    further = _pole_parameters(structure.order, x[1] + _SMALL, x[2])
-    wider = _pole_parameters(structure.order, x[1], (1 + _SMALL) * x[2])
-    moves = np.stack([further - parameters[1:], (wider - parameters[1:]) / x[2]], axis=1) / _SMALL
-    return parameters, state.residual[0], np.concatenate([by_delay, by_poles @ moves], axis=1)
+    inwards = -_SMALL if x[2] + _SMALL > law.high else _SMALL
+    slower = _parameters(rates * np.exp(-_SMALL))
+    reshaped = _parameters(law.rates(order, x[2] + inwards) * np.exp(-x[1]))
+    moves = [(slower - parameters[1:]) / _SMALL, (reshaped - parameters[1:]) / inwards]
+    columns = by_poles @ np.stack(moves, axis=1)
+    return parameters, state.residual[0], np.concatenate([by_delay, columns], axis=1)
 
 
-def _pole_parameters(order: int, log_lag: float, spread: float) -> FloatArray:
-    return parameters_from_poles(-_rates(order, log_lag, spread).astype(np.complex128))
-
-
-def _rates(order: int, log_lag: float, spread: float) -> FloatArray:
-    rates: FloatArray = (1 + np.sqrt(spread) * np.linspace(-1, 1, order)) * np.exp(-log_lag)
-    return rates
+def _parameters(rates: FloatArray) -> FloatArray:
+    return parameters_from_poles(-rates.astype(np.complex128))

@@ -6,7 +6,7 @@ The rule:
    is the model, and what its residual leaves is compared with the noise before the step.
 2. Where the residual is noise, the delay is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
-   four to eight equal lags among them where lags show.
+   four to eight nearly equal lags and modes of diffusion among them.
 3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
    first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
    of up to three poles for the first 63 % and for all of it. The delay is their median.
@@ -24,7 +24,7 @@ import numpy as np
 
 from .arrays import ComplexArray, FloatArray
 from .fit_window import WindowFit, fit_window
-from .lag_chains import LagChain, chain_profile, fit_chains, still_improving
+from .lag_chains import LagChain, chain_profile, fit_chains, fit_diffusion, still_improving
 from .profile_interval import delay_profile, profile_limits
 from .separable_fit import KnownFactor, Structure, evaluate, fit_batch
 from .step_problem import StepData, step_scales, stop_at, window
@@ -42,7 +42,8 @@ from .structure_search import (
 ADEQUATE = 1.3
 """Residual over noise, in means over bins, up to which a model is taken for right."""
 
-_LAGS_OF_A_CHAIN = 3  # poles from which on there may be more lags than show
+_LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
+"""Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,8 @@ class OutputErrorFit:
     ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
     The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
     are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
-    the model is a chain of nearly equal lags; `endless`: chains of lags fit the better the longer they are, so that all of the delay may be lags.
+    which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
+    longer they are, so that all of the delay may be lags. `std` is that of the chosen structure.
     """
 
     delay: float
@@ -87,7 +89,7 @@ class OutputErrorFit:
     fitted: FloatArray
     profile: tuple[FloatArray, FloatArray]
     latest: float
-    chain: bool = False
+    chain: str = ""
     endless: bool = False
 
 
@@ -139,21 +141,20 @@ def likelihood_fit(
         chosen, level = better.candidate, better.criterion
     free = plausible(whole.candidates, whole.criterion, whole.variance, chosen, level)
     profiles = {s: _profile(whole, whole.candidates[s]) for s in free}
-    curves = list(profiles.values())
-    curves += [
-        chain_profile(chain, whole.scales)
-        for chain in chains
-        if chain.criterion <= level + PLAUSIBLE
-    ]
-    chain = better is not None and chosen is better.candidate
-    if better is not None and chain:
-        whole = _with_chain(whole, better)
+    imitating = [chain for chain in chains if chain.criterion <= level + PLAUSIBLE]
+    curves = [*profiles.values(), *(chain_profile(chain, whole.scales) for chain in imitating)]
+    chain = ""
+    if better is not None and chosen is better.candidate:
+        whole, chain = _with_chain(whole, better), better.name
         profiles[chosen.structure] = chain_profile(better, whole.scales)
     limits = [profile_limits(*curve) for curve in curves]
     low = min(chosen.delay, *(ends[0] for ends in limits))
+    # 1.96 errors below, and the modes that no record shows.
+    below = [chain.candidate.delay - 1.96 * chain.error - chain.hidden for chain in imitating]
+    low = max(min(low, *below), whole.scales.earliest) if below else low
     high = max(chosen.delay, *(ends[1] for ends in limits))
     own = profile_limits(*profiles[chosen.structure])
-    if endless := still_improving(chains):
+    if endless := still_improving([chain for chain in chains if not chain.hidden]):
         low = whole.scales.earliest
     interval = (low, high, (own[1] - own[0]) / 3.92)
     found = _result(whole, chosen, adequate, (), profiles, interval)
@@ -163,9 +164,10 @@ def likelihood_fit(
 def _chains(whole: WindowFit) -> list[LagChain]:
     """Chains of lags, where so many lags show that there may be more than were tried."""
     best = whole.best
-    if best.structure.order < _LAGS_OF_A_CHAIN:
-        return []
-    return fit_chains(whole.problem, best, whole.scales, whole.variance, whole.penalty)
+    setting = whole.problem, best, whole.scales, whole.variance, whole.penalty
+    tanks = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
+    diffusion = fit_diffusion(*setting) if best.structure.order >= _LAGS_OF_DIFFUSION else []
+    return tanks + diffusion
 
 
 def _with_chain(whole: WindowFit, chain: LagChain) -> WindowFit:

@@ -42,6 +42,35 @@ def test_lags_that_are_not_spread_evenly_are_covered():
         assert high - low < 20  # without chains: 32 and 45 samples
 
 
+def diffusion_record(noise: float, *, delay: float = 37.0, seed: int = 0):
+    """Step record of 1 / cosh(sqrt(s T)), its slowest mode at 2.2 Hz: a wall that is heated."""
+    k = np.arange(-2000, 2600)
+    after = np.clip((k - delay) * TS, 0, None)
+    m = np.arange(300)[:, None]
+    modes = (
+        4 / np.pi * (-1.0) ** m / (2 * m + 1) * np.exp(-2 * np.pi * 2.2 * (2 * m + 1) ** 2 * after)
+    )
+    y = np.where(after > 0, 16 * (1 - modes.sum(axis=0)), 0.0)
+    y += noise * 16 * np.random.default_rng(seed).standard_normal(k.size)
+    return cr.Record(k * TS, 16.0 * (k >= 0), y)
+
+
+@pytest.mark.parametrize(("noise", "width"), [(0.001, 15), (0.005, 30)])
+def test_the_dead_time_before_diffusion_is_covered(noise, width):
+    for seed in range(3):
+        low, high = cr.fit_delay(diffusion_record(noise, seed=seed)).fit.delay_interval
+        # Free structures alone put it in 40 ... 49 samples.
+        assert low <= 37 <= high
+        assert high - low < width  # half as much again as is seen
+
+
+def test_two_lags_far_apart_are_not_read_as_diffusion():
+    for seed in range(3):
+        fit = cr.fit_delay(rigs.step_record(rigs.R2, noise=0.005, seed=seed)).fit
+        assert fit.structure == (2, 2)
+        assert abs(fit.delay - 37) < 4 * 0.3  # four times the Cramer-Rao bound
+
+
 def test_more_lags_than_were_tried_are_flagged_and_no_delay_is_promised():
     fit = cr.fit_delay(chain_record(12, 20.0, 0.005)).fit
     assert "many_lags" in {flag.code for flag in fit.flags}

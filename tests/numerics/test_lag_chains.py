@@ -14,6 +14,7 @@ from ctrl_realize.numerics.lag_chains import (
     LagChain,
     chain_profile,
     fit_chains,
+    fit_diffusion,
     still_improving,
 )
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
@@ -121,3 +122,30 @@ def test_the_profile_of_a_chain_is_the_parabola_of_its_error(problem):
     assert excess[delay == chain.candidate.delay] == 0
     at = np.interp(chain.candidate.delay + 2 * chain.error, delay, excess)
     assert at == pytest.approx(4.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.5])
+def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
+    """Forty modes with rates (k - c)^2 behind a dead time of 20."""
+    k = np.arange(-300, 900, dtype=float)
+    after = np.clip(k - 20, 0, None)
+    numbers = (np.arange(1, 41) - shift) / (1 - shift)
+    rates = 0.01 * numbers**2
+    others = [np.delete(rates, i) for i in range(rates.size)]
+    weights = np.array([np.prod(o / (o - r)) for o, r in zip(others, rates, strict=True)])
+    y = np.where(after > 0, 1 - weights @ np.exp(-np.outer(rates, after)), 0.0)
+    y += 1e-4 * np.random.default_rng(2).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(300, 1)])
+    scales = step_scales(data, k.size, None)
+    problem = window(data, k.size, KnownFactor()).problem
+    start = np.append(25.0, parameters_from_poles(-np.array([0.01, 0.06], complex)))
+    bounds = parameter_bounds(2, scales)
+    parameters, cost = fit_batch(problem, Structure(2, 2), start[None], bounds)
+    like = Candidate(Structure(2, 2), parameters[0], float(cost[0]))
+    (chain,) = fit_diffusion(problem, like, scales, 1e-8, 7.0)
+    beyond = float(np.sum(1 / rates[8:]))
+    assert abs(chain.candidate.delay - beyond - 20) < 0.5
+    # What comes after the forty modes of this plant: 1 / (k - c)^2 sums to 1 / (40.5 - c).
+    endless = beyond + (1 - shift) ** 2 / (40.5 - shift) / 0.01
+    assert chain.hidden == pytest.approx(endless, rel=0.05)
+    assert "diffusion" in chain.name
