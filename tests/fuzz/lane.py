@@ -109,7 +109,8 @@ def _long(name: str, case: Target) -> None:
     grown = _megabytes() - early if early else 0.0
     if LOG:
         line = {
-            "target": name, "seed": SEED, "first": FIRST, "cases": done, "ends": dict(ends.most_common(12)),
+            "target": name, "seed": SEED, "first": FIRST, "cases": done,
+            "ends": dict(ends.most_common(12)),
             "seconds": round(time.monotonic() - start), "grown_mb": round(grown),
             "failures": failures,
         }  # fmt: skip
