@@ -17,6 +17,9 @@ from ..signals.record import check_complete
 _BATCH_SAMPLES = 300_000
 _STEADY_RATIO = 1.5
 _MIN_PERIODS = 0.9
+_BESIDE = (0.75, 4.5)
+"""Bins of the spectrum beside a line that tell the noise at its frequency; the line and what the
+fit took out with it lie nearer."""
 
 Sweep: TypeAlias = Sequence[Record] | Sequence[Sequence[Record]]
 
@@ -60,7 +63,7 @@ def stepped_sine_frf(
     MeasuredFRF
         At the frequencies as measured (mean over the repeats), sorted. `std` is that of the
         averaged complex response: from the scatter of the repeats where there are at least
-        three, from the misfit of the sines otherwise.
+        three, from the misfit of the sines otherwise, as strong as it is beside their frequency.
 
     Raises
     ------
@@ -106,6 +109,7 @@ def stepped_sine_frf(
         power[batch] = 0.5 * np.abs(fit.phasor) ** 2 + fit.noise_variance
         # Total variance of a phasor is the trace; that of a ratio adds the relative ones.
         variance = np.trace(fit.phasor_covariance, axis1=2, axis2=3)
+        variance = variance * _colour([flat[i] for i in batch], fit)
         relative_variance[batch] = (variance / np.abs(fit.phasor) ** 2).sum(axis=1)
     return _averaged(points, omega, phasors, power, relative_variance, name)
 
@@ -202,6 +206,29 @@ def _fit_batch(
             "record longer, or state a shorter settle"
         )
     return fit_sines(time, signals, starts, free_frequency=free_frequency, drift=drift, mask=mask)
+
+
+def _colour(records: list[Record], fit: SineFit) -> FloatArray:
+    """How much stronger the misfit is beside the line than on average, shape (B, 2); at least 1.
+
+    The covariance of the fit takes the misfit for white, which a sine in slow noise feels most.
+    Where the noise is weaker there than elsewhere, eight bins are too few to say so.
+    """
+    n_samples, dt = records[0].n_samples, records[0].dt
+    time = dt * np.arange(n_samples, dtype=np.float64)
+    signals = np.stack([[record.input, record.output] for record in records])
+    turning = np.exp(1j * fit.omega[:, None] * time)
+    model = (fit.phasor[..., None] * turning[:, None]).real
+    left = signals - model - fit.offset[..., None] - fit.slope[..., None] * time
+    late = left[..., n_samples // 2 :]
+    power = np.abs(np.fft.rfft(late - late.mean(axis=2, keepdims=True))) ** 2
+    bins = np.arange(power.shape[2])
+    away = np.abs(bins - fit.omega[:, None] * dt * late.shape[2] / (2 * np.pi))
+    beside = (away > _BESIDE[0]) & (away < _BESIDE[1]) & (bins > 0)
+    count = np.maximum(beside.sum(axis=1), 1)[:, None]
+    near = (power * beside[:, None]).sum(axis=2) / count
+    average = np.maximum(power[..., 1:].mean(axis=2), np.finfo(float).tiny)
+    return np.maximum(near / average, 1.0)
 
 
 def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:

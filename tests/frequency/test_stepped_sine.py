@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
@@ -92,6 +93,27 @@ def test_std_of_single_records_agrees_with_the_scatter_of_many():
     # sigma sqrt(4 / N) / amplitude of u, by hand
     assert scatter == pytest.approx(0.1 * np.sqrt(4 / 400) / 2, rel=0.12)
     assert np.mean([frf.std[0] for frf in single]) == pytest.approx(scatter, rel=0.1)
+
+
+@pytest.mark.parametrize("hz", [0.6, 4.0, 20.0])
+def test_std_of_single_records_counts_slow_noise_where_it_is_strong(hz):
+    rng = np.random.default_rng(6)
+    truth = 0.5 - 0.2j
+    inside, size = 0, []
+    for _ in range(60):
+        record = sine_record(hz, truth)
+        slow = lfilter([0.02], [1, -0.9], rng.standard_normal(600))[200:]
+        noisy = cr.Record(record.time, record.input, np.ravel(record.output) + slow)
+        frf = cr.stepped_sine_frf([noisy], settle=0.0)
+        inside += abs(frf.complex[0] - truth) <= np.sqrt(-np.log(0.05)) * frf.std[0]
+        size.append(frf.std[0])
+    # 95 % of 60 are 57, and 48 at 0.6 Hz, where few bins tell; taken for white they would be 7
+    assert inside >= 40
+    # by hand: sigma sqrt(4 / N) / amplitude of u, with the noise at this frequency
+    gain = 0.02 / abs(1 - 0.9 * np.exp(-2j * np.pi * hz * 0.01))
+    overall = 0.02 / np.sqrt(1 - 0.9**2)
+    expected = np.sqrt(4 / 400) / 2 * max(gain, overall)
+    assert np.median(size) == pytest.approx(expected, rel=0.3)
 
 
 def test_given_frequencies_start_the_fit_or_are_kept():
