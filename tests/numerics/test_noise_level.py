@@ -189,10 +189,11 @@ def test_a_line_carries_a_third_of_the_variance(amplitude, seen):
 def test_fewer_than_four_periods_and_fewer_than_sixtyfour_samples_are_no_line():
     index = np.arange(1000)
     for slow in (0.7, 1.5, 2.5, 3.2):
-        assert not hum_frequencies(np.cos(2 * np.pi * slow / 1000 * index) + 0.01 * white(1000))
+        swing = np.cos(2 * np.pi * slow / 1000 * index) + 0.01 * white(1000)
+        assert hum_frequencies(swing) == []
     assert hum_frequencies(np.cos(2 * np.pi * 8e-3 * index) + 0.01 * white(1000))
     line = np.cos(2 * np.pi * 0.2 * index)
-    assert not hum_frequencies(line[:63])
+    assert hum_frequencies(line[:63]) == []
     assert hum_frequencies(line[:64] + 1e-3 * white(64))
 
 
