@@ -49,8 +49,8 @@ def test_the_interval_of_a_rate_is_the_set_of_rates_whose_score_test_passes(hits
 def test_every_sixteen_seeds_see_each_plant_at_each_noise_level_once():
     cells = {runs.single.cell("white", k) for k in range(16)}
     assert cells == {(plant, noise) for plant in worlds.PLANTS for noise in worlds.NOISES}
-    wrong = {runs.single.cell("wrong structure", k) for k in range(20)}
-    assert len(wrong) == 20
+    wrong = {runs.single.cell("wrong structure", k) for k in range(24)}
+    assert len(wrong) == 24
 
 
 @pytest.mark.parametrize("kind", worlds.KINDS)

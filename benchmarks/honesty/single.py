@@ -47,6 +47,6 @@ def fit_once(kind: str, plant: str, noise: float, seed: int) -> Seen:
 
 
 def cell(kind: str, seed: int) -> tuple[str, float]:
-    """Plant and noise level of a seed: every 16 (20) seeds hold every pair once."""
+    """Plant and noise level of a seed: every 16 (24) seeds hold every pair once."""
     plants = WRONG if kind == "wrong structure" else tuple(PLANTS)
     return plants[seed % len(plants)], NOISES[seed // len(plants) % len(NOISES)]

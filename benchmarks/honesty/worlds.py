@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 from scipy.signal import lfilter
-from scipy.special import gammainc
+from scipy.special import gammainc, ndtr
 
 import ctrl_realize as cr
 from ctrl_realize.bench.imperfections import slew_limited
@@ -21,7 +21,14 @@ BITS = 8
 NOISES = (0.001, 0.005, 0.01, 0.02)
 KINDS = ("white", "coloured", "quantised", "wrong structure")
 PLANTS = {"R1": rigs.R1, "R2": rigs.R2, "R3": rigs.R3, "R4": rigs.R4}
-WRONG = ("eight equal lags", "diffusion", "slew limit", "static friction", "quadratic sensor")
+WRONG = (
+    "eight equal lags",
+    "diffusion",
+    "dispersion",
+    "slew limit",
+    "static friction",
+    "quadratic sensor",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +110,8 @@ def wrong_step(name: str, time: np.ndarray) -> np.ndarray:
         return gammainc(8, after * 2 * np.pi * 10.0)
     if name == "diffusion":
         return _diffusion(after)
+    if name == "dispersion":
+        return _dispersion(after)
     if name == "slew limit":
         return slew_limited(unit_step("R3", time), 4.0, DT)
     if name == "static friction":
@@ -118,6 +127,14 @@ def _diffusion(after: np.ndarray) -> np.ndarray:
     sign = np.where(odd % 4 == 1, 1.0, -1.0)
     terms = sign / odd * np.exp(-slowest * np.outer(after, odd**2))
     return np.where(after > 0, 1 - 4 / np.pi * terms.sum(axis=1), 0.0)
+
+
+def _dispersion(after: np.ndarray, mean: float = 0.08, shape: float = 0.08) -> np.ndarray:
+    """Step of a flow that disperses on its way: inverse Gaussian residence times, in s."""
+    time = np.maximum(after, 1e-6)
+    root = np.sqrt(shape / time)
+    late = np.exp(2 * shape / mean) * ndtr(-root * (time / mean + 1))
+    return np.where(after > 1e-6, ndtr(root * (time / mean - 1)) + late, 0.0)
 
 
 STATIC, SLIDING = 0.06, 0.03
