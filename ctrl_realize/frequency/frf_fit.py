@@ -70,6 +70,11 @@ class FRFFit(Result):
         Size of the residuals in units of `sigma`; 1 is a fit down to the noise if it is known.
     matrices : tuple of ndarray
         A, B, C, D of the continuous core.
+    poles : ndarray of complex, shape (order,)
+        Poles of the core in rad/s, slow ones first.
+    pole_std : ndarray, shape (order,)
+        Root mean square error of each pole within the structure, in rad/s. Where the noise is
+        not known it comes from the residuals, each point with its own.
     structures : tuple of FRFStructure
         All that were tried, best first.
     name : str
@@ -88,6 +93,8 @@ class FRFFit(Result):
     noise_known: bool
     misfit: float
     matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    poles: ComplexArray
+    pole_std: FloatArray
     structures: tuple[FRFStructure, ...]
     name: str
     flags: tuple[Flag, ...] = field(default=())
@@ -96,12 +103,6 @@ class FRFFit(Result):
     def core(self) -> ct.StateSpace:
         """The continuous system without its dead time."""
         return ct.ss(*self.matrices, name="core", inputs="u", outputs="y")
-
-    @property
-    def poles(self) -> ComplexArray:
-        """Poles of the core in rad/s, slow ones first."""
-        poles = np.linalg.eigvals(self.matrices[0]).astype(np.complex128)
-        return np.asarray(poles[np.argsort(np.abs(poles), kind="stable")])
 
     @property
     def gain(self) -> float:
@@ -142,7 +143,8 @@ class FRFFit(Result):
         shown = [
             f"{abs(p) / (2 * np.pi):.4g} Hz"
             + (f" (damping {-p.real / abs(p):.2g})" if p.imag > 0 else "")
-            for p in self.poles
+            + (f" +-{100 * error / abs(p):.2g} %" if error < abs(p) else " +-100 % or more")
+            for p, error in zip(self.poles, self.pole_std, strict=True)
             if p.imag >= 0
         ]
         return [

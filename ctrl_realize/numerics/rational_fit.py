@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import ComplexArray, FloatArray
-from .rational import full_jacobian, project
+from .rational import project
 
 _MAX_ITERATIONS = 60
-_CHI2_95 = 3.841458820694124
+_FIRST_ITERATIONS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +28,15 @@ class FRFData:
         One over the standard deviation of the complex response, up to a factor.
     max_dead_time : float
         Upper bound of the search.
+    min_dead_time : float
+        Lower bound; below 0 only to see whether the phase leads.
     """
 
     s: ComplexArray
     response: ComplexArray
     weight: FloatArray
     max_dead_time: float
+    min_dead_time: float = 0.0
 
     @property
     def clear(self) -> NDArray[np.bool_]:
@@ -57,7 +60,13 @@ class RationalFit:
 
 
 def refine(
-    data: FRFData, order: int, count: int, start: FloatArray, *, frozen_delay: bool = False
+    data: FRFData,
+    order: int,
+    count: int,
+    start: FloatArray,
+    *,
+    frozen_delay: bool = False,
+    iterations: int = _MAX_ITERATIONS,
 ) -> RationalFit:
     """Minimise the misfit from one start by Levenberg-Marquardt on poles and dead time.
 
@@ -69,13 +78,15 @@ def refine(
     start : ndarray, shape (order + 1,)
     frozen_delay : bool
         Keep the dead time of the start.
+    iterations : int
+        At most so many.
     """
     theta = inside_limits(start, data, order)
     now = project(data.s, data.response, data.weight, theta, order, count)
     cost = _cost(now.residual)
     damping = 1e-3
     stalled = 0
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(iterations):
         J = now.jacobian.copy()
         if frozen_delay or _pinned(theta, float(J[:, order] @ now.residual), data, order):
             J[:, order] = 0.0
@@ -105,69 +116,14 @@ def refine(
     return RationalFit(order=order, theta=theta, numerator=now.numerator, cost=cost)
 
 
-def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
-    """Invert the information on (poles, dead time, numerator).
-
-    Parameters
-    ----------
-    data : FRFData
-    fit : RationalFit
-    scale : float
-        Variance of the weighted misfit at a point, real and imaginary part together.
-
-    Returns
-    -------
-    ndarray, shape (P, P)
-        With infinite diagonal entries where the data say nothing.
-    """
-    J = full_jacobian(data.s, data.weight, fit.theta, fit.numerator, fit.order)
-    size = np.linalg.norm(J, axis=0)
-    size[size == 0] = 1.0
-    _, sv, Vt = np.linalg.svd(J / size, full_matrices=False)
-    if sv[-1] <= 1e-10 * sv[0]:
-        return np.full((size.size, size.size), np.inf)
-    root = Vt.T / sv
-    # Half of the complex variance is in each of the two rows of a point.
-    return np.asarray(0.5 * scale * (root @ root.T) / np.outer(size, size))
-
-
-def profile_interval(
-    data: FRFData, fit: RationalFit, count: int, scale: float, std: float
-) -> tuple[float, float]:
-    """Find the dead times at which the misfit has grown by what 95 % confidence allows."""
-    allowed = 0.5 * scale * _CHI2_95
-    best = fit.theta[fit.order]
-    ends = []
-    for side in (-1.0, 1.0):
-        bound = 0.0 if side < 0 else data.max_dead_time
-        reach = abs(bound - best)
-        step = min(max(1.96 * std if np.isfinite(std) else 0.1 * reach, 1e-9), reach)
-        inside, outside = 0.0, None
-        start = fit.theta
-        for _ in range(12):
-            if step <= 0:
-                break
-            theta = start.copy()
-            theta[fit.order] = best + side * step
-            moved = refine(data, fit.order, count, theta, frozen_delay=True)
-            grown = moved.cost - fit.cost
-            if grown < allowed:
-                inside, start = step, moved.theta
-                if step >= reach:
-                    break
-                if grown > 0.8 * allowed:
-                    break
-                ratio = np.sqrt(allowed / max(grown, 1e-3 * allowed))
-                wanted = step * min(1.02 * ratio, 3.0)
-                step = min(wanted, reach) if outside is None else 0.5 * (step + outside)
-            else:
-                outside = step
-                if outside - inside < 0.05 * outside:
-                    break
-                ratio = np.sqrt(allowed / grown)
-                step = max(step * ratio, inside + 0.1 * (outside - inside))
-        ends.append(best + side * (inside if outside is None else 0.5 * (inside + outside)))
-    return float(ends[0]), float(ends[1])
+def refine_best(
+    data: FRFData, order: int, count: int, starts: list[FloatArray], kept: int
+) -> list[RationalFit]:
+    """Refine several starts: all of them a little, the best few to the end; the best first."""
+    early = [refine(data, order, count, start, iterations=_FIRST_ITERATIONS) for start in starts]
+    early.sort(key=lambda fit: fit.cost)
+    late = [refine(data, order, count, fit.theta) for fit in early[:kept]]
+    return sorted(late, key=lambda fit: fit.cost)
 
 
 def inside_limits(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
@@ -180,12 +136,12 @@ def inside_limits(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
     middle = 0.5 * kept[0:pairs:2] + np.log(2.0)
     kept[1:pairs:2] = np.clip(kept[1:pairs:2], middle + np.log(1e-4), middle + np.log(1e3))
     kept[pairs:order] = np.clip(kept[pairs:order], low, high)
-    kept[order] = np.clip(kept[order], 0.0, data.max_dead_time)
+    kept[order] = np.clip(kept[order], data.min_dead_time, data.max_dead_time)
     return kept
 
 
 def _pinned(theta: FloatArray, slope: float, data: FRFData, order: int) -> bool:
-    at_zero = theta[order] <= 0.0 and slope >= 0.0
+    at_zero = theta[order] <= data.min_dead_time and slope >= 0.0
     return bool(at_zero or (theta[order] >= data.max_dead_time and slope <= 0.0))
 
 

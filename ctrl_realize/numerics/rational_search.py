@@ -8,7 +8,7 @@ import numpy as np
 
 from .arrays import ComplexArray, FloatArray
 from .rational import chain_state_space, factor_parameters, poles_of
-from .rational_fit import FRFData, RationalFit, refine
+from .rational_fit import FRFData, RationalFit, refine_best
 from .rational_starts import delay_grid, grown_starts, starting_points
 
 DEFAULT_ORDERS = range(1, 5)
@@ -116,8 +116,7 @@ def _fit_one(
         smaller = fits[n - 1, r - 1]
         poles = np.append(poles_of(smaller.theta, n - 1), -3.0 * np.abs(data.s).max())
         tried.append(np.append(factor_parameters(poles), smaller.theta[n - 1]))
-    attempts = [refine(data, n, n + 1 - r, start) for start in tried]
-    return min(attempts, key=lambda fit: fit.cost)
+    return refine_best(data, n, n + 1 - r, tried, _KEPT)[0]
 
 
 class _Ladder:
@@ -145,8 +144,7 @@ class _Ladder:
     def _best(self, order: int) -> list[RationalFit]:
         """Fit with a free numerator, the best first, of different dead times."""
         if order not in self._fits:
-            fits = [refine(self._data, order, order, start) for start in self.starts(order)]
-            fits.sort(key=lambda fit: fit.cost)
+            fits = refine_best(self._data, order, order, self.starts(order), 2 * _KEPT)
             apart = np.pi / (4 * np.abs(self._data.s).max())
             kept: list[RationalFit] = []
             for fit in fits:

@@ -81,8 +81,8 @@ def test_dead_times_scatter_as_the_stated_deviation_and_are_covered():
     assert np.mean([fit.misfit for fit in fits]) == pytest.approx(1.0, abs=0.03)
 
 
-def test_stated_deviation_is_the_cramer_rao_bound():
-    fit = cr.fit_frf(noisy(3), 2, relative_degree=2, dt=1e-3).fit
+def bound_of(level):
+    """Cramer-Rao bounds of dead time and the two poles, from differences of the model."""
 
     def model(p):
         return p[0] * np.exp(-S * p[1]) / (S / p[2] + 1) / (S / p[3] + 1)
@@ -95,10 +95,40 @@ def test_stated_deviation_is_the_cramer_rao_bound():
         ],
         axis=1,
     )
-    information = 2 * (J.conj().T @ J).real / 0.01**2
-    bound = np.sqrt(np.linalg.inv(information)[1, 1])
-    # The misfit of 76 degrees of freedom scales it: 8 % above at most here.
-    assert fit.std == pytest.approx(bound, rel=0.1)
+    information = 2 * (J.conj().T @ J).real / level**2
+    return np.sqrt(np.diag(np.linalg.inv(information)))[1:]
+
+
+def test_stated_deviations_are_the_cramer_rao_bounds():
+    fit = cr.fit_frf(noisy(3), 2, relative_degree=2, dt=1e-3).fit
+    # The misfit of 76 degrees of freedom scales them: 8 % above at most here. The poles' are
+    # taken where the fit is, not at the truth.
+    assert [fit.std, *fit.pole_std] == pytest.approx(bound_of(0.01), rel=0.15)
+
+
+def test_delay_and_poles_reach_their_cramer_rao_bounds():
+    fits = [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(60)]
+    truth = np.array([0.04, -4 * np.pi, -10 * np.pi])
+    found = np.array([[fit.dead_time, *fit.poles.real] for fit in fits])
+    rms = np.sqrt(np.mean((found - truth) ** 2, axis=0))
+    # The rms of 60 runs is known to 9 %: three of them.
+    assert rms / bound_of(0.01) == pytest.approx(np.ones(3), abs=0.27)
+
+
+def test_poles_know_their_error_where_the_noise_is_not_told():
+    """Noise that is ten times stronger below 1 Hz than the weights suppose."""
+    share = np.where(F < 1, 0.1, 0.01)
+    errors, stated = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        noise = share * (rng.standard_normal(F.size) + 1j * rng.standard_normal(F.size))
+        frf = cr.MeasuredFRF(second_order(S) * (1 + noise / np.sqrt(2)), F)
+        fit = cr.fit_frf(frf, 2, relative_degree=2, dt=1e-3).fit
+        errors.append(fit.poles.real - np.array([-4, -10]) * np.pi)
+        stated.append(fit.pole_std)
+    rms = np.sqrt(np.mean(np.square(errors), axis=0))
+    # Rms of 40 runs: 11 %, and a deviation from 80 residuals is itself rough.
+    assert rms / np.sqrt(np.mean(np.square(stated), axis=0)) == pytest.approx(1, abs=0.4)
 
 
 def test_structure_is_found_from_the_data():
@@ -163,11 +193,87 @@ def test_circuit_without_delay_is_given_less_than_three_samples(shared_data):
     assert fit.dead_time < 60e-6
 
 
-def test_stage_has_its_authors_poles_inside_the_band(shared_data):
+@pytest.mark.parametrize("band_hz", [None, (2, 400)])
+def test_stage_has_its_authors_poles_as_far_as_the_data_know_them(shared_data, band_hz):
     frf = read_frf(shared_data / "stage" / "frf_output_1.csv")
-    fit = cr.fit_frf(frf, 8, dt=1e-4, band_hz=(2, 400)).fit
+    fit = cr.fit_frf(frf, 8, dt=1e-4, band_hz=band_hz).fit
     for pole in (-131.1 + 1868.1j, -22.70 + 559.8j, -5.447 + 191.4j):
         assert np.abs(fit.poles - pole).min() < 0.02 * abs(pole)
+    # The real pole at 0.33 Hz rests on few points with 15 to 27 % of scatter: its deviation is
+    # a fifth at least, so 2 % of agreement would be luck. Within the deviation it is the same.
+    slow = int(np.argmin(np.abs(fit.poles)))
+    assert fit.pole_std[slow] > 0.2 * 2.101
+    assert abs(fit.poles[slow] + 2.101) < 2 * fit.pole_std[slow]
+
+
+def test_two_mass_set_up_has_three_samples_beyond_its_hold(shared_data):
+    data = np.load(shared_data / "tue_load_500k.npz")
+    dt = float(data["dt"])
+    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
+    frf = cr.spectral_frf(record).trusted(0.85)
+    fit = cr.fit_frf(frf, dt=dt, hold="zoh").fit
+    assert np.abs(fit.poles).max() / (2 * np.pi) == pytest.approx(58, abs=0.5)
+    # Against the phase of two masses without friction, no model involved: what is left grows
+    # with frequency as 3.5 samples do, half a sample of which is the hold.
+    omega = 2 * np.pi * frf.between_hz(20, 50).frequency_hz
+    masses = 1 / (1 - (omega / np.abs(fit.poles).max()) ** 2)
+    phase = np.angle(np.asarray(frf.between_hz(20, 50).complex) / masses)
+    lag = -np.median(phase / omega) / dt - 0.5
+    assert lag == pytest.approx(3.1, abs=0.2)
+    assert fit.dead_time / dt == pytest.approx(lag, abs=0.2)
+    # Up to 80 Hz a fast lag would look the same: part of the three samples may be one. That
+    # leaves the look at the data that gave 1.5 to 2 samples possible, and 0 and 10 excluded.
+    assert [flag.code for flag in fit.flags] == ["structures_disagree"]
+    assert 0.5 < fit.interval[0] / dt < 2.3
+    assert 4 < fit.interval[1] / dt < 10
+
+
+def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
+    frf = read_frf(shared_data / "hydrophone" / "frf.csv")
+    fit = cr.fit_frf(frf, 4, relative_degree=1, band_hz=(1e6, 60e6)).fit
+    assert fit.dead_time == 0
+    assert [flag.code for flag in fit.flags] == ["phase_leads"]
+    assert "-7.3e-06 ms" in str(fit.flags[0]) or "-7.26e-06 ms" in str(fit.flags[0])
+    # With 8 ns put back, four poles explain it, and the dead time that is left says how much
+    # too much had been taken out.
+    later = frf.complex * np.exp(-2j * np.pi * frf.frequency_hz * 20e-9)
+    back = cr.fit_frf(
+        cr.MeasuredFRF(later, frf.frequency_hz), 4, relative_degree=1, band_hz=(1e6, 60e6)
+    ).fit
+    assert back.flags == ()
+    assert back.dead_time == pytest.approx(12.7e-9, abs=0.5e-9)
+    assert back.misfit < 0.6 * fit.misfit
+    assert back.misfit < 0.07
+
+
+def test_leading_phase_is_told_and_a_missing_delay_is_not_taken_for_it():
+    rng = np.random.default_rng(0)
+    noise = 1e-3 * (rng.standard_normal(F.size) + 1j * rng.standard_normal(F.size))
+    std = np.full(F.size, 1e-3 * np.sqrt(2))
+
+    def codes(tau):
+        frf = cr.MeasuredFRF(second_order(S, tau=tau) + noise, F, std=std)
+        return {flag.code for flag in cr.fit_frf(frf, (2, 3), dt=1e-3).fit.flags}
+
+    assert "phase_leads" in codes(-0.05)
+    assert "phase_leads" not in codes(0.0)
+
+
+def test_resonances_over_three_decades_are_found_in_noise():
+    """Six pairs, damping 1 %, 3 % noise: nothing tells where they are but the response."""
+    f = np.geomspace(1, 1000, 300)
+    s = 2j * np.pi * f
+    centres = 2 * np.pi * np.array([2.0, 7.0, 20.0, 55.0, 160.0, 480.0])
+    response = sum(1 / (s**2 / w**2 + 0.02 * s / w + 1) / (k + 1) for k, w in enumerate(centres))
+    rng = np.random.default_rng(3)
+    scatter = 0.03 * (rng.standard_normal(300) + 1j * rng.standard_normal(300)) / np.sqrt(2)
+    measured = response * np.exp(-s * 2e-4) * (1 + scatter)
+    fit = cr.fit_frf(cr.MeasuredFRF(measured, f), 12, relative_degree=2).fit
+    assert fit.misfit == pytest.approx(0.03, rel=0.15)
+    for w in centres:
+        k = int(np.argmin(np.abs(fit.poles - w * complex(-0.01, 1))))
+        assert abs(fit.poles[k] - w * complex(-0.01, 1)) < 4 * fit.pole_std[k] < 0.02 * w
+    assert fit.dead_time == pytest.approx(2e-4, abs=4 * fit.std)
 
 
 def test_motor_bench_resonance_and_one_sample_of_delay(shared_data):
@@ -274,6 +380,24 @@ def test_result_pickles_and_tells_itself():
     assert table["bic"].is_monotonic_increasing
     with pytest.raises(ValueError, match="read-only"):
         model.fit.measured[0] = 0
+
+
+def test_shift_of_time_moves_the_dead_time_alone():
+    frf = noisy(6)
+    plain = cr.fit_frf(frf, 2, relative_degree=2, dt=1e-3).fit
+    later = cr.MeasuredFRF(frf.complex * np.exp(-S * 0.3), F, std=frf.std)
+    moved = cr.fit_frf(later, 2, relative_degree=2, dt=1e-3).fit
+    assert moved.dead_time - plain.dead_time == pytest.approx(0.3, abs=1e-3 * plain.std)
+    assert_allclose(moved.poles, plain.poles, rtol=1e-4)
+    assert_allclose(moved.pole_std, plain.pole_std, rtol=1e-3)
+
+
+def test_noise_alone_is_refused():
+    rng = np.random.default_rng(0)
+    t = 0.01 * np.arange(20_000)
+    unmoved = cr.Record(t, rng.standard_normal(t.size), rng.standard_normal(t.size))
+    with pytest.raises(cr.CtrlRealizeError, match="does not excite"):
+        cr.fit_frf(cr.spectral_frf(unmoved), dt=0.01, hold="zoh")
 
 
 @pytest.mark.parametrize(

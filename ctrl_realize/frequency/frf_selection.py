@@ -1,0 +1,201 @@
+"""The structure that a frequency response supports, what is uncertain in it, and the model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..delayed import DelayedStateSpace, delayed_ss
+from ..numerics.arrays import ComplexArray, read_only
+from ..numerics.rational import chain_state_space
+from ..numerics.rational_bounds import (
+    covariance,
+    pole_deviations,
+    profile_interval,
+    robust_covariance,
+)
+from ..numerics.rational_fit import FRFData, RationalFit
+from ..numerics.rational_search import (
+    dead_time_bound,
+    fit_structures,
+    information_criterion,
+    residual_variance,
+    smallest_cost,
+)
+from ..numerics.statistics import mixture_quantile
+from ..results import Flag
+from .frf_fit import FRFFit, FRFStructure
+from .points import FRFPoints
+
+_NEAR_BIC = 8.0
+_SMALL_WIDTH = 1e-3
+_ORDER_OF_LEAD = 4
+_FAR_BETTER = 0.5
+"""Of the square of the misfit."""
+
+
+def chosen_model(
+    frf: Any,
+    data: FRFData,
+    fits: dict[tuple[int, int], RationalFit],
+    points: FRFPoints,
+    unit: float,
+    size: float,
+    dt: float,
+    name: str | None,
+) -> DelayedStateSpace:
+    """Choose the structure, state the uncertainty and build the model."""
+    frequency, noise_known = points.frequency_hz, points.noise_known
+    n_values = 2 * frequency.size
+    rows, scales = [], {}
+    for (n, r), fit in fits.items():
+        n_parameters = 2 * n + 2 - r
+        cost, bic = smallest_cost(data, fit), information_criterion(data, fit, n, r)
+        scales[n, r] = residual_variance(data, fit, n_values - n_parameters, noise_known)
+        spread = covariance(data, fit, scales[n, r])[n, n]
+        rows.append(
+            FRFStructure(n, r, float(fit.theta[n]) / unit, float(np.sqrt(spread)) / unit, cost, bic)
+        )
+    rows.sort(key=lambda row: row.bic)
+    best = rows[0]
+    n, r = best.order, best.relative_degree
+    chosen = fits[n, r]
+    within = _profiles(data, fits, rows, scales, unit)
+    interval, flags = _cover(rows, within, data.max_dead_time / unit, 1 / float(frequency[-1]))
+    misfit = float(np.sqrt(chosen.cost / (frequency.size - 0.5 * (2 * n + 2 - r))))
+    if noise_known and misfit > 2:
+        flags.append(
+            Flag(
+                "misfit",
+                f"the residual is {misfit:.2g} times the measured noise: the plant is not exactly "
+                f"of order {n}, or not linear; the interval is widened by that",
+            )
+        )
+    flags.extend(_leading_phase(data, fits, chosen, unit))
+    spread_of = covariance if noise_known else robust_covariance
+    poles, pole_std = pole_deviations(chosen, spread_of(data, chosen, scales[n, r]))
+    A, B, C, D = chain_state_space(chosen.theta, chosen.numerator * size, n)
+    matrices = (read_only(A * unit), read_only(B * unit), read_only(C), read_only(D))
+    dead_time = best.dead_time
+    used = dead_time
+    if r == 0:
+        used = round(dead_time / dt) * dt
+        if abs(used - dead_time) > 1e-9 * dt:
+            flags.append(
+                Flag(
+                    "dead_time_rounded",
+                    "a model with direct term takes whole samples: its dead time is "
+                    f"{1e3 * used:.5g} ms, not {1e3 * dead_time:.5g} ms; a shorter dt rounds less",
+                )
+            )
+    result = FRFFit(
+        order=n,
+        relative_degree=r,
+        dead_time=dead_time,
+        std=best.std,
+        interval=interval,
+        frequency_hz=read_only(frequency),
+        measured=_locked(points.response),
+        sigma=read_only(points.sigma),
+        noise_known=noise_known,
+        misfit=misfit,
+        matrices=matrices,
+        poles=_locked(poles * unit),
+        pole_std=read_only(pole_std * unit),
+        structures=tuple(rows),
+        name=str(frf.name or "measured"),
+        flags=tuple(flags),
+    )
+    return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
+
+
+def _locked(values: ComplexArray) -> ComplexArray:
+    locked = np.array(values)
+    locked.flags.writeable = False
+    return locked
+
+
+def _leading_phase(
+    data: FRFData, fits: dict[tuple[int, int], RationalFit], chosen: RationalFit, unit: float
+) -> list[Flag]:
+    """Say so where a response that comes before its input fits far better.
+
+    At high order a chain of zeros imitates the lead, so a low order is asked.
+    """
+    if chosen.theta[chosen.order] > 0:
+        return []
+    n = min(chosen.order, _ORDER_OF_LEAD)
+    as_is = [fit.cost for (order, _), fit in fits.items() if order == n] or [chosen.cost]
+    lead = dead_time_bound(data.response.conj(), np.abs(data.s), 1 / data.weight)
+    turned = replace(data, response=data.response * np.exp(-data.s * lead), max_dead_time=lead)
+    earlier = min(fit_structures(turned, (n,), (1,)).values(), key=lambda fit: fit.cost)
+    dead_time = float(earlier.theta[n]) - lead
+    if dead_time > -0.5 / np.abs(data.s).max() or earlier.cost > _FAR_BETTER * min(as_is):
+        return []
+    return [
+        Flag(
+            "phase_leads",
+            f"the response comes before its input: at order {n} a dead time of "
+            f"{1e3 * dead_time / unit:.3g} ms, which no plant has, leaves "
+            f"{100 * np.sqrt(earlier.cost / min(as_is)):.2g} % of the misfit; the FRF's time axis "
+            "starts late, perhaps because a delay was taken out: put it back before the fit",
+        )
+    ]
+
+
+def _profiles(
+    data: FRFData,
+    fits: dict[tuple[int, int], RationalFit],
+    rows: list[FRFStructure],
+    scales: dict[tuple[int, int], float],
+    unit: float,
+) -> list[tuple[float, float]]:
+    """Return the profile intervals of the structures that come close to the best, best first.
+
+    Where a numerator is freer than the plant's, the standard deviation is infinite, or says
+    nothing; the profile is finite all the same.
+    """
+    found = []
+    for row in rows:
+        if row.bic - rows[0].bic < _NEAR_BIC:
+            key = row.order, row.relative_degree
+            count = row.order + 1 - row.relative_degree
+            ends = profile_interval(data, fits[key], count, scales[key], row.std * unit)
+            found.append((ends[0] / unit, ends[1] / unit))
+    return found
+
+
+def _cover(
+    rows: list[FRFStructure], within: list[tuple[float, float]], bound: float, shortest: float
+) -> tuple[tuple[float, float], list[Flag]]:
+    """Widen the best structure's interval to those that the data do not tell from it."""
+    best, interval = rows[0], within[0]
+    ends = np.array(within)
+    # exp(-BIC / 2) is the evidence for a structure: the interval is that of the mixture.
+    share = np.exp(-0.5 * np.array([row.bic - best.bic for row in rows[: len(within)]]))
+    spread = np.maximum((ends[:, 1] - ends[:, 0]) / 3.92, 1e-12 * bound)
+    centre = ends.mean(axis=1)
+    low = min(interval[0], mixture_quantile(0.025, centre, spread, share))
+    high = max(interval[1], mixture_quantile(0.975, centre, spread, share))
+    flags = []
+    low, high = max(low, 0.0), min(high, bound)
+    if best.dead_time >= (1 - 1e-9) * bound:
+        flags.append(
+            Flag(
+                "delay_at_bound",
+                f"the dead time is at the upper bound of the search, {1e3 * bound:.4g} ms; "
+                "try a larger max_dead_time",
+            )
+        )
+    if high - low > max(1.5 * (interval[1] - interval[0]), _SMALL_WIDTH * shortest):
+        flags.append(
+            Flag(
+                "structures_disagree",
+                "structures that fit as well split the phase otherwise between dead time and "
+                f"lags: the interval is {1e3 * (high - low):.3g} ms wide, within the chosen "
+                f"structure {1e3 * (interval[1] - interval[0]):.3g} ms",
+            )
+        )
+    return (low, high), flags
