@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..checks import real, whole
+from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.correlation import (
@@ -32,8 +33,9 @@ class ResidualCheck(Result):
     """Residual of a simulated model against a record.
 
     ``residual == record.output - simulated``. A model that has taken all from the input leaves a
-    residual that is not correlated with its past: ``|cross| <= cross_bound`` at lags >= 0, but for
-    a share ``1 - confidence`` of them. Correlation at negative lags is feedback. Whiteness asks
+    residual that is not correlated with its past: ``|cross| <= cross_bound`` at lags > 0 (and at 0
+    where the model has a direct term), but for a share ``1 - confidence`` of them. Correlation at
+    the lags before is feedback. Whiteness asks
     more than an output-error model promises: sensor noise may well be coloured.
 
     Attributes
@@ -165,12 +167,17 @@ def check_residuals(
     wider = float(ndtri((1 - family) / 2) / ndtri((1 - level) / 2))
     outside = np.abs(cross) > wider * bounds[:, :, None]
     white = bool(np.all(probability > 1 - level))
-    independent = not bool(outside[:, :, count:].any())
+    # What a plant without direct term shows at lag 0, a controller has put there.
+    direct = _first_response(system) != 0
+    later = outside[:, :, count:].copy()
+    later[:, :, 0] &= direct
+    earlier = outside[:, :, : count + 1].copy()
+    earlier[:, :, -1] &= ~direct
+    independent = not bool(later.any())
     flags = []
     if not independent:
-        _, _, lag = np.unravel_index(
-            np.argmax(np.abs(cross[:, :, count:])), cross[:, :, count:].shape
-        )
+        size = np.where(later, np.abs(cross[:, :, count:]), 0.0)
+        _, _, lag = np.unravel_index(np.argmax(size), size.shape)
         flags.append(
             Flag(
                 "input_in_residual",
@@ -178,7 +185,7 @@ def check_residuals(
                 "model are not right, or the plant is not linear",
             )
         )
-    if outside[:, :, :count].any():
+    if earlier.any():
         flags.append(
             Flag(
                 "feedback",
@@ -201,6 +208,14 @@ def check_residuals(
         record=record,
         flags=tuple(flags),
     )
+
+
+def _first_response(system: ct.StateSpace) -> FloatArray:
+    """Markov parameter at lag 0, shape (p, m); the chains of a delayed system are not formed."""
+    if isinstance(system, DelayedStateSpace):
+        first = np.asarray(system.markov(1), dtype=np.float64)
+        return first.reshape(system.noutputs, system.ninputs)
+    return np.asarray(system.D, dtype=np.float64)
 
 
 def cross_validate(

@@ -101,6 +101,28 @@ def test_feedback_is_told_from_a_wrong_model():
     assert "feedback" in [flag.code for flag in check.flags]
 
 
+@pytest.mark.parametrize("integral", [0.0, 0.1])
+def test_a_controller_of_the_same_sample_is_feedback_and_no_wrong_delay(integral):
+    rng = np.random.default_rng(1)
+    n, total = 2000, 0.0
+    u, y, e = np.zeros(n), np.zeros(n), 0.3 * rng.standard_normal(n)
+    target = np.repeat(rng.choice([-1.0, 1.0], n // 20), 20)
+    state = 0.0
+    for k in range(n):
+        state = 0.8 * state + (0.2 * u[k - 4] if k > 3 else 0.0)
+        y[k] = state + e[k]
+        total += integral * (target[k] - y[k])
+        u[k] = target[k] - y[k] + total
+    core = ct.ss([[0.8]], [[1.0]], [[0.2 * 0.8]], [[0.2]], DT)
+    check = cr.check_residuals(cr.DelayedStateSpace(core, 4), cr.Record(DT * np.arange(n), u, y))
+    assert [flag.code for flag in check.flags] == ["feedback"]
+    assert check.independent
+    # a model that answers at once may be wrong at lag 0 itself
+    direct = ct.ss([[0.8]], [[1.0]], [[0.16]], [[0.2]], DT)
+    at_once = cr.check_residuals(direct, cr.Record(DT * np.arange(n), u, y))
+    assert not at_once.independent
+
+
 def test_predictions_fall_from_the_noise_model_to_the_simulation():
     one = record(noise=0.1, colour=0.95, n=2000)
     simulated = cr.check_residuals(PLANT, one).fit_percent[0]
