@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -27,6 +28,7 @@ Kind = Literal["dead time", "upper bound"]
 TOP_BAND = 1 / 3
 """Part of the band, from its upper end, where the slope of the phase is taken."""
 MOST_LAGS = 1000
+_DOUBTS = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_leads")
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,8 @@ class DelayView:
 
     ``low <= value <= high``. A view of kind ``"dead time"`` estimates the dead time itself; an
     ``"upper bound"`` sees the dead time and part of the lags: the dead time is not above `high`.
+    A view with a `doubt` says of itself that its data do not carry it; it is shown and does not
+    count in the verdict.
     """
 
     method: str
@@ -43,15 +47,17 @@ class DelayView:
     value: float
     low: float
     high: float
+    doubt: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class DelayCheck(Result):
     """Delay from several methods side by side.
 
-    `agree` is true when one dead time lies in the interval of every dead-time view and not above
-    any upper bound; `common` is then the interval of such dead times. Otherwise `common` is None
-    and `conflicts` names the pairs that cannot both be right.
+    `agree` is true when one dead time lies in the interval of every dead-time view that counts and
+    not above any upper bound; `common` is then the interval of such dead times. Otherwise `common`
+    is None and `conflicts` names the pairs that cannot both be right. Views in doubt count only
+    where all are.
 
     Attributes
     ----------
@@ -60,6 +66,9 @@ class DelayCheck(Result):
     common : tuple of float or None
         In s.
     conflicts : tuple of (str, str)
+    rely_on : str or None
+        Method of the view to take the dead time from: the narrowest interval among those that
+        count. None where they do not agree, or none sees the dead time itself.
     dt : float or None
         Sample time of the record in s.
     flags : tuple of Flag
@@ -72,6 +81,14 @@ class DelayCheck(Result):
     conflicts: tuple[tuple[str, str], ...]
     dt: float | None
     flags: tuple[Flag, ...] = ()
+
+    @property
+    def rely_on(self) -> str | None:
+        """Method whose interval of the dead time is the narrowest of those that count."""
+        times = [view for view in _counted(self.views) if view.kind == "dead time"]
+        if not self.agree or not times:
+            return None
+        return min(times, key=lambda view: view.high - view.low).method
 
     def table(self) -> pd.DataFrame:
         """Tabulate the views, one row each, in s and in samples."""
@@ -90,6 +107,7 @@ class DelayCheck(Result):
         for view in self.views:
             samples = "" if self.dt is None else f" = {view.value / self.dt:.4g} samples"
             sign = "" if view.kind == "dead time" else ", upper bound"
+            sign += "; in doubt" if view.doubt else ""
             rows.append(
                 (
                     f"{view.method} ({view.source})",
@@ -100,7 +118,11 @@ class DelayCheck(Result):
             words = "no: " + "; ".join(f"{a} against {b}" for a, b in self.conflicts)
         else:
             words = f"yes, on {self.common[0]:.5g} to {self.common[1]:.5g} s"
-        return [*rows, ("they agree", words)]
+        rows.append(("they agree", words))
+        if self.rely_on is not None:
+            rows.append(("rely on", f"{self.rely_on}: the narrowest interval of those that count"))
+        rows += [(f"{view.method} in doubt", view.doubt) for view in self.views if view.doubt]
+        return rows
 
     def __repr__(self) -> str:
         verdict = "agree" if self.agree else "do not agree"
@@ -145,7 +167,10 @@ def check_delay(
     Notes
     -----
     The scan has no confidence interval: its row shows the delays that fit about as well, with
-    one sample to both sides for the part of a sample that it cannot see. First motion, onset of
+    one sample to both sides for the part of a sample that it cannot see. Where it says itself
+    that its data do not tell a delay from none, or that its order is in the noise, it is in
+    doubt and does not count; nor does a fit to an FRF whose phase leads. The others have
+    intervals of 95 %, and the one to rely on is the narrowest. First motion, onset of
     the correlation and slope of the phase cannot be before the dead time ends (but for noise),
     and lie after it by part of the lags: they bound it from above.
 
@@ -247,7 +272,19 @@ def _scan(record: Record, stepped: bool, most: int, order: int, total: float) ->
         scan.delay * record.dt,
         max(low - 1, 0) * record.dt,
         (high + 1) * record.dt,
+        _doubt(scan.flags),
     )
+
+
+def _doubt(flags: tuple[Flag, ...]) -> str:
+    """Return what a method says against its own answer."""
+    return "; ".join(str(flag) for flag in flags if flag.code in _DOUBTS)
+
+
+def _counted(views: Sequence[DelayView]) -> list[DelayView]:
+    """Leave out the views in doubt, unless no other sees the dead time."""
+    clear = [view for view in views if not view.doubt]
+    return clear if any(view.kind == "dead time" for view in clear) else list(views)
 
 
 def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> None:
@@ -259,7 +296,8 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> No
     except CtrlRealizeError as problem:
         flags.append(Flag("no_frf_fit", f"FRF fit: {problem}"))
     else:
-        views.append(DelayView("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval))
+        doubt = _doubt(fit.flags)
+        views.append(DelayView("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval, doubt))
     omega = 2 * np.pi * np.asarray(frf.frequency_hz)
     values = np.asarray(frf.complex, dtype=np.complex128).ravel()
     if omega.size < 4:
@@ -278,6 +316,7 @@ def _verdict(
     views: list[DelayView],
 ) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
     """Find the dead times that no view rules out, or the pairs that rule each other out."""
+    views = _counted(views)
     times = [view for view in views if view.kind == "dead time"]
     low = max((view.low for view in times), default=0.0)
     high = min(view.high for view in views)

@@ -17,11 +17,11 @@ class CorrelationOnset:
     """Cross-correlation of the whitened input with the output, filtered alike.
 
     ``onset`` is the first lag where ``|rho| > bound`` (-1 if there is none) and `peak` the lag of
-    the largest.
+    the largest; `rho` and `bound` have shape (lags + 1,).
     """
 
     rho: FloatArray
-    bound: float
+    bound: FloatArray
     onset: int
     peak: int
 
@@ -47,7 +47,17 @@ def correlation_onset(
     white = lfilter(whiten, [1.0], drive - drive.mean())[c.size :]
     alike = lfilter(whiten, [1.0], output - output.mean())[c.size :]
     rho = correlation(alike, white, lags)
-    bound = float(-ndtri((1 - confidence) / 2 / (lags + 1)) / np.sqrt(white.size))
+    # An input that is held for samples on end is silent between its moves when whitened: then few
+    # products make up a lag, and their own squares tell how far it scatters (White 1980).
+    drive2, output2 = (white - white.mean()) ** 2, (alike - alike.mean()) ** 2
+    pairs = np.array([drive2[: white.size - k] @ output2[k:] for k in range(lags + 1)])
+    total = float(drive2.sum() * output2.sum())
+    spread = np.sqrt(np.maximum(pairs / total if total > 0 else 0.0, 1 / white.size))
+    bound = -ndtri((1 - confidence) / 2 / (lags + 1)) * spread
+    # What whitening has left of the input's own correlation shows a late response early as well.
+    left = np.abs(correlation(white, white, lags))
+    left[left < 4 / np.sqrt(white.size)] = 0.0
+    bound += [left[1 : lags + 1 - k] @ np.abs(rho[k + 1 :]) for k in range(lags + 1)]
     seen = np.flatnonzero(np.abs(rho) > bound)
     onset = int(seen[0]) if seen.size else -1
     return CorrelationOnset(rho, bound, onset, int(np.abs(rho).argmax()))

@@ -8,7 +8,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError
-from ctrl_realize.identification.cross_check import DelayView, _verdict
+from ctrl_realize.identification.cross_check import DelayCheck, DelayView, _verdict
 from tests.rigs import R1, R2, step_record
 
 DT = 0.01
@@ -93,6 +93,36 @@ def test_the_verdict_is_the_intersection_of_dead_times_below_all_bounds():
     assert set(conflicts) == {("a", "d"), ("d", "c")}
 
 
+def test_a_view_in_doubt_is_shown_and_does_not_count():
+    views = [view("a", 1.0, 3.0), view("b", 0.5, 4.0), view("c", 0.0, 2.5, "upper bound")]
+    doubted = [*views, replace(view("d", 8.0, 9.0), doubt="says so itself")]
+    assert _verdict(doubted) == _verdict(views) == ((1.0, 2.5), ())
+    check = DelayCheck(tuple(doubted), True, (1.0, 2.5), (), 0.1)
+    assert check.rely_on == "a"
+    assert "says so itself" in check.report()
+    assert "narrowest" in check.report()
+
+
+def test_where_all_are_in_doubt_all_count():
+    low, high = replace(view("a", 1, 2), doubt="x"), replace(view("b", 4, 5), doubt="y")
+    assert _verdict([low, high]) == (None, (("a", "b"),))
+    assert DelayCheck((low, high), False, None, (("a", "b"),), 0.1).rely_on is None
+
+
+def test_a_shift_of_the_record_is_a_shift_of_the_views_and_a_scale_is_none(both):
+    record = operating_record()
+    other = cr.Record(record.time, 7 * record.input, -0.01 * record.output)
+    scaled = cr.check_delay(other)
+    for ours, theirs in zip(both.views[:3], scaled.views, strict=True):
+        assert theirs.value == pytest.approx(ours.value, abs=0.02 * DT)
+        assert theirs.method == ours.method
+    later = cr.check_delay(operating_record(delay=32.4))
+    assert later.agree
+    # The noise meets other samples of the response: within the intervals, not to the digit.
+    fit = next(v for v in later.views if v.method == "output error")
+    assert fit.value - both.views[0].value == pytest.approx(20 * DT, abs=fit.high - fit.low)
+
+
 def test_two_bounds_never_contradict_each_other():
     views = [view("a", 4.0, 5.0, "upper bound"), view("b", 1.0, 2.0, "upper bound")]
     assert _verdict(views) == ((0.0, 2.0), ())
@@ -144,3 +174,21 @@ def test_the_motor_has_its_step_and_its_frequency_response_in_one_table(shared_d
     assert 1.8e-3 < table.loc["output error", "value"] < 3.2e-3
     assert 2.2e-3 < table.loc["FRF fit", "value"] < 3.4e-3
     assert set(table["source"]) == {"record", "FRF"}
+    # The step alone does not exclude zero; what it moves first and the FRF bound it together.
+    assert check.agree
+    assert 1.9e-3 < check.common[0] < check.common[1] < 2.6e-3
+    assert check.rely_on == "FRF fit"
+    assert "in doubt" in check.report()
+
+
+def test_the_circuit_without_delay_is_not_given_one_by_a_scan_that_doubts_itself(shared_data):
+    folder = shared_data / "rlc_zero_delay"
+    record = cr.Record(*np.loadtxt(folder / "up.csv", delimiter=",", skiprows=1).T)
+    check = cr.check_delay(record, frf=cr.read_frf(folder / "frf.csv"))
+    table = check.table()
+    # The scan sees eight samples, and says that it cannot tell them from none.
+    assert table.loc["scan", "samples"] > 4
+    assert "do not tell a delay from none" in table.loc["scan", "doubt"]
+    assert check.agree
+    assert check.common[1] < record.dt
+    assert check.rely_on in {"output error", "FRF fit"}
