@@ -109,12 +109,19 @@ def robustness_plot(
             ceiling = 1 / bound.bound
         keep = np.isfinite(ceiling)
         lines += _positive_loglog(
-            axes, hertz[keep], ceiling[keep], color=style.BAND, label="1 / uncertainty"
+            axes,
+            hertz[keep],
+            ceiling[keep],
+            color=style.BAND,
+            linestyle=style.DASHES[0],
+            label="1 / uncertainty",
         )
         at = found.omega_critical / style.HERTZ
         axes.axvline(at, color=style.INPUT, linewidth=1, label=f"margin {found.margin:.3g}")
         axes.set(xlabel="frequency [Hz]", ylabel="magnitude")
         axes.set_ylim(bottom=max(1e-4, float(found.complementary.min())))
+        # Far below the critical frequency both curves are flat.
+        axes.set_xlim(max(float(hertz[0]), at / 300), float(hertz[-1]))
         return lines
 
     word = "Robustly stable" if found.robust else "Robust stability not guaranteed"

@@ -197,7 +197,13 @@ def finished(
     )
 
 
-def in_one(ax: AxesLike, title: str, draw: Callable[[Axes], Sequence[Line2D]]) -> ct.ControlPlot:
+def in_one(
+    ax: AxesLike,
+    title: str,
+    draw: Callable[[Axes], Sequence[Line2D]],
+    *,
+    loc: str = "upper right",
+) -> ct.ControlPlot:
     """Draw a plot that needs a single pair of axes: those given, or new ones.
 
     Parameters
@@ -207,10 +213,12 @@ def in_one(ax: AxesLike, title: str, draw: Callable[[Axes], Sequence[Line2D]]) -
         Put on only where the figure is new.
     draw : callable
         Takes the axes and returns the lines of the plot.
+    loc : str, optional
+        Place of the legend.
     """
     with context():
         (axes,) = axes_for(ax)
-        return finished([axes], [draw(axes)], title=title, own_figure=ax is None)
+        return finished([axes], [draw(axes)], title=title, own_figure=ax is None, loc=loc)
 
 
 def time_unit(largest: float, axes: Axes | None = None) -> tuple[float, str]:

@@ -6,6 +6,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError
@@ -63,4 +64,27 @@ def test_closed_loops_are_drawn_as_they_respond(valve, pi_controller):
     line = np.ravel(drawn.lines)[0][0]
     exact = ct.step_response(ct.feedback(ct.ss(plant) * pi, 1), timepts=np.arange(1025) * plant.dt)
     np.testing.assert_allclose(line.get_ydata(), exact.outputs[: line.get_ydata().size], atol=1e-5)
+    plt.close(drawn.figure)
+
+
+def test_rules_that_ring_stand_at_the_edge_with_their_peak():
+    # Two lags make the reduced dead time too short, and the classic rules ring.
+    core = ct.tf([2.25], [0.95, 1]) * ct.tf([1], [0.12, 1])
+    plant = cr.delayed_ss(core, dead_time=0.03, dt=0.01)
+    found = cr.design.compare_pid(plant)
+    largest = max(m.ms for m in found.margins if m.stable)
+    assert largest > 5  # otherwise this says nothing
+    drawn = found.plot()
+    axes = np.ravel(drawn.axes)[0]
+    assert max(np.max(line.get_xdata()) for line in np.ravel(drawn.lines)[0]) == 5
+    names = [text.get_text() for text in axes.texts]
+    assert sum("Ms = " in name for name in names) == sum(
+        m.stable and m.ms > 5 for m in found.margins
+    )
+    # No name lies upon another.
+    drawn.figure.canvas.draw()
+    # Of the words alone, without the line to a point.
+    boxes = [Text.get_window_extent(text) for text in axes.texts]
+    for number, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:number]), names
     plt.close(drawn.figure)
