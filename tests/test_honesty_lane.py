@@ -108,7 +108,7 @@ def test_tables_count_what_was_seen():
     refused = Seen("pulses", "white", "R1", 0.001, 2, failed="DataError: too | short")
     row = tables.interval_table([hit, miss, refused])[-1]
     assert row == "| band | white | 50 % |  |  |  | 50 (9.5–90.5) % | 2 |"
-    assert "1 of 3 | DataError: too / short" in tables.refusal_table([hit, miss, refused])[-1]
+    assert r"1 of 3 | DataError: too \| short" in tables.refusal_table([hit, miss, refused])[-1]
     case = runs.FLAG_CASES[0]
     due, not_due = (runs.world(case, side) for side in ("due", "not due"))
     flags = [

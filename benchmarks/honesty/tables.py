@@ -44,7 +44,7 @@ def _percent(share: float) -> str:
 
 
 def _line(cells: Iterable[object]) -> str:
-    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+    return "| " + " | ".join(str(cell).replace("|", r"\|") for cell in cells) + " |"
 
 
 def _head(*titles: str) -> list[str]:
@@ -155,8 +155,7 @@ def refusal_table(seen: list[Seen]) -> list[str]:
     runs = _groups(seen, "study", "kind")
     lines = _head("study", "world", "refused", "for example")
     for key, group in groups.items():
-        text = group[0].failed.replace("|", "/")
-        lines.append(_line([*key, f"{len(group)} of {len(runs[key])}", text[:120]]))
+        lines.append(_line([*key, f"{len(group)} of {len(runs[key])}", group[0].failed[:120]]))
     return lines
 
 
