@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -15,7 +17,9 @@ from ctrl_realize.identification.averaging import (
     delay_outliers,
     mean_step,
     repeatability,
+    widened,
 )
+from ctrl_realize.identification.delay_fit_result import Repeatability
 from tests import rigs
 
 TS = rigs.TS
@@ -196,3 +200,52 @@ def test_a_delay_apart_from_the_others_is_an_outlier():
     assert found.delays[2] / TS == pytest.approx(47, abs=0.5)
     assert delay_outliers(found, (0, 1, 2, 3, 4)) == (2,)
     assert delay_outliers(found, (0, 1, 3, 4)) == ()
+
+
+def test_errors_are_those_of_the_delay_and_so_fall_with_the_gain():
+    # the same noise, relative to the step, beside a response of half and of twice the size
+    made = simulated([37.0] * 3, [16.0] * 3, noise=0.01, gains=[0.5, 1.0, 2.0])
+    louder = []
+    for step, gain in zip(made, [0.5, 1.0, 2.0], strict=True):
+        record = step.record
+        exact = gain * rigs.step_record(rigs.R3, amplitude=16.0, before=300, after=1300).output
+        noise = (record.output - exact) / gain
+        louder.append(cr.Record(record.time, record.input, exact + noise))
+    made = aligned_steps(tuple(louder))
+    mean = mean_step(made)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS)
+    # correlation and seeds leave 10 %
+    assert_allclose(found.errors / found.errors[1], [2, 1, 0.5], rtol=0.15)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What is widened of a fit."""
+
+    low: float
+    high: float
+    std: float
+
+
+def repeats_of(delays, p_value):
+    n = len(delays)
+    return Repeatability(
+        names=("",) * n, amplitudes=np.ones(n), delays=np.array(delays), errors=np.ones(n),
+        gains=np.ones(n), chi_square=0.0, p_value=p_value, trend=0.0, trend_error=0.0, outlying=(),
+    )  # fmt: skip
+
+
+def test_an_interval_takes_up_the_scatter_of_records_that_differ():
+    fit = Fit(low=9.0, high=11.0, std=0.5)
+    delays = [10.0, 12.0, 8.0, 50.0]
+    between = np.std(delays[:3], ddof=1) / np.sqrt(3)
+    wide = widened(fit, repeats_of(delays, 1e-6), (0, 1, 2))
+    assert_allclose(
+        [wide.low, wide.high, wide.std],
+        [9 - 1.96 * between, 11 + 1.96 * between, np.sqrt(0.25 + between**2)],
+    )
+    # a delay is not negative
+    assert widened(Fit(0.1, 11.0, 0.5), repeats_of(delays, 1e-6), (0, 1, 2)).low == 0
+    # records that differ by noise alone leave it as it is
+    assert widened(fit, repeats_of(delays, 0.01), (0, 1, 2)) is fit
+    assert widened(fit, repeats_of(delays, 0.0099), (0, 1, 2)) is not fit
