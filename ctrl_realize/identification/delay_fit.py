@@ -91,9 +91,9 @@ def fit_delay(
     up to three poles on 63 % and on all of it). The interval spans them and a third-order lag on
     the first 15 %, but for the lowest.
 
-    Chains of four to eight nearly equal lags (from three poles on) and the modes of diffusion
-    (from two) compete with the structures by the same criterion, so that many lags are not read
-    as dead time.
+    Chains of four to eight nearly equal lags compete with the structures by the same criterion
+    where three poles or more are needed, so that many lags are not read as dead time. The modes
+    of diffusion widen the interval where they fit as well.
 
     A dead time has no Fisher information in a model with more zeros than the plant: a superfluous
     zero imitates it. That is why the relative degree is chosen, not left free.

@@ -45,12 +45,6 @@ class LagChain:
     error: float
     hidden: float = 0.0
 
-    @property
-    def name(self) -> str:
-        """What it is, in words."""
-        order = self.candidate.structure.order
-        return f"{order} modes of diffusion" if self.hidden else f"{order} nearly equal lags"
-
 
 @dataclass(frozen=True)
 class _Law:

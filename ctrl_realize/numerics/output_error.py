@@ -136,7 +136,9 @@ def likelihood_fit(
     """Take delay and interval from the likelihood (points 1 and 2 of the rule)."""
     chosen = whole.best
     level = whole.criterion[chosen.structure] + needless_charge(chosen.structure)
-    better = min(chains, key=lambda chain: chain.criterion, default=None)
+    # Diffusion widens the interval and is never the model: friction, too, looks like it.
+    tanks = [chain for chain in chains if not chain.hidden]
+    better = min(tanks, key=lambda chain: chain.criterion, default=None)
     if better is not None and better.criterion < level:
         chosen, level = better.candidate, better.criterion
     free = plausible(whole.candidates, whole.criterion, whole.variance, chosen, level)
@@ -145,7 +147,8 @@ def likelihood_fit(
     curves = [*profiles.values(), *(chain_profile(chain, whole.scales) for chain in imitating)]
     chain = ""
     if better is not None and chosen is better.candidate:
-        whole, chain = _with_chain(whole, better), better.name
+        whole = _with_chain(whole, better)
+        chain = f"chain of {chosen.structure.order} nearly equal lags"
         profiles[chosen.structure] = chain_profile(better, whole.scales)
     limits = [profile_limits(*curve) for curve in curves]
     low = min(chosen.delay, *(ends[0] for ends in limits))
@@ -154,7 +157,7 @@ def likelihood_fit(
     low = max(min(low, *below), whole.scales.earliest) if below else low
     high = max(chosen.delay, *(ends[1] for ends in limits))
     own = profile_limits(*profiles[chosen.structure])
-    if endless := still_improving([chain for chain in chains if not chain.hidden]):
+    if endless := still_improving(tanks):
         low = whole.scales.earliest
     interval = (low, high, (own[1] - own[0]) / 3.92)
     found = _result(whole, chosen, adequate, (), profiles, interval)

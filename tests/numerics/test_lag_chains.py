@@ -148,4 +148,3 @@ def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
     # What comes after the forty modes of this plant: 1 / (k - c)^2 sums to 1 / (40.5 - c).
     endless = beyond + (1 - shift) ** 2 / (40.5 - shift) / 0.01
     assert chain.hidden == pytest.approx(endless, rel=0.05)
-    assert "diffusion" in chain.name
