@@ -304,9 +304,9 @@ def test_a_step_response_that_ends_in_almost_nothing_has_a_rise_time():
     assert 0 < ends[0] < step.size * 0.1
 
 
-@pytest.mark.parametrize("zeros", ["\0", "\0\0\0"])
+@pytest.mark.parametrize("zeros", [b"\0", b"\0\0"])
 def test_a_line_of_zeros_among_the_last_is_no_row(tmp_path, zeros):
     # three of 25 000 tables: a row without a cell was asked for its last one
-    (tmp_path / "a.csv").write_text(f"{zeros}\n5 6", encoding="utf-8")
-    with good_end(), pytest.raises((DataError, FileFormatError)):
+    (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbf" + zeros + b"\r5 6")
+    with good_end():
         cr.read_record(tmp_path / "a.csv")
