@@ -331,6 +331,22 @@ def test_spikes_may_have_no_length_and_the_share_ends_below_one():
             cr.detect_step(record_of(u), min_share=share)
 
 
+@pytest.mark.parametrize("zero_phase", [True, False])
+def test_a_record_that_starts_at_its_step_is_filtered_as_if_it_had_rested(zero_phase):
+    def filtered(before):
+        step = cr.unit_step(step_record(R1, delay=0.0, before=before, after=2000))
+        return cr.impulse_from_step(step, cutoff_hz=50.0, zero_phase=zero_phase).markov
+
+    rested, largest = filtered(2000), np.abs(filtered(2000)).max()
+    # the filter starts at rest in either case, so that only rounding is left
+    assert_allclose(filtered(5), rested, rtol=0, atol=1e-12 * largest)
+
+
+def test_an_impulse_response_keeps_the_step_that_it_comes_from():
+    step = cr.unit_step(step_record(R1))
+    assert cr.impulse_from_step(step).step is step
+
+
 def test_measured_records_have_one_step_where_it_is(shared_data):
     from ctrl_realize import read_record
 
