@@ -55,6 +55,10 @@ TABLES = {
     "performance": ("docs/performance_table.md", "python -m benchmarks.speed"),
     "accuracy": ("docs/accuracy_table.md", "python -m benchmarks.accuracy"),
     "honesty": ("docs/honesty_table.md", "python -m benchmarks.honesty"),
+    "campaign": (
+        "docs/campaign_table.md",
+        "python -m benchmarks.campaign --output docs/campaign_table.md",
+    ),
     "peers": ("docs/peers_table.md", "python -m benchmarks.peers simulated"),
     "peers_measured": ("docs/peers_measured_table.md", "python -m benchmarks.peers measured"),
 }
