@@ -108,6 +108,22 @@ def test_fit_says_what_its_docstring_promises(hankel, samples):
         assert fit.error_bound >= 2 * tail.sum() * (1 - 1e-12)
 
 
+@pytest.mark.parametrize("hankel", ["square", "padded"])
+def test_the_report_says_the_numbers_of_the_result(hankel):
+    g = np.concatenate([np.zeros(4), 0.2 * 0.8 ** np.arange(120) + 0.1 * 0.5 ** np.arange(120)])
+    fit = cr.realize(g, 2, delay=4, samples=100, hankel=hankel, dt=0.05).fit
+    rows = dict(fit._rows())
+    assert rows["dead time"] == "0.2 s (4 samples of 0.05 s)"
+    assert rows["Hankel matrix"] == f"{hankel}, 100 samples"
+    assert rows["direct term"] == "G[4]"
+    first, second = fit.singular_values[:2]
+    assert rows["singular values"].startswith(f"{first:.4g}, {second:.4g} (next ")
+    assert rows["sum of |error|"] == f"{fit.iae:.4g}"
+    bound = f"{fit.error_bound:.4g} at any frequency" if hankel == "padded" else None
+    assert rows.get("error bound") == bound
+    assert all(text in fit.report() for text in rows.values())
+
+
 def test_result_is_frozen_and_survives_copies():
     sys = cr.realize(valve_pulse("zero-phase"), 3, delay=37, dt=TS)
     assert not sys.fit.singular_values.flags.writeable
