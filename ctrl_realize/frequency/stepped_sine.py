@@ -228,7 +228,7 @@ def _colour(records: list[Record], fit: SineFit) -> FloatArray:
     count = np.maximum(beside.sum(axis=1), 1)[:, None]
     near = (power * beside[:, None]).sum(axis=2) / count
     average = np.maximum(power[..., 1:].mean(axis=2), np.finfo(float).tiny)
-    return np.maximum(near / average, 1.0)
+    return np.asarray(np.maximum(near / average, 1.0), dtype=np.float64)
 
 
 def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
