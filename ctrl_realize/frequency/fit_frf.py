@@ -60,7 +60,8 @@ def fit_frf(
         "auto": "std" where there is one, else "relative".
     hold : {"zoh", None}
         "zoh" for an FRF that was estimated from samples of a held input, such as one from
-        `spectral_frf`: the hold, for which `dt` must be that of the samples, is divided out.
+        `spectral_frf`: the hold, for which `dt` must be that of the samples, is divided out, and
+        points near Nyquist, where samples fold, count for less.
     band_hz : tuple of float, optional
         Use points in this band alone.
     name : str, optional
@@ -124,6 +125,10 @@ def fit_frf(
     frequency, response, sigma = points.frequency_hz, points.response, points.sigma
     if hold is not None and step is not None:
         response = response / hold_response(2 * np.pi * frequency, step)
+        if points.noise_known:
+            # Samples fold what lies beyond Nyquist back, which a continuous model cannot follow;
+            # of a plant that falls with 1/omega it is about this large.
+            sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / step - frequency)) ** 2)
     orders = _candidates(order, "order", 1)
     degrees = _candidates(relative_degree, "relative_degree", 0)
     _check_structures(orders, degrees, frequency.size)
@@ -146,7 +151,7 @@ def fit_frf(
         max_dead_time=longest * unit,
     )
     fits = fit_structures(data, orders, degrees)
-    used = replace(points, response=response)
+    used = replace(points, response=response, sigma=sigma)
     return chosen_model(frf, data, fits, used, unit, size, sample_time, name)
 
 

@@ -20,7 +20,7 @@ from ..numerics.rational_fit import FRFData, RationalFit
 from ..numerics.rational_search import (
     dead_time_bound,
     fit_structures,
-    information_criterion,
+    information_criteria,
     residual_variance,
     smallest_cost,
 )
@@ -50,9 +50,10 @@ def chosen_model(
     frequency, noise_known = points.frequency_hz, points.noise_known
     n_values = 2 * frequency.size
     rows, scales = [], {}
+    criteria = information_criteria(data, fits)
     for (n, r), fit in fits.items():
         n_parameters = 2 * n + 2 - r
-        cost, bic = smallest_cost(data, fit), information_criterion(data, fit, n, r)
+        cost, bic = smallest_cost(data, fit), criteria[n, r]
         scales[n, r] = residual_variance(data, fit, n_values - n_parameters, noise_known)
         spread = covariance(data, fit, scales[n, r])[n, n]
         rows.append(

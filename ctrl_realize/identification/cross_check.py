@@ -297,7 +297,9 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> No
         flags.append(Flag("no_frf_fit", f"FRF fit: {problem}"))
     else:
         doubt = _doubt(fit.flags)
-        views.append(DelayView("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval, doubt))
+        views.append(
+            DelayView("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval, doubt=doubt)
+        )
     omega = 2 * np.pi * np.asarray(frf.frequency_hz)
     values = np.asarray(frf.complex, dtype=np.complex128).ravel()
     if omega.size < 4:

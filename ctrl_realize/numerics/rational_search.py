@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .arrays import ComplexArray, FloatArray
-from .rational import chain_state_space, factor_parameters, poles_of
+from .rational import factor_parameters, poles_of, project
 from .rational_fit import FRFData, RationalFit, refine_best
 from .rational_starts import delay_grid, grown_starts, starting_points
 
@@ -76,7 +76,8 @@ def fit_structures(
     # An order is believed when a larger one was tried and found no better.
     points = data.s.size
     while fits:
-        n, r = min(fits, key=lambda key: information_criterion(data, fits[key], *key))
+        criteria = information_criteria(data, fits)
+        n, r = min(criteria, key=lambda key: criteria[key])
         largest = max(key[0] for key in fits)
         if n < largest or n >= _LARGEST_ORDER or 4 * n > points:
             break
@@ -88,12 +89,21 @@ def fit_structures(
     return fits
 
 
-def information_criterion(data: FRFData, fit: RationalFit, order: int, degree: int) -> float:
-    """Return the Bayesian information criterion of a structure, for noise of unknown size."""
-    count = 2 * data.s.size
-    return float(
-        count * np.log(smallest_cost(data, fit)) + (2 * order + 2 - degree) * np.log(count)
-    )
+def information_criteria(
+    data: FRFData, fits: dict[tuple[int, int], RationalFit]
+) -> dict[tuple[int, int], float]:
+    """Return the Bayesian information criterion of each structure, for noise of unknown size.
+
+    What the best fit leaves may be alike at neighbouring frequencies: then it is no noise, as
+    with a plant that is not quite linear, and so many points count for fewer. Otherwise every
+    higher order would be welcome.
+    """
+    best = min(fits.values(), key=lambda fit: fit.cost)
+    count = 2 * data.s.size / correlation_cost(data, best)
+    return {
+        (n, r): float(count * np.log(smallest_cost(data, fit)) + (2 * n + 2 - r) * np.log(count))
+        for (n, r), fit in fits.items()
+    }
 
 
 def smallest_cost(data: FRFData, fit: RationalFit) -> float:
@@ -160,17 +170,22 @@ def residual_variance(data: FRFData, fit: RationalFit, freedom: int, noise_known
     Residuals that are alike at neighbouring frequencies count for fewer points. Known noise is
     never scaled down: a lucky fit is no reason to trust it more.
     """
-    A, B, C, D = chain_state_space(fit.theta, fit.numerator, fit.order)
-    eye = np.eye(fit.order)
-    states = np.linalg.solve(data.s[:, None, None] * eye - A, B.astype(complex))
-    model = (C @ states)[:, 0, 0] + D[0, 0]
-    residual = data.weight * (data.response - model * np.exp(-data.s * fit.theta[fit.order]))
+    scale = 2 * fit.cost / max(freedom, 1)
+    if noise_known:
+        scale = max(scale, 1.0)
+    return scale * correlation_cost(data, fit)
+
+
+def correlation_cost(data: FRFData, fit: RationalFit) -> float:
+    """Return how many neighbouring points count for one, by the residuals' correlation."""
+    stacked = project(
+        data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
+    ).residual
+    points = data.s.size
+    residual = stacked[:points] + 1j * stacked[points:]
     power = float(np.sum(np.abs(residual) ** 2))
     neighbours = float(np.sum((residual[1:] * residual[:-1].conj()).real))
     correlation = float(np.clip(neighbours / power if power > 0 else 0.0, 0.0, 0.95))
-    if correlation < 2 / np.sqrt(residual.size):
-        correlation = 0.0
-    scale = 2 * power / max(freedom, 1)
-    if noise_known:
-        scale = max(scale, 1.0)
-    return scale * (1 + correlation) / (1 - correlation)
+    if correlation < 2 / np.sqrt(points):
+        return 1.0
+    return (1 + correlation) / (1 - correlation)
