@@ -296,10 +296,9 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> No
     except CtrlRealizeError as problem:
         flags.append(Flag("no_frf_fit", f"FRF fit: {problem}"))
     else:
+        low, high = fit.interval
         doubt = _doubt(fit.flags)
-        views.append(
-            DelayView("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval, doubt=doubt)
-        )
+        views.append(DelayView("FRF fit", "FRF", "dead time", fit.dead_time, low, high, doubt))
     omega = 2 * np.pi * np.asarray(frf.frequency_hz)
     values = np.asarray(frf.complex, dtype=np.complex128).ravel()
     if omega.size < 4:
