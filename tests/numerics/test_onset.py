@@ -50,3 +50,25 @@ def test_std_of_the_slope_is_its_scatter():
         [phase_slope(omega, -0.02 * omega + 0.05 * rng.normal(size=80), 0.5) for _ in range(400)]
     )
     assert_allclose(found[:, 0].std(), np.sqrt(np.mean(found[:, 1] ** 2)), rtol=0.12)  # 3.5 %
+
+
+def test_only_the_share_at_the_top_of_the_band_counts():
+    omega = np.linspace(1, 51, 101)  # the upper third begins at 34.33
+    phase = -0.5 * omega
+    phase[omega >= 34.3] = -0.07 * omega[omega >= 34.3]
+    slope, std = phase_slope(omega, phase, 1 / 3)
+    assert_allclose([slope, std], [0.07, 0], rtol=1e-9, atol=1e-12)
+    # with any more of it the kink shows
+    assert phase_slope(omega, phase, 0.36)[0] < 0
+    # three points at least
+    assert_allclose(phase_slope(omega, phase, 1e-6)[0], 0.07, rtol=1e-9)
+
+
+def test_offsets_do_not_matter():
+    rng = np.random.default_rng(3)
+    u = rng.normal(size=2000)
+    y = lfilter([0, 0, 0, 1.0], [1, -0.8], u)
+    plain = correlation_onset(u, y, 40, 0.99)
+    moved = correlation_onset(u + 500, y - 300, 40, 0.99)
+    assert_allclose(moved.rho, plain.rho, atol=1e-9)
+    assert (moved.onset, moved.peak) == (3, 3)
