@@ -290,6 +290,8 @@ def test_cards_show_core_and_shift():
     S = valve(37, name="valve", inputs="i", outputs="x")
     assert "order 3, z^-37 (0.0289063 s)" in repr(S)
     assert "z^-37" in S._repr_html_()
+    assert "DC gain" in S._repr_html_()
+    assert "$" not in S._repr_html_()  # formulas need a script that few pages have
     assert "times z^-37" in str(S)
     hostile = valve(1, name="<script>alert(1)</script>")
     assert "<script>" not in hostile._repr_html_()

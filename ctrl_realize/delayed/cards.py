@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import html
+import numpy as np
 
+from ..numerics.arrays import ComplexArray
+from ..results import html_card
 from .parts import CoreAndDelays
+
+_MOST_POLES = 8
 
 
 class DelayedCards(CoreAndDelays):
@@ -35,13 +39,32 @@ class DelayedCards(CoreAndDelays):
         return "\n".join([*lines, f"times {self._shift()}"])
 
     def _repr_html_(self) -> str:
-        core = self._core._repr_html_() or html.escape(f"core of order {self._core.nstates}")
-        fit = f"<div>{html.escape(self._fit_line())}</div>" if self.fit is not None else ""
-        title = "" if self._generic_name_check() else html.escape(f"{self.name}: ")
-        return (
-            f"<div><div>{title}core of order {self._core.nstates} times "
-            f"<b>{html.escape(self._shift())}</b></div>{core}{fit}</div>"
-        )
+        # Not the host's card of the core: that is LaTeX, which not every page draws.
+        name = "" if self._generic_name_check() else f" {self.name}"
+        signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
+        rows = [
+            ("signals", signals),
+            ("dead time", self._shift()),
+            ("sample time", f"{self.dt:.6g} s"),
+            ("core", f"order {self._core.nstates}"),
+            ("poles of the core", _few(self._core.poles())),
+        ]
+        if self._core.issiso():
+            rows.append(("DC gain", f"{float(np.real(self._core.dcgain())):.6g}"))
+        if self.fit is not None:
+            rows.append(("fit", self._fit_line()))
+        return html_card(f"DelayedStateSpace{name}", rows)
 
     def _repr_markdown_(self) -> None:
         return None
+
+
+def _few(poles: ComplexArray) -> str:
+    """Write poles of z, a pair once; the slowest first, and not too many."""
+    slowest = sorted((pole for pole in poles if pole.imag >= 0), key=lambda z: -abs(z))
+    shown = [
+        f"{pole.real:.4g}" + (f" ± {pole.imag:.3g}j" if pole.imag > 0 else "")
+        for pole in slowest[:_MOST_POLES]
+    ]
+    more = ", …" if len(slowest) > _MOST_POLES else ""
+    return ", ".join(shown) + more if shown else "none"
