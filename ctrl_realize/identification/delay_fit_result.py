@@ -147,7 +147,7 @@ class DelayFit(Result):
         rows = [
             ("dead time", f"{self.dead_time:.6g} s = {self.delay:.4g} samples"),
             (self.interval_label, f"{low:.6g} ... {high:.6g} s"),
-            ("first motion", f"{self.onset:.6g} s"),
+            *([("first motion", f"{self.onset:.6g} s")] if self.onset == self.onset else []),
             ("total delay", f"{self.total_delay:.6g} s (dead time and lags: the firm number)"),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
             ("gain", f"{self.gain:.6g}"),

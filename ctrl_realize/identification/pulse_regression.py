@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -13,9 +12,10 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, ndtri
 
 from ..checks import whole
-from ..errors import DataError, DataWarning
+from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.arx import (
+    ArxFit,
     arx_equations,
     arx_markov,
     arx_markov_std,
@@ -39,7 +39,10 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class PulseRegression:
-    """Pulse responses (p, m, N) with their std, noise per output (p,), and how they were found."""
+    """Pulse responses (p, m, N) with their std, noise per output (p,), and how they were found.
+
+    `kernels` are the priors of the outputs, `arx` the model, where there are any.
+    """
 
     markov: FloatArray
     std: FloatArray
@@ -47,6 +50,8 @@ class PulseRegression:
     rows: int
     method: str
     flags: tuple[Flag, ...] = ()
+    kernels: tuple[str, ...] = ()
+    arx: ArxFit | None = None
 
 
 def without_prior(group: tuple[Record, ...], count: int, start: str) -> PulseRegression:
@@ -74,8 +79,13 @@ def without_prior(group: tuple[Record, ...], count: int, start: str) -> PulseReg
     )
 
 
-def with_prior(group: tuple[Record, ...], count: int, start: str, kernel: str) -> PulseRegression:
-    """Estimate Markov parameters under a prior of decay, output by output."""
+def with_prior(
+    group: tuple[Record, ...], count: int, start: str, kernels: Sequence[str]
+) -> PulseRegression:
+    """Estimate Markov parameters under a prior of decay, output by output.
+
+    `kernels` has one name for each output.
+    """
     m, p = group[0].n_inputs, group[0].n_outputs
     equations = _fir_equations(group, count, start, 2 * m + 8)
     excited, wanted = excited_directions(equations.gram), m * count
@@ -87,7 +97,6 @@ def with_prior(group: tuple[Record, ...], count: int, start: str, kernel: str) -
             "partly_excited",
             f"the input excites {excited} of {wanted} lags; the rest is what the prior says",
         )
-        warnings.warn(note.message, DataWarning, stacklevel=3)
         flags = (note,)
     fits = [
         fit_kernel(
@@ -99,7 +108,7 @@ def with_prior(group: tuple[Record, ...], count: int, start: str, kernel: str) -
                 equations.freedom,
             ),
             count,
-            kernel,
+            kernels[a],
         )
         for a in range(p)
     ]
@@ -111,8 +120,10 @@ def with_prior(group: tuple[Record, ...], count: int, start: str, kernel: str) -
         std=np.stack([fit.std for fit in fits]),
         noise_std=np.sqrt([fit.noise_variance for fit in fits]),
         rows=equations.rows,
-        method=f"{kernel} kernel, {', '.join(f'{f.effective:.0f}' for f in fits)} free parameters",
+        method=f"{', '.join(dict.fromkeys(f.kernel for f in fits))} kernel, "
+        f"{', '.join(f'{f.effective:.0f}' for f in fits)} free parameters",
         flags=flags + _silence(silent),
+        kernels=tuple(f.kernel for f in fits),
     )
 
 
@@ -163,6 +174,7 @@ def through_arx(
         rows=equations.rows,
         method=f"OKID, ARX order {order}",
         flags=_silence(silent),
+        arx=fit,
     )
 
 

@@ -147,6 +147,20 @@ def arx_markov(fit: ArxFit, count: int) -> FloatArray:
     return _divide(fit.a, drive).transpose(1, 2, 0)
 
 
+def arx_state_space(fit: ArxFit) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Write A^-1 B in observer form: q p states for q lags, matrices A, B, C, D."""
+    nb, p, m = fit.b.shape
+    count = max(fit.a.shape[0], fit.delay + nb - 1)
+    a = np.zeros((count, p, p))
+    a[: fit.a.shape[0]] = fit.a
+    b = np.zeros((count + 1, p, m))
+    b[fit.delay : fit.delay + nb] = fit.b
+    A = np.eye(count * p, k=p)
+    A[:, :p] -= a.reshape(count * p, p)
+    B = (b[1:] - a @ b[0]).reshape(count * p, m)
+    return A, B, np.eye(p, count * p), b[0]
+
+
 def arx_markov_std(fit: ArxFit, count: int) -> FloatArray:
     """Compute the standard deviations of `arx_markov` to first order, shape (p, m, count).
 

@@ -32,6 +32,12 @@ from scipy.optimize import minimize
 from .arrays import FloatArray
 from .lagged import NormalEquations
 
+CHOSEN_FROM = ("TC", "SS")
+"""Kernels that are compared when none is asked for: a search in DC takes several times as long."""
+
+FEW = 40
+"""Taps to which a response is tied for that comparison."""
+
 COARSE = 100
 """Taps up to which hyper-parameters are searched at full resolution."""
 _WORST = 1e300
@@ -48,7 +54,7 @@ class KernelFit:
     ``markov`` (m, n) is the mean and ``std`` its standard deviation; `decay` (m,) holds lambda,
     `correlation` (m,) the correlation of neighbours, `scale` (m,) c, and `evidence` the log
     marginal likelihood up to a constant. ``effective`` is the number of parameters that the data
-    decide, trace(I - M^-1).
+    decide, trace(I - M^-1); ``kernel`` is the prior.
     """
 
     markov: FloatArray
@@ -59,6 +65,7 @@ class KernelFit:
     scale: FloatArray
     evidence: float
     effective: float
+    kernel: str
 
 
 def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
@@ -69,7 +76,8 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
     equations : NormalEquations
         Of ``m * lags`` regressors, one target.
     lags : int
-    kernel : {"TC", "DC", "SS"}
+    kernel : {"TC", "DC", "SS", "auto"}
+        ``"auto"``: TC or SS, whichever has the larger marginal likelihood.
 
     Returns
     -------
@@ -80,14 +88,16 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
     equations = replace(equations, gram=equations.gram + np.diag(diagonal))
     b, power = equations.cross[:, 0], float(equations.power[0, 0])
     group = -(-lags // COARSE)
+    misfit = (power, equations.freedom)
+    if kernel == "auto":
+        kernel = _likelier(equations, m, lags)
     x = _start(equations, m, lags, kernel)
-    misfit = (power, equations.freedom, kernel)
     if group > 1:
         # Most of the way is gone with neighbouring taps tied, at a fraction of the cost.
-        x = _search(*_grouped(equations, m, lags, group), *misfit, x, 0.7)
-        x = _search(equations.gram, b, m, lags, 1, *misfit, x, 0.15)
+        x = _search(*_grouped(equations, m, lags, group), *misfit, kernel, x, 0.7)[0]
+        x = _search(equations.gram, b, m, lags, 1, *misfit, kernel, x, 0.15)[0]
     else:
-        x = _search(equations.gram, b, m, lags, 1, *misfit, x, 0.7)
+        x = _search(equations.gram, b, m, lags, 1, *misfit, kernel, x, 0.7)[0]
     factor = _factor(x, m, lags, 1, kernel)
     value, C, half, least = _likelihood(equations.gram, b, factor, power, equations.freedom)
     variance = least / equations.freedom
@@ -108,7 +118,19 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
         scale=scale * variance,
         evidence=-value / 2,
         effective=float(m * lags - (inverse_diagonal**2).sum()),
+        kernel=kernel,
     )
+
+
+def _likelier(equations: NormalEquations, m: int, lags: int) -> str:
+    """Compare kernels on tied taps, where a likelihood costs little."""
+    tied = _grouped(equations, m, lags, -(-lags // FEW))
+    misfit = (float(equations.power[0, 0]), equations.freedom)
+    values = {
+        name: _search(*tied, *misfit, name, _start(equations, m, lags, name), 0.7)[1]
+        for name in CHOSEN_FROM
+    }
+    return min(values, key=lambda name: values[name])
 
 
 def _shape_count(kernel: str) -> int:
@@ -197,7 +219,7 @@ def _search(
     kernel: str,
     start: FloatArray,
     size: float,
-) -> FloatArray:
+) -> tuple[FloatArray, float]:
     """Minimize -2 log marginal likelihood over the logarithms of the hyper-parameters.
 
     The simplex starts with steps of `size`, and ends with a thirtieth of that.
@@ -234,7 +256,7 @@ def _search(
             "maxfev": (300 if size > 0.5 else 40) * m,
         },
     )
-    return np.asarray(found.x, dtype=np.float64)
+    return np.asarray(found.x, dtype=np.float64), float(found.fun)
 
 
 def _grouped(

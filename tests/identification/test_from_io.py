@@ -284,10 +284,36 @@ def test_the_estimate_is_an_impulse_response_that_pickles_and_reports():
     again = pickle.loads(pickle.dumps(g))
     assert isinstance(g, cr.ImpulseResponse)
     assert_allclose(again.std, g.std, rtol=0)
-    assert "TC kernel" in g.report()
+    assert "kernel" in g.report()
+    assert "unseen" in g.report()
     assert repr(g) == "<ImpulseEstimate: 40 samples of 0.1 s>"
     with pytest.raises(ValueError, match="read-only"):
         g.std[0] = 1.0
+
+
+RINGING = cr.DelayedStateSpace(
+    ct.ss([[1.96, -0.992], [1.0, 0.0]], [[1.0], [0.0]], [[0.1, 0.05]], [[0.0]], DT), 3
+)  # decays to 1/e in 250 samples
+
+
+def test_a_plant_that_rings_for_longer_than_the_window_is_estimated_by_okid():
+    one = record(plant=RINGING, n=800, noise=0.3)
+    g = cr.impulse_from_io(one)
+    assert g.method.startswith("OKID")
+    assert "unseen" in g.choices[0]
+    truth = RINGING.markov(g.n_samples)
+    # 3.5 % of the largest Markov parameter; regularized it is 40 %
+    assert np.abs(g.markov - truth).max() < 0.1 * np.abs(truth).max()
+    smooth = cr.impulse_from_io(one, g.n_samples, method="regularized", kernel="TC").markov
+    assert np.abs(smooth - truth).max() > 0.2 * np.abs(truth).max()
+
+
+def test_a_plant_that_settles_is_regularized_and_the_window_grows_until_it_has():
+    assert "kernel" in cr.impulse_from_io(record()).method
+    slow = cr.DelayedStateSpace(ct.ss([[0.98]], [[1.0]], [[0.02]], [[0.0]], DT), 5)
+    g = cr.impulse_from_io(record(plant=slow, n=2400))
+    assert g.n_samples == 200
+    assert g.flags == ()
 
 
 @pytest.mark.parametrize("options", METHODS)

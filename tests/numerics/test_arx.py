@@ -9,10 +9,12 @@ from ctrl_realize.numerics.arx import (
     arx_equations,
     arx_markov,
     arx_markov_std,
+    arx_state_space,
     excited_directions,
     solve_arx,
 )
 from ctrl_realize.numerics.lagged import normal_equations
+from ctrl_realize.numerics.state_space import markov
 
 
 def test_arx_of_the_hairdryer_has_the_published_coefficients(shared_data):
@@ -32,6 +34,14 @@ def test_pulse_response_of_an_arx_model_is_b_over_a():
     pulse = lfilter([0, 0, 0.5, 0.2], [1, -1.2, 0.5], np.eye(1, 40)[0])
     # exact data; the normal equations square a condition number of 10
     assert_allclose(arx_markov(fit, 40)[0, 0], pulse, rtol=0, atol=1e-11)
+
+
+def test_the_state_space_form_has_the_pulse_response_of_the_arx_model():
+    rng = np.random.default_rng(0)
+    u, y = rng.normal(size=(2, 200)), rng.normal(size=(3, 200))
+    for na, nb, delay in ((2, 3, 0), (3, 1, 0), (1, 2, 2)):
+        fit = solve_arx(arx_equations(u, y, na, nb, delay), na, nb, delay)
+        assert_allclose(markov(*arx_state_space(fit), 30), arx_markov(fit, 30), atol=1e-12)
 
 
 def test_std_of_the_pulse_response_is_the_scatter_over_many_records():

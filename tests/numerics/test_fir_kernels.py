@@ -79,3 +79,16 @@ def test_a_longer_window_is_searched_in_two_steps_and_ends_at_the_same_answer(da
     long = fit_kernel(normal_equations(u[None], y[None], 120), 120, "TC")
     # the data of 25 more lags are dropped, so the answers differ by part of their std
     assert np.all(np.abs(long.markov[0, :95] - short.markov[0]) < 2 * short.std[0] + 1e-4)
+
+
+@pytest.mark.parametrize(("poles", "best"), [([-0.5], "TC"), ([0.85] * 3, "SS")])
+def test_of_two_kernels_the_one_of_larger_likelihood_is_taken(poles, best):
+    # signs that alternate from sample to sample; a bell that sets in smoothly
+    rng = np.random.default_rng(5)
+    u = rng.normal(size=600)
+    y = lfilter([1.0], np.poly(poles), u) + 0.05 * rng.normal(size=600)
+    equations = normal_equations(u[None], y[None], 40)
+    one = {name: fit_kernel(equations, 40, name) for name in ("TC", "SS")}
+    chosen = fit_kernel(equations, 40, "auto")
+    assert chosen.kernel == best == max(one, key=lambda name: one[name].evidence)
+    assert_allclose(chosen.markov, one[best].markov, rtol=0, atol=1e-12)
