@@ -82,14 +82,14 @@ def main() -> None:
         assert again.table().equals(campaign.table())
         kinds = sorted({str(row.error).split(":")[0] for row in campaign.failed})
         size = sum(path.stat().st_size for path in store.folder.iterdir()) / 2**20
+        each = "" if found else f", {1e3 * first / (arguments.records - tenth):.1f} ms a record"
         there = f", {found} rows found in the store" if found else ""
         lines += [
             f"| records, processes, method | {arguments.records}, {arguments.jobs}, "
             f"{arguments.method} |",
             f"| identified / corrupt, told by name | {len(campaign.good)} / "
             f"{len(campaign.failed)} ({', '.join(kinds)}) |",
-            f"| time of the last nine tenths{there} | {first:.0f} s, "
-            f"{1e3 * first / (arguments.records - tenth):.1f} ms a record |",
+            f"| time of the last nine tenths{there} | {first:.0f} s{each} |",
             f"| the same again, from its store | {second:.0f} s, same table |",
             f"| peak memory of the main process after a tenth / all | {early[0]:.0f} MB / "
             f"{late[0]:.0f} MB |",
