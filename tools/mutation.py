@@ -50,7 +50,8 @@ MODULES = {
     "numerics/separable_fit": "tests/numerics/test_separable_fit.py",
     "numerics/structure_search": "tests/numerics/test_separable_fit.py",
     "numerics/delay_bound": "tests/numerics/test_delay_bound.py",
-    "numerics/profile_interval": "tests/numerics/test_step_numerics.py",
+    "numerics/profile_interval": "tests/numerics/test_step_numerics.py "
+    "tests/numerics/test_delay_bound.py",
     "numerics/step_problem": "tests/identification/test_delay_fit.py",
     "numerics/output_error": "tests/identification/test_delay_fit.py",
     "identification/steps": "tests/identification/test_steps.py",
