@@ -48,6 +48,30 @@ def test_a_dead_time_that_wears_from_37_to_60_samples_is_followed(dynamics, erro
     assert abs(track.delay[-1] - 60) < 0.6
 
 
+def test_a_delay_at_rest_is_known_as_well_as_weighted_samples_can_tell_it():
+    errors, limits = [], []
+    for seed in range(6):
+        record, _ = worn_valve(seconds=12, last=37.0, seed=seed)
+        bank = tracker(dynamics=False)
+        bank.run(record)
+        last = bank.estimate()
+        assert last.interval[0] <= 37 <= last.interval[1]
+        errors.append(last.dead_time / TS - 37)
+        # bound of any linear estimate from samples of these weights: delay, gain and offset free
+        k, moved = np.arange(record.n_samples), record.input - record.input[0]
+        weight = np.exp(-(k[-1] - k) * TS / 2.5)
+        early, here, late = (
+            cr.delayed_ss(R3, dead_time=d * TS, dt=TS).simulate(moved) for d in (36.95, 37, 37.05)
+        )
+        slopes = np.column_stack([(late - early) / 0.1, here, np.ones(k.size)])
+        inverse = np.linalg.inv(slopes.T @ (weight[:, None] * slopes))
+        spread = slopes.T @ (weight[:, None] ** 2 * slopes)
+        limits.append(0.08 * np.sqrt((inverse @ spread @ inverse)[0, 0]))
+    # chi-square of six: 22.5 is exceeded once in 1000
+    assert np.sum((np.array(errors) / limits) ** 2) < 22.5
+    assert np.mean(limits) < 0.05  # samples
+
+
 def test_gain_is_followed_with_the_delay():
     record, _ = worn_valve(gain=0.8)
     bank = tracker()
