@@ -217,7 +217,10 @@ def _fit(
 ) -> WindowFit:
     problem = data.problem(known)
     window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
-    noise = _SMALLEST * float(np.ptp(problem.data)), max(map(quantisation_step, data.outputs))
+    # behind a spike at the start nothing may be left that moves
+    whole = 1e-9 * max(float(np.ptp(y)) for y in data.outputs)
+    sigma = _SMALLEST * max(float(np.ptp(problem.data)), whole)
+    noise = sigma, max(map(quantisation_step, data.outputs))
     return fit_window(window, structures, scales, noise, huber)
 
 

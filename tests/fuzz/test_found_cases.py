@@ -310,3 +310,11 @@ def test_a_line_of_zeros_among_the_last_is_no_row(tmp_path, zeros):
     (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbf" + zeros + b"\r5 6")
     with good_end():
         cr.read_record(tmp_path / "a.csv")
+
+
+def test_an_output_that_is_one_spike_at_the_start_is_refused():
+    # the first samples are left out, and what was left had a noise level of 0
+    u = np.random.default_rng(0).standard_normal(26)
+    y = np.where(np.arange(26) == 0, 482.0, 0.0)
+    with pytest.raises(DataError, match="the output does not follow the input"):
+        cr.identify(cr.Record(np.arange(26.0), u, y))
