@@ -25,6 +25,9 @@ Start = Literal["unknown", "rest"]
 SHORTEST, LONGEST = 100, 1 / 3
 """Length that is tried first, in samples, and the longest, as a part of the longest record."""
 
+MOST_UNKNOWNS = 400
+"""Most lags of all inputs together to which the length grows by itself; time goes with its cube."""
+
 TAIL = 0.05
 """Part of the largest Markov parameter that may be left at the end of the window."""
 
@@ -117,7 +120,8 @@ def impulse_from_io(
         One or several experiments on the same plant, with the same sample time and channels.
     length : int, optional
         Number of Markov parameters; the response must have died away within it. Default: 100,
-        doubled until it has, up to a third of the longest record.
+        doubled until it has, up to a third of the longest record and 400 over the number of
+        inputs.
     method : {"auto", "regularized", "least_squares", "okid"}
         ``"auto"`` is ``"okid"`` where that halves the error of ``"regularized"`` on the last
         third of the data, unseen, and ``"regularized"`` otherwise. ``"regularized"`` weighs the
@@ -189,12 +193,10 @@ def impulse_from_io(
         raise OptionError(f"arx_order={arx_order!r} belongs to method='okid', not {method!r}")
     group = _as_group(records)
     longest = max(record.n_samples for record in group)
-    most = max(int(LONGEST * longest), 2)
+    most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].n_inputs), 2)
     count = min(SHORTEST, most) if length is None else whole(length, "length", 2)
-    chosen: Choice | None = None
+    chosen = choose_estimate(group, count, start) if method == "auto" else None
     while True:
-        if method == "auto":
-            chosen = choose_estimate(group, count, start)
         found = _estimate(group, count, start, chosen, (method, kernel, arx_order))
         tail = _tail_flags(found)
         if length is not None or not tail or count == most:
