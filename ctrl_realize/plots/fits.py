@@ -113,8 +113,7 @@ def _data_and_model(
     factor, unit = style.time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
     time = factor * result.time
     looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
-    several = len(result.records) > 1
-    label = f"mean of {len(result.records)} records" if several else "measured"
+    label = f"mean of {len(result.records)} records" if _averaged(result) else "measured"
     data = list(upper.plot(time, result.measured, color=style.MEASURED, lw=1.5, label=label))
     data += upper.plot(time, result.fitted, **looks)
     left = result.measured - result.fitted
@@ -142,8 +141,13 @@ def _first_motion(result: DelayFit) -> int:
     return max(0, first - max((result.time.size - first) // 8, round(1.5 * result.delay)))
 
 
+def _averaged(result: DelayFit) -> bool:
+    """Steps are averaged; records of other inputs have no first motion and follow each other."""
+    return len(result.records) > 1 and not np.isnan(result.onset)
+
+
 def _output_label(result: DelayFit) -> str:
-    if len(result.records) > 1:  # records of different steps are scaled before they are averaged
+    if _averaged(result):  # records of different steps are scaled before they are averaged
         return "unit step\nresponse"
     label = result.records[0].output_labels[0] if result.records else "y"
     return "output" if label == "y" else style.wrapped(label, 18)
