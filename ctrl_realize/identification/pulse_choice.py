@@ -87,8 +87,11 @@ def _error(
         y = np.atleast_2d(part.output)[:, behind:]
         model = _by_arx(found.arx, part) if found.arx else _by_convolution(found.markov, part)
         error = y - model[:, behind:]
-        scale = np.maximum(y.std(axis=1, keepdims=True), 1e-300)
-        missed += float((((error - error.mean(axis=1, keepdims=True)) / scale) ** 2).sum())
+        error = error - error.mean(axis=1, keepdims=True)
+        # Of an output that stands still nearly everything can be missed: a million times is enough.
+        least = np.maximum(1e-6 * np.abs(error).max(axis=1, keepdims=True), 1e-300)
+        scale = np.maximum(y.std(axis=1, keepdims=True), least)
+        missed += float(((error / scale) ** 2).sum())
         total += float(y.size)
     return float(np.sqrt(missed / total))
 

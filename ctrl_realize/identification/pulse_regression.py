@@ -19,6 +19,7 @@ from ..numerics.arx import (
     arx_equations,
     arx_markov,
     arx_markov_std,
+    arx_state_space,
     excited_directions,
     least_squares,
     solve_arx,
@@ -32,6 +33,9 @@ OKID_ORDERS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 """ARX orders among which BIC chooses."""
 SILENT = 0.01
 """Level of the tests for a response: share of false alarms."""
+
+MOST_GROWTH = 60.0
+"""Decades by which a pulse response may grow before its numbers mean nothing."""
 
 RIDGE = 1e-9
 """Added to the Gram matrix of an output without noise, as a share of its diagonal."""
@@ -151,6 +155,8 @@ def through_arx(
                 f"of an ARX model of order {top}; choose a smaller arx_order, or a richer input"
             )
         orders = orders[:-1]
+    if not np.all(np.diag(equations.gram) > 0):
+        raise DataError("an output does not move at all: no ARX model follows from it")
     if excited_directions(equations.gram) < equations.gram.shape[0]:
         # Without noise the output follows many models of high order; any of them will do.
         equations = replace(
@@ -159,10 +165,22 @@ def through_arx(
     fits = {}
     for order in orders:
         columns = [*range(order * p), *range(top * p, top * p + (order + 1) * m)]
-        fit = solve_arx(equations.take(columns), order, order + 1)
+        try:
+            fit = solve_arx(equations.take(columns), order, order + 1)
+        except np.linalg.LinAlgError:
+            raise DataError(
+                f"the equations of an ARX model of order {order} are rounding: the output moves "
+                "by too little beside its level; take the level out, or record more digits"
+            ) from None
         misfit = equations.rows * np.linalg.slogdet(fit.noise)[1]
         fits[misfit + p * len(columns) * np.log(equations.rows)] = (order, fit)
     order, fit = fits[min(fits)]
+    growth = count * np.log10(np.abs(np.linalg.eigvals(arx_state_space(fit)[0])).max() + 1e-9)
+    if growth > MOST_GROWTH:
+        raise DataError(
+            f"the ARX model of order {order} is unstable: its pulse response grows by 1e{growth:.0f} "
+            f"within {count} samples; choose another arx_order, or method='regularized'"
+        )
     markov, std = arx_markov(fit, count), arx_markov_std(fit, count)
     # Beyond this many standard deviations lies one of all numbers in 1 % of cases.
     level = -float(ndtri(SILENT / 2 / (m * count)))

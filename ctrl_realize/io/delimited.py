@@ -98,15 +98,14 @@ def _cut_last_line(path: Path, layout: TextLayout) -> str:
     if encoding == "utf-16":
         encoding = "utf-16-be" if raw[:64:2].count(0) > raw[1:64:2].count(0) else "utf-16-le"
     text = codecs.getincrementaldecoder(encoding)("replace").decode(raw)
-    # zeros are what a writer that was stopped leaves behind
-    lines = [line.rstrip("\0") for line in re.split(r"\r\n|\n|\r", text)[-_TAIL_LINES:]]
-    lines = [line for line in lines if line.strip()]
+    lines = [line for line in re.split(r"\r\n|\n|\r", text)[-_TAIL_LINES:] if line.strip()]
     if layout.comment:
         lines = [line for line in lines if not line.lstrip().startswith(layout.comment)]
-    if len(lines) < 2:
+    # Zeros are what a writer that was stopped leaves behind: at the end they are a cut line.
+    rows = [split_line(line.rstrip("\0"), layout.delimiter) for line in lines]
+    before, last = [row for row in rows[:-1] if any(row)], rows[-1] if rows else []
+    if not before:
         return ""
-    rows = [split_line(line, layout.delimiter) for line in lines]
-    *before, last = rows
     if len(last) < min(layout.n_columns, len(before[-1])):
         return f"it has {len(last)} of {layout.n_columns} cells"
     if text.endswith(("\n", "\r")) or len(last) != layout.n_columns:
