@@ -178,8 +178,9 @@ def through_arx(
     growth = count * np.log10(np.abs(np.linalg.eigvals(arx_state_space(fit)[0])).max() + 1e-9)
     if growth > MOST_GROWTH:
         raise DataError(
-            f"the ARX model of order {order} is unstable: its pulse response grows by 1e{growth:.0f} "
-            f"within {count} samples; choose another arx_order, or method='regularized'"
+            f"the ARX model of order {order} is unstable: its pulse response grows by "
+            f"1e{growth:.0f} within {count} samples; choose another arx_order, or "
+            "method='regularized'"
         )
     markov, std = arx_markov(fit, count), arx_markov_std(fit, count)
     # Beyond this many standard deviations lies one of all numbers in 1 % of cases.
