@@ -12,9 +12,9 @@ from ..numerics.arrays import ComplexArray, read_only
 from ..numerics.rational import chain_state_space
 from ..numerics.rational_bounds import (
     covariance,
+    error_root,
     pole_deviations,
     profile_interval,
-    robust_covariance,
 )
 from ..numerics.rational_fit import FRFData, RationalFit
 from ..numerics.rational_search import (
@@ -75,8 +75,8 @@ def chosen_model(
             )
         )
     flags.extend(_leading_phase(data, fits, chosen, unit))
-    spread_of = covariance if noise_known else robust_covariance
-    poles, pole_std = pole_deviations(chosen, spread_of(data, chosen, scales[n, r]))
+    errors = error_root(data, chosen, scales[n, r], robust=not noise_known)
+    poles, pole_std = pole_deviations(chosen, errors)
     A, B, C, D = chain_state_space(chosen.theta, chosen.numerator * size, n)
     matrices = (read_only(A * unit), read_only(B * unit), read_only(C), read_only(D))
     dead_time = best.dead_time

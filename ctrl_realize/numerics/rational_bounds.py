@@ -34,21 +34,27 @@ def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
     return np.asarray(0.5 * scale * (root @ root.T))
 
 
-def robust_covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
-    """Take the covariance on (poles, dead time, numerator) from the residuals point by point.
+def error_root(data: FRFData, fit: RationalFit, scale: float, *, robust: bool) -> FloatArray:
+    """Factor R of the covariance R R' of (poles, dead time, numerator), shape (P, Q).
 
-    Right also where the noise is not in proportion to the weights (White 1980): each point
-    counts with its own residual, so a noisy part of the band makes uncertain what rests on it.
+    A pole far beyond the band makes both coefficients of its factor uncertain by many decades,
+    and the other pole not at all: that survives in R, but not in the products of R R'.
 
     Parameters
     ----------
     data : FRFData
     fit : RationalFit
     scale : float
-        As for `covariance`; its excess over the mean square of the residuals, which is what
-        their correlation costs, is kept.
+        As for `covariance`.
+    robust : bool
+        Take it from the residuals point by point. Right also where the noise is not in
+        proportion to the weights (White 1980): each point counts with its own residual, so a
+        noisy part of the band makes uncertain what rests on it. The excess of `scale` over the
+        mean square of the residuals, which is what their correlation costs, is kept.
     """
     J, root, _ = _inverse_root(data, fit)
+    if not robust:
+        return np.asarray(np.sqrt(0.5 * scale) * root)
     residual = project(
         data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
     ).residual
@@ -56,17 +62,17 @@ def robust_covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArr
     power = float(residual @ residual)
     excess = 0.5 * scale * freedom / power if power > 0 else 1.0
     part = root @ (root.T @ (J * residual[:, None]).T)
-    return np.asarray(excess * (residual.size / freedom) * (part @ part.T))
+    return np.asarray(np.sqrt(excess * residual.size / freedom) * part)
 
 
-def pole_deviations(fit: RationalFit, covariance: FloatArray) -> tuple[ComplexArray, FloatArray]:
+def pole_deviations(fit: RationalFit, errors: FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Return the poles, slow ones first, and the root mean square error of each.
 
     Parameters
     ----------
     fit : RationalFit
-    covariance : ndarray, shape (P, P)
-        On (poles, dead time, numerator).
+    errors : ndarray, shape (P, Q)
+        Factor of the covariance of (poles, dead time, numerator); see `error_root`.
     """
     order = fit.order
     poles = np.zeros(order, dtype=np.complex128)
@@ -85,10 +91,9 @@ def pole_deviations(fit: RationalFit, covariance: FloatArray) -> tuple[ComplexAr
     if order % 2:
         w = np.exp(fit.theta[order - 1])
         poles[-1] = gradients[-1, -1] = -w
-    part = covariance[:order, :order]
-    variance = np.einsum("ki,ij,kj->k", gradients, part, gradients.conj()).real
+    error = np.linalg.norm(gradients @ errors[:order], axis=1)
     sequence = np.argsort(np.abs(poles), kind="stable")
-    return poles[sequence], np.sqrt(np.maximum(variance, 0.0))[sequence]
+    return poles[sequence], error[sequence]
 
 
 def _inverse_root(data: FRFData, fit: RationalFit) -> tuple[FloatArray, FloatArray, bool]:

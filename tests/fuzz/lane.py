@@ -161,6 +161,8 @@ def good_end(seconds: float = 20.0, megabytes: float = 1000.0) -> Iterator[list[
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            # as in the ordinary run: what python-control itself calls
+            warnings.filterwarnings("ignore", category=DeprecationWarning, module="control")
             warnings.simplefilter("ignore", CtrlRealizeWarning)
             yield results
         ends["result"] += 1
