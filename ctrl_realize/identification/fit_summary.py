@@ -8,7 +8,8 @@ import control as ct
 import numpy as np
 
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..numerics.output_error import OutputErrorFit, lag_sum
+from ..numerics.lag_chains import lag_sum
+from ..numerics.output_error import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from ..signals import Record

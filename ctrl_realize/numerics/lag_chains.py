@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import ComplexArray, FloatArray
 from .pole_factors import parameters_from_poles
 from .separable_fit import Problem, Structure, evaluate
 from .structure_search import Candidate, Scales
@@ -137,11 +137,26 @@ def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArr
     return grid, ((grid - delay) / chain.error) ** 2
 
 
+def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
+    """Ends of the 95 % interval of the delay, what is hidden taken off the lower one."""
+    delay, half = chain.candidate.delay, 1.96 * chain.error
+    low = max(delay - half - chain.hidden, scales.earliest)
+    return low, min(delay + half, scales.latest)
+
+
+def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
+    """Delay at zero frequency of b(s)/a(s): sum of its lags less that of its leads, in s."""
+    lag = float(np.sum(-1.0 / poles).real)
+    if numerator.size > 1 and numerator[0] != 0:
+        lag -= float(numerator[1] / numerator[0])
+    return lag
+
+
 def _moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     """Mean and variance in time of the impulse response, from the cumulants of poles and zeros."""
     numerator = evaluate(problem, like.structure, like.parameters[None]).numerator[0]
     zeros = np.roots(numerator[::-1])
-    mean = like.delay + float(np.sum(1 / zeros).real - np.sum(1 / like.poles).real)
+    mean = like.delay + lag_sum(like.poles, numerator)
     return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)
 
 

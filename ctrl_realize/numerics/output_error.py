@@ -24,7 +24,15 @@ import numpy as np
 
 from .arrays import ComplexArray, FloatArray
 from .fit_window import WindowFit, fit_window
-from .lag_chains import LagChain, chain_profile, fit_chains, fit_diffusion, still_improving
+from .lag_chains import (
+    LagChain,
+    chain_limits,
+    chain_profile,
+    fit_chains,
+    fit_diffusion,
+    lag_sum,
+    still_improving,
+)
 from .profile_interval import delay_profile, profile_limits
 from .separable_fit import KnownFactor, Structure, evaluate, fit_batch
 from .step_problem import StepData, step_scales, stop_at, window
@@ -143,18 +151,18 @@ def likelihood_fit(
         chosen, level = better.candidate, better.criterion
     free = plausible(whole.candidates, whole.criterion, whole.variance, chosen, level)
     profiles = {s: _profile(whole, whole.candidates[s]) for s in free}
-    imitating = [chain for chain in chains if chain.criterion <= level + PLAUSIBLE]
-    curves = [*profiles.values(), *(chain_profile(chain, whole.scales) for chain in imitating)]
+    limits = [profile_limits(*profile) for profile in profiles.values()]
+    limits += [
+        chain_limits(chain, whole.scales)
+        for chain in chains
+        if chain.criterion <= level + PLAUSIBLE
+    ]
     chain = ""
     if better is not None and chosen is better.candidate:
         whole = _with_chain(whole, better)
         chain = f"chain of {chosen.structure.order} nearly equal lags"
         profiles[chosen.structure] = chain_profile(better, whole.scales)
-    limits = [profile_limits(*curve) for curve in curves]
     low = min(chosen.delay, *(ends[0] for ends in limits))
-    # 1.96 errors below, and the modes that no record shows.
-    below = [chain.candidate.delay - 1.96 * chain.error - chain.hidden for chain in imitating]
-    low = max(min(low, *below), whole.scales.earliest) if below else low
     high = max(chosen.delay, *(ends[1] for ends in limits))
     own = profile_limits(*profiles[chosen.structure])
     if endless := still_improving(tanks):
@@ -246,14 +254,6 @@ def _table(
         excess = whole.criterion[s] - best
         lines.append(StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles))
     return tuple(sorted(lines, key=lambda line: line.excess))
-
-
-def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
-    """Delay at zero frequency of b(s)/a(s): sum of its lags less that of its leads, in s."""
-    lag = float(np.sum(-1.0 / poles).real)
-    if numerator.size > 1 and numerator[0] != 0:
-        lag -= float(numerator[1] / numerator[0])
-    return lag
 
 
 def _with_delay(whole: WindowFit, candidate: Candidate, delay: float) -> Candidate:
