@@ -28,8 +28,7 @@ from .trial import Seen
 
 OTHERS = (
     "Nominal is 95 %, but for the flat sets and the scan, which claim no level. A band of many "
-    "points counts with the part of them that holds the truth. Levels of noise with the same seed "
-    "share its shape, so that a row knows no more than its seeds."
+    "points counts with the part of them that holds the truth. Each record has noise of its own."
 )
 
 
@@ -37,7 +36,11 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--short", action="store_true", help="two seeds, few minutes")
     parser.add_argument("--seeds", type=int, default=1000, help="records of each world")
-    parser.add_argument("--interval-seeds", type=int, help="of the other intervals, default 1/25")
+    parser.add_argument(
+        "--interval-seeds",
+        type=int,
+        help="of the other intervals, cheap ones four times as many; default 1/25",
+    )
     parser.add_argument("--flag-seeds", type=int, help="of each flag's worlds, default 1/25")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after these")

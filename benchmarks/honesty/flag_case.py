@@ -13,10 +13,7 @@ Run = Callable[[int], Codes]
 
 @dataclass(frozen=True)
 class FlagCase:
-    """A flag of a result; `raising` and `quiet` make a seed into the codes that are seen.
-
-    `heavy` divides the number of seeds.
-    """
+    """A flag of a result; `raising` and `quiet` make a seed into the codes that are seen."""
 
     result: str
     code: str
@@ -24,7 +21,6 @@ class FlagCase:
     raising: Run
     not_due: str
     quiet: Run
-    heavy: int = 1
 
 
 def codes(result: Any) -> Codes:

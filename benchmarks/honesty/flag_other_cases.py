@@ -247,10 +247,9 @@ CASES: list[FlagCase] = [
             lambda s: fit(driven(s, core=rigs.lag(0.8) * rigs.lag(4.0)
                                  * ct.tf([-1 / (2 * np.pi), 1], [1])))),
     FlagCase("fit_delay, moving inputs", "gains_differ", "gains of three records 0.9, 1 and 1.1",
-             lambda s: together(s, gains=(0.9, 1.0, 1.1)), "three records alike", together,
-             heavy=3),
+             lambda s: together(s, gains=(0.9, 1.0, 1.1)), "three records alike", together),
     FlagCase("fit_delay, moving input", "cut", "6000 samples",
-             lambda s: fit(driven(s, samples=6000)), DRIVEN, ordinary, heavy=10),
+             lambda s: fit(driven(s, samples=6000)), DRIVEN, ordinary),
     FlagCase("impulse_from_io", "not_died_away", "30 lags of a response of 100",
              lambda s: pulses(driven(s, held=3), 30), "120 lags",
              lambda s: pulses(driven(s, held=3))),

@@ -254,7 +254,6 @@ def _several(code: str, due: str, **what: object) -> FlagCase:
         lambda seed: together(seed, **what),
         "six records alike, white noise 0.1 and 0.5 %",
         together,
-        heavy=2,
     )
 
 
@@ -321,12 +320,10 @@ CASES: list[FlagCase] = [
     FlagCase("realize", "no_gap", "R1 of order 4, noise 1 %", realized(rigs.R1, 4, 0.01),
              "R2 of order 2, noise 0.1 %", realized(rigs.R2, 2, 0.001)),
     FlagCase("identify_campaign", "failed_records", "one flat record of twelve",
-             lambda s: campaign(s, broken=True), "twelve records alike, by the scan", campaign,
-             heavy=2),
+             lambda s: campaign(s, broken=True), "twelve records alike, by the scan", campaign),
     FlagCase("identify_campaign", "amplitude_trend", "delay 6 samples longer at half the height",
-             lambda s: campaign(s, trend=6.0), "twelve records alike, by the scan", campaign,
-             heavy=2),
+             lambda s: campaign(s, trend=6.0), "twelve records alike, by the scan", campaign),
     FlagCase("bootstrap", "failed_draws", "one draw of five raises",
              lambda s: bootstrap(s, fails=True), "none raises",
-             lambda s: bootstrap(s, fails=False), heavy=2),
+             lambda s: bootstrap(s, fails=False)),
 ]  # fmt: skip

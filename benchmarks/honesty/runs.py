@@ -26,26 +26,26 @@ FLAG_CASES: list[FlagCase] = flag_step_cases.CASES + flag_other_cases.CASES
 
 @dataclass(frozen=True)
 class Study:
-    """A trial and what part of the seeds it is given; `by_plant` draws the plant with the seed."""
+    """A trial, how many seeds it is given for one; `by_plant` draws the plant with the seed."""
 
     trial: Trial
-    share: float
+    share: int = 1
     by_plant: bool = True
 
 
 STUDIES: dict[str, Study] = {
-    "given": Study(step_intervals.given, 1.0),
-    "scans": Study(step_intervals.scans, 2.0),
-    "views": Study(step_intervals.views, 0.5),
-    "several": Study(step_intervals.several, 0.5),
-    "redrawn": Study(step_intervals.redrawn, 0.2),
-    "tracked": Study(step_intervals.tracked, 2.0),
-    "pulses": Study(driven_intervals.pulses, 2.0, by_plant=False),
-    "any input": Study(driven_intervals.any_input, 0.5, by_plant=False),
-    "joined": Study(driven_intervals.joined, 0.3, by_plant=False),
-    "responses": Study(driven_intervals.responses, 0.4, by_plant=False),
-    "noise spectra": Study(driven_intervals.noise_spectra, 2.0, by_plant=False),
-    "sines": Study(driven_intervals.sines, 2.0, by_plant=False),
+    "given": Study(step_intervals.given, 4),
+    "scans": Study(step_intervals.scans, 4),
+    "views": Study(step_intervals.views),
+    "several": Study(step_intervals.several),
+    "redrawn": Study(step_intervals.redrawn),
+    "tracked": Study(step_intervals.tracked, 4),
+    "pulses": Study(driven_intervals.pulses, 4, by_plant=False),
+    "any input": Study(driven_intervals.any_input, by_plant=False),
+    "joined": Study(driven_intervals.joined, by_plant=False),
+    "responses": Study(driven_intervals.responses, by_plant=False),
+    "noise spectra": Study(driven_intervals.noise_spectra, 4, by_plant=False),
+    "sines": Study(driven_intervals.sines, 4, by_plant=False),
 }
 
 
@@ -55,16 +55,17 @@ def main_tasks(seeds: int) -> list[Task]:
 
 
 def interval_tasks(seeds: int) -> list[Task]:
-    """Other intervals: at every noise level and kind as many seeds as the study's share says."""
+    """Other intervals; the noise level goes round with the seed, so that every case is its own."""
     tasks = []
-    for k in range(2 * seeds):
+    for k in range(max(study.share for study in STUDIES.values()) * seeds):
         for name, study in STUDIES.items():
-            if k >= max(round(study.share * seeds), 1):
+            if k >= study.share * seeds:
                 continue
             for kind in KINDS:
-                for noise in NOISES:
-                    plant = single.cell(kind, k)[0] if study.by_plant else "two lags"
-                    tasks.append((name, kind, plant, noise, k))
+                plant, noise = single.cell(kind, k)
+                if not study.by_plant:
+                    plant, noise = "two lags", NOISES[k % len(NOISES)]
+                tasks.append((name, kind, plant, noise, k))
     return tasks
 
 
@@ -86,12 +87,7 @@ FLAG_WORLDS = _flag_worlds()
 
 def flag_tasks(seeds: int) -> list[Task]:
     """Worlds in which a flag is due, and worlds in which it is not."""
-    return [
-        ("flag", name, side, 0.0, k)
-        for k in range(seeds)
-        for (name, side), case in FLAG_WORLDS.items()
-        if k < max(seeds // case.heavy, 1)
-    ]
+    return [("flag", name, side, 0.0, k) for k in range(seeds) for name, side in FLAG_WORLDS]
 
 
 def family(task: Task) -> str:

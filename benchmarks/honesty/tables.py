@@ -135,7 +135,7 @@ def interval_table(seen: list[Seen]) -> list[str]:
     seen = [one for one in seen if not one.failed]
     names = list(dict.fromkeys(name for one in seen for name in one.covered))
     groups = _groups(seen, "kind", "noise")
-    lines = _head("interval", "world", *(f"{100 * n:g} %" for n in NOISES), "all", "seeds")
+    lines = _head("interval", "world", *(f"{100 * n:g} %" for n in NOISES), "all", "records")
     for name in names:
         for kind in KINDS:
             found = [_covered(groups.get((kind, noise), []), name) for noise in NOISES]
@@ -143,9 +143,7 @@ def interval_table(seen: list[Seen]) -> list[str]:
             if not runs:
                 continue
             cells = [f"{100 * hits / n:.0f} %" if n else "" for hits, n in found]
-            # The noise levels of a seed share its noise: together they count as one.
-            seeds = len({s.seed for s in seen if s.kind == kind and name in s.covered})
-            lines.append(_line([name, kind, *cells, rate(total / runs * seeds, seeds), seeds]))
+            lines.append(_line([name, kind, *cells, rate(total, runs), runs]))
     return lines
 
 
