@@ -14,6 +14,8 @@ from .worlds import DRIVEN_DT, driven_case, noise_of, rounded
 LENGTH = 180
 """Lags, after which the response has fallen to a ten-thousandth."""
 PERIOD = 500
+LAGS_HZ = np.array([0.8, 4.0])
+"""Of the plant of `driven_case`."""
 METHODS = ("regularized", "least_squares", "okid")
 
 
@@ -90,6 +92,13 @@ def responses(kind: str, plant: str, noise: float, seed: int) -> Seen:
         "fit_frf: interval": inside(fit.interval, truth),
         "fit_frf: -+ 1.96 std": inside(near, truth),
     }
+    if fit.order == 2:
+        # the first is the slow one, of both
+        found = np.abs(np.asarray(fit.poles) / (-2 * np.pi) - LAGS_HZ) * 2 * np.pi
+        for name, off, std in zip(("slow", "fast"), found, fit.pole_std, strict=True):
+            covered[f"fit_frf, {name} pole where two are found: -+ 1.96 std"] = float(
+                off <= 1.96 * std
+            )
     exact = cr.design.margins(case.plant, controller())
     for name, ends in margins.intervals.items():
         covered[f"margins of a measured response: {name}"] = inside(ends, getattr(exact, name))
