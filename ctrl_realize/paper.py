@@ -55,6 +55,12 @@ class Settings:
         r = floor(n / 2) (section 2.1, step 2).
     singular_values_shown : int
         Length of Fig. 5.
+
+    Examples
+    --------
+    >>> from ctrl_realize import paper
+    >>> paper.SETTINGS.order, paper.SETTINGS.samples, paper.SETTINGS.max_delay
+    (3, 1000, 100)
     """
 
     sample_time: float = 7.8125e-4
@@ -95,6 +101,12 @@ class SetUp:
         Records at each step size.
     alias_free_hz : float
         Printed as "Nyquist frequency"; it is the sample rate / 2.56 (see `ERRATA`, E6).
+
+    Examples
+    --------
+    >>> from ctrl_realize import paper
+    >>> paper.SETUP.step_sizes_ma, paper.SETUP.records_per_size
+    ((16.0, 12.0, 8.0, 4.0), 10)
     """
 
     valve: str = "Varipack 28000"
@@ -124,6 +136,12 @@ class SteppedSine:
         Measurements averaged at each frequency.
     frequency_accuracy_hz : float
         Printed accuracy of the input frequency (see `ERRATA`, E14).
+
+    Examples
+    --------
+    >>> from ctrl_realize import paper
+    >>> paper.STEPPED_SINE.points, paper.STEPPED_SINE.band_hz, paper.STEPPED_SINE.repeats
+    (500, (0.1, 50.0), 5)
     """
 
     points: int = 500
@@ -146,6 +164,15 @@ class Erratum:
         What is printed, or left unsaid.
     read_as : str
         What is implemented.
+
+    Examples
+    --------
+    >>> from ctrl_realize import paper
+    >>> erratum = paper.ERRATA[0]
+    >>> print(erratum.code, "-", erratum.place)
+    E1 - section 2.1, step 4
+    >>> print(erratum.read_as)
+    r for rho: H_a = T(2:r+1,1:r), H_b = T(1:r,1), H_c = T(1,1:r)
     """
 
     code: str

@@ -24,6 +24,15 @@ class Flag:
         Short fixed name, for programs: ``"delay_at_bound"``.
     message : str
         What was seen, with its numbers, and what to try.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]
+    >>> for flag in cr.estimate_delay(pulse, 1, max_delay=37, dt=0.01).fit.flags:
+    ...     print(f"{flag.code}: {flag}")
+    delay_at_bound: the best delay is max_delay=37; try a larger one
     """
 
     code: str
@@ -34,7 +43,21 @@ class Flag:
 
 
 class Result:
-    """Mixin of all results: `report`, `plot` and the card that a notebook shows."""
+    """Mixin of all results: `report`, `plot` and the card that a notebook shows.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from ctrl_realize.results import Result
+    >>> @dataclass(frozen=True)
+    ... class Weight(Result):
+    ...     kilograms: float
+    ...     def _rows(self):
+    ...         return [("mass", f"{self.kilograms:g} kg")]
+    >>> print(Weight(4.2).report())
+    Weight
+      mass  4.2 kg
+    """
 
     def _title(self) -> str:
         return type(self).__name__
@@ -99,7 +122,15 @@ def html_card(
     choices: Sequence[str] = (),
     flags: Sequence[str] = (),
 ) -> str:
-    """Lay out label-value rows as a small HTML table; everything is escaped."""
+    """Lay out label-value rows as a small HTML table; everything is escaped.
+
+    Examples
+    --------
+    >>> from ctrl_realize.results import html_card
+    >>> card = html_card("Delay", [("delay", "37 samples")], flags=["look <twice>"])
+    >>> print(card[card.index("⚠"):])
+    ⚠ look &lt;twice&gt;</div></div>
+    """
     body = "".join(
         f"<tr><th style='text-align:left;font-weight:500;padding:2px 16px 2px 0'>"
         f"{html.escape(label)}</th>"

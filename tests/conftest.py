@@ -5,11 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import matplotlib as mpl
 import pytest
 from hypothesis import HealthCheck, settings
-
-mpl.use("Agg")
 
 # Same examples on every run: a failure seen once is seen again. CI machines are slow at times,
 # so no deadline on a single example.
@@ -32,11 +29,3 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip(f"measured records are not there ({SHARED_DATA.name}/ beside the project)")
     return SHARED_DATA
-
-
-@pytest.fixture(autouse=True)
-def _no_figure_left_open():
-    yield
-    import matplotlib.pyplot as plt
-
-    plt.close("all")

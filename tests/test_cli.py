@@ -267,7 +267,9 @@ def test_an_interruption_is_told_and_leaves_nothing(folder, tmp_path, capsys, mo
 
     monkeypatch.setattr("ctrl_realize.cli.identify_command.identify_record", interrupted)
     assert main(["identify", str(folder / "step_0.csv"), "-o", str(tmp_path / "out")]) == 130
-    assert capsys.readouterr().err == "ctrl-realize: interrupted; nothing was written\n"
+    assert capsys.readouterr().err == (
+        "ctrl-realize: interrupted; what was not finished is not written\n"
+    )
     assert list(tmp_path.iterdir()) == []
 
 

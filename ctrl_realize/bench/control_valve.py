@@ -42,6 +42,14 @@ class Valve:
     ----------
     truth : ValveTruth
         The linear part: total frequency response, dead time, core.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.bench.valve(noise=0.002)
+    >>> record = valve.step_record(16, rng=5)
+    >>> print(f"{valve.truth.dead_time:.5f} s, {record.output[-1]:.2f} mm")
+    0.02891 s, 2.26 mm
     """
 
     truth: ValveTruth = field(repr=False)

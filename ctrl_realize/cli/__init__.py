@@ -84,5 +84,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
             complain(one_line(error.format_message()) + " (see --help)")
             return 2
     if code == INTERRUPTED:  # typer tells of it by an exception or by the code
-        complain("interrupted; nothing was written")
+        complain("interrupted; what was not finished is not written")
     return code if isinstance(code, int) else 0

@@ -17,7 +17,7 @@ from ..io import read_frf
 from ..signals import MeasuredFRF
 from .inputs import Reading, check_files, python_keywords, reading, typed_call
 from .results import campaign_table, write_campaign_files, write_record_files
-from .staging import appearing
+from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say
 
 _MANY = 12
@@ -77,7 +77,8 @@ def identify(
 
     One record gives model.json, report.html and figures/. Several records of one plant make a
     campaign: a table of their delays as well (records.csv), a model for each (models/) and a
-    final one. A record that fails is a row of the table with its error.
+    final one. A record that fails is a row of the table with its error. If a campaign is stopped,
+    the finished records are kept in rows/, and the same command goes on from there.
 
     \b
     Examples:
@@ -105,12 +106,12 @@ def identify(
     calls = _calls(files, settings, how, words)
     if separate and len(files) > 1:
         return _each_alone(files, output, settings, how, measured, words)
-    with appearing(output) as folder:
-        if len(files) == 1:
+    failed = False
+    if len(files) > 1:
+        failed = _many(files, output, settings, how, measured, calls, jobs)
+    else:
+        with appearing(output) as folder:
             _one(files[0], folder, settings, how, measured, calls)
-            failed = False
-        else:
-            failed = _many(files, folder, settings, how, measured, calls, jobs)
     names = "model.json, report.html, figures/"
     if len(files) > 1:
         names += ", records.csv, models/"
@@ -142,7 +143,7 @@ def _one(
 
 def _many(
     files: list[Path],
-    folder: Path,
+    output: Path,
     settings: dict[str, Any],
     how: Reading,
     frf: MeasuredFRF | None,
@@ -150,13 +151,16 @@ def _many(
     jobs: int | None,
 ) -> bool:
     n_jobs = jobs if jobs is not None else -1 if len(files) >= _MANY else 1
-    campaign = identify_campaign([how.source(file) for file in files], n_jobs=n_jobs, **settings)
-    _refuse_useless(campaign)
-    comparison = None if frf is None else compare_frf(campaign.system, frf)
-    write_campaign_files(
-        folder, campaign, files,
-        frf=frf, comparison=comparison, settings=settings, calls=calls,
-    )  # fmt: skip
+    sources = [how.source(file) for file in files]
+    with kept_rows(output) as store:
+        campaign = identify_campaign(sources, n_jobs=n_jobs, store=store, **settings)
+        _refuse_useless(campaign)
+        comparison = None if frf is None else compare_frf(campaign.system, frf)
+        with appearing(output) as folder:
+            write_campaign_files(
+                folder, campaign, files,
+                frf=frf, comparison=comparison, settings=settings, calls=calls,
+            )  # fmt: skip
     say(campaign_table(campaign))
     say()
     say(campaign.report())
@@ -190,24 +194,27 @@ def _each_alone(
     words: list[str],
 ) -> int:
     """Identify each file into a folder of its own; failures do not stop the rest."""
+    refuse_a_file(output)
     failed = 0
-    names = unique_names([file.stem for file in files])
-    with appearing(output) as folder:
-        for file, name in progress(zip(files, names, strict=True), len(files), "identify"):
-            alone = folder / name
-            alone.mkdir()
-            calls = _calls([file], settings, how, words)
-            try:
-                _one(file, alone, settings, how, frf, calls)
-            except (CtrlRealizeError, OSError) as error:
-                failed += 1
-                alone.rmdir()
-                complain(f"{printable(str(file))}: {one_line(error)}")
-            say()
-        if failed == len(files):
-            raise DataError(f"none of the {len(files)} records could be identified")
+    names = unique_names([folder_name(file) for file in files])
+    for file, name in progress(zip(files, names, strict=True), len(files), "identify"):
+        try:
+            # each appears as it is finished, so that an interruption loses no other
+            with appearing(output / name) as folder:
+                _one(file, folder, settings, how, frf, _calls([file], settings, how, words))
+        except (CtrlRealizeError, OSError) as error:
+            failed += 1
+            complain(f"{printable(str(file))}: {one_line(error)}")
+        say()
+    if failed == len(files):
+        raise DataError(f"none of the {len(files)} records could be identified")
     say(f"written to {printable(str(output))}: a folder for each record")
     return 1 if failed else 0
+
+
+def folder_name(file: Path) -> str:
+    """Name of a record's folder: the file's without its ending, and never "." or ".."."""
+    return file.stem if file.stem.strip(".") else "record"
 
 
 def unique_names(names: list[str]) -> list[str]:

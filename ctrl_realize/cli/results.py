@@ -91,9 +91,9 @@ def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -
 
 
 def file_name(name: str) -> str:
-    """Make a name safe for a file of any system."""
+    """Make a name safe for a file of any system, most of which count 255 bytes."""
     safe = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)
-    return safe[:80] or "record"
+    return safe[:80].encode()[:200].decode(errors="ignore") or "record"
 
 
 def campaign_table(campaign: Campaign) -> str:

@@ -5,19 +5,25 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import OptionError
+from ..errors import CtrlRealizeError, OptionError
+from ..io import CampaignStore
+from .terminal import complain, printable
+
+ROWS = "rows"
+"""Folder of finished records in that of the results, while a campaign runs."""
 
 
 @contextmanager
 def appearing(folder: Path) -> Iterator[Path]:
     """Give a temporary folder whose files move into `folder` when the block ends well.
 
-    If `folder` is there already, files of the same names are replaced and others stay. If the
-    block raises, nothing in `folder` has changed.
+    If `folder` is there already, files of the same names are replaced and others stay, and
+    nothing outside it is touched: it may be on a disk of its own. If the block raises, nothing in
+    `folder` has changed.
 
     Parameters
     ----------
@@ -42,11 +48,11 @@ def appearing(folder: Path) -> Iterator[Path]:
     ['a.txt']
     """
     target = Path(os.path.realpath(folder))
-    if target.exists() and not target.is_dir():
-        raise OptionError(f"{folder} is a file; --output needs a folder")
+    refuse_a_file(folder)
     made = _missing_parents(target.parent)
     target.parent.mkdir(parents=True, exist_ok=True)
-    staged = target.parent / f".{target.name[:40]}-{secrets.token_hex(6)}.tmp"
+    place = target if target.exists() else target.parent
+    staged = place / f".{target.name[:40]}-{secrets.token_hex(6)}.tmp"
     staged.mkdir()
     try:
         yield staged
@@ -59,6 +65,48 @@ def appearing(folder: Path) -> Iterator[Path]:
         for parent in made:
             _remove_if_empty(parent)
         raise
+
+
+@contextmanager
+def kept_rows(output: Path) -> Iterator[CampaignStore]:
+    """Give a store in `output` for the records of a campaign, gone when the results are there.
+
+    Where the process is killed or interrupted, or the disk is full, the finished records stay,
+    and the same command goes on from them. An error of ours, such as records that do not belong
+    together, leaves nothing.
+    """
+    refuse_a_file(output)
+    made = _missing_parents(output)
+    store = CampaignStore(output / ROWS)
+    try:
+        yield store
+    except KeyboardInterrupt:
+        if len(store):
+            complain(
+                f"{len(store)} finished records are kept in {printable(str(store.folder))}; the "
+                "same command goes on from them"
+            )
+        else:
+            _remove_rows(store, made)
+        raise
+    except CtrlRealizeError:
+        _remove_rows(store, made)
+        raise
+    _remove_rows(store, made)
+
+
+def refuse_a_file(output: Path) -> None:
+    """Refuse a file where a folder is needed, before any work is done."""
+    if output.exists() and not output.is_dir():
+        raise OptionError(f"{output} is a file; --output needs a folder")
+
+
+def _remove_rows(store: CampaignStore, made: Sequence[Path]) -> None:
+    """Remove the rows of a store, and of the folders made for it those that are empty."""
+    for path in store.folder.glob("row-*.json"):
+        path.unlink(missing_ok=True)
+    for folder in (store.folder, *made):
+        _remove_if_empty(folder)
 
 
 def _missing_parents(folder: Path) -> list[Path]:

@@ -37,6 +37,15 @@ class BalancedReduction(Result):
     kept_unstable : int
         States on or outside the unit circle, which are never reduced.
     error_bound : float
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> lags = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * ct.tf([1], [0.001, 1])
+    >>> found = cr.design.reduce(cr.delayed_ss(lags, dead_time=0.03, dt=0.001), 2).fit
+    >>> print(found.singular_values.round(4), f"error at most {found.error_bound:.1e}")
+    [5.759e-01 7.630e-02 4.000e-04] error at most 7.4e-04
     """
 
     singular_values: FloatArray

@@ -87,6 +87,15 @@ class ContinuousModel(Result):
         In s; may hold a fraction of a sample.
     dt : float
         Sample time in s of the discrete system.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([2], [0.08, 1]), dead_time=0.0289, dt=0.001)
+    >>> model = cr.design.to_continuous(plant)
+    >>> print(f"{model.dead_time:.4f} s", model.core.poles().real.round(6))
+    0.0289 s [-12.5]
     """
 
     core: ct.StateSpace

@@ -46,6 +46,15 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         d.
     inner_poles : ndarray, shape (n,)
         Eigenvalues of A. They are not the controller's poles: the line closes a loop around them.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([2.0, -1.8], [1, -1], 0.01))
+    >>> print(predictor.line_length, predictor.inner_poles.real.round(4))
+    10 [1.     0.8825]
     """
 
     def __init__(

@@ -46,6 +46,18 @@ class DelayRobustness(Result):
     held : float
         Time in s by which the delay overstates the dead time, where the core holds a fraction of
         a sample: ``dead_times = delays * dt - held``.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([4.0, -3.8], [1, -1], 0.01))
+    >>> found = cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
+    >>> print(f"stable from {found.stable_from:.2f} to {found.stable_to:.2f} s")
+    stable from 0.08 to 0.12 s
+    >>> print(f"worst modulus margin {found.worst_modulus_margin:.2f}")
+    worst modulus margin 0.11
     """
 
     delays: IntArray

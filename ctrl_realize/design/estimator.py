@@ -31,6 +31,15 @@ class KalmanPredictor(Result):
     poles : ndarray, shape (n,)
         Of the estimator, eigenvalues of A - gain C.
     dt : float
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[1.0]], [[0.0]], 0.1), 3)
+    >>> found = cr.design.kalman_predictor(plant, 1.0, 1.0)
+    >>> print(found.gain.round(4), found.covariance.round(4), found.poles.real.round(4))
+    [[0.5377]] [[1.4839]] [0.3623]
     """
 
     gain: FloatArray

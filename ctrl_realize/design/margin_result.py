@@ -53,6 +53,16 @@ class Margins(Result):
     flags : tuple of Flag
     response : tuple of ndarray
         (omega, L) as followed by the count, for drawing.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> found = cr.design.margins(plant, cr.design.pid(plant))
+    >>> print(f"gain {found.gain_margin:.2f}, phase {found.phase_margin:.1f} degrees")
+    gain 3.14, phase 61.4 degrees
+    >>> print(f"{1e3 * found.delay_margin:.1f} ms more dead time until it is unstable")
+    63.2 ms more dead time until it is unstable
     """
 
     gain_margin: float

@@ -28,6 +28,16 @@ class Performance:
         Of the set-point response over its final value, as a ratio; 0 without.
     settling_time : float
         In s until the set-point response stays within 2 % of its final value.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> for rule in ("simc", "amigo"):
+    ...     found = cr.design.performance(plant, cr.design.pid(plant, rule), 0.5)
+    ...     print(rule, f"overshoot {found.overshoot:.1%}, load error {found.load_error:.4f} s")
+    simc overshoot 4.1%, load error 0.0590 s
+    amigo overshoot 0.2%, load error 0.1248 s
     """
 
     setpoint_error: float
@@ -67,7 +77,16 @@ def step_responses(
 
 
 def performance(plant: DelayedStateSpace, controller: Any, total_time: float) -> Performance:
-    """Measure a stable loop; `total_time` (s) sets the first guess of how long that takes."""
+    """Measure a stable loop; `total_time` (s) sets the first guess of how long that takes.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> found = cr.design.performance(plant, cr.design.pid(plant), 0.5)
+    >>> print(f"load error {found.load_error:.4f} s, settled after {found.settling_time:.3f} s")
+    load error 0.0590 s, settled after 0.179 s
+    """
     dt = float(plant.dt)
     count = 2 ** int(np.ceil(np.log2(max(64.0, min(20 * total_time / dt, LONGEST)))))
     while True:

@@ -38,6 +38,16 @@ class PIDComparison(Result):
         inf where the loop is unstable.
     refused : tuple of (str, str, str)
         Rule, kind and reason where a rule has no answer for this plant.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> found = cr.design.compare_pid(plant, ["simc", "amigo"], ["PI"])
+    >>> print(found.table()[["rule", "kp", "ti", "ms", "iae_load"]].round(3).to_string(index=False))
+     rule    kp   ti    ms  iae_load
+     simc 1.356 0.08 1.591     0.059
+    amigo 0.565 0.07 1.222     0.125
     """
 
     controllers: tuple[PIDController, ...]

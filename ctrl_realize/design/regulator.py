@@ -49,6 +49,15 @@ class PredictorLQR(Result):
     delay : int, or tuple of int where the inputs differ
         In samples.
     dt : float
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[1.0]], [[0.0]], 0.1), 3)
+    >>> found = cr.design.predictor_lqr(plant, 1.0, 1.0)
+    >>> print(found.core_gain.round(4), found.gain.round(4), found.poles.real.round(4))
+    [[0.5377]] [[0.392  0.5377 0.4839 0.4355]] [0.3623]
     """
 
     gain: FloatArray

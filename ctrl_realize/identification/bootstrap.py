@@ -45,6 +45,19 @@ class Bootstrap(Result):
         Length of the blocks in samples; 0 where records were drawn.
     failed : int
         Draws for which the method gave an error.
+
+    Examples
+    --------
+    >>> from functools import partial
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(300)
+    >>> u = np.where(t < 0.5, 0.0, 2.0)
+    >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
+    >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
+    >>> again = cr.bootstrap(record, partial(cr.fit_delay, structures=[(1, 1)]), repeats=10)
+    >>> print(f"{again.system.fit.dead_time:.4f} s, and {again.std:.4f} s of scatter")
+    0.1250 s, and 0.0002 s of scatter
     """
 
     system: DelayedStateSpace
@@ -173,8 +186,8 @@ def bootstrap(
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
     >>> lag = partial(cr.fit_delay, structures=[(1, 1)])
     >>> again = bootstrap(record, lag, repeats=10)
-    >>> len(again.systems), bool(again.std < 0.002)
-    (10, True)
+    >>> print(f"{again.interval[0]:.4f} to {again.interval[1]:.4f} s")
+    0.1245 to 0.1253 s
     """
     count = whole(repeats, "repeats", 2)
     whole(seed, "seed", 0)

@@ -44,6 +44,15 @@ class Campaign(Result):
         How the records were identified.
     options : dict
         Further arguments of `identify`.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.bench.valve()
+    >>> records = [valve.step_record(16.0, seed) for seed in range(4)]
+    >>> campaign = cr.identify_campaign(records, method="scan")
+    >>> print(campaign.delays, campaign.statistics(trim=1).mean)
+    [44. 45. 46. 45.] 45.0
     """
 
     rows: tuple[CampaignRow, ...]

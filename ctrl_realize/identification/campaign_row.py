@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from importlib import metadata
 from typing import Any, Protocol
 
+import control as ct
 import numpy as np
 
 from ..checks import spelled_out
@@ -55,6 +58,17 @@ class CampaignRow:
     flags : tuple of Flag
     warnings : tuple of str
         What was warned of on the way.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> record = cr.bench.valve().step_record(16.0, 1)
+    >>> silent = cr.Record(record.time, 0 * record.input, record.output, name="plug was out")
+    >>> rows = cr.identify_campaign([record, silent], method="scan").rows
+    >>> print(rows[0].name, rows[0].delay, "samples")
+    valve_16mA 45.0 samples
+    >>> print(rows[1].error)
+    NoStepError: no step in the input of record 'plug was out': it runs from 0 to 0 ...
     """
 
     name: str
@@ -130,9 +144,10 @@ def identify_row(
         return row
     try:
         return store.save(key, row)
-    except CtrlRealizeError:
-        # Names or labels that no file takes: the result is there, and will be made again.
-        return row
+    except (CtrlRealizeError, OSError) as error:
+        # A full disk, or labels that no file takes: the result is there, and will be made again.
+        text = spelled_out(f"not kept in the store: {error}"[:_LONGEST_ERROR])
+        return replace(row, warnings=(*row.warnings, text))
 
 
 def read_source(source: RecordSource) -> Record:
@@ -144,14 +159,32 @@ def read_source(source: RecordSource) -> Record:
 
 
 def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:
-    """SHA-256 of a record's samples and of what is done with them."""
-    digest = hashlib.sha256()
+    """SHA-256 of a record's samples, of what is done with them, and by which version."""
+    digest = hashlib.sha256(_version().encode())
     for values in (record.time, record.input, record.output):
         digest.update(str(values.shape).encode())
         digest.update(np.ascontiguousarray(values).tobytes())
-    settings = sorted((name, repr(value)) for name, value in options.items())
+    settings = sorted((name, _exact(value)) for name, value in options.items())
     digest.update(repr((method, settings, record.input_labels, record.output_labels)).encode())
     return digest.hexdigest()
+
+
+@functools.cache
+def _version() -> str:
+    try:
+        return metadata.version("ctrl-realize")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _exact(value: Any) -> str:
+    """Write a setting with all digits; python-control shows eight, or a system's name alone."""
+    if isinstance(value, ct.StateSpace):
+        return repr([getattr(value, letter).tolist() for letter in "ABCD"] + [value.dt])
+    if isinstance(value, ct.TransferFunction):
+        sides = (value.num, value.den)
+        return repr([[[p.tolist() for p in row] for row in side] for side in sides] + [value.dt])
+    return repr(value)
 
 
 def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:

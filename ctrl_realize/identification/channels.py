@@ -49,6 +49,16 @@ class ChannelRealization(Result):
     misfit : ndarray, shape (p, m)
     impulse : ImpulseResponse
     flags : tuple of Flag
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
+    >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
+    >>> found = cr.realize_channels(np.array(late)[:, None, :], 1, dt=0.1).fit
+    >>> found.structure, found.delays.ravel().tolist(), found.output_delays, found.input_delays
+    ('common', [3, 7], (0, 4), (3,))
     """
 
     delays: IntArray

@@ -76,6 +76,18 @@ class DelayFit(Result):
         What was chosen, and why.
     flags : tuple of Flag
         What one should know before trusting the result.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(900)
+    >>> u = np.where(t < 1.0, 0.0, 2.0)
+    >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
+    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    >>> fit = cr.fit_delay(cr.Record(t, u, y + noise), structures=[(1, 1)]).fit
+    >>> print(f"{fit.dead_time:.4f} s, within {fit.interval[0]:.4f} to {fit.interval[1]:.4f} s")
+    0.1250 s, within 0.1245 to 0.1254 s
     """
 
     dead_time: float

@@ -90,6 +90,15 @@ class DelayScan(Result):
         `realization`.
     choices : tuple of str
         What was chosen for the caller, and why (`identify`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]     # 37 samples, then a lag
+    >>> scan = cr.estimate_delay(pulse, 1, max_delay=60, dt=0.01).fit
+    >>> print(scan.delay, scan.interval, scan.iae[[30, 36, 38]].round(3))
+    37 (37, 38) [1.133 0.302 0.   ]
     """
 
     iae: FloatArray

@@ -52,6 +52,18 @@ class ImpulseEstimate(ImpulseResponse, Result):
     choices : tuple of str
         What was chosen, and why.
     flags : tuple of Flag
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
+    >>> y = 3.0 * np.roll(u, 5) + 0.1 * noise
+    >>> estimate = cr.impulse_from_io(cr.Record(0.01 * np.arange(2000), u, y), 20)
+    >>> print(f"{estimate.markov[5]:.3f} -+ {2 * estimate.std[5]:.3f}")
+    2.998 -+ 0.004
+    >>> print(estimate.noise_std.round(2))
+    [0.1]
     """
 
     std: FloatArray

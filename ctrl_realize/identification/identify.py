@@ -90,8 +90,8 @@ def identify(
     >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
     >>> rng = np.random.default_rng(1)
     >>> sys = cr.identify(cr.Record(t, u, y + 0.01 * rng.standard_normal(t.size)))
-    >>> isinstance(sys, ct.StateSpace), round(sys.fit.dead_time, 2)
-    (True, 0.12)
+    >>> isinstance(sys, ct.StateSpace), round(sys.fit.dead_time, 3)
+    (True, 0.125)
     """
     one_of(method, "method", METHODS)
     scan_only = {"cutoff_hz": cutoff_hz != "auto", "samples": samples is not None}

@@ -68,6 +68,19 @@ class OrderScan(Result):
     impulse : ImpulseResponse
     flags : tuple of Flag
         For the suggested order.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> k = np.arange(300)
+    >>> pulse = np.r_[np.zeros(22), 0.9**k + 0.8**k]     # 21 samples, then two lags
+    >>> scan = cr.scan_orders(pulse, 3, max_delay=40, dt=0.01)
+    >>> for order, delay, iae in zip(scan.orders, scan.delays, scan.iae):
+    ...     print(order, delay, round(float(iae[delay]), 3))
+    1 22 0.691
+    2 21 0.0
+    3 20 0.0
     """
 
     orders: tuple[int, ...]

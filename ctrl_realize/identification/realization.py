@@ -63,6 +63,15 @@ class Realization(Result):
         The data.
     flags : tuple of Flag
         ``"unstable"``, ``"negative_pole"``, ``"no_gap"``, ``"filter_delay"``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[0.0, 0.9 ** np.arange(99) + 0.01 * (-0.5) ** np.arange(99)]
+    >>> found = cr.realize(pulse, 1, dt=0.1).fit
+    >>> print(found.singular_values[:1].round(2), round(found.following, 4), round(found.iae, 3))
+    [5.26] 0.0124 0.029
     """
 
     order: int

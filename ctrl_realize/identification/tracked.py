@@ -37,6 +37,20 @@ class TrackedDelay(Result):
         Standard deviation of the residual.
     tells : bool
     reason : str
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> for sample in zip(u, cr.DelayedStateSpace(core, 7).simulate(u)):
+    ...     tracker.update(*sample)
+    >>> now = tracker.estimate()
+    >>> print(now.delay, now.interval, round(now.gain_ratio, 3))
+    7 (6, 7) 0.996
     """
 
     time: float
@@ -74,6 +88,19 @@ class DelayTrack(Result):
 
     Where ``tells`` is false, nothing is claimed; `low` and `high` then only show what is left
     open.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
+    >>> record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> track = tracker.run(record)
+    >>> print(track.time[[0, 20, -1]], track.tells[[0, 20, -1]], track.delay[[0, 20, -1]])
+    [0.05 1.25 9.95] [False False  True] [0.         7.8695741  6.97755342]
     """
 
     time: FloatArray

@@ -13,6 +13,7 @@ from ..identification.campaign_row import CampaignRow
 from ..identification.packed_model import PackedModel
 from ..results import Flag
 from .atomic import write_text
+from .checks import usable_file
 from .json_content import field
 from .model_files import MAX_MODEL_BYTES, model_from_text, model_to_text
 
@@ -25,9 +26,9 @@ class CampaignStore:
     """Folder that keeps the result of each record of a campaign as it is finished.
 
     Each row is one JSON file, written whole or not at all, named by the SHA-256 of the record's
-    samples and of the settings, and holding that of its own content; processes and machines that
-    share the folder can write to it at once. A file that is damaged is made anew. Only this
-    package's files are ever read, and none is deleted.
+    samples, of the settings and of this package's version, and holding that of its own content;
+    processes and machines that share the folder can write to it at once. A file that is damaged
+    is made anew. Only this package's files are ever read, and none is deleted.
 
     Parameters
     ----------
@@ -71,9 +72,9 @@ class CampaignStore:
         """Return the row kept under `key`; None if there is none, or its file is damaged."""
         path = self._path(key)
         try:
-            if path.stat().st_size > 2 * MAX_MODEL_BYTES:
-                return None
-            return _row_from(json.loads(path.read_text(encoding="utf-8")), key)
+            # what it holds may be the work of others: a pipe would never end
+            file = usable_file(path, 2 * MAX_MODEL_BYTES)
+            return _row_from(json.loads(file.read_text(encoding="utf-8")), key)
         except (OSError, ValueError, TypeError, RecursionError):
             # FileFormatError is a ValueError: whatever is wrong, the record is identified anew.
             return None

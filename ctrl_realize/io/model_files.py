@@ -106,6 +106,19 @@ def load_model(
         There is no such file, or no permission to read it.
     FileFormatError
         The file is not a model, damaged, edited, of a later version, or too large.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "valve.json"
+    ...     cr.save_model(path, cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 37, name="valve"))
+    ...     valve = cr.load_model(path)
+    >>> valve.delay, valve.name
+    (37, 'valve')
     """
     file = usable_file(path, MAX_MODEL_BYTES)
     try:

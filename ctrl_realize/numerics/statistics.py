@@ -32,6 +32,13 @@ class TrimmedStatistics:
         Number of values left.
     dropped : int
         Number of values dropped, both ends together.
+
+    Examples
+    --------
+    >>> from ctrl_realize import paper
+    >>> found = paper.table_1_statistics()
+    >>> print(f"{found.mean:.2f} samples of {found.count} records, variance {found.variance:.2f}")
+    36.68 samples of 34 records, variance 2.10
     """
 
     mean: float

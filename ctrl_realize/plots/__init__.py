@@ -7,7 +7,7 @@ from typing import Any
 
 import control as ct
 
-from ..errors import OptionError
+from .. import errors
 from .bootstraps import bootstrap_plot as bootstrap_plot
 from .campaigns import campaign_plot as campaign_plot
 from .design_plots import closed_loop_plot as closed_loop_plot
@@ -89,6 +89,15 @@ def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
     ------
     OptionError
         There is no picture of such a thing.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> cplt = plots.draw(record)                # what record.plot() does
+    >>> cplt.figure.axes[-1].get_xlabel()
+    'time [s]'
     """
     for kind in type(result).__mro__:
         if kind.__name__ in _DRAWN_BY:
@@ -98,11 +107,11 @@ def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
             )
             return drawn
     if type(result).__name__ == "FitSummary":
-        raise OptionError(
+        raise errors.OptionError(
             "a model file keeps the report of a fit and not its curves; identify the record "
             "again to draw them"
         )
-    raise OptionError(
+    raise errors.OptionError(
         f"there is no picture of a {type(result).__name__}; there is one of "
         f"{', '.join(sorted(_DRAWN_BY))}"
     )

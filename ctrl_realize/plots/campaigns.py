@@ -53,6 +53,16 @@ def campaign_plot(
     ------
     DataError
         No record was identified, or their sample times differ.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> valve = cr.bench.valve()
+    >>> records = [valve.step_record(16.0, seed) for seed in range(4)]
+    >>> cplt = plots.campaign_plot(cr.identify_campaign(records, method="scan"), truth=37.0)
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['trimmed mean 45.00 samples = 35.2 ms', 'truth 37 (simulated)']
     """
     dt = campaign.dt
     summary = campaign.statistics(trim)

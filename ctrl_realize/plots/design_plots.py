@@ -44,6 +44,15 @@ def margins_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> cplt = plots.margins_plot(cr.design.margins(plant, cr.design.pid(plant)))
+    >>> [axes.get_title() or axes.get_ylabel() for axes in cplt.figure.axes]
+    ['loop gain [dB]', 'loop phase [deg]', 'imaginary part']
     """
     omega, values = found.response
     frequency = omega / style.HERTZ
@@ -142,6 +151,15 @@ def pid_comparison_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> cplt = plots.pid_comparison_plot(cr.design.compare_pid(plant, ["simc", "amigo"], ["PI"]))
+    >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
+    ('sensitivity peak Ms', 'integrated absolute load error [s]')
     """
     kinds = sorted({c.kind for c in found.controllers})
     rows = zip(found.controllers, found.margins, found.performance, strict=True)
@@ -229,6 +247,17 @@ def hankel_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> lags = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * ct.tf([1], [0.001, 1])
+    >>> small = cr.design.reduce(cr.delayed_ss(lags, dead_time=0.03, dt=0.001), 2)
+    >>> cplt = plots.hankel_plot(small.fit)
+    >>> cplt.figure.axes[0].get_ylabel()
+    'Hankel singular value'
     """
 
     def draw(axes: Axes) -> list[Line2D]:
@@ -259,6 +288,14 @@ def process_model_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> cplt = plots.process_model_plot(cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029))
+    >>> cplt.figure.axes[0].get_xlabel()
+    'time [s]'
     """
 
     def draw(axes: Axes) -> list[Line2D]:
@@ -300,6 +337,16 @@ def closed_loop_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> loops = {rule: cr.design.pid(plant, rule) for rule in ("simc", "amigo")}
+    >>> cplt = plots.closed_loop_plot(plant, loops, span=0.5)
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['output, set-point step', 'output, load step']
     """
     positive(span, "span", "time in s")
     count = int(np.ceil(span / plant.dt)) + 1

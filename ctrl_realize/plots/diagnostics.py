@@ -45,6 +45,19 @@ def residual_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
+    >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
+    >>> cplt = plots.residual_plot(cr.check_residuals(plant, record))
+    >>> cplt.figure.axes[-1].get_xlabel()
+    'lag [samples]'
     """
     row = whole(output, "output", 0, check.fit_percent.size - 1)
     column = whole(input, "input", 0, check.cross.shape[1] - 1)
@@ -86,6 +99,19 @@ def prediction_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 300))
+    >>> record = cr.Record(0.1 * np.arange(300), u, plant.simulate(u) + 0.05 * noise)
+    >>> cplt = plots.prediction_plot(cr.predict(plant, record, 10))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['measured', '10 ahead, fit 86.6 %']
     """
     row = whole(output, "output", 0, prediction.fit_percent.size - 1)
     with style.context():
@@ -112,6 +138,21 @@ def delay_check_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
+    >>> rng = np.random.default_rng(0)
+    >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
+    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
+    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
+    >>> cplt = plots.delay_check_plot(check)
+    >>> cplt.figure.axes[0].get_xlabel()
+    'dead time, or bound ◂ [ms]'
     """
     with style.context():
         axes = style.axes_for(ax, size=(8.0, 1.6 + 0.5 * len(check.views)))
@@ -149,6 +190,17 @@ def channels_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
+    >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
+    >>> cplt = plots.channels_plot(cr.realize_channels(np.array(late)[:, None, :], 1, dt=0.1).fit)
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes], cplt.figure.axes[-1].get_xlabel()
+    (['impulse response [1/s]', 'impulse response [1/s]'], 'time [s]')
     """
     drawn = impulse_plot(fit.impulse, ax=ax, title=title, **kwargs)
     factor, _ = style.time_unit(1.0, drawn.axes[-1, 0])
@@ -171,6 +223,18 @@ def impulse_estimate_plot(estimate: ImpulseEstimate, *args: Any, **kwargs: Any) 
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
+    >>> y = 3.0 * np.roll(u, 5) + 0.1 * noise
+    >>> estimate = cr.impulse_from_io(cr.Record(0.01 * np.arange(2000), u, y), 20)
+    >>> cplt = plots.impulse_estimate_plot(estimate)
+    >>> cplt.figure.axes[0].get_ylabel()
+    'impulse response [1/s]'
     """
     drawn = impulse_plot(estimate, *args, **kwargs)
     factor, _ = style.time_unit(1.0, drawn.axes[-1, 0])

@@ -43,6 +43,20 @@ def fit_plot(
     ------
     OptionError
         A model that was not found by an output-error fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> t = 0.01 * np.arange(900)
+    >>> u = np.where(t < 1.0, 0.0, 2.0)
+    >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
+    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    >>> sys = cr.fit_delay(cr.Record(t, u, y + noise), structures=[(1, 1)])
+    >>> cplt = plots.fit_plot(sys)
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['output', 'residual', '']
     """
     result = _delay_fit(fit)
     with style.context():
@@ -86,6 +100,20 @@ def dead_time_plot(
     ------
     OptionError
         A model that was not found by an output-error fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> t = 0.01 * np.arange(900)
+    >>> u = np.where(t < 1.0, 0.0, 2.0)
+    >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
+    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    >>> sys = cr.fit_delay(cr.Record(t, u, y + noise), structures=[(1, 1), (2, 2)])
+    >>> cplt = plots.dead_time_plot(sys)
+    >>> cplt.figure.axes[0].get_xlabel()
+    'dead time [ms]'
     """
     result = _delay_fit(fit)
     with style.context():

@@ -144,6 +144,20 @@ def comparison_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=0.001)
+    >>> f = np.geomspace(0.1, 10, 40)
+    >>> s = 2j * np.pi * f
+    >>> frf = cr.MeasuredFRF(1.02 * np.exp(-0.03 * s) / (0.08 * s + 1), f)
+    >>> cplt = plots.comparison_plot(cr.compare_frf(model, frf))
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['gain error [dB]', 'phase error [deg]']
     """
     errors = (comparison.gain_error_db, comparison.phase_error_deg)
     spread: tuple[FloatArray | None, FloatArray | None] = (None, None)

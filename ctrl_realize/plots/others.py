@@ -28,6 +28,18 @@ def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> f = np.geomspace(0.1, 20, 80)
+    >>> s = 2j * np.pi * f
+    >>> frf = cr.MeasuredFRF(2 * np.exp(-0.0289 * s) / (0.08 * s + 1) ** 2, f)
+    >>> cplt = plots.frf_fit_plot(cr.fit_frf(frf, 2, dt=0.001).fit)
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['measured', 'fit, order 2']
     """
     omega = 2 * np.pi * fit.frequency_hz
     model = np.asarray(fit.core(1j * omega)).reshape(-1) * np.exp(-1j * omega * fit.dead_time)
@@ -49,6 +61,14 @@ def truth_plot(truth: ValveTruth, *, ax: style.AxesLike = None, **kwargs: Any) -
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> cplt = plots.truth_plot(cr.bench.valve().truth)
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['gain [dB]', 'phase [deg]']
     """
     frf = truth.frf(np.geomspace(0.1, 50.0, 500))
     return frf_plot(frf, ax=ax, dead_time=truth.dead_time, **kwargs)
@@ -70,6 +90,20 @@ def track_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
+    >>> record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> cplt = plots.track_plot(tracker.run(record))
+    >>> cplt.figure.axes[0].get_ylabel()
+    'dead time [s]'
     """
     with style.context():
         axes = style.axes_for(ax, 2, size=(8.0, 5.2), heights=(2.0, 1.0))

@@ -92,6 +92,15 @@ def step_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> cplt = plots.step_plot(record, cr.identify(record, method="scan"))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['measured', 'model']
     """
     steps = _steps(step)
     with style.context():
@@ -139,6 +148,15 @@ def onset_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> cplt = plots.onset_plot(record, cr.identify(record, method="scan"))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['measured', 'model']
     """
     steps = _steps(step)
     with style.context():

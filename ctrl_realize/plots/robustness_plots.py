@@ -28,6 +28,18 @@ def delay_robustness_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([2.0, -1.8], [1, -1], 0.01))
+    >>> found = cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
+    >>> cplt = plots.delay_robustness_plot(found)
+    >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
+    ('dead time of the plant [ms]', 'modulus margin')
     """
 
     def draw(axes: Axes) -> list[Line2D]:
@@ -67,6 +79,16 @@ def uncertainty_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.03).system(0.001)
+    >>> bound = cr.design.uncertainty_bound([1.3 * plant], plant, dead_time_interval=(0.025, 0.035))
+    >>> cplt = plots.uncertainty_plot(bound)
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['bound', 'spread of the systems', 'unsure dead time']
     """
 
     def draw(axes: Axes) -> list[Line2D]:
@@ -99,6 +121,16 @@ def robustness_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.03).system(0.001)
+    >>> bound = cr.design.uncertainty_bound([1.3 * plant], plant, dead_time_interval=(0.025, 0.035))
+    >>> cplt = plots.robustness_plot(bound.check(cr.design.pid(plant)))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['|T|', '1 / uncertainty', 'margin 2.59']
     """
 
     def draw(axes: Axes) -> list[Line2D]:

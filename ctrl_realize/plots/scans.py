@@ -107,6 +107,17 @@ def singular_value_plot(
     ------
     OptionError
         A model that was not found from singular values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> k = np.arange(300)
+    >>> pulse = np.r_[np.zeros(22), 0.9**k + 0.8**k]     # 21 samples, then two lags
+    >>> cplt = plots.singular_value_plot(cr.realize(pulse, 2, delay=21, dt=0.01), count=5)
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['order 2']
     """
     result = fit.fit if isinstance(fit, DelayedStateSpace) else fit
     values, order, floor, name = _singular_values(result, count)
@@ -138,6 +149,17 @@ def order_plot(
     Returns
     -------
     control.ControlPlot
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> k = np.arange(300)
+    >>> pulse = np.r_[np.zeros(22), 0.9**k + 0.8**k]     # 21 samples, then two lags
+    >>> cplt = plots.order_plot(cr.scan_orders(pulse, 3, max_delay=40, dt=0.01))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['order 1: 22', 'order 2: 21', 'order 3: 20']
     """
     with style.context():
         axes = style.axes_for(ax, 2, size=(8.0, 7.0), heights=(1.5, 1.0), sharex=False)

@@ -29,7 +29,14 @@ class PageFigure:
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column; `kind` is "text", "name", "number" or "mono"."""
+    """Heading of a column; `kind` is "text", "name", "number" or "mono".
+
+    Examples
+    --------
+    >>> from ctrl_realize import report
+    >>> report.Column("dead time [ms]", "number")
+    Column(name='dead time [ms]', kind='number')
+    """
 
     name: str
     kind: str = "text"
@@ -37,7 +44,14 @@ class Column:
 
 @dataclass(frozen=True)
 class Row:
-    """Cells of a table as text; `kind` is "", "best" or "failed"."""
+    """Cells of a table as text; `kind` is "", "best" or "failed".
+
+    Examples
+    --------
+    >>> from ctrl_realize import report
+    >>> report.Row(("valve_16mA_05", "37.1"), "best")
+    Row(cells=('valve_16mA_05', '37.1'), kind='best')
+    """
 
     cells: tuple[str, ...]
     kind: str = ""
@@ -45,7 +59,17 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text."""
+    """A table of text.
+
+    Examples
+    --------
+    >>> from ctrl_realize import report
+    >>> columns = (report.Column("record", "name"), report.Column("delay [samples]", "number"))
+    >>> rows = (report.Row(("valve_1", "37.1"), "best"), report.Row(("valve_2", "38.0")))
+    >>> table = report.Table("Delays", rows, columns, note="two of forty")
+    >>> table.kind_of(1), len(table.rows)
+    ('number', 2)
+    """
 
     title: str
     rows: tuple[Row, ...]
@@ -61,7 +85,21 @@ class Table:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything that a report says."""
+    """Everything that a report says.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import report
+    >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
+    >>> bench = report.pairs("Bench", [("shaker", "4.2 kg")])
+    >>> verdict = report.verdict_of(system)
+    >>> page = report.Page(
+    ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
+    ... )
+    >>> print(page.title, "-", page.verdict.facts[0])
+    Valve 7 - ('dead time', '34.38 ms')
+    """
 
     title: str
     subtitle: str
@@ -74,7 +112,15 @@ class Page:
 
 
 def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) -> Table:
-    """Make a table of labels and values."""
+    """Make a table of labels and values.
+
+    Examples
+    --------
+    >>> from ctrl_realize import report
+    >>> table = report.pairs("Bench", [("shaker", "4.2 kg"), ("room", "21 °C")])
+    >>> [row.cells for row in table.rows]
+    [('shaker', '4.2 kg'), ('room', '21 °C')]
+    """
     return Table(
         title,
         tuple(Row(tuple(row)) for row in rows),
@@ -99,7 +145,25 @@ def render(page: Page) -> str:
 
 
 def write_page(path: str | os.PathLike[str], page: Page) -> Path:
-    """Write a page to a file, whole or not at all."""
+    """Write a page to a file, whole or not at all.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import report
+    >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
+    >>> bench = report.pairs("Bench", [("shaker", "4.2 kg")])
+    >>> verdict = report.verdict_of(system)
+    >>> page = report.Page(
+    ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     html = report.write_page(Path(folder) / "valve.html", page).read_text()
+    >>> print(html[html.index("<h1"):html.index("</h1>") + 5])
+    <h1>Valve 7</h1>
+    """
     target = Path(path)
     write_text(target, render(page))
     return target

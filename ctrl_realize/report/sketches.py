@@ -43,6 +43,15 @@ class Sketch:
         Draws into a matplotlib Figure.
     size : tuple of float
         In inches.
+
+    Examples
+    --------
+    >>> from ctrl_realize import report
+    >>> def draw(figure):
+    ...     figure.add_subplot(ylabel="room [°C]").plot([20.5, 21.0, 20.8])
+    >>> sketch = report.Sketch("room", "Room", "Temperature of the day.", draw)
+    >>> sketch.figure.axes[0].get_ylabel()
+    'room [°C]'
     """
 
     key: str

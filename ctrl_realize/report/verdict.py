@@ -11,6 +11,7 @@ import numpy as np
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
+from ..identification.delay_scan import DelayScan
 from ..plots.dead_times import estimate_of, interval_of
 from ..plots.style import in_time
 from ..results import Flag
@@ -24,6 +25,14 @@ SEVERE = frozenset(
     }
 )
 """Flags after which the dead time should not be used as it stands."""
+
+SCANNED = Flag(
+    "no_confidence",
+    "the dead time is where the misfit of a scan is least, and the interval tells how flat the "
+    "misfit is there; neither knows a probability, and fast lags that the order leaves out count "
+    "as dead time. The output-error fit gives a 95 % interval",
+)
+"""What any scan leaves open, however good the record."""
 
 CLOSE, FAR = 0.05, 0.2
 """Relative errors (rms, in the trusted band) under which a model is close, over which it is off."""
@@ -51,8 +60,18 @@ class Verdict:
 
 
 def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Verdict:
-    """Judge a model by the flags of its fit."""
-    flags = (*getattr(system.fit, "flags", ()), *more_flags)
+    """Judge a model by the flags of its fit.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import report
+    >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
+    >>> verdict = report.verdict_of(system)
+    >>> print(verdict.level, "-", verdict.judgement)
+    caution - Use it with care: read the remarks below.
+    """
+    flags = (*_flags_of(system), *more_flags)
     level = _level(flags)
     return Verdict(
         level, headline_of(system), facts_of(system), _reasons(flags), _JUDGEMENTS[level]
@@ -63,7 +82,7 @@ def campaign_verdict(campaign: Campaign) -> Verdict:
     """Judge a campaign by its final model, its own flags and how many records carry flags."""
     system = campaign.system
     own = tuple(campaign.flags)
-    flags = (*own, *getattr(system.fit, "flags", ()))
+    flags = (*own, *_flags_of(system))
     summary = campaign.statistics()
     facts = [
         ("records", f"{len(campaign.good)} of {len(campaign.rows)} identified"),
@@ -87,7 +106,7 @@ def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> 
         f"The model is within {100 * error:.3g} % (rms) of the measurement from {low:.4g} Hz to "
         f"{high:.4g} Hz."
     )
-    flags = (*comparison.flags, *getattr(system.fit, "flags", ()))
+    flags = (*comparison.flags, *_flags_of(system))
     level: Level = "good" if error < CLOSE else "caution" if error < FAR else "poor"
     if level == "good" and flags:
         level = "caution"
@@ -170,6 +189,11 @@ def poles_of(system: DelayedStateSpace) -> str:
 def _gain(system: DelayedStateSpace) -> str:
     gain = float(np.real(np.ravel(system.delay_free.dcgain())[0]))
     return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
+
+
+def _flags_of(system: DelayedStateSpace) -> tuple[Flag, ...]:
+    flags: tuple[Flag, ...] = tuple(getattr(system.fit, "flags", ()))
+    return (*flags, SCANNED) if isinstance(system.fit, DelayScan) else flags
 
 
 def _level(flags: Sequence[Any]) -> Level:

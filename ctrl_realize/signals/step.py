@@ -32,6 +32,16 @@ class StepEdge:
         `stop` (exclusive).
     edges : tuple of StepEdge
         All edges of the record, this one among them; empty on the members.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(300)
+    >>> u = np.where(t < 1.0, 4.0, 12.0)
+    >>> edge = cr.detect_step(cr.Record(t, u, np.where(t < 1.2, 0.0, 3.0)))
+    >>> edge.index, edge.time, edge.rest, edge.amplitude, edge.samples
+    (100, 1.0, 4.0, 8.0, 1)
     """
 
     index: int
@@ -73,6 +83,16 @@ class StepResponse:
     name : str
     record : Record or None
         What it was cut out of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(300)
+    >>> u = np.where(t < 1.0, 4.0, 12.0)
+    >>> step = cr.unit_step(cr.Record(t, u, np.where(t < 1.2, 5.0, 29.0)))
+    >>> print(step.amplitude, step.rest_output, step.output[[19, 20]])
+    8.0 5.0 [0. 3.]
     """
 
     time: FloatArray

@@ -10,12 +10,14 @@ import subprocess
 import sys
 import time
 
+import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError
+from ctrl_realize.identification.campaign_row import fingerprint
 from tests.rigs import step_record
 
 
@@ -112,6 +114,35 @@ def test_rows_of_a_store_hold_no_data(records, tmp_path):
     kept = cr.identify_campaign(records[:1], method="paper", store=cr.CampaignStore(tmp_path))
     assert not hasattr(kept.rows[0].system.fit, "impulse")
     assert "misfit" in kept.rows[0].system.fit.report()
+
+
+def test_systems_that_look_alike_are_other_rows(records, monkeypatch):
+    # python-control shows eight digits of a system, or its name alone
+    monkeypatch.setitem(ct.config.defaults, "iosys.repr_format", "info")
+    sensors = [ct.tf([1], [1 / (2 * np.pi * hz), 1], name="sensor") for hz in (30.0, 10.0)]
+    sensors += [ct.ss(sensor, name="sensor") for sensor in sensors]
+    assert len({repr(sensor) for sensor in sensors}) < 4
+    keys = {fingerprint(records[0], "output_error", {"known": sensor}) for sensor in sensors}
+    assert len(keys) == 4
+    again = ct.tf([1], [1 / (2 * np.pi * 30.0), 1], name="another name")
+    assert fingerprint(records[0], "output_error", {"known": again}) in keys
+
+
+def test_rows_of_another_version_are_made_anew(records, monkeypatch):
+    mine = fingerprint(records[0], "paper", {})
+    monkeypatch.setattr("ctrl_realize.identification.campaign_row._version", lambda: "99.0")
+    assert fingerprint(records[0], "paper", {}) != mine
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are those of POSIX")
+def test_a_pipe_in_the_place_of_a_row_is_not_waited_for(records, tmp_path):
+    store = cr.CampaignStore(tmp_path)
+    first = cr.identify_campaign(records[:1], method="paper", store=store)
+    (path,) = tmp_path.glob("row-*.json")
+    path.unlink()
+    os.mkfifo(path)
+    assert_same_results(first, cr.identify_campaign(records[:1], method="paper", store=store))
+    assert path.is_file()
 
 
 def test_a_file_is_no_store(tmp_path):

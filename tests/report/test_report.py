@@ -226,6 +226,14 @@ def test_the_level_of_trust_follows_the_flags(record):
     assert bad.reasons == ("Try a larger one.",)
 
 
+def test_a_scan_is_never_trusted_without_a_remark(record):
+    scanned = cr.identify(record, method="scan")
+    assert not scanned.fit.flags  # an easy record
+    verdict = verdict_of(scanned)
+    assert verdict.level == "caution"
+    assert "neither knows a probability" in verdict.reasons[0]
+
+
 def test_poles_are_told_as_corner_frequencies():
     import control as ct
 
