@@ -22,8 +22,7 @@ EQUAL = 1e-3
 def missed(name: str, noise: float, seed: int) -> bool:
     """Tell whether a start at the truth finds a better optimum than the search does."""
     plant = {**plants.RIGS, **plants.FACTORIAL}[name]
-    order = len(plant.poles())
-    structure = Structure(order, order)
+    structure = Structure(len(plant.poles()), len(plant.poles()))
     record, truth = plants.record(plant, noise, seed)
     data = step_data(record.output, record.input, record.dt, [(plants.BEFORE, 1)])
     problem = window(data, data.output.size, KnownFactor()).problem
@@ -31,7 +30,7 @@ def missed(name: str, noise: float, seed: int) -> bool:
     # The frequency that stands out is found from a first fit; here none is told to the search.
     found = search(problem, [structure], replace(scales, ringing=0.0))[structure]
     start = np.concatenate([[truth * record.dt], parameters_from_poles(plant.poles() + 0j)])
-    box = parameter_bounds(order, scales)
+    box = parameter_bounds(structure, scales)
     _, cost = fit_batch(problem, structure, start[None], box, most_iterations=100)
     return bool(found.cost > cost[0] * (1 + EQUAL))
 

@@ -98,6 +98,8 @@ def fit_chains(
         return chains
     for order in range(SHORTEST, LONGEST + 1):
         chain = _chain(problem, order, _TANKS, moments, scales, variance, penalty)
+        if _over_within_a_sample(chain, scales):
+            break
         if chains and chain.criterion > chains[-1].criterion + _WORSE:
             break
         chains.append(chain)
@@ -112,12 +114,19 @@ def fit_diffusion(
     if not moments[1] > 0:
         return []
     chain = _chain(problem, LONGEST, _DIFFUSION, moments, scales, variance, penalty)
+    if _over_within_a_sample(chain, scales):
+        return []
     # The sum of 1 / (k - c)^2 beyond n is that of the integral from n + 1/2 - c on.
     slowest, second = np.sort(np.abs(chain.candidate.poles))[:2]
     root = float(np.sqrt(second / slowest))  # (2 - c) / (1 - c)
     first = 1 / (root - 1)  # 1 - c
     hidden = first**2 / (LONGEST - 0.5 + first) / float(slowest)
     return [replace(chain, criterion=chain.criterion + _DIFFUSION_CHARGE, hidden=hidden)]
+
+
+def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
+    """Tell whether no sample shows anything of the lags, so that their curvature is rounding."""
+    return float(np.sum(1 / np.abs(chain.candidate.poles))) < scales.dt
 
 
 def still_improving(chains: Sequence[LagChain]) -> bool:

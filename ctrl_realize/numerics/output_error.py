@@ -260,7 +260,7 @@ def _with_delay(whole: WindowFit, candidate: Candidate, delay: float) -> Candida
     """Best model of the same structure with a given delay."""
     start = candidate.parameters.copy()
     start[0] = delay
-    bounds = parameter_bounds(candidate.structure.order, whole.scales)
+    bounds = parameter_bounds(candidate.structure, whole.scales)
     parameters, cost = fit_batch(
         whole.problem, candidate.structure, start[None], bounds, delay_fixed=True
     )

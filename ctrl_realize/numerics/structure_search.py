@@ -16,6 +16,10 @@ SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)
 NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
 """Charged for every zero, and for every pole beyond the third, when a structure is chosen."""
 
+FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
+"""Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
+lag of half a sample at least, its delay would be known better than to the sample."""
+
 PLAUSIBLE = 10.0
 """A structure is not ruled out while its criterion is within this of the best."""
 
@@ -78,7 +82,7 @@ def search(
         if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
             starts += _pattern_starts(structure, scales)
         parameters, cost = fit_batch(
-            problem, structure, np.array(starts), parameter_bounds(structure.order, scales)
+            problem, structure, np.array(starts), parameter_bounds(structure, scales)
         )
         best = int(np.argmin(cost))
         found[structure] = Candidate(structure, parameters[best], float(cost[best]))
@@ -117,16 +121,21 @@ def refine(
             problem,
             structure,
             old.parameters[None],
-            parameter_bounds(structure.order, scales),
+            parameter_bounds(structure, scales),
             most_iterations=6,
         )
         again[structure] = Candidate(structure, parameters[0], float(cost[0]))
     return again
 
 
-def parameter_bounds(order: int, scales: Scales) -> Bounds:
-    """Box for delay and poles: time constants from half a sample to (nearly) an integrator."""
-    fast = np.log(2.0 / scales.dt)
+def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
+    """Box for delay and poles: time constants up to (nearly) an integrator.
+
+    Beside zeros they are half a sample at least: with more freedom such a model imitates a ringing
+    that was sampled too coarsely.
+    """
+    order = structure.order
+    fast = np.log((SLOWER_WITH_ZEROS if structure.zeros else FASTEST) / scales.dt)
     low, high = [scales.earliest], [scales.latest]
     if order % 2:
         low.append(np.log(1e-4 / scales.length))

@@ -190,6 +190,31 @@ def test_no_delay_is_said_to_be_no_delay(plant):
     assert fit.delay < 1
 
 
+@pytest.mark.parametrize("delay", [25.0, 25.4, 25.9])
+@pytest.mark.parametrize("noise", [0.001, 0.005, 0.025])
+def test_a_jump_between_two_samples_may_have_come_at_any_time_between_them(noise, delay):
+    # Nothing but a dead time: whatever comes after the sample before, and up to the jump, fits.
+    k = np.arange(-100, 400)
+    y = (k >= delay) + noise * np.random.default_rng(0).standard_normal(k.size)
+    low, high = cr.fit_delay(cr.Record(0.01 * k, (k >= 0).astype(float), y)).fit.delay_interval
+    before, seen = np.ceil(delay) - 1, np.ceil(delay)
+    assert before - 0.5 < low < before + 0.1
+    assert seen <= high < seen + 0.05
+
+
+def test_a_lag_of_a_tenth_of_a_sample_leaves_its_sample_open_and_one_of_two_samples_does_not():
+    k = np.arange(-100, 400)
+    noise = 0.001 * np.random.default_rng(0).standard_normal(k.size)
+    intervals = []
+    for lag in (0.1, 2.0):
+        y = -np.expm1(-np.maximum(k - 25.4, 0) / lag) + noise
+        fit = cr.fit_delay(cr.Record(0.01 * k, (k >= 0).astype(float), y)).fit
+        assert covers(fit, 25.4)
+        intervals.append(fit.delay_interval)
+    assert intervals[0][1] == pytest.approx(26.0, abs=0.01)
+    assert intervals[1][1] < 25.5
+
+
 def test_a_delay_beyond_max_delay_is_flagged_and_found_without_the_limit():
     record = rigs.step_record(delay=130.0, noise=0.001)
     limited = cr.fit_delay(record, max_delay=100).fit

@@ -37,7 +37,7 @@ def problem():
     problem = window(data, k.size, KnownFactor()).problem
     structure = Structure(3, 3)
     start = np.append(40.0, parameters_from_poles(-np.array([0.04, 0.05, 0.06], complex)))
-    bounds = parameter_bounds(3, scales)
+    bounds = parameter_bounds(Structure(3, 3), scales)
     parameters, cost = fit_batch(problem, structure, start[None], bounds)
     return problem, Candidate(structure, parameters[0], float(cost[0])), scales
 
@@ -150,7 +150,7 @@ def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
     scales = step_scales(data, k.size, None)
     problem = window(data, k.size, KnownFactor()).problem
     start = np.append(25.0, parameters_from_poles(-np.array([0.01, 0.06], complex)))
-    bounds = parameter_bounds(2, scales)
+    bounds = parameter_bounds(Structure(2, 2), scales)
     parameters, cost = fit_batch(problem, Structure(2, 2), start[None], bounds)
     like = Candidate(Structure(2, 2), parameters[0], float(cost[0]))
     (chain,) = fit_diffusion(problem, like, scales, 1e-8, 7.0)

@@ -134,7 +134,7 @@ def test_exact_data_give_their_own_parameters_back(zeta):
         problem,
         Structure(3, 3),
         found.parameters[None],
-        parameter_bounds(3, scales),
+        parameter_bounds(Structure(3, 3), scales),
         tolerance=1e-13,
     )
     assert_allclose(polished[0, 0], truth[0], rtol=1e-6)
@@ -153,7 +153,7 @@ def test_no_random_start_beats_the_few_that_are_tried():
         problem = Problem(data, np.ones(500), drive, np.ones((500, 1)), KnownFactor())
         scales = Scales(52 * rigs.TS, 90 * rigs.TS, 480 * rigs.TS, rigs.TS, 75 * rigs.TS)
         found = search(problem, [Structure(3, 3)], scales)[Structure(3, 3)]
-        box = parameter_bounds(3, scales)
+        box = parameter_bounds(Structure(3, 3), scales)
         starts = rng.uniform(box.low, box.high, size=(30, 4))
         _, cost = fit_batch(problem, Structure(3, 3), starts, box, most_iterations=60)
         worse += found.cost > cost.min() * (1 + 1e-4)
