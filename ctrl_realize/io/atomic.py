@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -44,7 +45,11 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
     ...     print([(p.name, p.read_text()) for p in Path(folder).iterdir()])
     [('a.txt', 'done')]
     """
-    target = Path(os.path.realpath(path))
+    try:
+        target = Path(os.path.realpath(path))
+    except ValueError as error:
+        # a NUL character in the name
+        raise OSError(errno.EINVAL, str(error), os.fspath(path)) from error
     # Created by hand, not by tempfile, so that the file gets the permissions of any new file.
     temporary = target.with_name(f".{target.name[:40]}-{secrets.token_hex(8)}.tmp")
     os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+from numbers import Real
 from pathlib import Path
 
 from ..errors import FileFormatError, MissingFileError, OptionError
@@ -22,8 +23,10 @@ def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
     FileFormatError
         If it is a folder, a device or a pipe (which might never end), empty, or too large.
     """
-    if not max_bytes > 0:
-        raise OptionError(f"max_bytes={max_bytes} must be positive")
+    if not isinstance(max_bytes, Real) or not max_bytes > 0:
+        raise OptionError(f"max_bytes={max_bytes!r} must be a positive number")
+    if not isinstance(path, str | os.PathLike):
+        raise OptionError(f"a file is named by text or a Path, not by {type(path).__name__}")
     try:
         path = Path(path)
         status = path.stat()

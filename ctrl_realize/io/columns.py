@@ -41,6 +41,8 @@ def find_columns(table: Table, wanted: Selector, argument: str) -> list[int]:
     """
     if isinstance(wanted, str | int | np.integer):
         return _one_choice(table, wanted, argument)
+    if not isinstance(wanted, Iterable):
+        raise OptionError(f"{argument}={wanted!r} must be a column's name or number, or several")
     chosen = [index for one in wanted for index in _one_choice(table, one, argument)]
     if not chosen or len(set(chosen)) != len(chosen):
         raise OptionError(f"{argument}={wanted!r} must name one or more different columns")

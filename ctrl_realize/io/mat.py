@@ -24,6 +24,9 @@ _HEADER_BYTES = 128
 _CHUNK = 1 << 20
 _MAX_DEPTH = 8
 _MAX_ARRAYS = 10_000
+# an empty element takes eight bytes: a large file of zeros would be looked at for minutes
+_MAX_ELEMENTS = 20 * _MAX_ARRAYS
+_SPARE = 64
 
 _MATRIX, _COMPRESSED = 14, 15
 _TYPES = {
@@ -78,8 +81,11 @@ class _DamagedError(Exception):
 
 def _elements(content: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
     """Give type and data of the elements that follow each other in `content`."""
-    at = 0
+    at = count = 0
     while at + 8 <= len(content):
+        count += 1
+        if count > _MAX_ELEMENTS:
+            raise _DamagedError(f"more than {_MAX_ELEMENTS} elements in a row")
         kind, n_bytes = struct.unpack_from(order + "II", content, at)
         start = at + 8
         if kind >> 16:
@@ -102,23 +108,33 @@ def _unpacked(
     for kind, data in _elements(content, order):
         if kind == _MATRIX:
             yield data
-        if kind != _COMPRESSED:
-            continue
-        unpacker, pieces = zlib.decompressobj(), []
-        rest: bytes | memoryview = data
-        try:
-            while not unpacker.eof and len(rest):
-                pieces.append(unpacker.decompress(rest, _CHUNK))
-                rest = unpacker.unconsumed_tail
-                total += len(pieces[-1])
-                check_size(path, total, max_bytes, ", unpacked,")
-        except zlib.error as error:
-            raise _DamagedError(str(error)) from error
-        if not unpacker.eof:
-            raise _DamagedError("packed data end too early")
-        for inner, matrix in _elements(memoryview(b"".join(pieces)), order):
-            if inner == _MATRIX:
-                yield matrix
+        elif kind == _COMPRESSED:
+            matrix = _unpack(path, data, order, max_bytes - total)
+            total += len(matrix)
+            yield matrix
+
+
+def _unpack(path: Path, packed: memoryview, order: str, room: float) -> memoryview:
+    """Unpack one matrix, as much as it says of its size; nothing if it is something else."""
+    unpacker, content, size = zlib.decompressobj(), bytearray(), 0
+    rest: bytes | memoryview = packed
+    try:
+        while not unpacker.eof and len(rest):
+            content += unpacker.decompress(rest, min(_CHUNK, size + _SPARE - len(content)))
+            rest = unpacker.unconsumed_tail
+            if not size and len(content) >= 8:
+                kind, announced = struct.unpack_from(order + "II", content)
+                if kind != _MATRIX:
+                    return memoryview(b"")
+                size = 8 + announced
+                check_size(path, size, room, ", unpacked,")
+            if len(content) >= size + _SPARE:
+                raise _DamagedError(f"more than the {size} bytes announced are packed")
+    except zlib.error as error:
+        raise _DamagedError(str(error)) from error
+    if not unpacker.eof or len(content) < max(size, 8):
+        raise _DamagedError("packed data end too early")
+    return memoryview(content)[8:size]
 
 
 def _collect(

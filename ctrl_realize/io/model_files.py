@@ -13,6 +13,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import whole
 from ..delayed import DelayedStateSpace
 from ..errors import CtrlRealizeError, FileFormatError, OptionError
 from .atomic import write_text
@@ -120,6 +121,7 @@ def load_model(
     >>> valve.delay, valve.name
     (37, 'valve')
     """
+    whole(max_states, "max_states", 0)
     file = usable_file(path, MAX_MODEL_BYTES)
     try:
         text = file.read_bytes().decode("utf-8")

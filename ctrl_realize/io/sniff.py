@@ -21,6 +21,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..checks import whole
 from ..errors import FileFormatError, OptionError
 from .checks import read_head
 from .units import is_units_line, plain_unit, split_unit
@@ -42,6 +43,9 @@ MISSING = frozenset({"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-"
 _NOT_NAMES = MISSING | {"inf", "+inf", "-inf", "infinity", "-infinity"}
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
+    # before that of UTF-16, with which it begins
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
@@ -59,18 +63,20 @@ class TextOptions:
     skip_rows: int = 0
 
     def __post_init__(self) -> None:
+        for name in ("delimiter", "decimal", "encoding"):
+            if not isinstance(getattr(self, name), str):
+                raise OptionError(f"{name}={getattr(self, name)!r} must be text, such as 'auto'")
         if self.delimiter != "auto" and (len(self.delimiter) != 1 or self.delimiter in "\r\n\"'"):
             raise OptionError(f"delimiter={self.delimiter!r} must be one character or 'auto'")
         if self.decimal not in ("auto", ".", ","):
             raise OptionError(f"decimal={self.decimal!r} must be '.', ',' or 'auto'")
-        if self.comment not in ("auto", None) and len(self.comment) != 1:
+        if self.comment not in ("auto", None) and not (
+            isinstance(self.comment, str) and len(self.comment) == 1
+        ):
             raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")
         if self.header not in (True, False, "auto"):
             raise OptionError(f"header={self.header!r} must be True, False or 'auto'")
-        if isinstance(self.skip_rows, bool) or self.skip_rows != int(self.skip_rows):
-            raise OptionError(f"skip_rows={self.skip_rows!r} must be a number of lines")
-        if self.skip_rows < 0:
-            raise OptionError(f"skip_rows={self.skip_rows} must not be negative")
+        whole(self.skip_rows, "skip_rows", 0)
         if self.encoding != "auto":
             try:
                 # also refuses the codecs of Python that are no encodings of text: zlib, rot13

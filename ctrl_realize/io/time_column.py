@@ -69,7 +69,7 @@ def _parsed_dates(table: Table, index: int, time_format: str | None) -> np.ndarr
         stamps = pd.to_datetime(
             pd.Series(cells), format=time_format or "ISO8601", utc=True, errors="coerce"
         )
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise OptionError(f"time_format={time_format!r} is no format of time: {error}") from error
     bad = stamps.isna().to_numpy()
     if bad.any():

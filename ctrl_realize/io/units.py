@@ -85,7 +85,7 @@ def to_seconds(values: FloatArray, unit: str) -> FloatArray:
 
 def checked_time_unit(unit: str) -> str:
     """Return the plain spelling of a unit of time, or say which ones there are."""
-    plain = plain_unit(unit)
+    plain = plain_unit(unit) if isinstance(unit, str) else None
     if plain not in TIME_UNITS:
         raise OptionError(
             f"{unit!r} is not a known unit of time; say time_unit= one of " + ", ".join(TIME_UNITS)

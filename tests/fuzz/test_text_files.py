@@ -106,7 +106,10 @@ OPTIONS = {
     "missing": of("refuse", "keep"),
     "resample": of(True, False),
     "variable": of("x"),
+    "max_bytes": of(1e9, 10, -1, float("nan")),
 }
+ODD_KINDS = (None, True, 3, -7, 1.5, "", b"t", [], {}, object, float("nan"))
+"""What none of the arguments, or nearly none, should be."""
 
 
 def numbers_in(content: bytes) -> set[float]:
@@ -161,6 +164,8 @@ def test_a_damaged_table_is_read_or_refused(rng, file):
 @fuzz(100)
 def test_any_choice_of_arguments_is_followed_or_refused(rng, file):
     content, choice = rng.choice([any_table, mutated])(rng), chosen(rng, OPTIONS)
+    if choice and sometimes(rng, 10):
+        choice[rng.choice(sorted(choice))] = rng.choice(ODD_KINDS)
     file.write_bytes(content)
     with good_end() as records:
         records.append(read_record(file, **choice))

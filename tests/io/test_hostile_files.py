@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
 import socket
+import struct
 import tracemalloc
+import zlib
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -16,7 +20,7 @@ from ctrl_realize.errors import (
     MissingFileError,
     OptionError,
 )
-from ctrl_realize.io import load_model, read_frf, read_record
+from ctrl_realize.io import load_model, read_frf, read_record, save_model
 
 READERS = [read_record, read_frf, load_model]
 JUNK = np.random.default_rng(7).bytes(100_000)
@@ -188,3 +192,70 @@ def test_a_table_of_thousands_of_columns_is_listed_shortly(tmp_path):
     file.write_text(names + "\n" + (",".join("1" * 5000) + "\n") * 5)
     with pytest.raises(OptionError, match=r"\(5000 in all\)"):
         read_record(file)
+
+
+def test_a_packed_mat_of_zeros_is_not_unpacked_and_looked_at_for_minutes(tmp_path):
+    # 500 MiB of zeros in half a megabyte were 62 million empty elements
+    packer = zlib.compressobj()
+    packed = b"".join([packer.compress(bytes(1 << 20)) for _ in range(100)]) + packer.flush()
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    file = tmp_path / "zeros.mat"
+    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+    tracemalloc.start()
+    with pytest.raises(FileFormatError, match="no columns"):
+        read_record(file)
+    assert tracemalloc.get_traced_memory()[1] < 10e6
+    tracemalloc.stop()
+
+
+def test_what_is_packed_behind_a_matrix_is_not_unpacked(tmp_path):
+    matrix = struct.pack("<II", 14, 64) + bytes(64)
+    packed = zlib.compress(matrix + bytes(50 << 20))
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    file = tmp_path / "tail.mat"
+    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+    with pytest.raises(FileFormatError, match="more than the 72 bytes announced"):
+        read_record(file)
+
+
+def test_a_file_of_empty_elements_is_damaged(tmp_path):
+    file = tmp_path / "empty.mat"
+    file.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + bytes(8 * 200_001))
+    with pytest.raises(FileFormatError, match="200000 elements"):
+        read_record(file)
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("path", [None, 3, b"a.csv", io.StringIO("t,u,y\n")], ids=str)
+def test_what_is_no_name_of_a_file_is_refused(read, path):
+    with pytest.raises(OptionError, match=f"not by {type(path).__name__}"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    "argument",
+    [
+        {"max_bytes": "x"}, {"skip_rows": "x"}, {"skip_rows": 1.5}, {"delimiter": None},
+        {"decimal": 3}, {"encoding": None}, {"comment": 3}, {"time_unit": None},
+        {"time": 0, "time_format": 3}, {"input": 1.5}, {"output": object},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_arguments_of_another_kind_are_refused(tmp_path, argument):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y\n" + "".join(f"{k},{k > 3:d},{k}\n" for k in range(9)))
+    with pytest.raises(OptionError):
+        read_record(file, **argument)
+
+
+def test_utf_32_with_its_mark_is_read(tmp_path):
+    file = tmp_path / "a.csv"
+    text = "t,u,y\n" + "".join(f"{k},{k > 3:d},{k}\n" for k in range(9))
+    for encoding in ("utf-32", "utf-16", "utf-8-sig"):
+        file.write_bytes(text.encode(encoding))
+        assert list(read_record(file).output) == list(range(9))
+
+
+def test_a_model_is_not_saved_under_a_name_that_no_file_can_have(tmp_path):
+    with pytest.raises(OSError, match="null"):
+        save_model(tmp_path / "a\0b.json", ct.ss(0.9, 1, 1, 0, 0.1))
