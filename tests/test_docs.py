@@ -107,3 +107,20 @@ def test_every_page_is_linked_from_a_table_of_contents():
 def test_errata_of_the_paper_are_all_on_the_map():
     text = (DOCS / "paper_map.md").read_text()
     assert "ERRATA" in text  # the cell that prints them all
+
+
+def test_every_public_name_shows_how_it_is_used(reference):
+    silent = []
+    for entry in sorted(listed(reference)):
+        module, _, name = entry.rpartition(".")
+        value = getattr(import_module(module), name)
+        # An error is raised, not called; the functions that raise it say when. Constants show
+        # their value.
+        error = inspect.isclass(value) and issubclass(value, Exception)
+        if error or not callable(value):
+            continue
+        # A class inherits the words of its parent, but not a use.
+        own = vars(value).get("__doc__") if inspect.isclass(value) else value.__doc__
+        if ">>>" not in (own or "").partition("Examples\n    --------")[2]:
+            silent.append(entry)
+    assert not silent
