@@ -207,7 +207,7 @@ def alternating() -> np.ndarray:
     return np.concatenate([[0.0], 0.9**k + 0.3 * (-0.8) ** k])
 
 
-def campaign(seed: int, *, broken: bool = False, trend: float = 0.0) -> Codes:
+def campaign(seed: int, *, broken: bool = False, twice: bool = False, trend: float = 0.0) -> Codes:
     noise = _noise(seed, LOW)
     plant = _plant(seed)
     records = []
@@ -224,6 +224,8 @@ def campaign(seed: int, *, broken: bool = False, trend: float = 0.0) -> Codes:
     if broken:
         flat = np.zeros(records[3].n_samples)
         records[3] = cr.Record(records[3].time, records[3].input, flat)
+    if twice:
+        records[7] = records[2]
     return codes(cr.identify_campaign(records, method="scan"))
 
 
@@ -321,6 +323,8 @@ CASES: list[FlagCase] = [
              "R2 of order 2, noise 0.1 %", realized(rigs.R2, 2, 0.001)),
     FlagCase("identify_campaign", "failed_records", "one flat record of twelve",
              lambda s: campaign(s, broken=True), "twelve records alike, by the scan", campaign),
+    FlagCase("identify_campaign", "same_records", "one record of twelve given twice",
+             lambda s: campaign(s, twice=True), "twelve records alike, by the scan", campaign),
     FlagCase("identify_campaign", "amplitude_trend", "delay 6 samples longer at half the height",
              lambda s: campaign(s, trend=6.0), "twelve records alike, by the scan", campaign),
     FlagCase("bootstrap", "failed_draws", "one draw of five raises",

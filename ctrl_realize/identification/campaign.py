@@ -7,6 +7,7 @@ together, since averaging estimates keeps their common bias.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -226,7 +227,7 @@ class Campaign(Result):
 
     @property
     def flags(self) -> tuple[Flag, ...]:
-        """What one should know: failed records, and delays that depend on the step height."""
+        """What one should know: records that failed or came twice, a delay that is not constant."""
         flags = []
         if self.failed:
             names = ", ".join(row.name for row in self.failed[:5])
@@ -238,10 +239,8 @@ class Campaign(Result):
                     "table tells why",
                 )
             )
-        trend = _amplitude_trend(self.good, self.method)
-        if trend is not None:
-            flags.append(trend)
-        return tuple(flags)
+        found = (_same_records(self.good), _amplitude_trend(self.good, self.method))
+        return (*flags, *(flag for flag in found if flag is not None))
 
     def _title(self) -> str:
         return f"Campaign of {len(self.rows)} records ({self.method})"
@@ -270,10 +269,33 @@ class Campaign(Result):
         return f"<Campaign: {len(self.rows)} records{failed}, method {self.method!r}>"
 
 
+def _same_records(rows: tuple[CampaignRow, ...]) -> Flag | None:
+    """Find records whose results agree in every digit, which noise never lets happen."""
+    alike: dict[tuple[float, ...], list[str]] = {}
+    for row in rows:
+        results = (row.delay, row.misfit, row.gain, row.amplitude, *row.interval)
+        alike.setdefault(results, []).append(row.name)
+    twice = [names for names in alike.values() if len(names) > 1]
+    if not twice:
+        return None
+    extra = sum(len(names) - 1 for names in twice)
+    names = ", ".join(twice[0][:4]) + (", ..." if len(twice[0]) > 4 else "")
+    more = "" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)"
+    return Flag(
+        "same_records",
+        f"{extra} of {len(rows)} records are others over again: {names} have the same results to "
+        f"the last digit{more}; the scatter and its interval are too small",
+    )
+
+
 def _amplitude_trend(rows: tuple[CampaignRow, ...], method: str) -> Flag | None:
     """Test whether the delay depends on the height of the step, by the rank correlation."""
     from scipy.stats import spearmanr  # scipy.stats takes a while to import
 
+    if rows and method != "output_error":
+        # A realization of one order more takes a lag out of the delay: compared is what is alike.
+        orders = Counter(row.order for row in rows)
+        rows = tuple(row for row in rows if row.order == orders.most_common(1)[0][0])
     heights = np.array([abs(row.amplitude) for row in rows])
     delays = np.array([row.delay for row in rows])
     known = np.isfinite(heights) & np.isfinite(delays)

@@ -138,6 +138,14 @@ def test_a_linear_plant_raises_no_alarm(campaign):
     assert campaign.flags == ()
 
 
+def test_a_record_that_comes_twice_is_told(campaign, records):
+    assert "same_records" not in {flag.code for flag in campaign.flags}
+    again = cr.identify_campaign([*records[:3], named(records[1], "copy")], method="scan")
+    (flag,) = (flag for flag in again.flags if flag.code == "same_records")
+    assert "1 of 4 records" in flag.message
+    assert f"{records[1].name}, copy have the same results" in flag.message
+
+
 def test_a_campaign_pickles(campaign):
     twin = pickle.loads(pickle.dumps(campaign))
     assert_array_equal(twin.delays, campaign.delays)
