@@ -310,7 +310,7 @@ CASES: list[FlagCase] = [
           "order 1 of R1, noise 0.1 %", scanned("R1", 0.001, 1)),
     FlagCase("realize", "filter_delay", "causal filter at 50 Hz", filtered(False),
              "zero-phase filter at 50 Hz", filtered(True)),
-    FlagCase("realize", "unstable", "integrator, noise 1 % of the pulse",
+    FlagCase("realize", "not_died_away", "integrator, noise 1 % of the pulse",
              realized(ct.tf([1], [1, 0]), 1, 0.01),
              "R3 of order 3, noise 1 %", realized(rigs.R3, 3, 0.01)),
     FlagCase("realize", "unstable", "a pole at z = 1.01, noise 1 %",

@@ -23,6 +23,9 @@ HANKEL = ("square", "padded")
 NO_GAP = 0.8
 """Ratio of neighbouring singular values from which there is no gap between them."""
 
+DIED_AWAY = 0.2
+"""Part of a response that may be left at the end of the data."""
+
 
 @dataclass(frozen=True, eq=False)
 class Realization(Result):
@@ -62,7 +65,8 @@ class Realization(Result):
     impulse : ImpulseResponse
         The data.
     flags : tuple of Flag
-        ``"unstable"``, ``"negative_pole"``, ``"no_gap"``, ``"filter_delay"``.
+        ``"unstable"``, ``"not_died_away"``, ``"negative_pole"``, ``"no_gap"``,
+        ``"filter_delay"``.
 
     Examples
     --------
@@ -237,7 +241,7 @@ def realize(
         error_bound=model.rest_bound if padded else None,
         iae=iae if np.isfinite(iae) else np.inf,
         impulse=data,
-        flags=filter_flags(data) + _pole_flags(model.A) + _gap_flags(model, order),
+        flags=filter_flags(data) + _pole_flags(model.A, samples) + _gap_flags(model, order),
     )
     core = ct.ss(model.A, model.B, model.C, D, data.dt)
     return DelayedStateSpace(core, delay, fit=fit)
@@ -253,7 +257,7 @@ def uses_feedthrough(impulse: ImpulseResponse, delay: int, feedthrough: bool | N
     return bool(abs(impulse.markov[delay]) > 3 * np.std(noise, ddof=1))
 
 
-def _pole_flags(A: FloatArray) -> tuple[Flag, ...]:
+def _pole_flags(A: FloatArray, samples: int) -> tuple[Flag, ...]:
     poles = np.linalg.eigvals(A)
     flags = []
     largest = float(np.abs(poles).max())
@@ -263,6 +267,15 @@ def _pole_flags(A: FloatArray) -> tuple[Flag, ...]:
                 "unstable",
                 f"the largest pole has magnitude {largest:.5f}: an integrating plant, noise, or "
                 "an order that is too high; hankel='padded' is stable by construction",
+            )
+        )
+    elif largest**samples > DIED_AWAY:
+        flags.append(
+            Flag(
+                "not_died_away",
+                f"the largest pole has magnitude {largest:.5f} and keeps "
+                f"{100 * largest**samples:.0f} % of its response at the end of the {samples} "
+                "samples: an integrating plant, or data that end too early to know the gain",
             )
         )
     negative = poles[(np.abs(poles.imag) < 1e-9) & (poles.real < 0)].real

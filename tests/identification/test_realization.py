@@ -161,6 +161,9 @@ def test_flags_tell_what_to_distrust():
     k = np.arange(300)
     assert codes(cr.realize(1.001**k, 1, dt=1.0)) == {"unstable"}
     assert codes(cr.realize((-0.8) ** k, 1, dt=1.0)) == {"negative_pole"}
+    # 0.99^k has fallen to 0.13 after 200 samples, 0.992^k to 0.2007
+    assert codes(cr.realize(0.99 ** np.arange(201), 1, dt=1.0)) == set()
+    assert codes(cr.realize(0.992 ** np.arange(201), 1, dt=1.0)) == {"not_died_away"}
     assert "no_gap" in codes(cr.realize(np.random.default_rng(0).standard_normal(300), 3, dt=1.0))
     causal = cr.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
     lagging = cr.realize(cr.ImpulseResponse(valve_pulse("clean"), TS, filter=causal), 3, delay=37)
