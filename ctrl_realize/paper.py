@@ -124,7 +124,7 @@ class SetUp:
 
 @dataclass(frozen=True)
 class SteppedSine:
-    """The stepped-sine measurement of the FRF (section 3.1, Fig. 2).
+    """The stepped-sine measurement of the FRF (section 3.1, figure 2).
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ SETUP = SetUp()
 """Sections 2.2 and 3.1."""
 
 STEPPED_SINE = SteppedSine()
-"""Section 3.1 and Fig. 2."""
+"""Section 3.1 and figure 2."""
 
 DELAY = 37
 """Estimated delay in samples (section 3.2, under Table 1)."""
@@ -200,10 +200,10 @@ DEAD_TIME = DELAY * SETTINGS.sample_time
 """The same delay in s: 28.9 ms."""
 
 TRUSTED_BAND_HZ = (0.1, 13.0)
-"""Where the model is good (section 3.2, Fig. 8); printed as 0.01-13 Hz, see `ERRATA`, E13."""
+"""Where the model is good (section 3.2, figure 8); printed as 0.01-13 Hz, see `ERRATA`, E13."""
 
 SHOWN_RECORD = (16.0, 5)
-"""Step size in mA and number of the record of Figs. 6 and 7."""
+"""Step size in mA and number of the record of figures 6 and 7."""
 
 FINAL_RECORD = (16.0, 2)
 """Step size in mA and number of the record of least IAE, which gave the final model."""

@@ -89,6 +89,21 @@ class DelayTrack(Result):
     Where ``tells`` is false, nothing is claimed; `low` and `high` then only show what is left
     open.
 
+    Attributes
+    ----------
+    time : ndarray, shape (K,)
+        From the first sample, in s.
+    dead_time : ndarray, shape (K,)
+        In s, interpolated between samples.
+    low, high : ndarray, shape (K,)
+        95 % interval in samples.
+    gain_ratio : ndarray, shape (K,)
+        Gain over that of the starting model.
+    tells : ndarray of bool, shape (K,)
+        Whether the samples within the memory tell a delay.
+    dt : float
+        Sample time in s.
+
     Examples
     --------
     >>> import control as ct

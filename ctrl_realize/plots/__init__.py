@@ -15,6 +15,7 @@ from .design_plots import hankel_plot as hankel_plot
 from .design_plots import margins_plot as margins_plot
 from .design_plots import pid_comparison_plot as pid_comparison_plot
 from .design_plots import process_model_plot as process_model_plot
+from .diagnostics import channel_fit_plot as channel_fit_plot
 from .diagnostics import channels_plot as channels_plot
 from .diagnostics import delay_check_plot as delay_check_plot
 from .diagnostics import impulse_estimate_plot as impulse_estimate_plot
@@ -41,6 +42,7 @@ from .scans import singular_value_plot as singular_value_plot
 _DRAWN_BY = {
     "BalancedReduction": "design_plots:hankel_plot",
     "Campaign": "campaigns:campaign_plot",
+    "ChannelFit": "diagnostics:channel_fit_plot",
     "ChannelRealization": "diagnostics:channels_plot",
     "DelayCheck": "diagnostics:delay_check_plot",
     "Bootstrap": "bootstraps:bootstrap_plot",

@@ -69,7 +69,9 @@ def bootstrap_plot(
             lower.axvline(factor * limit, color=style.INK, linewidth=1.0)
         lower.set_xlabel(f"dead time [{unit}]")
         lower.set_ylabel("draws")
-        return style.finished(axes, [lines, []], title=title or "", own_figure=ax is None)
+        return style.finished(
+            axes, [lines, []], title=title or "", own_figure=ax is None, loc="lower right"
+        )
 
 
 def _settled(result: Bootstrap) -> int:

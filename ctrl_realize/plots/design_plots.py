@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
@@ -58,9 +60,7 @@ def margins_plot(
     frequency = omega / style.HERTZ
     phase = np.degrees(np.unwrap(np.angle(values)))
     with style.context():
-        gain_ax, phase_ax, nyquist = style.axes_for(
-            ax, 1, columns=3, size=(13.0, 4.2), sharex=False
-        )
+        gain_ax, phase_ax, nyquist = _three(ax)
         drawn = [gain_ax.semilogx(frequency, style.decibel(np.abs(values)), color=style.MODEL)]
         drawn.append(phase_ax.semilogx(frequency, phase, color=style.MODEL))
         gain_ax.axhline(0, color=style.INPUT, linewidth=1)
@@ -88,7 +88,17 @@ def margins_plot(
             legends=(0, 1, 2),
             title=title or f"Closed loop {verdict}",
             own_figure=ax is None,
+            loc="lower left",
         )
+
+
+def _three(ax: style.AxesLike) -> list[Axes]:
+    """Put gain above phase and the Nyquist curve beside them; axes that are given stay."""
+    if ax is not None and not isinstance(ax, FigureBase):
+        return style.axes_for(ax, 3)
+    figure = plt.figure(figsize=(9.6, 5.4), layout="constrained") if ax is None else ax
+    grid = figure.add_gridspec(2, 2)
+    return [figure.add_subplot(place) for place in (grid[0, 0], grid[1, 0], grid[:, 1])]
 
 
 def _mark_gain_margin(axes: Any, found: Margins) -> None:
@@ -179,7 +189,9 @@ def pid_comparison_plot(
         axes.set(xlabel="sensitivity peak Ms", ylabel="integrated absolute load error [s]")
         axes.margins(x=0.05)
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        low, high = axes.get_ylim()
+        few = high < 5 * low  # too few round numbers for a logarithmic axis
+        axes.yaxis.set_major_locator(MaxNLocator(5) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())
         low, high = axes.get_xlim()
@@ -311,7 +323,7 @@ def process_model_plot(
         axes.set(xlabel=f"time [{unit}]", ylabel="step response")
         return lines
 
-    return style.in_one(ax, title or "Process model", draw)
+    return style.in_one(ax, title or "Process model", draw, loc="lower right")
 
 
 def closed_loop_plot(

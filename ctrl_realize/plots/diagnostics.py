@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from ..checks import whole
+from ..errors import OptionError
+from ..identification.channel_fit import ChannelFit
 from ..identification.channels import ChannelRealization
 from ..identification.cross_check import DelayCheck
 from ..identification.from_io import ImpulseEstimate
@@ -73,7 +75,9 @@ def residual_plot(
         axes[1].set_ylabel("residual with\nitself")
         axes[2].set_ylabel("residual with\ninput before")
         axes[2].set_xlabel("lag [samples]")
-        return style.finished(axes, [above, own, cross], title=title, own_figure=ax is None)
+        return style.finished(
+            axes, [above, own, cross], title=title, own_figure=ax is None, loc="above"
+        )
 
 
 def prediction_plot(
@@ -119,7 +123,7 @@ def prediction_plot(
         label = f"{prediction.steps} ahead, fit {prediction.fit_percent[row]:.1f} %"
         values = np.atleast_2d(prediction.output)[row]
         lines = _signals(axes[0], prediction.record, values, row, label, kwargs)
-        return style.finished(axes, [lines], title=title, own_figure=ax is None)
+        return style.finished(axes, [lines], title=title, own_figure=ax is None, loc="above")
 
 
 def delay_check_plot(
@@ -174,6 +178,39 @@ def delay_check_plot(
         return style.finished(axes, [lines], title=title, own_figure=ax is None)
 
 
+def channel_fit_plot(fit: ChannelFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
+    """Draw how a fitted model follows one of its records, and the correlations of what is left.
+
+    Parameters
+    ----------
+    fit : ChannelFit
+    record : int, optional
+        Which of the records without gaps.
+    **kwargs
+        Passed on to `residual_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
+    >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
+    >>> cplt = plots.channel_fit_plot(cr.fit_channels(record, 1).fit)
+    >>> cplt.figure.axes[-1].get_xlabel()
+    'lag [samples]'
+    """
+    if not fit.checks:
+        raise OptionError("all records have gaps; there is no simulation to draw them beside")
+    return residual_plot(fit.checks[whole(record, "record", 0, len(fit.checks) - 1)], **kwargs)
+
+
 def channels_plot(
     fit: ChannelRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
@@ -199,8 +236,8 @@ def channels_plot(
     >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
     >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
     >>> cplt = plots.channels_plot(cr.realize_channels(np.array(late)[:, None, :], 1, dt=0.1).fit)
-    >>> [axes.get_ylabel() for axes in cplt.figure.axes], cplt.figure.axes[-1].get_xlabel()
-    (['impulse response [1/s]', 'impulse response [1/s]'], 'time [s]')
+    >>> [axes.get_title(loc="right") for axes in cplt.figure.axes]
+    ['input 0 to output 0', 'input 0 to output 1']
     """
     drawn = impulse_plot(fit.impulse, ax=ax, title=title, **kwargs)
     factor, _ = style.time_unit(1.0, drawn.axes[-1, 0])

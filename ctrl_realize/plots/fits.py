@@ -183,7 +183,7 @@ def _output_label(result: DelayFit) -> str:
 
 def evidence_height(result: DelayFit) -> float:
     """Return the height in inches that the rows of `_evidence` need."""
-    return 0.75 + 0.2 * len(_evidence_rows(result))
+    return 0.75 + 0.23 * len(_evidence_rows(result))
 
 
 def _evidence_rows(
@@ -214,10 +214,11 @@ def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
             axes.plot(ends, [height, height], color=colour, linewidth=2.5, alpha=0.5)
         looks = {"color": colour, "marker": "o", "linestyle": "none", **kwargs}
         points += axes.plot([factor * seen], [height], **looks)
-    axes.set_yticks(range(len(rows)), [style.plain(name, 40) for name, *_ in rows], fontsize=9)
+    axes.set_yticks(range(len(rows)), [style.plain(name, 40) for name, *_ in rows], fontsize=10)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel(f"dead time [{unit}]")
-    said = f"{style.in_time(result.dead_time)} ({style.in_time(low)} to {style.in_time(high)})"
+    wait = style.in_time(result.dead_time, style.interval_digits(low, high))
+    said = f"{wait} ({style.interval_in_time(low, high)})"
     axes.set_title(said, loc="left", fontsize=11)
     return points

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import control as ct
@@ -19,6 +20,8 @@ from . import style
 
 TRUSTED_COHERENCE = 0.95
 _POINTS = 600
+FITTED = "fit, order"
+"""How the name of a fitted response begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +52,7 @@ def frf_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw measured frequency responses and models on top of them (Figs. 2 and 8).
+    """Draw measured frequency responses and models on top of them (figures 2 and 8).
 
     Gain in dB and phase in degrees; where a measurement has a coherence, that too, and points
     with a coherence below 0.95 are drawn pale. Phases are unwrapped with the dead time of the
@@ -220,6 +223,10 @@ def _curves(
     delays = [float(np.max(item.dead_time)) for item in items if hasattr(item, "dead_time")]
     delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
     curves = [_curve(item, grid, delay) for item in items]
+    nameless = [curve for curve in curves if re.fullmatch(r"sys\[\d+\]", curve.label)]
+    if len(nameless) == 1:  # python-control's own name says nothing
+        place = curves.index(nameless[0])
+        curves[place] = replace(nameless[0], label="model")
     return _aligned(curves)
 
 
@@ -251,7 +258,8 @@ def _curve(item: Any, grid: FloatArray, delay: float) -> _Curve:
         response = np.asarray(item(_points(frequency, step))).reshape(-1)
         coherence = None
     phase = np.degrees(unwrapped_phase(response, 2 * np.pi * frequency, delay))
-    measured = isinstance(item, ct.FrequencyResponseData)
+    # A fitted curve is a model, though only its response may be known.
+    measured = isinstance(item, ct.FrequencyResponseData) and not item.name.startswith(FITTED)
     return _Curve(item.name or "measured", frequency, response, phase, coherence, measured)
 
 

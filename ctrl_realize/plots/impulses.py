@@ -26,7 +26,7 @@ def impulse_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw a measured impulse response and those of models (Fig. 7).
+    """Draw a measured impulse response and those of models (figure 7).
 
     The responses are drawn as densities, to an impulse of unit area.
 
@@ -75,6 +75,9 @@ def impulse_plot(
             for number, model in enumerate(models):
                 drawn += _model(one, model, index, count * impulse.dt, factor, number, len(models))
             lines.append(drawn)
+            if rows * columns > 1:
+                way = f"input {index % columns} to output {index // columns}"
+                one.set_title(way, loc="right", fontsize=11)
             if index >= (rows - 1) * columns:
                 one.set_xlabel(f"time [{unit}]")
             if index % columns == 0:

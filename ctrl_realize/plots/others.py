@@ -12,7 +12,7 @@ from ..frequency.frf_fit import FRFFit
 from ..identification.tracked import DelayTrack
 from ..signals import MeasuredFRF
 from . import style
-from .frequencies import frf_plot
+from .frequencies import FITTED, frf_plot
 
 
 def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
@@ -44,7 +44,7 @@ def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct
     omega = 2 * np.pi * fit.frequency_hz
     model = np.asarray(fit.core(1j * omega)).reshape(-1) * np.exp(-1j * omega * fit.dead_time)
     measured = MeasuredFRF(fit.measured, fit.frequency_hz, name=fit.name or "measured")
-    fitted = MeasuredFRF(model, fit.frequency_hz, name=f"fit, order {fit.order}")
+    fitted = MeasuredFRF(model, fit.frequency_hz, name=f"{FITTED} {fit.order}")
     return frf_plot([measured, fitted], ax=ax, dead_time=fit.dead_time, **kwargs)
 
 
@@ -103,18 +103,18 @@ def track_plot(
     >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
     >>> cplt = plots.track_plot(tracker.run(record))
     >>> cplt.figure.axes[0].get_ylabel()
-    'dead time [s]'
+    'dead time [ms]'
     """
     with style.context():
         axes = style.axes_for(ax, 2, size=(8.0, 5.2), heights=(2.0, 1.0))
         factor, unit = style.time_unit(float(np.max(np.abs(track.time))), axes[1])
         time = factor * track.time
         told = np.asarray(track.tells, dtype=bool)
-        scale, name = style.time_unit(float(np.nanmax(track.high)))
+        scale, name = style.time_unit(float(np.nanmax(track.high)) * track.dt)
         looks = {"color": style.MODEL, "label": "dead time", **kwargs}
         axes[0].fill_between(
-            time, scale * track.low, scale * track.high, where=told, color=style.BAND, alpha=0.3,
-            linewidth=0, label="95 % interval",
+            time, scale * track.low * track.dt, scale * track.high * track.dt, where=told,
+            color=style.BAND, alpha=0.3, linewidth=0, label="95 % interval",
         )  # fmt: skip
         upper = list(axes[0].plot(time, np.where(told, scale * track.dead_time, np.nan), **looks))
         gain = np.where(told, track.gain_ratio, np.nan)
@@ -122,4 +122,4 @@ def track_plot(
         axes[0].set_ylabel(f"dead time [{name}]")
         axes[1].set_ylabel("gain over\nthe model's")
         axes[1].set_xlabel(f"time [{unit}]")
-        return style.finished(axes, [upper, lower], title=title, own_figure=ax is None)
+        return style.finished(axes, [upper, lower], title=title, own_figure=ax is None, loc="above")

@@ -27,7 +27,7 @@ UNIT_STEP = "unit step response\n[output / input]"
 def record_plot(
     record: Record, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
-    """Draw a record: outputs above, inputs below (Fig. 3).
+    """Draw a record: outputs above, inputs below (figure 3).
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def onset_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw the first moments after a step, with the dead time of a model (Fig. 4).
+    """Draw the first moments after a step, with the dead time of a model (figure 4).
 
     Parameters
     ----------

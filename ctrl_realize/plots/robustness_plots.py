@@ -62,7 +62,7 @@ def delay_robustness_plot(
         axes.set_ylim(bottom=0)
         return lines
 
-    return style.in_one(ax, title or "Robustness to the dead time", draw)
+    return style.in_one(ax, title or "Robustness to the dead time", draw, loc="lower right")
 
 
 def uncertainty_plot(
@@ -104,7 +104,7 @@ def uncertainty_plot(
         axes.set(xlabel="frequency [Hz]", ylabel="relative error")
         return lines
 
-    return style.in_one(ax, title or "Multiplicative uncertainty", draw)
+    return style.in_one(ax, title or "Multiplicative uncertainty", draw, loc="upper left")
 
 
 def robustness_plot(

@@ -26,7 +26,7 @@ def delay_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw the misfit against the delay, its minimum and all delays within 5 % of it (Fig. 6).
+    """Draw the misfit against the delay, its minimum and all delays within 5 % of it (figure 6).
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def singular_value_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw the singular values of the Hankel matrix, and the level of pure noise (Fig. 5).
+    """Draw the singular values of the Hankel matrix, and the level of pure noise (figure 5).
 
     Parameters
     ----------

@@ -172,13 +172,17 @@ def finished(
     legends: Sequence[int] = (0,),
     title: str | None = None,
     own_figure: bool = False,
-    loc: Any = "upper right",
+    loc: str = "upper right",
 ) -> ct.ControlPlot:
-    """Put legends and title on, and bundle everything as python-control's plots do."""
+    """Put legends and title on, and bundle everything as python-control's plots do.
+
+    The place `loc` is one of matplotlib's, or "above": outside, at the right, where curves that
+    go everywhere leave no place inside.
+    """
     for position in legends:
         labelled = axes[position].get_legend_handles_labels()[1]
         if labelled:
-            axes[position].legend(loc=loc)
+            _legend(axes[position], loc)
     if title and own_figure:
         axes[0].set_title(plain(title), loc="left")
     shape = (len(axes) // columns, columns)
@@ -195,6 +199,13 @@ def finished(
         axes[0].figure,
         legend=legend_array.reshape(shape),
     )
+
+
+def _legend(axes: Axes, loc: Any) -> None:
+    if loc == "above":
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    else:
+        axes.legend(loc=loc)
 
 
 def in_one(
@@ -254,6 +265,27 @@ def in_time(seconds: float, digits: int = 3) -> str:
         return "0 s"
     factor, name = time_unit(abs(seconds))
     return f"{seconds * factor:.{digits}g} {name}"
+
+
+def interval_in_time(low: float, high: float) -> str:
+    """Write an interval of times with digits that show its width.
+
+    Examples
+    --------
+    >>> from ctrl_realize.plots.style import interval_in_time
+    >>> interval_in_time(0.0256, 0.03737), interval_in_time(0.124534, 0.125411)
+    ('25.6 ms to 37.4 ms', '124.5 ms to 125.4 ms')
+    """
+    digits = interval_digits(low, high)
+    return f"{in_time(low, digits)} to {in_time(high, digits)}"
+
+
+def interval_digits(low: float, high: float) -> int:
+    """Return how many digits the ends of an interval need to be told apart, at least 3."""
+    width, largest = high - low, max(abs(low), abs(high))
+    if not 0 < width < np.inf:
+        return 4
+    return int(np.clip(3 + np.floor(np.log10(largest / width)) - 1, 3, 9))
 
 
 def decibel(magnitude: ArrayLike) -> FloatArray:

@@ -69,7 +69,7 @@ class FilterSpec:
 
 @dataclass(frozen=True, eq=False)
 class ImpulseResponse:
-    """Response to a unit pulse: the Markov parameters G_0, G_1, ....
+    """Response to a unit pulse: the Markov parameters G_0, G_1 and so on.
 
     The pulse has height 1 and lasts one sample, so a model's D, CB, CAB, ... are these numbers,
     and their sum is the gain. ``density == markov / dt`` is the response to a unit area.

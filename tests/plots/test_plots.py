@@ -321,3 +321,33 @@ def test_records_of_any_input_are_drawn_one_after_the_other_and_steps_as_their_m
     for records, label in ((moving, "measured"), (steps, "mean of 2 records")):
         drawn = plots.fit_plot(cr.fit_delay(records, structures=[(1, 1)]))
         assert drawn.lines[0, 0][0].get_label() == label
+
+
+def test_the_band_of_a_tracked_delay_encloses_its_line():
+    core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
+    record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
+    tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    axes = plots.track_plot(tracker.run(record)).axes[0, 0]
+    assert axes.get_ylabel() == "dead time [ms]"
+    line = axes.lines[0].get_ydata()
+    assert_allclose(line[-1], 70, atol=5)  # half a sample of 10 ms
+    edges = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert 0 <= edges.min() <= np.nanmin(line)
+    assert np.nanmax(line) <= edges.max() <= 200  # max_delay
+
+
+def test_a_fitted_response_looks_like_a_model():
+    f = np.geomspace(0.1, 20, 40)
+    s = 2j * np.pi * f
+    fit = cr.fit_frf(cr.MeasuredFRF(2 * np.exp(-0.03 * s) / (0.08 * s + 1), f), 1).fit
+    measured, fitted = fit.plot().lines[0, 0]
+    assert (measured.get_color(), fitted.get_color()) == (plots.style.MEASURED, plots.style.MODEL)
+    assert fitted.get_linestyle() != "-"
+
+
+def test_a_model_without_a_name_of_its_own_is_called_model(measured):
+    nameless = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=1e-3)
+    assert nameless.name.startswith("sys[")
+    labels = [t.get_text() for t in plots.frf_plot([measured, nameless]).legend[0, 0].get_texts()]
+    assert labels == [measured.name, "model"]
