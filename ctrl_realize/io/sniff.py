@@ -38,6 +38,7 @@ NUMBER = {
     ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
+_IN_NUMBERS = {"delimiter": frozenset("0123456789eE"), "comment": frozenset("0123456789eE.,+-")}
 _TIME = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([ T].*|[.,]\d+)?|\d{1,2}:\d{2}([.,]\d+)?")
 MISSING = frozenset({"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "?"})
 _NOT_NAMES = MISSING | {"inf", "+inf", "-inf", "infinity", "-infinity"}
@@ -74,6 +75,9 @@ class TextOptions:
             isinstance(self.comment, str) and len(self.comment) == 1
         ):
             raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")
+        for name in ("delimiter", "comment"):
+            if str(getattr(self, name)) in _IN_NUMBERS[name]:
+                raise OptionError(f"{name}={getattr(self, name)!r} would cut numbers in two")
         if self.header not in (True, False, "auto"):
             raise OptionError(f"header={self.header!r} must be True, False or 'auto'")
         whole(self.skip_rows, "skip_rows", 0)

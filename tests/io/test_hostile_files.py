@@ -248,6 +248,15 @@ def test_arguments_of_another_kind_are_refused(tmp_path, argument):
         read_record(file, **argument)
 
 
+@pytest.mark.parametrize(("name", "sign"), [("comment", "1"), ("comment", "e"), ("delimiter", "4")])
+def test_a_sign_that_is_part_of_numbers_does_not_cut_them(tmp_path, name, sign):
+    # comment="1" made 0. of 0.125 and 4 of 410
+    file = tmp_path / "a.csv"
+    file.write_text("t|u|y\n0|-526|410\n0.125|-822|610\n0.25|-339|361\n")
+    with pytest.raises(OptionError, match="cut numbers in two"):
+        read_record(file, **{name: sign})
+
+
 def test_utf_32_with_its_mark_is_read(tmp_path):
     file = tmp_path / "a.csv"
     text = "t,u,y\n" + "".join(f"{k},{k > 3:d},{k}\n" for k in range(9))
