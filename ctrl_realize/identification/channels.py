@@ -219,7 +219,7 @@ def realize_channels(
     choice = one_of(structure, "structure", ("auto", "common", "rows", "columns"))
     one_of(hankel, "hankel", HANKEL)
     markov = channels(data)
-    found = channel_delays(data, level=level) if delays is None else _given(delays, markov)
+    found = channel_delays(data, level=level) if delays is None else given_delays(delays, markov)
     known = found >= 0
     if not known.any():
         raise DataError("no channel has a response; is the input connected?")
@@ -260,7 +260,8 @@ def realize_channels(
     )
 
 
-def _given(delays: ArrayLike, markov: FloatArray) -> IntArray:
+def given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
+    """Check the delays of a caller against the data."""
     found = np.asarray(delays)
     p, m, N = markov.shape
     if found.shape != (p, m) or found.dtype.kind not in "iu" or np.any(found < -1):

@@ -15,6 +15,7 @@ from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
 from ..results import Flag, Result
 from ..signals import MeasuredFRF, Record
 from ..signals.record import check_complete
+from ..wording import in_time, interval_in_time
 from .delay_fit import fit_delay
 from .delay_fit_result import DelayFit
 from .delay_scan import estimate_delay
@@ -91,8 +92,8 @@ class DelayCheck(Result):
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
     >>> check = cr.check_delay(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
-    >>> print(f"{check.common[0]:.4f} to {check.common[1]:.4f} s, take that of the {check.rely_on}")
-    0.1200 to 0.1256 s, take that of the output error
+    >>> print(f"{check.common[0]:.3f} to {check.common[1]:.3f} s, take that of the {check.rely_on}")
+    0.120 to 0.126 s, take that of the output error
     """
 
     views: tuple[DelayView, ...]
@@ -131,13 +132,14 @@ class DelayCheck(Result):
             rows.append(
                 (
                     f"{view.method} ({view.source})",
-                    f"{view.value:.5g} s{samples} ({view.low:.5g} to {view.high:.5g} s{sign})",
+                    f"{in_time(view.value, 4)}{samples} "
+                    f"({interval_in_time(view.low, view.high)}{sign})",
                 )
             )
         if self.common is None:
             words = "no: " + "; ".join(f"{a} against {b}" for a, b in self.conflicts)
         else:
-            words = f"yes, on {self.common[0]:.5g} to {self.common[1]:.5g} s"
+            words = f"yes, on {interval_in_time(*self.common)}"
         rows.append(("they agree", words))
         if self.rely_on is not None:
             rows.append(("rely on", f"{self.rely_on}: the narrowest interval of those that count"))

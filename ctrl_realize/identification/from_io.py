@@ -203,7 +203,7 @@ def impulse_from_io(
     one_of(start, "start", ("unknown", "rest"))
     if arx_order is not None and method != "okid":
         raise OptionError(f"arx_order={arx_order!r} belongs to method='okid', not {method!r}")
-    group = _as_group(records)
+    group = as_group(records)
     longest = max(record.n_samples for record in group)
     most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].n_inputs), 2)
     count = min(SHORTEST, most) if length is None else whole(length, "length", 2)
@@ -271,7 +271,8 @@ def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
     )
 
 
-def _as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:
+def as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:
+    """Check that records are of one plant: the same sample time and channels."""
     group = (records,) if isinstance(records, Record) else tuple(records)
     if not group or not all(isinstance(record, Record) for record in group):
         raise DataError("records is empty or holds something that is no Record")

@@ -30,7 +30,7 @@ def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatA
     """
     one_of(start, "start", ("estimate", "rest"))
     check_complete(record, "a simulation")
-    model = _as_delayed(system, record)
+    model = as_delayed(system, record)
     u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
     p, N = y.shape
     # At rest, the input stood at its first value before the record.
@@ -85,7 +85,8 @@ def _through_outputs(responses: FloatArray, model: DelayedStateSpace) -> FloatAr
     return late.transpose(0, 2, 1).reshape(-1, responses.shape[1])
 
 
-def _as_delayed(system: Any, record: Record) -> DelayedStateSpace:
+def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedStateSpace:
+    """Check that a system fits a record, and give it delays (of zero) where it has none."""
     if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
         raise UnsuitableSystemError(
             f"system is a {type(system).__name__}; needed is a discrete control.StateSpace"
@@ -106,7 +107,7 @@ def _as_delayed(system: Any, record: Record) -> DelayedStateSpace:
         )
     delayed = model if isinstance(model, DelayedStateSpace) else DelayedStateSpace(model)
     worst = np.abs(delayed.delay_free.poles()).max(initial=0.0)
-    if worst > 1 + 1e-6:
+    if stable and worst > 1 + 1e-6:
         raise UnsuitableSystemError(
             f"the system is unstable (a pole at |z| = {worst:.6g}): its simulation runs away from "
             "any record"

@@ -27,6 +27,9 @@ from .record_simulation import Start, simulate_record
 if TYPE_CHECKING:
     import pandas as pd
 
+EXACT = 1e-8
+"""Residual, as a part of the range of the output, below which a model counts as exact."""
+
 
 @dataclass(frozen=True, eq=False)
 class ResidualCheck(Result):
@@ -172,6 +175,8 @@ def check_residuals(
             f"lags={count} needs {3 * count} samples, the record has {record.n_samples}"
         )
     e = y - simulated
+    # What rounding leaves says nothing about the model.
+    e[np.abs(e).max(axis=1) <= EXACT * np.ptp(y, axis=1)] = 0.0
     own = np.stack([correlation(row, row, count) for row in e])
     cross = np.stack([[_two_sided(row, drive, count) for drive in u] for row in e])
     bounds = np.array([[cross_bound(row, drive, count, level) for drive in u] for row in e])

@@ -139,7 +139,7 @@ def _shape_count(kernel: str) -> int:
 
 def _start(equations: NormalEquations, m: int, lags: int, kernel: str) -> FloatArray:
     """Guess that the response decays within a third of the window and explains the output."""
-    energy = np.array([equations.gram[i * lags, i * lags] for i in range(m)])
+    energy = np.diag(equations.gram).reshape(m, lags).mean(axis=1)
     signal = 20.0 * equations.freedom / np.maximum(energy, 1e-300) / lags
     shape = [np.log(6.0 / lags)] + ([np.log(3.0 / lags)] if kernel == "DC" else [])
     return np.concatenate([[*shape, np.log(s)] for s in signal])
@@ -240,6 +240,9 @@ def _search(
 
     steps = np.tile([size] * shapes + [2 * size], m)
     inside = np.clip(start, low, high)
+    scales = slice(shapes, None, shapes + 1)
+    while misfit(inside) >= _WORST and inside[scales].max() > low[shapes]:
+        inside[scales] = np.maximum(inside[scales] - 3.0, low[shapes])
     # Steps go inward where the start lies at a bound, or the simplex would be flat there.
     steps = np.where(inside + steps > high, -steps, steps)
     simplex = np.vstack([inside, inside + np.diag(steps)])

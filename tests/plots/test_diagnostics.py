@@ -65,6 +65,14 @@ def test_channels_plot_marks_the_delay_of_every_channel():
     assert_allclose(ends, [0.3, 0.7])
 
 
+def test_a_fit_of_channels_is_drawn_beside_its_record(record):
+    fit = cr.fit_channels(record, 1).fit
+    drawn = fit.plot()
+    assert_allclose(drawn.lines[0, 0][1].get_ydata(), fit.checks[0].simulated)
+    with pytest.raises(OptionError, match="record=1"):
+        fit.plot(record=1)
+
+
 def test_an_estimate_is_drawn_in_its_band(record):
     estimate = cr.impulse_from_io(record, 40)
     drawn = estimate.plot()

@@ -1,0 +1,381 @@
+"""Output-error fit of a model of several channels to whole records."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import whole
+from ..delayed import DelayedStateSpace
+from ..errors import DataError, DataWarning, OrderError
+from ..numerics.arrays import FloatArray, IntArray, read_only
+from ..numerics.delay_split import split_delays
+from ..numerics.gramians import balanced_truncation
+from ..numerics.section_fit import MOST_STEPS, fit_sections
+from ..numerics.sections import in_sections
+from ..results import Flag, Result
+from ..signals import Record
+from .channel_search import ORDERS, Candidate, Search, Shares, experiments
+from .channels import channel_delays, given_delays
+from .from_io import Method, Start, as_group, impulse_from_io
+from .record_simulation import as_delayed
+from .residuals import ResidualCheck, check_residuals
+
+LEVEL = 0.02
+"""Part of a channel's largest Markov parameter that counts as response, where delays are to be
+found: the search moves them further, and one that is too long costs more than one too short."""
+STARTS: tuple[tuple[Start, Method], ...] = (
+    ("unknown", "auto"),
+    ("rest", "auto"),
+    ("unknown", "okid"),
+    ("rest", "okid"),
+)
+"""Estimates of the impulse response to start from: the next one where the residual of the best
+model so far still follows the input."""
+STILL = 10
+"""Samples that an input stands still at the start of a record for the plant to count as at rest."""
+LAGS = 25
+"""Of the correlations in the residual checks."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelFit(Result):
+    """How a model was fitted to records of one or several channels.
+
+    Attributes
+    ----------
+    order : int
+        States of the core.
+    input_delays, output_delays : tuple of int
+        In samples.
+    direct : bool
+        Whether the core has a direct term.
+    bic : dict of int to float
+        Bayesian information criterion of every order tried; of the last one, with its final
+        delays. Smaller is better, 6 less is clear.
+    noise_std : ndarray, shape (p,)
+        Standard deviation of what the model leaves of every output.
+    steps : int
+        Gauss-Newton steps of the last fit.
+    fit_percent : ndarray, shape (p,)
+        ``100 (1 - noise_std / std y)`` of every output, over all records.
+    checks : tuple of ResidualCheck
+        Of every record without gaps.
+    records : tuple of Record
+    choices : tuple of str
+    flags : tuple of Flag
+        Those of the checks, and ``"highest_order"``, ``"not_converged"``, ``"no_response"``.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
+    >>> y = plant.simulate(u) + 0.05 * noise
+    >>> fit = cr.fit_channels(cr.Record(0.1 * np.arange(500), u, y), 1).fit
+    >>> fit
+    <ChannelFit: order 1, fit 85.7 %>
+    >>> fit.input_delays, fit.noise_std.round(2), fit.checks[0].independent
+    ((5,), array([0.05]), True)
+    """
+
+    order: int
+    input_delays: tuple[int, ...]
+    output_delays: tuple[int, ...]
+    direct: bool
+    bic: dict[int, float]
+    noise_std: FloatArray
+    fit_percent: FloatArray
+    steps: int
+    checks: tuple[ResidualCheck, ...]
+    records: tuple[Record, ...]
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = ()
+
+    def _title(self) -> str:
+        return f"Fit of {len(self.output_delays)} x {len(self.input_delays)} channels"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [
+            ("order", f"{self.order}, {'with' if self.direct else 'without'} direct term"),
+            ("delays of the inputs", " ".join(map(str, self.input_delays)) + " samples"),
+            ("delays of the outputs", " ".join(map(str, self.output_delays)) + " samples"),
+            ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
+            ("fit", ", ".join(f"{f:.2f} %" for f in self.fit_percent)),
+        ]
+
+    def __repr__(self) -> str:
+        fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
+        return f"<ChannelFit: order {self.order}, fit {fit} %>"
+
+
+def fit_channels(
+    records: Record | Sequence[Record],
+    order: int | Sequence[int] | None = None,
+    *,
+    delays: ArrayLike | None = None,
+    feedthrough: bool | None = None,
+) -> DelayedStateSpace:
+    """Fit a state-space model with delays to whole records: several channels, or many modes.
+
+    The impulse response of `impulse_from_io` is realized at every order tried, and each of these
+    starts is refined until the simulated outputs are as near to the measured ones as white noise
+    of an unknown size in every output allows (output error). BIC chooses the order, the delays of
+    inputs and outputs, and whether there is a direct term.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        One or several experiments on the same plant. Inputs without gaps; outputs may have
+        missing samples.
+    order : int or sequence of int, optional
+        States without delays, or candidates. Default: from 1 up to 20, until three in a row were
+        no better.
+    delays : array_like of int, shape (p, m), optional
+        Delay of every channel, -1 where there is no response. Default: found.
+    feedthrough : bool, optional
+        Whether there is a direct term behind the delays. Default: chosen.
+
+    Returns
+    -------
+    DelayedStateSpace
+        Stable, in balanced coordinates, with a delay for every input and output; its `fit` is a
+        `ChannelFit`.
+
+    Raises
+    ------
+    DataError
+        Inputs that do not excite the plant, outputs that do not follow them, too few samples.
+    OrderError, DelayRangeError, OptionError
+        Arguments that make no sense.
+
+    See Also
+    --------
+    fit_delay : One input and output, with a delay between samples and its interval.
+    refine : The last step by itself, from any model.
+
+    Notes
+    -----
+    Noise need not be white for the model to come out right, only for BIC: with noise of long
+    memory the order comes out a little high. The delays are whole samples; what does not split
+    into delays of inputs and outputs is left to the states.
+
+    References
+    ----------
+    .. [1] M. Verhaegen and V. Verdult, Filtering and System Identification, Cambridge 2007,
+       chapter 7 (output error), here in second-order sections.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss(
+    ...     [[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1
+    ... )
+    >>> plant = cr.DelayedStateSpace(core, (2, 5))
+    >>> rng = np.random.default_rng(1)
+    >>> u = rng.choice([-1.0, 1.0], (2, 600))
+    >>> y = plant.simulate(u) + 0.1 * rng.standard_normal((2, 600))
+    >>> sys = cr.fit_channels(cr.Record(0.1 * np.arange(600), u, y))
+    >>> sys.fit.order, sys.fit.input_delays, sys.fit.output_delays
+    (2, (2, 5), (0, 0))
+    """
+    group = as_group(records)
+    asked = _orders(order)
+    _check_inputs(group)
+    best: tuple[float, DelayedStateSpace] | None = None
+    refused: DataError | None = None
+    at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
+    for start, method in sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else STARTS:
+        try:
+            found = _from_start(group, start, method, asked, delays, feedthrough)
+        except DataError as error:
+            refused = refused or error
+            continue
+        if best is None or found[0] < best[0]:
+            best = found
+        if all(check.independent for check in best[1].fit.checks):
+            break
+    if best is None:
+        raise refused or DataError("nothing could be fitted")
+    return best[1]
+
+
+def _from_start(
+    group: tuple[Record, ...],
+    start: Start,
+    method: Method,
+    asked: tuple[int, ...] | None,
+    delays: ArrayLike | None,
+    feedthrough: bool | None,
+) -> tuple[float, DelayedStateSpace]:
+    """Fit from one estimate of the impulse response; return the criterion and the model."""
+    with warnings.catch_warnings():
+        # What the prior has filled in only serves as a start.
+        warnings.simplefilter("ignore", DataWarning)
+        impulse = impulse_from_io(group, method=method, start=start)
+    markov = np.reshape(impulse.markov, (group[0].n_outputs, group[0].n_inputs, -1))
+    silent = tuple(flag for flag in impulse.flags if flag.code == "no_response")
+    if len(silent) == group[0].n_outputs:
+        raise DataError(
+            "no output shows a response to the inputs above the noise; are the channels right?"
+        )
+    search = Search(group, markov, max(asked or ORDERS))
+    orders = search.orders(asked)
+    found = channel_delays(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
+    shares = _split(found)
+    fits = search.by_order(orders, shares, direct=feedthrough is not False)
+    best = min(fits, key=lambda c: c.bic)
+    moved = search.improved(best, delays=delays is None, direct=feedthrough is None)
+    if asked is None or len(asked) > 1:
+        moved = search.lowered(moved, orders)
+    bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
+    flags = silent
+    if len(orders) > 1 and best.order == max(asked or ORDERS):
+        flags += (
+            Flag(
+                "highest_order",
+                f"the highest order that was tried, {best.order}, is the best: try higher ones",
+            ),
+        )
+    return moved.bic, _model(search.finish(moved), group, bic, _choices(moved, bic, shares), flags)
+
+
+def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str, ...]:
+    choices = []
+    if len(bic) > 1:
+        others = ", ".join(
+            f"{order} ({value - best.bic:+.0f})"
+            for order, value in sorted(bic.items())
+            if order != best.order
+        )
+        choices.append(f"order {best.order} has the least BIC; others: {others}")
+    if (best.inputs, best.outputs) != begun:
+        choices.append(
+            f"delays where the responses set in, {begun[0]} and {begun[1]}, moved while that "
+            "lowered BIC"
+        )
+    return tuple(choices)
+
+
+def refine(
+    system: ct.StateSpace,
+    records: Record | Sequence[Record],
+    *,
+    feedthrough: bool | None = None,
+) -> DelayedStateSpace:
+    """Fit all parameters of a model to records, and leave its order and delays as they are.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        Discrete, with the sample time of the records, from `realize` for example; poles outside
+        the unit circle are drawn inside first.
+    records : Record or sequence of Record
+        As for `fit_channels`.
+    feedthrough : bool, optional
+        Whether there is a direct term. Default: if `system` has one.
+
+    Returns
+    -------
+    DelayedStateSpace
+        Its `fit` is a `ChannelFit`.
+
+    Raises
+    ------
+    DataError, UnsuitableSystemError
+        Records and a system that do not fit each other.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> fast, slow = (ct.ss([[a]], [[1.0]], [[1.0]], [[0.0]], 1.0) for a in (0.5, 0.8))
+    >>> u = np.random.default_rng(0).choice([-1.0, 1.0], 400)
+    >>> record = cr.Record(np.arange(400.0), u, cr.delayed_ss(slow, 3).simulate(u))
+    >>> cr.refine(cr.delayed_ss(fast, 3), record).poles().real.max().round(6)
+    np.float64(0.8)
+    """
+    group = as_group(records)
+    _check_inputs(group)
+    model = as_delayed(system, group[0], stable=False)
+    core = model.delay_free
+    direct = bool(np.any(core.D)) if feedthrough is None else bool(feedthrough)
+    shares = model.input_delays, model.output_delays
+    found = fit_sections(
+        experiments(group, shares), in_sections(core.A, core.B, core.C, core.D), direct=direct
+    )
+    return _model(Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), ())
+
+
+def _orders(order: int | Sequence[int] | None) -> tuple[int, ...] | None:
+    if order is None:
+        return None
+    given = order if isinstance(order, Sequence) else (order,)
+    if len(given) == 0:
+        raise OrderError("order is empty; needed is at least one order")
+    return tuple(sorted({whole(n, "order", 1) for n in given}))
+
+
+def _check_inputs(group: Sequence[Record]) -> None:
+    for i, record in enumerate(group):
+        if np.isnan(record.input).any():
+            raise DataError(
+                f"record {i} has gaps in its input: what the plant does then is not known; use "
+                "the records between them, or impulse_from_io"
+            )
+
+
+def _split(delays: IntArray) -> Shares:
+    """Share delays out to inputs and outputs; channels without response follow the others."""
+    outputs, inputs = split_delays(delays, delays >= 0)[0]
+    return tuple(int(d) for d in inputs), tuple(int(d) for d in outputs)
+
+
+def _model(
+    best: Candidate,
+    group: tuple[Record, ...],
+    bic: dict[int, float],
+    choices: tuple[str, ...],
+    flags: tuple[Flag, ...],
+) -> DelayedStateSpace:
+    """Make the system and say how well it follows the records."""
+    A, B, C, D = best.found.model.matrices()
+    A, B, C, _ = balanced_truncation(A, B, C, best.order)
+    core = ct.ss(A, B, C, D, group[0].dt)
+    system = DelayedStateSpace(core, best.inputs, output_delay=best.outputs)
+    complete = [r for r in group if not r.n_missing]
+    checks = tuple(
+        check_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
+    )
+    seen = {flag.code: flag for check in checks for flag in check.flags}
+    if best.found.steps == MOST_STEPS:
+        seen["not_converged"] = Flag(
+            "not_converged",
+            f"the fit has not settled within {MOST_STEPS} steps: the order is probably too high "
+            "for the data; refine(model, records) goes on from here",
+        )
+    fit = ChannelFit(
+        order=core.nstates,
+        input_delays=best.inputs,
+        output_delays=best.outputs,
+        direct=best.direct,
+        bic=bic,
+        noise_std=read_only(np.sqrt(best.found.variance)),
+        fit_percent=read_only(100 * (1 - np.sqrt(best.found.variance / best.found.spread))),
+        steps=best.found.steps,
+        checks=checks,
+        records=group,
+        choices=choices,
+        flags=(*flags, *seen.values()),
+    )
+    return system.replace(fit=fit)

@@ -1,0 +1,202 @@
+from __future__ import annotations
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.errors import (
+    DataError,
+    DelayRangeError,
+    OptionError,
+    OrderError,
+    UnsuitableSystemError,
+)
+
+DT = 0.1
+CORE = ct.ss(
+    [[0.8, 0.3, 0.0], [-0.3, 0.8, 0.1], [0.0, 0.0, 0.5]],
+    [[1.0, 0.2], [0.0, 1.0], [0.5, -1.0]],
+    [[1.0, 0.0, 0.3], [0.4, 1.0, 0.0]],
+    np.zeros((2, 2)),
+    DT,
+)
+PLANT = cr.DelayedStateSpace(CORE, (2, 5), output_delay=(0, 7))
+
+
+def record(seed=0, samples=600, noise=0.1, plant=PLANT, scale=1.0, **kwargs):
+    rng = np.random.default_rng(seed)
+    u = rng.choice([-1.0, 1.0], (plant.ninputs, samples)).squeeze()
+    y = plant.simulate(u)
+    y = 3.0 + y + noise * np.std(y, axis=-1, keepdims=True) * rng.standard_normal(y.shape)
+    return cr.Record(DT * np.arange(samples), u, scale * y, **kwargs)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return cr.fit_channels(record())
+
+
+def test_order_delays_and_direct_term_are_found(model):
+    fit = model.fit
+    assert (fit.order, fit.input_delays, fit.output_delays, fit.direct) == (
+        3,
+        (2, 5),
+        (0, 7),
+        False,
+    )
+    assert (model.input_delays, model.output_delays) == ((2, 5), (0, 7))
+    assert fit.flags == ()
+    # noise of a tenth of the output, 600 samples, 12 parameters: about 1 % of the response
+    truth = PLANT.markov(80)
+    assert np.abs(model.markov(80) - truth).max() < 0.02 * np.abs(truth).max()
+    # the size of the noise to 3 x 3 %
+    assert_allclose(fit.fit_percent, 100 * (1 - 0.1 / np.sqrt(1.01)), rtol=0, atol=0.9)
+
+
+def test_another_record_is_predicted_to_its_noise(model):
+    check = cr.check_residuals(model, record(1))
+    assert check.white
+    assert check.independent
+
+
+def test_units_of_channels_change_the_gains_alone():
+    # realized as they are, the second output would have no state of its own
+    first, inputs, outputs = record(), np.array([1e3, 1.0]), np.array([1.0, 1e-6])
+    other = cr.Record(first.time, first.input * inputs[:, None], first.output * outputs[:, None])
+    back = inputs / outputs[:, None]
+    scaled = cr.fit_channels(other, 3).markov(60) * back[:, :, None]
+    expected = cr.fit_channels(first, 3).markov(60)
+    # a fit ends where a step gains less than 0.01 of log likelihood, 0.1 standard deviations
+    assert_allclose(scaled, expected, rtol=0, atol=1e-3 * np.abs(expected).max())
+
+
+def test_a_later_output_has_a_longer_delay():
+    late = cr.DelayedStateSpace(CORE, (2, 5), output_delay=(4, 11))
+    found = cr.fit_channels(record(plant=late), 3)
+    assert found.delay.tolist() == [[6, 9], [13, 16]]
+
+
+def test_exact_data_give_the_plant_back():
+    found = cr.fit_channels(record(noise=0.0))
+    assert found.fit.order == 3
+    assert_allclose(found.markov(60), PLANT.markov(60), rtol=0, atol=1e-7)
+    assert found.fit.flags == ()
+
+
+def test_several_records_and_missing_outputs_are_used():
+    first, second = record(2, 300), record(3, 300)
+    y = second.output + 40.0
+    y[0, 100:120] = np.nan
+    gaps = cr.Record(second.time, second.input, y, missing="keep")
+    found = cr.fit_channels([first, gaps], 3)
+    assert found.fit.input_delays == (2, 5)
+    assert len(found.fit.checks) == 1
+    truth = PLANT.markov(80)
+    assert np.abs(found.markov(80) - truth).max() < 0.04 * np.abs(truth).max()
+
+
+def test_one_channel_is_a_case_of_several():
+    plant = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT), 12)
+    found = cr.fit_channels(record(plant=plant))
+    assert (found.fit.order, found.delay) == (1, 12)
+    assert found.markov(5).shape == (5,)
+
+
+def test_a_direct_term_is_found_or_asked_for():
+    core = ct.ss(CORE.A, CORE.B, CORE.C, [[2.0, 0.0], [0.0, 0.0]], DT)
+    assert cr.fit_channels(record(plant=cr.DelayedStateSpace(core, 0)), 3).fit.direct
+    with_term = cr.fit_channels(record(), 3, feedthrough=True)
+    without = cr.fit_channels(record(), 3, feedthrough=False)
+    assert with_term.fit.direct
+    assert np.any(with_term.delay_free.D)
+    assert not without.fit.direct
+    assert not np.any(without.delay_free.D)
+
+
+def test_delays_that_are_given_stay():
+    found = cr.fit_channels(record(), 4, delays=[[2, 4], [9, 11]])
+    assert (found.input_delays, found.output_delays) == ((2, 4), (0, 7))
+
+
+def test_a_record_from_rest_with_one_step_at_its_start_is_enough():
+    # the step lies in the first 100 samples, which a start from an unknown past leaves out
+    t = DT * np.arange(500)
+    plant = cr.delayed_ss(ct.ss([[0.97]], [[1.0]], [[0.03]], [[0.0]], DT), 20)
+    u = (t > 2.0).astype(float)
+    y = plant.simulate(u) + 0.01 * np.random.default_rng(0).standard_normal(t.size)
+    found = cr.fit_channels(cr.Record(t, u, y))
+    assert found.fit.order == 1
+    assert abs(found.delay - 20) <= 1
+    assert float(found.dcgain()) == pytest.approx(1.0, abs=0.02)
+
+
+def test_another_start_is_tried_where_the_first_leads_nowhere():
+    # a chirp: the slow beginning, by which a lag shows, is past only for a FIR of 100 lags
+    t = 0.05 * np.arange(600)
+    plant = cr.delayed_ss(ct.ss([[0.97]], [[1.0]], [[0.03]], [[0.0]], 0.05), 20)
+    y = plant.simulate(np.sin(t**2))
+    y = y + 0.01 * y.std() * np.random.default_rng(0).standard_normal(t.size)
+    found = cr.fit_channels(cr.Record(t, np.sin(t**2), y))
+    assert (found.fit.order, found.delay) == (1, 20)
+
+
+@pytest.mark.parametrize("constant", [True, False])
+def test_inputs_that_do_not_excite_are_refused(constant):
+    first = record()
+    u = np.ones_like(first.input) if constant else np.stack([first.input[0]] * 2)
+    with pytest.raises(DataError, match="does not excite"):
+        cr.fit_channels(cr.Record(first.time, u, first.output))
+
+
+def test_outputs_without_response_are_refused_or_named():
+    first, noise = record(), np.random.default_rng(5).standard_normal((2, 600))
+    with pytest.raises(DataError, match="no output shows a response"):
+        cr.fit_channels(cr.Record(first.time, first.input, noise))
+    half = cr.fit_channels(
+        cr.Record(first.time, first.input, np.stack([first.output[0], noise[0]])), 3
+    )
+    assert [flag.code for flag in half.fit.flags] == ["no_response"]
+
+
+def test_arguments_that_make_no_sense_are_refused():
+    first = record()
+    gap = first.input.copy()
+    gap[0, 5] = np.nan
+    with pytest.raises(DataError, match="gaps in its input"):
+        cr.fit_channels(cr.Record(first.time, gap, first.output, missing="keep"))
+    with pytest.raises(OptionError):
+        cr.fit_channels(first, 0)
+    with pytest.raises(OrderError, match="empty"):
+        cr.fit_channels(first, [])
+    with pytest.raises(DataError, match="600 samples are too few"):
+        cr.fit_channels(first, 300)
+    with pytest.raises(DelayRangeError):
+        cr.fit_channels(first, 3, delays=[2, 5])
+
+
+def test_refining_brings_a_rough_model_to_the_fit(model):
+    core = ct.ss(CORE.A * 0.9, 0.5 * CORE.B, CORE.C, CORE.D, DT)
+    rough = cr.DelayedStateSpace(core, (2, 5), output_delay=(0, 7))
+    found = cr.refine(rough, record())
+    assert found.fit.order == 3
+    expected = model.markov(60)
+    assert_allclose(found.markov(60), expected, rtol=0, atol=2e-3 * np.abs(expected).max())
+    assert rough.delay_free.B[0, 0] == 0.5
+
+
+def test_refining_asks_for_a_system_that_fits_the_record():
+    with pytest.raises(DataError, match="2 inputs and 2 outputs, the system 1 and 1"):
+        cr.refine(cr.delayed_ss(ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT), 0), record())
+    with pytest.raises(UnsuitableSystemError):
+        cr.refine(ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), record())
+
+
+def test_it_is_a_result_like_the_others(model):
+    again = pickle.loads(pickle.dumps(model)).fit
+    assert again.report() == model.fit.report()
+    assert "order 3 has the least BIC" in model.fit.report()
+    assert repr(model.fit).startswith("<ChannelFit: order 3, fit 90.")
