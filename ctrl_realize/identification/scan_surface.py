@@ -38,8 +38,12 @@ class Surface:
     @property
     def rounding(self) -> float:
         """Differences of misfits up to which delays are equally good."""
-        window = channels(self.impulse)[:, :, : self.samples + self.iae.shape[1]]
-        return 1e-11 * float(np.abs(window).sum())
+        return 1e-11 * float(np.abs(channels(self.impulse)[:, :, : self.window]).sum())
+
+    @property
+    def window(self) -> int:
+        """Samples over which misfits are summed."""
+        return int(self.samples + self.iae.shape[1])
 
     def row(self, order: int) -> FloatArray:
         """Misfit over delay of one order."""

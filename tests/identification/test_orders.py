@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -75,6 +76,24 @@ def test_suggested_order_is_what_stands_out_of_the_noise(noise, order, seed):
 def test_without_known_noise_the_smallest_order_that_is_as_good_is_suggested():
     assert cr.scan_orders(valve_pulse("clean"), 6, max_delay=60, dt=TS).order == 3
     assert cr.scan_orders(valve_pulse("zero-phase"), 6, max_delay=60, dt=TS).order == 3
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.1])
+@pytest.mark.parametrize(("poles", "delay"), [([0.9], 5), ([0.9 + 0.3j, 0.9 - 0.3j], 3)])
+def test_of_an_estimate_the_order_is_what_its_standard_deviations_ask_for(poles, delay, noise):
+    # by the least misfit alone it is 5 to 8, with a delay that is up to five samples too short
+    rng = np.random.default_rng(0)
+    a = np.poly(poles).real
+    plant = cr.delayed_ss(ct.ss(ct.tf([a.sum()], a, 0.1)), delay)
+    u = rng.choice([-1.0, 1.0], 1500)
+    y = plant.simulate(u)
+    y = y + noise * y.std() * rng.standard_normal(u.size)
+    scan = cr.scan_orders(
+        cr.impulse_from_io(cr.Record(0.1 * np.arange(1500), u, y)), 8, max_delay=15
+    )
+    assert scan.order == len(poles)
+    # first seen as many samples later as there are poles, where a direct term may take it up
+    assert delay <= scan.delay <= delay + len(poles)
 
 
 def test_table_holds_one_row_for_each_order():
