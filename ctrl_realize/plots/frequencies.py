@@ -306,13 +306,15 @@ def _draw(axes: Axes, curve: _Curve, values: FloatArray, looks: dict[str, Any]) 
     )
     if bool(curve.good.all()):
         return list(
-            axes.plot(curve.frequency_hz, values, label=style.plain(curve.label), **looks, **dots)
+            axes.plot(
+                curve.frequency_hz, values, label=style.plain(curve.label, 50), **looks, **dots
+            )
         )
     pale = {**looks, "alpha": 0.35, "linewidth": 0.8}
     axes.plot(curve.frequency_hz, values, **pale)
     good = np.where(curve.good, values, np.nan)
     return list(
-        axes.plot(curve.frequency_hz, good, label=style.plain(curve.label), **looks, **dots)
+        axes.plot(curve.frequency_hz, good, label=style.plain(curve.label, 50), **looks, **dots)
     )
 
 

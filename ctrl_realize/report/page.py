@@ -16,6 +16,10 @@ from markupsafe import Markup
 from ..io.atomic import write_text
 from .verdict import Verdict
 
+# control characters, and those that turn the direction of writing: names of files may hold them
+_CONTROLS = (*range(9), 11, 12, *range(14, 32), *range(127, 160))
+_UNSEEN = dict.fromkeys((*_CONTROLS, *range(0x202A, 0x202F), *range(0x2066, 0x206A)), "\ufffd")
+
 
 @dataclass(frozen=True)
 class PageFigure:
@@ -129,7 +133,7 @@ def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) ->
 
 
 def render(page: Page) -> str:
-    """Write a page as HTML; all text of it is escaped."""
+    """Write a page as HTML; all text of it is escaped, and what steers a terminal is left out."""
     folder = resources.files("ctrl_realize.report") / "templates"
     html, css, js = (
         (folder / name).read_text(encoding="utf-8")
@@ -141,7 +145,8 @@ def render(page: Page) -> str:
     # The page allows this script and no other, whatever came with the data.
     digest = base64.b64encode(hashlib.sha256(js.encode("utf-8")).digest()).decode("ascii")
     template = environment.get_template("report")
-    return template.render(page=page, css=Markup(css), js=Markup(js), js_digest=digest) + "\n"
+    text = template.render(page=page, css=Markup(css), js=Markup(js), js_digest=digest)
+    return text.translate(_UNSEEN) + "\n"
 
 
 def write_page(path: str | os.PathLike[str], page: Page) -> Path:

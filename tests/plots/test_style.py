@@ -6,6 +6,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import ctrl_realize as cr
@@ -82,3 +83,15 @@ def test_a_plot_of_one_axes_goes_where_it_is_told():
     assert [line.get_label() for line in inside.lines[0, 0]] == ["line"]
     with pytest.raises(OptionError, match="needs 1"):
         style.in_one([given, given], "title", draw)
+
+
+@pytest.mark.parametrize("letter", ["W", "\u5b57", "a", "\U0001f600"])
+def test_names_of_wide_letters_are_cut_before_they_take_the_axes(letter):
+    shown = style.plain(250 * letter, 34)
+    figure = Figure(figsize=(6, 3))
+    text = figure.text(0, 0, shown, fontsize=10)
+    drawn = text.get_window_extent(FigureCanvasAgg(figure).get_renderer())
+    # 34 ordinary letters of 10 points take about 190 points
+    assert drawn.width * 72 / figure.dpi < 230
+    assert shown.endswith("…")
+    assert len(shown) > 15

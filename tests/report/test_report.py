@@ -171,6 +171,15 @@ def test_hostile_names_stay_text(tmp_path, record, fitted):
     assert "<script>alert(1)</script>" in tags.text  # said, not done
 
 
+def test_names_in_a_report_steer_no_terminal_and_turn_no_line(tmp_path, record, fitted):
+    strange = "a\x1b[31mb\0c\x9b\u202egnp.exe"
+    named = cr.Record(record.time, record.input, record.output, name=strange)
+    path = report.write_identification(tmp_path / "r.html", fitted, named)
+    text = path.read_text(encoding="utf-8")
+    assert not set(text) & set("\x1b\0\x9b\u202e")
+    assert "a\ufffd[31mb\ufffdc\ufffd\ufffdgnp.exe" in text
+
+
 def test_a_report_that_fails_leaves_the_old_one(tmp_path, record, fitted, monkeypatch):
     path = tmp_path / "r.html"
     path.write_text("old", encoding="utf-8")
