@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +13,7 @@ from ..checks import positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.sampling import sample_with_dead_time, split_dead_time
 from .parts import check_core
-from .system import DelayedStateSpace
+from .system import MAX_STATES, DelayedStateSpace
 
 
 def delayed_ss(
@@ -88,6 +89,7 @@ def delayed_ss(
         if dt is None:
             raise UnsuitableSystemError("the core is continuous; give dt, its sample time in s")
         step = positive(dt, "dt", "sample time in s")
+        _check_span(system, wait or 0.0, step)
         if delay is None and split_dead_time(wait or 0.0, step)[1] and np.any(system.D):
             raise UnsuitableSystemError(
                 "the core has a direct term D, whose response jumps between two samples when the "
@@ -113,6 +115,7 @@ def delayed_ss(
     if dt is not None and not np.isclose(positive(dt, "dt", "sample time in s"), system.dt):
         raise OptionError(f"dt={dt:g} s, but the core has the sample time {system.dt:g} s")
     if wait is not None:
+        _check_span(system, wait, system.dt)
         delay, rest = split_dead_time(wait, system.dt)
         if rest:
             raise DelayRangeError(
@@ -120,3 +123,18 @@ def delayed_ss(
                 "discrete core takes whole samples (a continuous core takes any)"
             )
     return DelayedStateSpace(system, 0 if delay is None else delay, **settings)
+
+
+def _check_span(system: ct.StateSpace, wait: float, step: float) -> None:
+    """Refuse sample times far too short for the dead time, or far too long for the core."""
+    if wait / step > MAX_STATES:
+        raise DelayRangeError(
+            f"dead_time={wait:g} s is {wait / step:.3g} samples of {step:g} s; at most "
+            f"{MAX_STATES} states are allowed: use a longer sample time"
+        )
+    largest = max(float(np.abs(M).max(initial=0.0)) for M in (system.A, system.B))
+    if system.isctime() and not math.isfinite(largest * step):
+        raise UnsuitableSystemError(
+            f"the core has entries up to {largest:.3g} per s, too large for samples of {step:g} s: "
+            "use a shorter dt"
+        )

@@ -114,7 +114,7 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
         if size > MAX_STATES:
             raise DelayRangeError(
                 f"the delays {before + behind} make {size} states, and a dense matrix of "
-                f"{8 * size**2 / 1e9:.0f} GB; at most {MAX_STATES} states are allowed. "
+                f"{8 * size**2 // 10**9} GB; at most {MAX_STATES} states are allowed. "
                 "Use a longer sample time, or keep core and delay apart"
             )
         input_names = signal_names(inputs, core.input_labels, "u")

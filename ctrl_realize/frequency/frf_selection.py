@@ -82,7 +82,8 @@ def chosen_model(
     dead_time = best.dead_time
     used = dead_time
     if r == 0:
-        used = round(dead_time / dt) * dt
+        # more than any model can hold are refused when it is made
+        used = round(min(dead_time / dt, 1e9)) * dt
         if abs(used - dead_time) > 1e-9 * dt:
             flags.append(
                 Flag(

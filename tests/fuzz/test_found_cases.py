@@ -13,6 +13,7 @@ import ctrl_realize as cr
 from ctrl_realize.cli import main
 from ctrl_realize.errors import (
     DataError,
+    DelayRangeError,
     FileFormatError,
     NoStepError,
     OptionError,
@@ -22,6 +23,8 @@ from ctrl_realize.errors import (
 from ctrl_realize.numerics.pole_moves import moved_core, pole_directions
 from ctrl_realize.numerics.rise import rise_time
 from tests.fuzz.lane import good_end
+
+PLANT = ct.ss(0.9, 1, 0.1, 0, 0.1)
 
 
 def test_five_thousand_digits_do_not_take_minutes(tmp_path):
@@ -231,6 +234,21 @@ def test_a_model_sampled_once_in_ten_to_the_seventy_seconds_is_refused():
     # a model of NaN came back, without a word
     with pytest.raises(UnsuitableSystemError, match="use a shorter dt"):
         cr.fit_frf(cr.MeasuredFRF(RESPONSE, FREQUENCY), 1, dt=1e70)
+
+
+@pytest.mark.parametrize("degree", [0, 1])
+@pytest.mark.parametrize("dt", [2.3e-308, 2.9e-230, 1e-9, 1.7e308])
+def test_a_sample_time_of_another_world_than_the_response_is_refused(dt, degree):
+    with pytest.raises((UnsuitableSystemError, DelayRangeError), match="use a"):
+        cr.fit_frf(cr.MeasuredFRF(RESPONSE, FREQUENCY), 1, relative_degree=degree, dt=dt)
+
+
+@pytest.mark.parametrize("delay", [10**6, 10**200])
+def test_a_delay_of_more_states_than_can_be_written_is_refused(delay):
+    with pytest.raises(DelayRangeError, match="at most 20000 states"):
+        cr.DelayedStateSpace(PLANT, delay)
+    with pytest.raises(DelayRangeError, match="at most 20000"):
+        cr.delayed_ss(PLANT, dead_time=delay * PLANT.dt)
 
 
 def test_a_pulse_response_is_the_same_in_any_unit_of_the_output():
