@@ -14,6 +14,7 @@ PACKAGE = Path(cr.__file__).parent
 FLOORS = {
     "errors": 0,
     "checks": 0,
+    "wording": 1,
     "numerics": 1,
     "results": 2,
     "signals": 3,

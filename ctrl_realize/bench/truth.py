@@ -11,6 +11,7 @@ from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Result
 from ..signals import MeasuredFRF
+from ..wording import in_time
 from .linear import Core, dc_gain
 
 
@@ -91,15 +92,15 @@ class ValveTruth(Result):
     def _rows(self) -> list[tuple[str, str]]:
         poles = np.sort_complex(np.linalg.eigvals(self.matrices[0]))[::-1] / (2 * np.pi)
         shown = [
-            f"{abs(p):.4g} Hz" + (f" (damping {-p.real / abs(p):.2g})" if p.imag > 0 else "")
+            f"{abs(p):.5g} Hz" + (f" (damping {-p.real / abs(p):.2g})" if p.imag > 0 else "")
             for p in poles
             if p.imag >= 0
         ]
         return [
             ("gain", f"{self.gain:.4g} mm/mA"),
             ("poles", ", ".join(shown)),
-            ("dead time", f"{1e3 * self.dead_time:.5g} ms = {self.delay:.5g} samples"),
-            ("total delay at DC", f"{1e3 * self.total_delay:.5g} ms"),
+            ("dead time", f"{in_time(self.dead_time, 5)} = {self.delay:.5g} samples"),
+            ("total delay at DC", in_time(self.total_delay, 5)),
         ]
 
     def __repr__(self) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..numerics.arrays import ComplexArray
 from ..results import html_card
+from ..wording import in_time
 from .parts import CoreAndDelays
 
 _MOST_POLES = 8
@@ -18,6 +19,11 @@ class DelayedCards(CoreAndDelays):
         if isinstance(self.delay, int):
             return f"z^-{self.delay} ({self.dead_time:.6g} s)"
         return f"input delays {self.input_delays}, output delays {self.output_delays}"
+
+    def _wait(self) -> str:
+        if isinstance(self.delay, int):
+            return f"{in_time(float(self.dead_time), 5)} = {self.delay} samples, as z^-{self.delay}"
+        return f"{self._shift()} samples"
 
     def _fit_line(self) -> str:
         return "" if self.fit is None else f"{self.fit!r}"
@@ -44,15 +50,15 @@ class DelayedCards(CoreAndDelays):
         signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
         rows = [
             ("signals", signals),
-            ("dead time", self._shift()),
-            ("sample time", f"{self.dt:.6g} s"),
+            ("dead time", self._wait()),
+            ("sample time", in_time(self.dt, 6)),
             ("core", f"order {self._core.nstates}"),
             ("poles of the core", _few(self._core.poles())),
         ]
         if self._core.issiso():
             rows.append(("DC gain", f"{float(np.real(self._core.dcgain())):.6g}"))
         if self.fit is not None:
-            rows.append(("fit", self._fit_line()))
+            rows.append(("fit", self._fit_line().strip("<>")))
         return html_card(f"DelayedStateSpace{name}", rows)
 
     def _repr_markdown_(self) -> None:

@@ -15,6 +15,7 @@ from ..errors import UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.inverse_hold import inverse_zero_order_hold, split_fraction
 from ..results import Result
+from ..wording import in_time
 from .approximations import pade_ss
 from .siso import delayed_system, proper_ss
 
@@ -120,13 +121,18 @@ class ContinuousModel(Result):
         return self.core * pade_ss(self.dead_time, order)
 
     def _title(self) -> str:
-        return f"Continuous model {self.core.name}"
+        generic = self.core.name.startswith("sys[")
+        return "Continuous model" if generic else f"Continuous model {self.core.name}"
 
     def _rows(self) -> list[tuple[str, str]]:
-        poles = ", ".join(f"{p:.4g}" for p in self.core.poles())
+        poles = ", ".join(
+            f"{p.real:.4g}" + (f" ± {p.imag:.4g}j" if p.imag > 0 else "")
+            for p in self.core.poles()
+            if p.imag >= 0
+        )
         return [
-            ("dead time", f"{self.dead_time:.6g} s ({self.dead_time / self.dt:.4g} samples)"),
-            ("poles", f"{poles} rad/s"),
+            ("dead time", f"{in_time(self.dead_time, 5)} ({self.dead_time / self.dt:.4g} samples)"),
+            ("poles", f"{poles} rad/s" if poles else "none"),
         ]
 
     def __repr__(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray, IntArray, read_only
 from ..results import Result
+from ..wording import in_time, interval_in_time
 from .loops import Loop, open_loop
 from .margin_result import Margins
 from .margins import loop_margins
@@ -117,11 +118,14 @@ class DelayRobustness(Result):
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.dead_time_interval
         return [
-            ("nominal", f"{self.nominal * self.dt - self.held:.4g} s ({self.nominal} samples)"),
-            ("interval", f"{low:.4g} ... {high:.4g} s"),
+            (
+                "nominal",
+                f"{in_time(self.nominal * self.dt - self.held, 4)} ({self.nominal} samples)",
+            ),
+            ("interval", interval_in_time(low, high)),
             ("over the interval", "stable" if self.stable else "UNSTABLE somewhere"),
             ("worst modulus margin", f"{self.worst_modulus_margin:.4g}"),
-            ("stable", f"from {self.stable_from:.4g} to {self.stable_to:.4g} s"),
+            ("stable", f"from {in_time(self.stable_from, 4)} to {in_time(self.stable_to, 4)}"),
         ]
 
     def __repr__(self) -> str:

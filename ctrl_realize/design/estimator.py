@@ -12,6 +12,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..results import Result
+from ..wording import in_numbers
 from .riccati import locked, riccati, weight_matrix
 from .siso import delayed_system
 
@@ -53,8 +54,8 @@ class KalmanPredictor(Result):
     def _rows(self) -> list[tuple[str, str]]:
         largest = float(np.abs(self.poles).max(initial=0.0))
         return [
-            ("gain", np.array2string(self.gain.T, precision=4)),
-            ("slowest pole", f"|z| = {largest:.6g}"),
+            ("gain", in_numbers(self.gain)),
+            ("slowest pole", f"|z| = {largest:.4g}"),
         ]
 
     def __repr__(self) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
+from ..wording import in_time
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,17 +111,21 @@ class Margins(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         verdict = "stable" if self.stable else f"UNSTABLE ({self.unstable_poles} poles)"
-        samples = "" if not self.dt else f" = {self.delay_margin_samples:.4g} samples"
+        delay = in_time(self.delay_margin, 4)
+        if np.isnan(self.delay_margin):
+            delay = "none: the loop is unstable as it is"
+        elif self.dt and np.isfinite(self.delay_margin):
+            delay += f" = {self.delay_margin_samples:.4g} samples"
         rows = [
             ("closed loop", verdict),
-            ("gain margin", f"{self.gain_margin:.4g} at {self.phase_crossover:.4g} rad/s"),
-            ("phase margin", f"{self.phase_margin:.4g} deg at {self.gain_crossover:.4g} rad/s"),
+            ("gain margin", _gain_in_words(self.gain_margin, self.phase_crossover)),
+            ("phase margin", _phase_in_words(self.phase_margin, self.gain_crossover)),
             (
                 "modulus margin",
                 f"{self.modulus_margin:.4g} at {self.modulus_crossover:.4g} rad/s "
                 f"(Ms = {self.ms:.4g})",
             ),
-            ("delay margin", f"{self.delay_margin:.4g} s{samples}"),
+            ("delay margin", delay),
         ]
         for name, (low, high) in self.intervals.items():
             rows.append((f"95 % {name.replace('_', ' ')}", f"{low:.4g} ... {high:.4g}"))
@@ -132,3 +137,15 @@ class Margins(Result):
             f"<Margins {state}: gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} deg, "
             f"modulus {self.modulus_margin:.4g}, delay {self.delay_margin:.4g} s>"
         )
+
+
+def _gain_in_words(margin: float, crossover: float) -> str:
+    if not np.isfinite(margin):
+        return "infinite: the phase never crosses -180 deg"
+    return f"{margin:.4g} ({20 * np.log10(margin):.3g} dB) at {crossover:.4g} rad/s"
+
+
+def _phase_in_words(margin: float, crossover: float) -> str:
+    if not np.isfinite(margin):
+        return "infinite: the gain never crosses 1"
+    return f"{margin:.4g} deg at {crossover:.4g} rad/s"

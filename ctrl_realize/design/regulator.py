@@ -21,6 +21,7 @@ from ..numerics import state_space
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.delayed_regulator import line_gain
 from ..results import Result
+from ..wording import in_numbers
 from .riccati import locked, riccati, weight_matrix
 from .siso import delayed_system
 
@@ -77,8 +78,8 @@ class PredictorLQR(Result):
         seconds = ", ".join(f"{d * self.dt:.4g}" for d in delays)
         return [
             ("delay", f"{samples} samples ({seconds} s)"),
-            ("gain on the core", np.array2string(self.core_gain, precision=4)),
-            ("slowest closed-loop pole", f"|z| = {largest:.6g}"),
+            ("gain on the core", in_numbers(self.core_gain)),
+            ("slowest closed-loop pole", f"|z| = {largest:.4g}"),
         ]
 
     def __repr__(self) -> str:

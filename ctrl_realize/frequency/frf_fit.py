@@ -10,6 +10,7 @@ import numpy as np
 
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
+from ..wording import in_time, interval_digits, interval_in_time
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -159,13 +160,11 @@ class FRFFit(Result):
             for p, error in zip(self.poles, self.pole_std, strict=True)
             if p.imag >= 0
         ]
+        digits = max(4, interval_digits(*self.interval))
         return [
-            ("dead time", f"{1e3 * self.dead_time:.5g} ms, {self._std_in_words()}"),
-            (
-                "95 % interval",
-                f"{1e3 * self.interval[0]:.5g} to {1e3 * self.interval[1]:.5g} ms",
-            ),
-            ("total delay at DC", f"{1e3 * self.total_delay:.5g} ms"),
+            ("dead time", f"{in_time(self.dead_time, digits)}, {self._std_in_words()}"),
+            ("95 % interval", interval_in_time(*self.interval)),
+            ("total delay at DC", in_time(self.total_delay, 5)),
             ("structure", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", ", ".join(shown)),
             ("gain", f"{self.gain:.5g}"),
@@ -187,7 +186,7 @@ class FRFFit(Result):
         # At a bound, or with a superfluous zero, the curvature says nothing; the interval does.
         if self.std > 2 * (high - low):
             return "its standard deviation is not determined"
-        return f"std {1e3 * self.std:.2g} ms"
+        return f"std {in_time(self.std, 2)}"
 
     def __repr__(self) -> str:
         low, high = self.interval

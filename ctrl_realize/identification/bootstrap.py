@@ -15,6 +15,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import correlation_time
 from ..results import Flag, Result
 from ..signals import Record
+from ..wording import in_time, interval_in_time
 from .delay_fit import fit_delay
 
 Estimator: TypeAlias = Callable[[Any], DelayedStateSpace]
@@ -124,10 +125,10 @@ class Bootstrap(Result):
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
         rows = [
-            ("dead time", f"{float(np.median(self.dead_times)):.6g} s (median)"),
-            ("middle 95 %", f"{low:.6g} ... {high:.6g} s"),
-            ("standard deviation", f"{self.std:.3g} s"),
-            ("gain", f"{self.gains.mean():.6g} +- {self.gains.std(ddof=1):.2g}"),
+            ("dead time", f"{in_time(float(np.median(self.dead_times)), 5)} (median)"),
+            ("middle 95 %", interval_in_time(low, high)),
+            ("standard deviation", in_time(self.std)),
+            ("gain", f"{self.gains.mean():.5g} +- {self.gains.std(ddof=1):.2g}"),
         ]
         if self.block:
             rows.append(("blocks", f"{self.block} samples of the residual"))

@@ -20,6 +20,7 @@ from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ..results import Flag, Result
+from ..wording import in_time
 from .campaign_row import CampaignRow, RecordSource, read_source
 from .identify import Method, fit_records, identify
 from .realization import realize
@@ -252,7 +253,7 @@ class Campaign(Result):
             ("identified", f"{len(self.good)} of {len(self.rows)} records"),
             (
                 "delay, trimmed mean",
-                f"{summary.mean:.2f} samples = {1e3 * summary.mean * self.dt:.4g} ms "
+                f"{summary.mean:.2f} samples = {in_time(summary.mean * self.dt, 4)} "
                 f"({summary.dropped} of {len(self.good)} left out)",
             ),
             ("variance", f"{summary.variance:.3g} samples^2"),

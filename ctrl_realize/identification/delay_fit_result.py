@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
 from ..signals import Record
+from ..wording import in_time, interval_digits, interval_in_time
 
 
 @dataclass(frozen=True)
@@ -152,20 +153,21 @@ class DelayFit(Result):
         )
 
     def _title(self) -> str:
-        return f"Output-error fit: dead time {self.dead_time:.4g} s"
+        return f"Output-error fit: dead time {in_time(self.dead_time, 4)}"
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
+        digits = max(4, interval_digits(low, high))
         rows = [
-            ("dead time", f"{self.dead_time:.6g} s = {self.delay:.4g} samples"),
-            (self.interval_label, f"{low:.6g} ... {high:.6g} s"),
-            *([("first motion", f"{self.onset:.6g} s")] if self.onset == self.onset else []),
-            ("total delay", f"{self.total_delay:.6g} s (dead time and lags: the firm number)"),
+            ("dead time", f"{in_time(self.dead_time, digits)} = {self.delay:.{digits}g} samples"),
+            (self.interval_label, interval_in_time(low, high)),
+            *([("first motion", in_time(self.onset, 4))] if self.onset == self.onset else []),
+            ("total delay", f"{in_time(self.total_delay, 5)} (dead time and lags: firm)"),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
             ("gain", f"{self.gain:.6g}"),
             ("residual", f"{self.residual:.3g}, noise {self.noise:.3g} (misfit {self.misfit:.3g})"),
         ]
-        rows += [(f"view: {name}", f"{value:.6g} s") for name, value in self.views.items()]
+        rows += [(f"view: {name}", in_time(value, 4)) for name, value in self.views.items()]
         if self.repeatability is not None:
             rows += self.repeatability.rows()
         return rows
@@ -210,7 +212,7 @@ class Repeatability:
         scatter = float(self.delays.std(ddof=1)) if self.delays.size > 1 else 0.0
         rows = [
             ("records", f"{len(self.names)}, {len(self.outlying)} of them left out"),
-            ("scatter of delays", f"{scatter:.3g} s between records"),
+            ("scatter of delays", f"{in_time(scatter)} between records"),
             (
                 "chi-square",
                 f"{self.chi_square:.3g} for {len(self.names) - 1} (p = {self.p_value:.2g})",

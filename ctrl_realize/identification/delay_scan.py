@@ -16,6 +16,7 @@ from ..errors import OrderError
 from ..numerics.arrays import FloatArray, read_only
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
+from ..wording import in_time
 from .realization import Realization, realize
 from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
 from .scan_surface import Surface, scan_surface
@@ -159,13 +160,13 @@ class DelayScan(Result):
         return last / self.noise_floor if self.noise_floor > 0 else np.inf
 
     def _title(self) -> str:
-        return f"Delay scan: {self.delay} samples ({self.delay * self.dt:.6g} s)"
+        return f"Delay scan: {self.delay} samples ({in_time(self.delay * self.dt, 5)})"
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
         rows = [
             ("within 5 % of the least misfit", f"{low}...{high} samples"),
-            ("tried", f"0...{self.max_delay} samples of {self.dt:g} s"),
+            ("tried", f"0...{self.max_delay} samples of {in_time(self.dt, 6)}"),
             ("order", f"{self.order}"),
             ("samples behind each delay", f"{self.samples}"),
             ("direct term", "G[d]" if self.feedthrough else "0"),

@@ -16,6 +16,7 @@ from ..numerics.arrays import FloatArray, read_only
 from ..numerics.delay_models import OneModel, hankel_size, realize_at
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
+from ..wording import in_time
 from .impulses import as_impulse, channels, check_samples, filter_flags
 
 HANKEL = ("square", "padded")
@@ -118,7 +119,7 @@ class Realization(Result):
     def _rows(self) -> list[tuple[str, str]]:
         values = ", ".join(f"{value:.4g}" for value in self.singular_values[: self.order])
         rows = [
-            ("dead time", f"{self.delay * self.dt:.6g} s ({self.delay} samples of {self.dt:g} s)"),
+            ("dead time", f"{in_time(self.delay * self.dt, 5)} ({self.delay} samples)"),
             ("Hankel matrix", f"{self.hankel}, {self.samples} samples"),
             ("direct term", f"G[{self.delay}]" if self.feedthrough else "0"),
             ("singular values", f"{values} (next {self.following:.4g})"),

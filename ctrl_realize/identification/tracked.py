@@ -8,6 +8,7 @@ import numpy as np
 
 from ..numerics.arrays import FloatArray
 from ..results import Result
+from ..wording import in_time
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ class TrackedDelay(Result):
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
         return [
-            ("delay", f"{self.delay} samples ({low} to {high}), {self.dead_time:.6g} s"),
+            ("delay", f"{self.delay} samples ({low} to {high}), {in_time(self.dead_time, 4)}"),
             ("gain", f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g} of the starting model's"),
             ("speed of poles", ", ".join(f"{s:.3g}" for s in self.speed_ratios) or "kept"),
             ("noise left", f"{self.noise_std:.3g}"),

@@ -6,10 +6,14 @@ with any kind of colour vision tell apart; models are dashed as well, for print 
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
+from itertools import accumulate
 from textwrap import wrap
 from typing import Any
+from unicodedata import east_asian_width
 
 import control as ct
 import matplotlib as mpl
@@ -17,12 +21,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
+from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
+from ..wording import UNITS, unit_for
+from ..wording import in_time as in_time
+from ..wording import interval_digits as interval_digits
+from ..wording import interval_in_time as interval_in_time
 
 MEASURED = "#0072b2"
 MODEL = "#d55e00"
@@ -77,8 +86,9 @@ AxesLike = Any
 def plain(text: str, longest: int = 80) -> str:
     r"""Make a name that came with the data safe to draw.
 
-    Dollar signs and a leading underscore are instructions to matplotlib; control characters
-    have no glyph.
+    Dollar signs and a leading underscore are instructions to matplotlib; control characters have
+    no glyph, nor have letters that the user's fonts do not know. `longest` counts letters of
+    ordinary width: a row of "W" is cut sooner, before it leaves no room for the axes.
 
     Examples
     --------
@@ -86,10 +96,32 @@ def plain(text: str, longest: int = 80) -> str:
     >>> print(plain("_price in $\n"))
     price in \$?
     """
-    shown = "".join(letter if letter.isprintable() else "?" for letter in text.lstrip("_"))
-    if len(shown) > longest:
-        shown = shown[: longest - 1] + "…"
+    known = _letters(tuple(mpl.rcParams["font.family"]), tuple(mpl.rcParams["font.sans-serif"]))
+    shown = "".join(
+        letter if letter.isprintable() and ord(letter) in known else "?"
+        for letter in text[:1000].lstrip("_")
+    )
+    ends = list(accumulate(map(_width, shown)))
+    if ends and ends[-1] > longest:
+        shown = shown[: bisect_right(ends, longest - 1)] + "…"
     return shown.replace("$", r"\$") or "signal"
+
+
+@cache
+def _letters(families: tuple[str, ...], sans: tuple[str, ...]) -> frozenset[int]:
+    """Code points that the fonts of these families can draw."""
+    found: set[int] = set()
+    for family in (name for one in families for name in (sans if one == "sans-serif" else (one,))):
+        with suppress(ValueError):  # a font that is not on this machine
+            path = findfont(FontProperties(family=family), fallback_to_default=False)
+            found.update(get_font(path).get_charmap())
+    return frozenset(found)
+
+
+def _width(letter: str) -> float:
+    if letter in "WMwm@%" or east_asian_width(letter) in "WF":
+        return 1.7
+    return 1.25 if letter.isupper() else 1.0
 
 
 def wrapped(text: str, width: int) -> str:
@@ -243,49 +275,12 @@ def time_unit(largest: float, axes: Axes | None = None) -> tuple[float, str]:
     >>> time_unit(3.0), time_unit(0.029)
     ((1.0, 's'), (1000.0, 'ms'))
     """
-    units = {"s": 1.0, "ms": 1e3, "µs": 1e6}
     label = "" if axes is None else axes.get_xlabel()
-    for name, factor in units.items():
+    for name, factor in UNITS.items():
         if label.endswith(f"[{name}]"):
             return factor, name
-    name = "s" if largest >= 0.5 else "ms" if largest >= 0.5e-3 else "µs"
-    return units[name], name
-
-
-def in_time(seconds: float, digits: int = 3) -> str:
-    """Write a time with a unit that suits it.
-
-    Examples
-    --------
-    >>> from ctrl_realize.plots.style import in_time
-    >>> in_time(0.02890625), in_time(1.3)
-    ('28.9 ms', '1.3 s')
-    """
-    if seconds == 0:
-        return "0 s"
-    factor, name = time_unit(abs(seconds))
-    return f"{seconds * factor:.{digits}g} {name}"
-
-
-def interval_in_time(low: float, high: float) -> str:
-    """Write an interval of times with digits that show its width.
-
-    Examples
-    --------
-    >>> from ctrl_realize.plots.style import interval_in_time
-    >>> interval_in_time(0.0256, 0.03737), interval_in_time(0.124534, 0.125411)
-    ('25.6 ms to 37.4 ms', '124.5 ms to 125.4 ms')
-    """
-    digits = interval_digits(low, high)
-    return f"{in_time(low, digits)} to {in_time(high, digits)}"
-
-
-def interval_digits(low: float, high: float) -> int:
-    """Return how many digits the ends of an interval need to be told apart, at least 3."""
-    width, largest = high - low, max(abs(low), abs(high))
-    if not 0 < width < np.inf:
-        return 4
-    return int(np.clip(3 + np.floor(np.log10(largest / width)) - 1, 3, 9))
+    name = unit_for(largest)
+    return UNITS[name], name
 
 
 def decibel(magnitude: ArrayLike) -> FloatArray:

@@ -13,8 +13,8 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..identification.delay_scan import DelayScan
 from ..plots.dead_times import estimate_of, interval_of
-from ..plots.style import in_time
 from ..results import Flag
+from ..wording import in_time, interval_in_time
 
 SEVERE = frozenset(
     {
@@ -126,7 +126,7 @@ def headline_of(system: DelayedStateSpace) -> str:
     )
     interval = interval_of(system)
     if interval is not None:
-        sentence += f", {interval_name(system)} {in_time(interval[0])} to {in_time(interval[1])}"
+        sentence += f", {interval_name(system)} {interval_in_time(*interval)}"
     order = system.delay_free.nstates
     gain = _gain(system)
     behind = "an integrating model" if gain == INTEGRATING else f"a model of gain {gain} and"
@@ -147,7 +147,7 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
     interval = interval_of(system)
     if interval is not None:
         name = interval_name(system)
-        facts.append((name, f"{in_time(interval[0], 4)} to {in_time(interval[1], 4)}"))
+        facts.append((name, interval_in_time(*interval)))
     for attribute, label in (
         ("std", "standard error"),
         ("onset", "visible onset"),

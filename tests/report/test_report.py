@@ -15,6 +15,7 @@ from ctrl_realize import report
 from ctrl_realize.report.provenance import file_sha256, record_sha256
 from ctrl_realize.report.sketches import identification_sketches
 from ctrl_realize.report.verdict import comparison_verdict, poles_of, verdict_of
+from ctrl_realize.wording import interval_in_time
 
 HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(2)>$\\frac{'
 
@@ -119,7 +120,7 @@ def test_the_verdict_comes_first_with_dead_time_and_interval(page, fitted):
     verdict = text.index(f"Dead time {1e3 * fitted.fit.dead_time:.4g} ms")
     assert verdict < text.index("Figures") < text.index("How it was found")
     low, high = fitted.fit.interval
-    assert f"{1e3 * low:.3g} ms to {1e3 * high:.3g} ms" in text
+    assert interval_in_time(low, high) in text
     assert text.index("simulated data") < verdict
 
 

@@ -1,0 +1,81 @@
+"""Times in words, with a unit that suits them and as many digits as are worth reading."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .numerics.arrays import FloatArray
+
+UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}
+"""Name of a unit of time -> how many of it are in a second."""
+
+
+def unit_for(seconds: float) -> str:
+    """Choose s, ms or µs for times up to so many seconds."""
+    return "s" if seconds >= 0.5 else "ms" if seconds >= 0.5e-3 else "µs"
+
+
+def in_time(seconds: float, digits: int = 3) -> str:
+    """Write a time with a unit that suits it.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import in_time
+    >>> in_time(0.02890625), in_time(1.3), in_time(8.06313e-06), in_time(float("nan"))
+    ('28.9 ms', '1.3 s', '8.06 µs', 'unknown')
+    """
+    if not np.isfinite(seconds):
+        return "unknown" if np.isnan(seconds) else "infinite"
+    if seconds == 0:
+        return "0 s"
+    name = unit_for(abs(seconds))
+    return f"{_plainly(seconds * UNITS[name], digits)} {name}"
+
+
+def interval_in_time(low: float, high: float) -> str:
+    """Write an interval of times in one unit, with digits that show its width.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import interval_in_time
+    >>> interval_in_time(0.0256, 0.03737), interval_in_time(0.124534, 0.125411)
+    ('25.6 to 37.4 ms', '124.5 to 125.4 ms')
+    >>> interval_in_time(0.0, 0.00327)
+    '0 to 3.27 ms'
+    """
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return f"{in_time(low)} to {in_time(high)}"
+    digits = interval_digits(low, high)
+    name = unit_for(max(abs(low), abs(high)))
+    ends = (_plainly(end * UNITS[name], digits) for end in (low, high))
+    return f"{' to '.join(ends)} {name}"
+
+
+def interval_digits(low: float, high: float) -> int:
+    """Return how many digits the ends of an interval need to be told apart, at least 3."""
+    width, largest = high - low, max(abs(low), abs(high))
+    if not 0 < width < np.inf:
+        return 4
+    return int(np.clip(2 + np.floor(np.log10(largest / width)), 3, 9))
+
+
+def _plainly(value: float, digits: int) -> str:
+    """Write a number without an exponent where its digits allow it."""
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
+
+
+def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
+    """Write a matrix in one line, its rows apart; long rows are cut.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.wording import in_numbers
+    >>> in_numbers(np.array([[0.53770001, 2.0], [1e-5, 0.0]]))
+    '0.5377, 2; 1e-05, 0'
+    """
+    rows = []
+    for row in np.atleast_2d(values):
+        shown = ", ".join(f"{value:.{digits}g}" for value in row[:most])
+        rows.append(shown + (", …" if row.size > most else ""))
+    return "; ".join(rows)
