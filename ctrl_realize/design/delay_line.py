@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike
 
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.state_space import frequency_response, schur_form
+from ..results import html_card
+from ..wording import in_time
 
 CHUNK = 2048
 """Frequencies that are evaluated together; bounds the memory of the powers z^-1 ... z^-d."""
@@ -106,6 +108,29 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         if attribute in notes:
             return notes[attribute]
         raise AttributeError(f"{type(self).__name__} has no attribute {attribute!r}")
+
+    def __repr__(self) -> str:
+        # python-control's lists every matrix, of as many states as the line is long.
+        return (
+            f"<{type(self).__name__} {self.name!r}: order {self.inner_poles.size}, line of "
+            f"{self.line_length} samples, dt = {self.dt:.6g} s>"
+        )
+
+    def _repr_html_(self) -> str:
+        largest = float(np.abs(self.inner_poles).max(initial=0.0))
+        rows = [
+            ("signals", f"{self.input_labels[0]} → {self.output_labels[0]}"),
+            ("inner states", f"{self.inner_poles.size}, the slowest with |z| = {largest:.4g}"),
+            (
+                "line of past outputs",
+                f"{self.line_length} samples = {in_time(self.line_length * self.dt, 4)}",
+            ),
+            ("sample time", in_time(self.dt, 6)),
+        ]
+        return html_card(f"Controller {self.name} with a delay line", rows)
+
+    def _repr_markdown_(self) -> None:
+        return None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (

@@ -10,6 +10,8 @@ import numpy as np
 from ..checks import one_of, positive, real
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
+from ..results import html_card
+from ..wording import in_time
 from .process_model import ProcessModel
 
 DISCRETIZATIONS = ("tustin", "forward", "backward")
@@ -162,6 +164,19 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
             words.append(f"td = {self.td:.4g} s, tf = {self.tf:.4g} s")
         words.append(f"dt = {self.dt:.4g} s" if self.dt else "continuous")
         return f"<PIDController {self.name!r}: {', '.join(words)}>"
+
+    def _repr_html_(self) -> str:
+        rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]
+        if "I" in self.kind:
+            rows.append(("integral time ti", in_time(self.ti, 4)))
+        if "D" in self.kind:
+            rows.append(("derivative time td", in_time(self.td, 4)))
+            rows.append(("its filter tf", in_time(self.tf, 4)))
+        step = f"{in_time(self.dt, 6)}, {self.method} rule" if self.dt else "none: continuous"
+        return html_card(f"PID controller {self.name}", [*rows, ("sample time", step)])
+
+    def _repr_markdown_(self) -> None:
+        return None
 
 
 def _rebuild(parameters: tuple[float, ...], settings: dict[str, Any]) -> PIDController:

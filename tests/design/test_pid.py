@@ -222,3 +222,12 @@ def test_impossible_controllers_are_refused():
         cr.design.PIDController(1.0, 0.0)
     with pytest.raises(OptionError, match="dt=-1"):
         cr.design.PIDController(1.0, dt=-1.0)
+
+
+def test_a_controller_shows_its_parameters_with_units():
+    card = cr.design.pid(SOPDT.system(0.1), "simc", "PID", name="<b>")._repr_html_()
+    assert "&lt;b&gt;" in card
+    assert "<b>" not in card
+    assert "integral time ti" in card
+    assert "100 ms, tustin rule" in card
+    assert "none: continuous" in cr.design.PIDController(0.5, 0.2)._repr_html_()

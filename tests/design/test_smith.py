@@ -207,3 +207,15 @@ def test_unsuitable_systems_are_refused_with_the_reason(valve, cores, pi_control
         make(valve(5), pi, filter_time=-1.0)
     with pytest.raises(OptionError, match="carries no interval"):
         cr.design.delay_robustness(valve(5), pi)
+
+
+def test_a_predictor_of_a_long_line_shows_in_a_few_words():
+    plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), 300, dt=1e-3)
+    predictor = cr.design.smith_predictor(plant, cr.design.pid(plant))
+    assert (
+        repr(predictor)
+        == "<DelayLineController 'smith': order 2, line of 300 samples, dt = 0.001 s>"
+    )
+    card = predictor._repr_html_()
+    assert "300 samples = 300 ms" in card
+    assert len(card) < 2000
