@@ -30,6 +30,9 @@ from .frf_fit import FRFFit, FRFStructure
 from .points import FRFPoints
 
 _NEAR_BIC = 8.0
+_SHARE = 0.1
+"""Part of the dead time by which structures must disagree for a word about it: the interval covers
+all of them in any case, and some other structure nearly always widens a narrow one."""
 _SMALL_WIDTH = 1e-3
 _ORDER_OF_LEAD = 4
 _FAR_BETTER = 0.5
@@ -126,7 +129,9 @@ def _leading_phase(
 
     At high order a chain of zeros imitates the lead, so a low order is asked.
     """
-    if chosen.theta[chosen.order] > 0:
+    # Half a radian at the highest frequency: what is less may as well be none.
+    half_radian = 0.5 / float(np.abs(data.s).max())
+    if chosen.theta[chosen.order] > half_radian:
         return []
     n = min(chosen.order, _ORDER_OF_LEAD)
     as_is = [fit.cost for (order, _), fit in fits.items() if order == n] or [chosen.cost]
@@ -134,7 +139,7 @@ def _leading_phase(
     turned = replace(data, response=data.response * np.exp(-data.s * lead), max_dead_time=lead)
     earlier = min(fit_structures(turned, (n,), (1,)).values(), key=lambda fit: fit.cost)
     dead_time = float(earlier.theta[n]) - lead
-    if dead_time > -0.5 / np.abs(data.s).max() or earlier.cost > _FAR_BETTER * min(as_is):
+    if dead_time > -half_radian or earlier.cost > _FAR_BETTER * min(as_is):
         return []
     return [
         Flag(
@@ -191,7 +196,9 @@ def _cover(
                 "try a larger max_dead_time",
             )
         )
-    if high - low > max(1.5 * (interval[1] - interval[0]), _SMALL_WIDTH * shortest):
+    more = high - low - (interval[1] - interval[0])
+    worth = max(0.5 * (interval[1] - interval[0]), _SHARE * best.dead_time)
+    if more > max(worth, _SMALL_WIDTH * shortest):
         flags.append(
             Flag(
                 "structures_disagree",
