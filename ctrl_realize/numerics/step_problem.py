@@ -22,6 +22,8 @@ from .response_bins import Bins, response_bins
 from .separable_fit import KnownFactor, Problem
 from .structure_search import Scales
 
+_CONTINUED = 2  # a drift at rest goes on for this many times the rest
+
 
 @dataclass(frozen=True, eq=False)
 class StepData:
@@ -151,11 +153,16 @@ def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
 
 
 def fixed_regressors(data: StepData) -> FloatArray:
-    """Offset, drift if there is one, and hum, shape (N, q)."""
+    """Offset, drift if there is one, and hum, shape (N, q).
+
+    A drift ends after twice the time for which it was seen: what a plant has not yet left behind
+    dies away, and a straight line over a long record would be an integrator's doing.
+    """
     n = data.output.size
     columns = [np.ones((n, 1))]
     if data.drift:
-        columns.append(((np.arange(n) - data.edge) / n)[:, None])
+        index = np.arange(n) - data.edge
+        columns.append((np.minimum(index, _CONTINUED * data.edge) / n)[:, None])
     if data.hum:
         columns.append(_hum_columns(n, data.hum))
     return np.concatenate(columns, axis=1)

@@ -93,3 +93,18 @@ def test_a_misfit_is_never_hidden(shared_data):
         assert ("structured_misfit" in flagged) == (not fit.at_noise_level)
         assert fit.interval[0] <= fit.dead_time <= fit.interval[1]
         assert np.isfinite(fit.onset)
+
+
+def test_a_drift_before_the_step_does_not_make_an_integrator_of_a_lamp(shared_data):
+    # Ten samples at rest, a hundred after: the drift is the end of the step before.
+    records = []
+    for i in range(5):
+        path = shared_data / "heating_system" / f"edge{i}.csv"
+        data = np.loadtxt(path, delimiter=",", skiprows=1)
+        records.append(cr.Record(*data.T, name=path.stem))
+    fit = cr.fit_delay(records).fit
+    flags = {flag.code for flag in fit.flags}
+    assert "drift" in flags
+    assert "integrating" not in flags
+    assert 17 < fit.gain < 23  # of the five records one by one: 16 to 23
+    assert 0.5 <= fit.delay <= 2.2

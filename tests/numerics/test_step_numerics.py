@@ -19,6 +19,7 @@ from ctrl_realize.numerics.noise_level import (
     winsorised_sigma,
 )
 from ctrl_realize.numerics.profile_interval import profile_limits
+from ctrl_realize.numerics.step_problem import fixed_regressors, step_data
 from tests import rigs
 
 
@@ -49,6 +50,18 @@ def test_slow_noise_is_no_drift(pole):
     assert rest_noise(slow[:500] + 0.5 * np.arange(500), slow, 0.0)[1] == pytest.approx(
         0.5, abs=0.05
     )
+
+
+@pytest.mark.parametrize(("edge", "end"), [(100, 300), (400, 1000)])
+def test_a_drift_goes_on_for_twice_as_long_as_it_was_seen(edge, end):
+    k = np.arange(1000)
+    output = 0.05 * k + 0.01 * white(1000) + 200.0 * (k >= edge + 20)
+    data = step_data(output, 1.0 * (k >= edge), 1.0, [(edge, 1)])
+    level, drift = fixed_regressors(data).T
+    assert_allclose(level, 1.0)
+    slope = np.diff(drift)
+    assert_allclose(slope[: end - 1], slope[0])
+    assert_allclose(slope[end:], 0.0)
 
 
 def test_noise_is_found_beside_outliers_drift_and_quantisation():
