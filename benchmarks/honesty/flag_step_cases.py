@@ -280,7 +280,7 @@ CASES: list[FlagCase] = [
          quiet=lambda s: fit(step_case("white", "R1", 0.001, s).record)),
     _fit("no_delay_resolved", "no delay, noise 1 and 2 %", lambda s: fit(undelayed(s))),
     _fit("many_lags", "diffusion, noise 0.1 and 0.5 %", wrong("diffusion", LOW)),
-    _fit("many_lags", "dispersion, noise 0.1 and 0.5 %", wrong("dispersion", LOW)),
+    _fit("onset_open", "dispersion, noise 0.1 and 0.5 %", wrong("dispersion", LOW)),
     _fit("integrating", "integrator behind a lag of 5 Hz", integrating),
     _fit("not_settled", "record ends one time constant after the delay", unsettled),
     _fit("inverse_response", "R2 with a zero at +5 Hz", inverse),

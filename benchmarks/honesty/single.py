@@ -14,6 +14,7 @@ DOUBTS = (
     "structures_disagree",
     "no_delay_resolved",
     "many_lags",
+    "onset_open",
     "delay_at_bound",
 )
 """Flags that tell the reader not to trust the interval's middle."""

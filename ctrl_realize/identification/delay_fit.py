@@ -93,7 +93,9 @@ def fit_delay(
 
     Chains of four to eight nearly equal lags compete with the structures by the same criterion
     where three poles or more are needed, so that many lags are not read as dead time. The modes
-    of diffusion widen the interval where they fit as well.
+    of diffusion widen the interval where they fit as well. Where the best structure has a zero,
+    which imitates a smooth beginning, the interval reaches to a sample after the first motion, and
+    three times as far before the delay as the first motion comes after it.
 
     A dead time has no Fisher information in a model with more zeros than the plant: a superfluous
     zero imitates it. That is why the relative degree is chosen, not left free.

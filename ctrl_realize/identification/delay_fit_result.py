@@ -45,7 +45,8 @@ class DelayFit(Result):
         in doubt, `interval` knows, `std` does not.
     interval : tuple of float
         95 % interval of the dead time in s: of all structures that the data cannot rule out
-        where the residual is noise, of the views where it is not.
+        where the residual is noise (and wider where a zero leaves the beginning open), of the
+        views where it is not.
     onset : float
         First motion of the output after the input has moved, in s (NaN when it is no step).
     total_delay : float

@@ -10,6 +10,7 @@ from ..results import Flag
 from .delay_fit_result import Repeatability
 
 _SAMPLES_BESIDE_NOTHING = 0.5
+_FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
 
 
 def fit_flags(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> tuple[Flag, ...]:
@@ -75,6 +76,7 @@ def model_flags(
         _bound(dt, fit, max_delay),
         _nothing(dt, fit),
         _many_lags(fit),
+        _open_start(fit),
         _slow(fit, length),
         _inverse(fit),
     ]
@@ -114,8 +116,8 @@ def _disagreement(dt: float, fit: OutputErrorFit) -> Flag | None:
         apart = [f"{name} {delay:.4g} s" for name, delay in fit.views if not _near(fit, delay)]
         return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
     own = next(line for line in fit.structures if line.structure == fit.structure)
-    wide = fit.high - fit.low > 0.3 * max(fit.delay, dt)
-    if not wide or fit.high - fit.low <= 1.5 * (own.high - own.low):
+    wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
+    if fit.open_start or not wide or fit.high - fit.low <= 2 * (own.high - own.low):
         return None
     return Flag(
         "structures_disagree",
@@ -144,6 +146,17 @@ def _many_lags(fit: OutputErrorFit) -> Flag | None:
         "many_lags",
         "chains of lags fit the better the longer they are, up to the longest that was tried: any "
         "part of the dead time may be more of such lags; only the total delay is firm",
+    )
+
+
+def _open_start(fit: OutputErrorFit) -> Flag | None:
+    if not fit.open_start:
+        return None
+    return Flag(
+        "onset_open",
+        "the best model has a zero, which imitates a smooth beginning: how much of the time up to "
+        f"the first motion is dead time is open, {fit.low:.4g} ... {fit.high:.4g} s; only the "
+        "total delay is firm",
     )
 
 

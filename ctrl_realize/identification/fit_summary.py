@@ -99,6 +99,10 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
         reasons.append(
             f"interval: profile likelihood of {count} structure(s) that the data cannot rule out"
         )
+    if fit.open_start:
+        reasons.append(
+            "interval widened by the first motion: a zero leaves open how the response begins"
+        )
     if fit.correlation > 1:
         reasons.append(f"the residual is correlated: {fit.correlation:.3g} samples count as one")
     return tuple(reasons)

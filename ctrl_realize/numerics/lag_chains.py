@@ -23,7 +23,9 @@ from .structure_search import Candidate, Scales
 SHORTEST, LONGEST = 4, 8
 """Shorter ones have few parameters when they are free; of longer ones rounding shows."""
 
-_PARAMETERS = 2 + 2  # the lag and how many, delay and gain; the shape is bounded
+FREE_IN_A_CHAIN = 2
+"""Parameters beside delay and gain: the lag, and how many; the shape is bounded."""
+
 _DIFFUSION_CHARGE = 8.0  # two lags far apart look like diffusion, and are more common
 _UNEVEN = 0.15  # by which real lags are taken to stray from the law
 _ITERATIONS = 12
@@ -183,7 +185,7 @@ def _chain(
     lag = float(np.sqrt(spread / (lags @ lags)))
     start = np.array([mean - lag * float(lags.sum()), np.log(lag), law.first])
     candidate, x = _fit(problem, order, law, start, scales)
-    value = candidate.cost / variance + _PARAMETERS * penalty
+    value = candidate.cost / variance + (FREE_IN_A_CHAIN + 2) * penalty
     return LagChain(candidate, value, _error(problem, candidate, law, x, variance))
 
 

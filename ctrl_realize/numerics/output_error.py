@@ -6,7 +6,9 @@ The rule:
    is the model, and what its residual leaves is compared with the noise before the step.
 2. Where the residual is noise, the delay is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
-   four to eight nearly equal lags and modes of diffusion among them.
+   four to eight nearly equal lags and modes of diffusion among them. A zero imitates a smooth
+   beginning: where the best structure has one, the interval reaches to a sample after the first
+   motion, and three times as far before the delay as the first motion comes after it.
 3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
    first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
    of up to three poles for the first 63 % and for all of it. The delay is their median.
@@ -25,6 +27,7 @@ import numpy as np
 from .arrays import ComplexArray, FloatArray
 from .fit_window import WindowFit, fit_window
 from .lag_chains import (
+    FREE_IN_A_CHAIN,
     LagChain,
     chain_limits,
     chain_profile,
@@ -38,6 +41,7 @@ from .separable_fit import KnownFactor, Structure, evaluate, fit_batch
 from .step_problem import StepData, step_scales, stop_at, window
 from .structure_search import (
     ALL_STRUCTURES,
+    LEAST_CHARGE,
     PLAUSIBLE,
     SIMPLE_STRUCTURES,
     Candidate,
@@ -49,6 +53,10 @@ from .structure_search import (
 
 ADEQUATE = 1.3
 """Residual over noise, in means over bins, up to which a model is taken for right."""
+
+_UNSEEN = 3.0
+"""How far before the delay a beginning that is open may lie, in times from there to the first
+motion. Flows that disperse, diffusion behind lags and parallel paths need up to 2.5."""
 
 _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 """Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
@@ -78,7 +86,8 @@ class OutputErrorFit:
     The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
     are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
     which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
-    longer they are, so that all of the delay may be lags. `std` is that of the chosen structure.
+    longer they are, so that all of the delay may be lags; `open_start`: how smoothly the response
+    begins is open. `std` is that of the chosen structure.
     """
 
     delay: float
@@ -99,6 +108,7 @@ class OutputErrorFit:
     latest: float
     chain: str = ""
     endless: bool = False
+    open_start: bool = False
 
 
 def fit_output_error(
@@ -132,16 +142,25 @@ def fit_output_error(
     if structures is not None:
         return likelihood_fit(whole, adequate=adequate)
     if adequate:
-        return likelihood_fit(whole, adequate=True, chains=_chains(whole))
+        assert data.motion is not None
+        onset = data.motion.onset * data.dt
+        return likelihood_fit(whole, adequate=True, chains=_chains(whole), onset=onset)
     simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
     chosen = whole.candidates[choose(simple)]
     return _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
 
 
 def likelihood_fit(
-    whole: WindowFit, *, adequate: bool, chains: Sequence[LagChain] = ()
+    whole: WindowFit,
+    *,
+    adequate: bool,
+    chains: Sequence[LagChain] = (),
+    onset: float | None = None,
 ) -> OutputErrorFit:
-    """Take delay and interval from the likelihood (points 1 and 2 of the rule)."""
+    """Take delay and interval from the likelihood (points 1 and 2 of the rule).
+
+    `onset` is the time of the first motion; without it the structures are believed.
+    """
     chosen = whole.best
     level = whole.criterion[chosen.structure] + needless_charge(chosen.structure)
     # Diffusion widens the interval and is never the model: friction, too, looks like it.
@@ -149,16 +168,13 @@ def likelihood_fit(
     better = min(tanks, key=lambda chain: chain.criterion, default=None)
     if better is not None and better.criterion < level:
         chosen, level = better.candidate, better.criterion
-    free = plausible(whole.candidates, whole.criterion, whole.variance, chosen, level)
+    is_chain = better is not None and chosen is better.candidate
+    free, kept = _not_ruled_out(whole, chosen, level, chains, is_chain=is_chain)
     profiles = {s: _profile(whole, whole.candidates[s]) for s in free}
     limits = [profile_limits(*profile) for profile in profiles.values()]
-    limits += [
-        chain_limits(chain, whole.scales)
-        for chain in chains
-        if chain.criterion <= level + PLAUSIBLE
-    ]
+    limits += [chain_limits(chain, whole.scales) for chain in kept]
     chain = ""
-    if better is not None and chosen is better.candidate:
+    if better is not None and is_chain:
         whole = _with_chain(whole, better)
         chain = f"chain of {chosen.structure.order} nearly equal lags"
         profiles[chosen.structure] = chain_profile(better, whole.scales)
@@ -167,9 +183,33 @@ def likelihood_fit(
     own = profile_limits(*profiles[chosen.structure])
     if endless := still_improving(tanks):
         low = whole.scales.earliest
+    open_start = chosen.structure.zeros > 0 and onset is not None
+    if open_start and onset is not None:
+        sample, bounds = whole.scales.dt, whole.scales
+        unseen = _UNSEEN * max(onset - chosen.delay, sample)
+        low = min(low, max(chosen.delay - unseen, bounds.earliest))
+        high = max(high, min(onset + sample, bounds.latest))
     interval = (low, high, (own[1] - own[0]) / 3.92)
     found = _result(whole, chosen, adequate, (), profiles, interval)
-    return replace(found, chain=chain, endless=endless)
+    return replace(found, chain=chain, endless=endless, open_start=open_start)
+
+
+def _not_ruled_out(
+    whole: WindowFit,
+    chosen: Candidate,
+    level: float,
+    chains: Sequence[LagChain],
+    *,
+    is_chain: bool,
+) -> tuple[list[Structure], list[LagChain]]:
+    """List the structures and chains that the data cannot rule out beside the chosen one."""
+    more = max(LEAST_CHARGE - whole.penalty, 0.0)
+    charged = {s: value + more * (s.order + s.zeros) for s, value in whole.criterion.items()}
+    of_chain = more * FREE_IN_A_CHAIN
+    own = chosen.structure
+    level += of_chain if is_chain else more * (own.order + own.zeros)
+    free = plausible(whole.candidates, charged, whole.variance, chosen, level)
+    return free, [chain for chain in chains if chain.criterion + of_chain <= level + PLAUSIBLE]
 
 
 def _chains(whole: WindowFit) -> list[LagChain]:

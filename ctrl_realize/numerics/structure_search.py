@@ -23,6 +23,10 @@ lag of half a sample at least, its delay would be known better than to the sampl
 PLAUSIBLE = 10.0
 """A structure is not ruled out while its criterion is within this of the best."""
 
+LEAST_CHARGE = 7.0
+"""Least charge for a parameter where structures are ruled out. Few independent samples charge less,
+and models with two zeros too many, in which a delay has no information, would never be."""
+
 
 @dataclass(frozen=True)
 class Scales:

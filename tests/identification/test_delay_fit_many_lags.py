@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.special import gammainc
+from scipy.special import gammainc, ndtr
 
 import ctrl_realize as cr
 from tests import rigs
@@ -91,3 +92,44 @@ def test_a_model_of_eight_lags_responds_as_its_fit():
     response = model.simulate(record.input)
     # Eight poles within 10 %: the coefficients of their polynomial lose six digits.
     assert_allclose(response + model.fit.fitted[0], model.fit.fitted, rtol=0, atol=1e-5 * 16)
+
+
+def dispersion_record(noise: float, *, mean: float, delay: float = 37.0, seed: int = 0):
+    """Step record of a flow that disperses: inverse Gaussian residence times, shape = mean [s]."""
+    k = np.arange(-2000, 2600)
+    time = np.maximum((k - delay) * TS, 1e-6)
+    root = np.sqrt(mean / time)
+    y = ndtr(root * (time / mean - 1)) + np.exp(2) * ndtr(-root * (time / mean + 1))
+    y = np.where(k > delay, y, 0.0) + noise * np.random.default_rng(seed).standard_normal(k.size)
+    return cr.Record(k * TS, (k >= 0).astype(float), y)
+
+
+@pytest.mark.parametrize(("mean", "noise"), [(0.05, 0.001), (0.05, 0.005), (0.08, 0.001)])
+def test_a_beginning_that_a_zero_imitates_is_left_open(mean, noise):
+    fit = cr.fit_delay(dispersion_record(noise, mean=mean)).fit
+    low, high = fit.delay_interval
+    assert fit.order > fit.relative_degree
+    assert "onset_open" in {flag.code for flag in fit.flags}
+    # no structure that is not ruled out knows of a delay as short as that
+    assert min(row.interval[0] for row in fit.structures if row.interval) / TS > 37.5
+    assert low <= 37 <= high
+    # three times as far before the delay as the first motion is behind it, and a sample after that
+    assert fit.delay - low == pytest.approx(3 * (fit.onset / TS - fit.delay))
+    assert high == pytest.approx(fit.onset / TS + 1)
+
+
+def test_a_plant_with_a_zero_is_covered_and_one_without_is_not_called_open():
+    w = 2 * np.pi * 4.0
+    zero = cr.fit_delay(rigs.step_record(rigs.R3 * ct.tf([1 / w, 1], [1]), noise=0.001)).fit
+    assert zero.structure == (3, 2)
+    assert "onset_open" in {flag.code for flag in zero.flags}
+    assert zero.delay_interval[0] <= 37 <= zero.delay_interval[1]
+    assert zero.delay_interval[1] - zero.delay_interval[0] < 25  # onset: five samples after it
+    plain = cr.fit_delay(rigs.step_record(noise=0.001)).fit
+    assert "onset_open" not in {flag.code for flag in plain.flags}
+
+
+def test_structures_that_are_given_are_believed():
+    fit = cr.fit_delay(dispersion_record(0.005, mean=0.08), structures=[(3, 2)]).fit
+    assert "onset_open" not in {flag.code for flag in fit.flags}
+    assert fit.interval[1] - fit.interval[0] < 5 * TS
