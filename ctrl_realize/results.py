@@ -14,6 +14,10 @@ from importlib import import_module
 from typing import Any
 
 
+SHORT_LABEL = 16
+"""Letters of a label that is never broken."""
+
+
 @dataclass(frozen=True)
 class Flag:
     """Something one should know before trusting a result.
@@ -131,10 +135,13 @@ def html_card(
     >>> print(card[card.index("⚠"):])
     ⚠ look &lt;twice&gt;</div></div>
     """
+    cell = "text-align:left;vertical-align:top"
     body = "".join(
-        f"<tr><th style='text-align:left;font-weight:500;padding:2px 16px 2px 0'>"
+        f"<tr><th style='{cell};font-weight:500;padding:2px 16px 2px 0;"
+        # On a phone the values wrap first.
+        f"white-space:{'nowrap' if len(label) <= SHORT_LABEL else 'normal'}'>"
         f"{html.escape(label)}</th>"
-        f"<td style='text-align:left;padding:2px 0'>{html.escape(value)}</td></tr>"
+        f"<td style='{cell};padding:2px 0'>{html.escape(value)}</td></tr>"
         for label, value in rows
     )
     lines = "".join(f"<div style='margin-top:4px'>{html.escape(text)}</div>" for text in choices)

@@ -42,12 +42,14 @@ def interval_in_time(low: float, high: float) -> str:
     ('25.6 to 37.4 ms', '124.5 to 125.4 ms')
     >>> interval_in_time(0.0, 0.00327)
     '0 to 3.27 ms'
+    >>> interval_in_time(0.026, 0.0374)
+    '26.0 to 37.4 ms'
     """
     if not (np.isfinite(low) and np.isfinite(high)):
         return f"{in_time(low)} to {in_time(high)}"
     digits = interval_digits(low, high)
     name = unit_for(max(abs(low), abs(high)))
-    ends = (_plainly(end * UNITS[name], digits) for end in (low, high))
+    ends = (_in_full(end * UNITS[name], digits) for end in (low, high))
     return f"{' to '.join(ends)} {name}"
 
 
@@ -57,6 +59,15 @@ def interval_digits(low: float, high: float) -> int:
     if not 0 < width < np.inf:
         return 4
     return int(np.clip(2 + np.floor(np.log10(largest / width)), 3, 9))
+
+
+def _in_full(value: float, digits: int) -> str:
+    """Write a number with its zeros, which tell how exact it is."""
+    return (
+        f"{value:#.{digits}g}".rstrip(".")
+        if 1e-3 < abs(value) < 10**digits
+        else (_plainly(value, digits))
+    )
 
 
 def _plainly(value: float, digits: int) -> str:

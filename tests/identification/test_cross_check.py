@@ -57,7 +57,9 @@ def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(bo
 def test_a_step_is_seen_in_three_ways():
     check = cr.check_delay(step_record(R1, noise=0.002))
     assert [v.method for v in check.views] == ["output error", "first motion", "scan"]
-    fit, onset, _ = check.views
+    fit, onset, scan = check.views
+    assert "not how far off" in scan.doubt  # its set holds the truth in 4 of 10 records
+    assert check.rely_on == "output error"
     assert fit.low <= 37 * 7.8125e-4 <= fit.high
     assert fit.value <= onset.high
     assert check.table().loc["output error", "samples"] == pytest.approx(37, abs=0.5)
