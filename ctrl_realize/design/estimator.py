@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..delayed import DelayedStateSpace
-from ..errors import UnsuitableSystemError
+from ..delayed.chains import augment
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..results import Result
 from ..wording import in_numbers
@@ -24,12 +24,17 @@ class KalmanPredictor(Result):
     ``x[k+1] = A x[k] + B u[k-d] + gain (y[k] - C x[k] - D u[k-d])``. The inputs on their way are
     known, so the chain needs no gain: the filter of the whole system is ``[gain; 0]``.
 
+    Where outputs are delayed, x is the core's state with the outputs on their way behind it,
+    ``y*[k-1] ... y*[k-q]`` of each, and A, B, C, D are those of core and outputs: the filter
+    predicts the core's state of now from what was measured `q` samples late.
+
     Attributes
     ----------
-    gain : ndarray, shape (n, p)
+    gain : ndarray, shape (n + q, p)
+        q is the sum of the output delays.
     covariance : ndarray, shape (n, n)
-        Of the error of the state predicted one sample ahead.
-    poles : ndarray, shape (n,)
+        Of the error of the core's state predicted one sample ahead.
+    poles : ndarray, shape (n + q,)
         Of the estimator, eigenvalues of A - gain C.
     dt : float
 
@@ -63,14 +68,16 @@ class KalmanPredictor(Result):
 
 
 def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) -> KalmanPredictor:
-    """Steady Kalman filter of a system with dead time at its inputs.
+    """Steady Kalman filter of a system with dead time.
 
-    Equal to `control.dlqe` of the augmented system with process noise on the core's states only.
+    Equal to `control.dlqe` of the augmented system with process noise on the core's states only,
+    at the cost of a Riccati equation of the core: what all outputs are late by is a prediction.
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Delays at the inputs (they may differ), none at the outputs.
+        Its delays may differ from channel to channel. Outputs of different delays make the
+        Riccati equation larger by what they differ.
     QN : array_like, shape (n, n)
         Covariance of the process noise on the core's states. For noise that enters with the
         input use ``B @ B.T`` of the core.
@@ -90,14 +97,50 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     [[0.5377]]
     """
     plant = delayed_system(system, "kalman_predictor", siso=False)
-    if any(plant.output_delays):
-        raise UnsuitableSystemError(
-            f"the outputs have delays {plant.output_delays}; a filter needs them at the inputs "
-            "(for one input and output: delayed_ss(core, delay))"
-        )
     core = plant.delay_free
     weight = weight_matrix(QN, core.nstates, "QN", "core state(s)")
     price = weight_matrix(RN, core.noutputs, "RN", "output(s)")
-    A, C = np.asarray(core.A), np.asarray(core.C)
-    gain, cost, poles = riccati(ct.dlqr, A.T, C.T, weight, price, "QN and RN")
-    return KalmanPredictor(read_only(gain.T), read_only(cost), locked(poles), float(plant.dt))
+    common = min(plant.output_delays)
+    own = tuple(q - common for q in plant.output_delays)
+    A, C = _with_outputs(core, own)
+    noise = np.zeros_like(A)
+    noise[: core.nstates, : core.nstates] = weight
+    gain, cost, poles = riccati(ct.dlqr, A.T, C.T, noise, price, "QN and RN")
+    if common:
+        gain, cost = _late(core, plant.output_delays, common, (A, gain.T, cost, noise))
+        poles = np.append(poles, np.zeros(common * core.noutputs))
+    else:
+        gain = gain.T
+    n = core.nstates
+    return KalmanPredictor(read_only(gain), read_only(cost[:n, :n]), locked(poles), float(plant.dt))
+
+
+def _with_outputs(core: ct.StateSpace, delays: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return A and C of the core with the outputs that are on their way."""
+    matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
+    A, _, C, _ = augment(matrices, (0,) * core.ninputs, delays)
+    return A, C
+
+
+def _late(
+    core: ct.StateSpace, delays: tuple[int, ...], common: int, found: tuple[FloatArray, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Predict the filter of outputs that all are `common` samples late.
+
+    What is learnt about the state then is carried on by A to now; what is on its way to an
+    output is that output of the states between.
+    """
+    A, gain, cost, noise = found
+    n, C = core.nstates, np.asarray(core.C, dtype=np.float64)
+    between = [gain]
+    for _ in range(common):
+        between.append(A @ between[-1])
+        cost = A @ cost @ A.T + noise
+    rows = [between[-1][:n]]
+    at = n
+    for i, q in enumerate(delays):
+        # y*[k+1-j] for j = 1 ... common, then what the smaller filter holds of its own delay.
+        rows += [C[[i]] @ between[common - j][:n] for j in range(1, common + 1)]
+        rows.append(gain[at : at + q - common])
+        at += q - common
+    return np.vstack(rows), cost

@@ -33,7 +33,7 @@ def lqg(
     Parameters
     ----------
     system : DelayedStateSpace
-        Delays at the inputs, which may differ; none at the outputs.
+        Its delays may differ from channel to channel.
     Q, R
         As for `predictor_lqr`.
     QN, RN
@@ -60,11 +60,15 @@ def lqg(
     regulator = predictor_lqr(plant, Q, R)
     estimator = kalman_predictor(plant, QN, RN)
     core = plant.delay_free
-    A, B, C, D = (np.asarray(M, dtype=np.float64) for M in (core.A, core.B, core.C, core.D))
-    K, L = regulator.gain, estimator.gain
+    matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
+    A, B, C, D = augment(matrices, (0,) * core.ninputs, tuple(plant.output_delays))
+    L = estimator.gain
     # Estimated core and line of own outputs, as the chains of the plant hold them.
     inner, into = A - L @ C, B - L @ D
-    n, d = core.nstates, sum(plant.input_delays)
+    n, d = A.shape[0], sum(plant.input_delays)
+    # What is on its way to an output counts among the states of the estimator, and for nothing.
+    gain, passed = np.split(regulator.gain, [core.nstates + d], axis=1)
+    K = np.hstack([gain[:, : core.nstates], passed, gain[:, core.nstates :]])
     if not plant.issiso():
         return _several_channels(plant, (inner, into, K, L), name)
     line = np.zeros((n, d))
