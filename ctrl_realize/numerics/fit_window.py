@@ -9,7 +9,7 @@ import numpy as np
 
 from .arrays import FloatArray
 from .delayed_modes import HeldInput
-from .noise_level import correlation_time, mad_sigma
+from .noise_level import correlation_time, is_coarse, mad_sigma
 from .response_bins import Bins
 from .separable_fit import Problem, Structure, evaluate, respond
 from .structure_search import (
@@ -71,7 +71,8 @@ class WindowFit:
     """Candidates on one window, and the noise that the best of them leaves.
 
     ``variance`` is that of independent noise which would scatter the estimates as much as the
-    residual does: its own times its `correlation`. `misfit` is the root mean square of the
+    residual does: its own, with that of a coarse `rounding` once more, for neighbours are rounded
+    alike, times its `correlation`. `misfit` is the root mean square of the
     residual of the chosen structure, in means over bins, over the noise level given.
     """
 
@@ -83,11 +84,12 @@ class WindowFit:
     sigma: float
     correlation: float
     misfit: float
+    rounding: float = 0.0
 
     @property
     def variance(self) -> float:
         """Variance per sample, colour included."""
-        return self.sigma**2 * self.correlation
+        return (self.sigma**2 + self.rounding**2) * self.correlation
 
     @property
     def penalty(self) -> float:
@@ -150,7 +152,10 @@ def fit_window(
     chosen = candidates[choose(criterion)]
     freedom = max(problem.data.size - lost, 1)
     misfit = float(np.sqrt(chosen.cost / freedom)) / sigma
-    return WindowFit(window, problem, candidates, criterion, scales, level, correlation, misfit)
+    rounding = quantum / np.sqrt(12) if is_coarse(sigma, quantum) else 0.0
+    return WindowFit(
+        window, problem, candidates, criterion, scales, level, correlation, misfit, rounding
+    )
 
 
 def _clipped(error: FloatArray, least: float) -> FloatArray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from .arrays import FloatArray
 
+_DITHER = 0.6  # noise, rounding included, in quantisation steps, from which means are unbiased
 _MANY = 50  # samples at rest that are enough to tell the noise
 _FEW = 8  # samples at rest below which the whole record must tell the noise
 
@@ -25,6 +26,15 @@ def quantisation_step(values: FloatArray) -> float:
     multiples = gaps / step
     whole = np.abs(multiples - np.round(multiples)) < 0.05
     return step if np.mean(whole) > 0.9 and np.median(multiples) < 50 else 0.0
+
+
+def is_coarse(sigma: float, quantum: float) -> bool:
+    """Tell whether a quantiser's steps are so high that averaging does not remove the rounding.
+
+    With less noise than half a step the mean of rounded samples depends on where between two
+    levels the signal lies (dither).
+    """
+    return quantum > 0 and sigma < _DITHER * quantum
 
 
 def mad_sigma(values: FloatArray) -> float:

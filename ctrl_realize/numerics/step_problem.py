@@ -14,6 +14,7 @@ from .input_moves import input_moves
 from .noise_level import (
     colouring,
     hum_frequencies,
+    is_coarse,
     quantisation_step,
     rest_noise,
     sine_pair,
@@ -67,7 +68,7 @@ class StepData:
     @property
     def coarse(self) -> bool:
         """Quantised so coarsely that averaging does not remove the rounding."""
-        return self.quantum > 0 and self.sigma < 0.4 * self.quantum
+        return is_coarse(self.sigma, self.quantum)
 
 
 def step_data(
