@@ -378,4 +378,8 @@ def _model(
         choices=choices,
         flags=(*flags, *seen.values()),
     )
-    return system.replace(fit=fit)
+    first = group[0]
+    labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}
+    # python-control takes no dots in names
+    name = {"name": first.name.replace(".", "_")} if first.name else {}
+    return system.replace(fit=fit, **labels, **name)

@@ -14,6 +14,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..signals import Record, StepResponse
+from .channel_fit import fit_channels
 from .delay_fit import MOST_ORDER, fit_delay
 from .delay_scan import estimate_delay
 from .orders import scan_orders
@@ -49,8 +50,9 @@ def identify(
     Parameters
     ----------
     record : Record or sequence of Record
-        One input, one output. The scan and the paper's method need one record with a step in its
-        input; the output-error fit takes several, and any input (see `fit_delay`).
+        The scan and the paper's method need one record with one output and a step in its one
+        input; the output-error fit takes several records, any input (see `fit_delay`), and
+        several channels (these go to `fit_channels`).
     method : {"output_error", "scan", "paper"}, optional
         ``"output_error"``: fit of the raw record with a continuous delay; the most accurate, and
         the only one whose interval is a confidence interval. ``"scan"``: the realization scan
@@ -69,7 +71,8 @@ def identify(
     Returns
     -------
     DelayedStateSpace
-        Its `.fit` is a `DelayFit` or a `DelayScan`; `.fit.report()` says what was chosen and why.
+        Its `.fit` is a `DelayFit`, a `DelayScan`, or for several channels a `ChannelFit`;
+        `.fit.report()` says what was chosen and why.
         The steps before it hang on the fit: ``.fit.impulse.step.record`` for the scans,
         ``.fit.records`` for the fit.
 
@@ -108,6 +111,14 @@ def identify(
             f"{', '.join(strange)}: not for method={method!r}; see the documentation of identify "
             "for the arguments of each method"
         )
+    if method == "output_error" and _of_several_channels(record):
+        fit_only |= {"max_delay": max_delay is not None}
+        strange = [name for name, given in fit_only.items() if given]
+        if strange:
+            raise OptionError(
+                f"{', '.join(strange)}: not for records of several channels; see fit_channels"
+            )
+        return fit_channels(record, order)
     if method == "output_error":
         return fit_records(
             record,
@@ -127,6 +138,11 @@ def identify(
     if method == "paper":
         return _paper(step, order, max_delay, cutoff_hz, samples, feedthrough)
     return _scan(step, order, max_delay, cutoff_hz, samples, feedthrough)
+
+
+def _of_several_channels(records: Record | Sequence[Record]) -> bool:
+    given = [records] if isinstance(records, Record) else records
+    return any(isinstance(r, Record) and r.n_inputs * r.n_outputs > 1 for r in given)
 
 
 def fit_records(

@@ -137,3 +137,19 @@ def test_a_step_at_the_last_sample_is_refused_by_every_method(method):
     noise = np.random.default_rng(0).standard_normal(2000)
     with pytest.raises(NoStepError, match="nothing was recorded after it"):
         cr.identify(cr.Record(t, u, noise), method=method)
+
+
+def test_records_of_several_channels_go_to_their_own_fit():
+    core = ct.ss([[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1)
+    plant = cr.DelayedStateSpace(core, (2, 5))
+    u = np.random.default_rng(0).choice([-1.0, 1.0], (2, 400))
+    record = cr.Record(
+        0.1 * np.arange(400), u, plant.simulate(u), name="a.b", input_labels=["heat", "flow"]
+    )
+    found = cr.identify(record, order=2)
+    assert isinstance(found.fit, cr.ChannelFit)
+    assert (found.input_delays, found.input_labels) == ((2, 5), ["heat", "flow"])
+    with pytest.raises(OptionError, match="max_delay: not for records of several channels"):
+        cr.identify(record, max_delay=9)
+    with pytest.raises(DataError):
+        cr.identify(record, method="scan")
