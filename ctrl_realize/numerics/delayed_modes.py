@@ -17,6 +17,7 @@ and pole sets at once; `SampledInput` does it for a long measured signal, by rec
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -78,7 +79,7 @@ class MoveTrain:
         decay = np.exp(elapsed * rates[:, None, :])
         static, mode = level[here], total[row, here] * decay
         slope = stretch[row, here] * decay + elapsed * mode
-        widths, kind = np.unique(self.width, return_inverse=True)
+        widths, kind = self._kinds
         if widths[-1] > 1:
             mean, turn = _geometric_mean(rates[:, None] * self.dt, widths[:, None])
             slope = slope * mean[:, kind] + mode * (self.dt * turn)[:, kind]
@@ -99,6 +100,12 @@ class MoveTrain:
                 sums = np.add.reduceat(samples, ends - count, axis=0)
                 values[row, column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
         return static, mode.astype(np.complex128), slope.astype(np.complex128)
+
+    @cached_property
+    def _kinds(self) -> tuple[IntArray, IntArray]:
+        """Different widths, and which of them every bin has."""
+        widths, kind = np.unique(self.width, return_inverse=True)
+        return widths, kind
 
     def _arrived(self, since: FloatArray) -> IntArray:
         """Count the moves that have arrived at delayed times (B, m)."""
