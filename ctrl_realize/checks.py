@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any
 
 from .errors import OptionError
+
+MOST = 10**12
+"""No count of samples, lags or states is larger."""
 
 
 def positive(value: Any, name: str, what: str) -> float:
@@ -30,12 +34,22 @@ def real(value: Any, name: str, what: str) -> float:
     return float(value)
 
 
+def band(value: Any, name: str, what: str) -> tuple[float, float]:
+    """Return the two ends of a band."""
+    ends = tuple(value) if isinstance(value, Iterable) else ()
+    if len(ends) != 2:
+        raise OptionError(f"{name}={value!r}; needed are two numbers, the ends: {what}")
+    return real(ends[0], name, what), real(ends[1], name, what)
+
+
 def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
     """Return `value` as an int when it is a whole number in low...high."""
     limits = f">= {low}" if high is None else f"in {low}...{high}"
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise OptionError(f"{name}={value!r}; needed is a whole number {limits}")
     number = int(value)
+    if abs(number) > MOST:
+        raise OptionError(f"{name} is beyond {MOST:.0e}; needed is a whole number {limits}")
     if number < low or (high is not None and number > high):
         raise OptionError(f"{name}={number}; needed is a whole number {limits}")
     return number
@@ -43,7 +57,8 @@ def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
 
 def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:
     """Return `value` when it is one of the choices."""
-    if value not in choices:
+    # an array would compare one by one
+    if not isinstance(value, str) or value not in choices:
         raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
     return str(value)
 

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..errors import UnsuitableSystemError
+from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, IntArray
 from .chains import Matrices, augment
 
@@ -108,6 +108,11 @@ def check_core(core: Any) -> None:
 def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter: str) -> list[str]:
     """Name signals: as given, as those of the core, or by one letter if the core has no names."""
     if given is not None:
-        return [given] if isinstance(given, str) else list(given)
+        names = [given] if isinstance(given, str) else given
+        if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+            raise OptionError(f"{given!r} is no list of names")
+        if len(names) != len(core):
+            raise OptionError(f"names {list(names)} for {len(core)} signals; give one for each")
+        return list(names)
     generic = [f"{letter}[{i}]" for i in range(len(core))]
     return [letter] if list(core) == generic and len(generic) == 1 else list(core)

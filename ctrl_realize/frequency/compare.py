@@ -7,7 +7,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of, real
+from ..checks import band, one_of, real
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
@@ -233,7 +233,7 @@ def _good_points(
                 "min_coherence is given, but the FRF has no coherence; pass band_hz=(low, high)"
             )
     if band_hz is not None:
-        low, high = (real(edge, "band_hz", "frequency in Hz") for edge in band_hz)
+        low, high = band(band_hz, "band_hz", "frequencies in Hz")
         inside = (frequency >= low) & (frequency <= high)
         if not inside.any():
             raise DataError(

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import one_of, real
+from ..checks import band, one_of
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray
 
@@ -61,7 +61,7 @@ def frf_points(
     usable = (frequency > _LEAST) & (np.abs(response) > _LEAST) & np.isfinite(response)
     usable &= frequency < below_hz
     if band_hz is not None:
-        low, high = (real(edge, "band_hz", "frequency in Hz") for edge in band_hz)
+        low, high = band(band_hz, "band_hz", "frequencies in Hz")
         usable &= (frequency >= low) & (frequency <= high)
     if usable.sum() < 3:
         limit = f", below {below_hz:.4g} Hz" if np.isfinite(below_hz) else ""

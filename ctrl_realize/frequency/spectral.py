@@ -18,7 +18,7 @@ from ..numerics.spectra import (
     segment_sums,
 )
 from ..signals import MeasuredFRF, Record
-from ..signals.record import check_complete
+from ..signals.given import as_records, check_complete
 
 _LONGEST_DEFAULT_SEGMENT = 8192
 _MIN_LINE_POWER = 1e-4
@@ -144,9 +144,7 @@ def _aligned(
 ) -> Iterator[tuple[FloatArray, FloatArray, float]]:
     """Yield input, output (moved earlier by `delay`) and sample time of each record."""
     first_dt, channels = None, None
-    for record in [records] if isinstance(records, Record) else records:
-        if not isinstance(record, Record):
-            raise DataError(f"got a {type(record).__name__}; needed are records")
+    for record in as_records(records):
         check_complete(record, "spectral_frf")
         if first_dt is None:
             first_dt = record.dt

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.sines import SineFit, dominant_frequency, fit_sines
 from ..signals import MeasuredFRF, Record
-from ..signals.record import check_complete
+from ..signals.given import as_records, check_complete
 
 _BATCH_SAMPLES = 300_000
 _STEADY_RATIO = 1.5
@@ -116,13 +116,13 @@ def stepped_sine_frf(
 
 def _as_points(records: Sweep) -> list[list[Record]]:
     """Check the records and give every point a list of repeats."""
-    points = [[entry] if isinstance(entry, Record) else list(entry) for entry in records]
-    if not points or not all(points):
+    if not isinstance(records, Iterable):
+        raise DataError(f"got a {type(records).__name__}; needed are records")
+    points = [list(as_records(entry)) for entry in records]
+    if not points:
         raise DataError("no records; needed is at least one for each frequency")
     for point in points:
         for record in point:
-            if not isinstance(record, Record):
-                raise DataError(f"got a {type(record).__name__} among the records")
             check_complete(record, "stepped_sine_frf")
             if not record.issiso:
                 raise DataError(

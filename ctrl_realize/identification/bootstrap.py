@@ -15,6 +15,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import correlation_time
 from ..results import Flag, Result
 from ..signals import Record
+from ..signals.given import as_records
 from ..wording import in_time, interval_in_time
 from .delay_fit import fit_delay
 
@@ -194,9 +195,7 @@ def bootstrap(
     whole(seed, "seed", 0)
     if not callable(estimator):
         raise OptionError(f"estimator={estimator!r}; needed is a function of the records")
-    several = (records,) if isinstance(records, Record) else tuple(records)
-    if not several or not all(isinstance(record, Record) for record in several):
-        raise DataError("records is empty or holds something else; needed are Record objects")
+    several = as_records(records)
     system = estimator(records)
     draws: list[Any]
     streams = [np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(count)]

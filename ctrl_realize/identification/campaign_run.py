@@ -71,8 +71,10 @@ def identify_campaign(
 
     one_of(method, "method", METHODS)
     _check_options(options)
-    if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or n_jobs == 0:
+    if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or not 0 < abs(n_jobs) <= 10_000:
         raise OptionError(f"n_jobs={n_jobs!r}; needed is a number of processes, or -1 for all")
+    if not isinstance(records, Iterable):
+        raise DataError(f"records is a {type(records).__name__}; needed are several records")
     sources = list(records)
     if not sources:
         raise DataError("there are no records to identify")

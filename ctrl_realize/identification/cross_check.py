@@ -14,7 +14,7 @@ from ..numerics.onset import correlation_onset, phase_slope
 from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
 from ..results import Flag, Result
 from ..signals import MeasuredFRF, Record
-from ..signals.record import check_complete
+from ..signals.given import check_complete
 from ..wording import in_time, interval_in_time
 from .delay_fit import fit_delay
 from .delay_fit_result import DelayFit

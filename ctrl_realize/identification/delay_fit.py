@@ -17,7 +17,7 @@ from ..numerics.output_error import OutputErrorFit, fit_output_error
 from ..numerics.separable_fit import KnownFactor, Structure
 from ..numerics.step_problem import StepData, step_data
 from ..signals import Record, StepEdge
-from ..signals.record import check_complete
+from ..signals.given import as_records, check_complete
 from .any_input_fit import LEAST_MOVE, fit_any_input
 from .averaging import aligned_steps, delay_outliers, mean_step, repeatability, widened
 from .delay_fit_result import DelayFit
@@ -180,9 +180,7 @@ def _fit_mean(
 
 
 def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
-    several = (records,) if isinstance(records, Record) else tuple(records)
-    if not several or not all(isinstance(record, Record) for record in several):
-        raise DataError("records is empty or holds something else; needed are Record objects")
+    several = as_records(records)
     for record in several:
         check_complete(record, "fit_delay")
         if record.n_samples < FEWEST_SAMPLES:

@@ -15,6 +15,7 @@ from ..errors import DataError, DataWarning, OptionError
 from ..numerics.arrays import FloatArray, read_only
 from ..results import Flag, Result
 from ..signals import ImpulseResponse, Record
+from ..signals.given import as_records
 from .pulse_choice import Choice, choose_estimate
 from .pulse_regression import PulseRegression, through_arx, with_prior, without_prior
 
@@ -273,9 +274,7 @@ def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
 
 def as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:
     """Check that records are of one plant: the same sample time and channels."""
-    group = (records,) if isinstance(records, Record) else tuple(records)
-    if not group or not all(isinstance(record, Record) for record in group):
-        raise DataError("records is empty or holds something that is no Record")
+    group = as_records(records)
     first = group[0]
     for i, other in enumerate(group[1:], start=1):
         if not np.isclose(other.dt, first.dt, rtol=1e-3, atol=0):

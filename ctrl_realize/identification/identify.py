@@ -14,6 +14,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..signals import Record, StepResponse
+from ..signals.given import as_records
 from .channel_fit import fit_channels
 from .delay_fit import MOST_ORDER, fit_delay
 from .delay_scan import estimate_delay
@@ -141,8 +142,7 @@ def identify(
 
 
 def _of_several_channels(records: Record | Sequence[Record]) -> bool:
-    given = [records] if isinstance(records, Record) else records
-    return any(isinstance(r, Record) and r.n_inputs * r.n_outputs > 1 for r in given)
+    return any(record.n_inputs * record.n_outputs > 1 for record in as_records(records))
 
 
 def fit_records(

@@ -14,7 +14,7 @@ from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.state_space import markov, step_response
 from ..signals import Record
-from ..signals.record import check_complete
+from ..signals.given import check_complete
 
 Start = Literal["estimate", "rest"]
 

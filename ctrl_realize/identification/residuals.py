@@ -22,6 +22,7 @@ from ..numerics.correlation import (
 )
 from ..results import Flag, Result
 from ..signals import Record
+from ..signals.given import as_record
 from .record_simulation import Start, simulate_record
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def check_residuals(
     """
     count = whole(lags, "lags", 1)
     level = _level(confidence)
-    simulated = simulate_record(system, record, start)
+    simulated = simulate_record(system, as_record(record), start)
     y, u = np.atleast_2d(record.output), np.atleast_2d(record.input)
     if record.n_samples < 3 * count:
         raise DataError(
@@ -297,7 +298,8 @@ def _two_sided(residual: FloatArray, drive: FloatArray, lags: int) -> FloatArray
 
 def _level(confidence: float) -> float:
     level = real(confidence, "confidence", "a probability between 0 and 1")
-    if not 0 < level < 1:
+    # beyond, 1 - confidence is lost among the digits, or the bound is zero
+    if not 1e-12 <= level <= 1 - 1e-12:
         raise OptionError(f"confidence={confidence!r}; needed is a number between 0 and 1")
     return level
 

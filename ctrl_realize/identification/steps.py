@@ -20,7 +20,7 @@ from ..numerics.rest import rest_line
 from ..numerics.rise import rise_time
 from ..numerics.time_axis import EXTREME
 from ..signals import FilterSpec, ImpulseResponse, Record, StepEdge, StepResponse
-from ..signals.record import check_complete
+from ..signals.given import as_record, check_complete
 
 BANDWIDTH_TIMES_RISE = 0.35
 """-3 dB bandwidth in Hz times the 10-90 % rise time, for a lag of any order within 5 %."""
@@ -67,7 +67,7 @@ def detect_step(
     >>> edge.index, edge.rest, edge.amplitude
     (100, 4.0, 16.0)
     """
-    signal = _single(record.input, "input", record)
+    signal = _single(as_record(record).input, "input", record)
     if spike_samples is None:
         spikes = int(np.clip(record.n_samples // 1000, 3, 50))
         # A record of a few samples holds no window of that length on either side of its step.
@@ -145,9 +145,11 @@ def unit_step(
     >>> float(step.output[-1]), step.amplitude, step.pre.size
     (2.0, 16.0, 100)
     """
-    u = _single(record.input, "input", record)
+    u = _single(as_record(record).input, "input", record)
     y = _single(record.output, "output", record)
     at = detect_step(record) if edge is None else edge
+    if not isinstance(at, StepEdge):
+        raise OptionError(f"edge is a {type(at).__name__}; needed is what detect_step returns")
     if not (0 <= at.index < at.stop <= record.n_samples and 0 <= at.start <= at.index):
         raise DataError(
             f"the edge lies at samples {at.start}...{at.index}...{at.stop}, the record has "
@@ -228,6 +230,8 @@ def impulse_from_step(
     >>> print(g.markov[9:13].round(4))
     [0.     0.     0.01   0.0099]
     """
+    if not isinstance(step, StepResponse):
+        raise DataError(f"step is a {type(step).__name__}; needed is a StepResponse, see unit_step")
     order = whole(filter_order, "filter_order", 1, 10)
     one_of(difference, "difference", ("backward", "central"))
     cutoff = _cutoff(step, cutoff_hz)
@@ -269,6 +273,11 @@ def _cutoff(step: StepResponse, cutoff_hz: float | str | None) -> float | None:
         raise OptionError(
             f"cutoff_hz={cutoff:g} Hz; needed is below half the sample rate, {rate / 2:g} Hz "
             "(None filters nothing)"
+        )
+    if settling_samples(cutoff, step.dt) > 10 * (step.output.size + step.pre.size):
+        raise OptionError(
+            f"cutoff_hz={cutoff:g} Hz: this filter takes {5 / cutoff:.3g} s to settle, the step "
+            f"response is {step.output.size * step.dt:.3g} s long"
         )
     return cutoff
 

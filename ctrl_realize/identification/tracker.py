@@ -16,7 +16,7 @@ from ..numerics.pole_moves import Core, Direction, moved_core, pole_directions, 
 from ..numerics.recursive import DelayBank
 from ..numerics.time_axis import EXTREME
 from ..signals import Record
-from ..signals.record import check_complete
+from ..signals.given import check_complete
 from .tracked import DelayTrack, TrackedDelay
 from .tracker_checks import check_start, doubt, fraction
 

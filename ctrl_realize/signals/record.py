@@ -325,18 +325,3 @@ def _rebuild(
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
-
-
-def check_complete(record: Record, task: str) -> None:
-    """Refuse a record with missing samples; `task` says in the message who needs them all.
-
-    Raises
-    ------
-    DataError
-        When a value of input or output is NaN.
-    """
-    if record.missing == "keep" and record.n_missing:
-        raise DataError(
-            f"{task} needs every sample, and {record.n_missing} of this record are missing; cut "
-            "out a complete part with record.between(t0, t1), or interpolate"
-        )

@@ -65,6 +65,8 @@ def labelled(
     """Return one name for each of `count` signals, made from `letter` if none are given."""
     if given is None:
         return (letter,) if count == 1 else tuple(f"{letter}[{i}]" for i in range(count))
+    if not isinstance(given, Sequence):
+        raise OptionError(f"{argument} is a {type(given).__name__}; needed are {count} names")
     labels = (given,) if isinstance(given, str) else tuple(str(label) for label in given)
     if len(labels) != count or len(set(labels)) != count:
         raise OptionError(f"{argument}={labels!r}; needed are {count} different names")

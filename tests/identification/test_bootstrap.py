@@ -74,5 +74,5 @@ def test_unusable_choices_are_refused(record):
         bootstrap(record, repeats=1)
     with pytest.raises(cr.errors.OptionError, match="function"):
         bootstrap(record, "fit_delay")
-    with pytest.raises(cr.errors.DataError, match="records is empty"):
+    with pytest.raises(cr.errors.DataError, match="no records"):
         bootstrap([])

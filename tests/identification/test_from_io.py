@@ -271,7 +271,7 @@ def test_records_that_do_not_belong_together_are_refused():
         cr.impulse_from_io([one, slow], 20)
     with pytest.raises(DataError, match="2 inputs and 3 outputs"):
         cr.impulse_from_io([one, record(plant=MIMO)], 20)
-    with pytest.raises(DataError, match="no Record"):
+    with pytest.raises(DataError, match="no records"):
         cr.impulse_from_io([], 20)
     flat = cr.Record(one.time, one.input, np.full(600, 3.0))
     for options in METHODS:

@@ -1,0 +1,55 @@
+"""Records as they are handed in: one or several, with all samples or some missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ..errors import DataError
+from .record import Record
+
+
+def as_record(given: Any) -> Record:
+    """Return what is handed in if it is a record.
+
+    Raises
+    ------
+    DataError
+    """
+    if not isinstance(given, Record):
+        raise DataError(
+            f"got a {type(given).__name__}; needed is a Record, such as Record(time, input, output)"
+        )
+    return given
+
+
+def as_records(given: Any) -> tuple[Record, ...]:
+    """Return one record or several as a tuple.
+
+    Raises
+    ------
+    DataError
+        There is none, or something else is among them.
+    """
+    if isinstance(given, Record):
+        return (given,)
+    several = tuple(given) if isinstance(given, Iterable) else (given,)
+    if not several:
+        raise DataError("no records; needed is at least one Record")
+    return tuple(map(as_record, several))
+
+
+def check_complete(record: Record, task: str) -> None:
+    """Refuse a record with missing samples; `task` says in the message who needs them all.
+
+    Raises
+    ------
+    DataError
+        When a value of input or output is NaN.
+    """
+    as_record(record)
+    if record.missing == "keep" and record.n_missing:
+        raise DataError(
+            f"{task} needs every sample, and {record.n_missing} of this record are missing; cut "
+            "out a complete part with record.between(t0, t1), or interpolate"
+        )
