@@ -203,7 +203,15 @@ def _disturbances(data: StepData, fit: OutputErrorFit) -> list[Flag | None]:
                 "neighbours, slow disturbances are not seen in it",
             )
         )
-    if data.drift:
+    if fit.relaxing:
+        flags.append(
+            Flag(
+                "not_at_rest",
+                "the output was still moving before the step, as after an earlier input: the "
+                "model's free response was fitted along",
+            )
+        )
+    elif data.drift:
         flags.append(Flag("drift", f"a drift of {data.drift / data.dt:.3g} per s was fitted along"))
     if data.hum:
         lines = ", ".join(f"{f / data.dt:.4g} Hz" for f in data.hum)

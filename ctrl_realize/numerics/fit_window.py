@@ -10,6 +10,7 @@ import numpy as np
 from .arrays import FloatArray
 from .delayed_modes import HeldInput
 from .noise_level import correlation_time, is_coarse, mad_sigma
+from .own_terms import OwnTerms, Stretches
 from .response_bins import Bins
 from .separable_fit import Problem, Structure, evaluate, respond
 from .structure_search import (
@@ -42,6 +43,8 @@ class Window:
     columns : ndarray, shape (N, q)
         Regressors at every sample.
     bins : Bins or None
+    own : Stretches or None
+        Own terms at every sample, where the problem has them on bins.
     """
 
     start: int
@@ -50,6 +53,7 @@ class Window:
     drive: HeldInput
     columns: FloatArray
     bins: Bins | None
+    own: Stretches | None = None
 
     def with_output(self, values: FloatArray) -> Problem:
         """Return the problem for other values (N,)."""
@@ -62,8 +66,14 @@ class Window:
         if self.bins is None:
             # The samples are the data of the problem, all of weight 1.
             return np.asarray(problem.data - state.residual[0])
-        model = respond(self.drive, problem.known, state.numerator[0], candidate.parameters)
-        return np.asarray(model + self.columns @ state.regression[0])
+        setting = problem.known, state.numerator[0], candidate.parameters
+        model = respond(self.drive, *setting) + self.columns @ state.regression[0]
+        if problem.stretches is not None and self.own is not None:
+            weight = problem.root_weight
+            terms = OwnTerms(problem.stretches, weight, candidate.poles[None])
+            rest = weight * (problem.data - respond(problem.drive, *setting))
+            model = model + terms.fitted(rest[None], self.own)[0]
+        return np.asarray(model)
 
 
 @dataclass(frozen=True, eq=False)

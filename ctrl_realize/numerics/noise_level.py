@@ -72,8 +72,7 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     sigma : float
     drift : float
         Slope per sample, 0 unless it is five standard errors, which slow noise has larger ones
-        of. A slope seen over less than a twentieth of the record is not extrapolated over the
-        rest of it.
+        of.
     """
     floor = quantum / np.sqrt(12)
     if before.size < _FEW:
@@ -89,8 +88,7 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
         if settled.size:
             sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
     error = sigma * np.sqrt(12 * correlation_time(left) / before.size**3)
-    known = before.size > 0.05 * (record.size - before.size)
-    return sigma, float(slope) if known and abs(slope) > 5 * error else 0.0
+    return sigma, float(slope) if abs(slope) > 5 * error else 0.0
 
 
 def correlation_time(residual: FloatArray) -> float:

@@ -2,6 +2,8 @@
 
 The rule:
 
+0. What the output does before the step is noise, hum, a drift, or the plant's own free response;
+   where a line and a free response both explain it, the lower information criterion decides.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
    is the model, and what its residual leaves is compared with the noise before the step.
 2. Where the residual is noise, the delay is that of the model, and its interval spans the
@@ -57,6 +59,7 @@ ADEQUATE = 1.3
 _UNSEEN = 3.0
 """How far before the delay a beginning that is open may lie, in times from there to the first
 motion. Flows that disperse, diffusion behind lags and parallel paths need up to 2.5."""
+_WILD = 3.0  # standard deviations at which residuals are cut where explanations are compared
 
 _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 """Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
@@ -87,7 +90,8 @@ class OutputErrorFit:
     are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
     which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
     longer they are, so that all of the delay may be lags; `open_start`: how smoothly the response
-    begins is open. `std` is that of the chosen structure.
+    begins is open; `relaxing`: the plant was moving before the step, and its free response was
+    fitted along. `std` is that of the chosen structure.
     """
 
     delay: float
@@ -109,6 +113,7 @@ class OutputErrorFit:
     chain: str = ""
     endless: bool = False
     open_start: bool = False
+    relaxing: bool = False
 
 
 def fit_output_error(
@@ -137,17 +142,41 @@ def fit_output_error(
     """
     factor = known or KnownFactor()
     tried = ALL_STRUCTURES if structures is None else tuple(structures)
+    ways = data.explanations()
+    if len(ways) > 1:
+        few = SIMPLE_STRUCTURES if structures is None else tried
+        data = _explained(
+            [(way, _fit_until(way, way.output.size, few, latest, factor, huber)) for way in ways]
+        )
     whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
     adequate = whole.misfit <= ADEQUATE * data.colour
     if structures is not None:
-        return likelihood_fit(whole, adequate=adequate)
-    if adequate:
+        found = likelihood_fit(whole, adequate=adequate)
+    elif adequate:
         assert data.motion is not None
         onset = data.motion.onset * data.dt
-        return likelihood_fit(whole, adequate=True, chains=_chains(whole), onset=onset)
-    simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
-    chosen = whole.candidates[choose(simple)]
-    return _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
+        found = likelihood_fit(whole, adequate=True, chains=_chains(whole), onset=onset)
+    else:
+        simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
+        chosen = whole.candidates[choose(simple)]
+        found = _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
+    return replace(found, relaxing=data.relaxing)
+
+
+def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
+    """Choose between explanations of the samples before the step, by an information criterion."""
+    closest = min((whole for _, whole in ways), key=lambda whole: whole.sigma)
+    worst = _WILD * closest.sigma
+
+    def criterion(way: tuple[StepData, WindowFit]) -> float:
+        data, whole = way
+        best = whole.best.structure
+        error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+        squares = float(np.sum(np.clip(error, -worst, worst) ** 2))
+        terms = best.order + best.zeros + (best.order if data.relaxing else bool(data.drift))
+        return squares / closest.variance + closest.penalty * terms + needless_charge(best)
+
+    return min(ways, key=criterion)[0]
 
 
 def likelihood_fit(

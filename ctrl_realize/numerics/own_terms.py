@@ -63,10 +63,9 @@ class OwnTerms:
         self._poles = poles
         self._weight = root_weight
         self._clock = stretches.clock
-        self._decay = np.exp(stretches.clock[:, None] * poles[:, None, :])
-        fixed = np.broadcast_to(stretches.regressors, (poles.shape[0], *stretches.regressors.shape))
+        self._decay = _decay(stretches, poles)
         self._known = stretches.regressors.shape[1]
-        columns = np.concatenate([fixed, self._free_columns()], axis=2) * root_weight[:, None]
+        columns = _columns(stretches, poles, self._decay) * root_weight[:, None]
         self._bases: list[FloatArray] = []
         self._triangles: list[FloatArray] = []
         self._norms: list[FloatArray] = []
@@ -99,24 +98,26 @@ class OwnTerms:
         """
         out = np.empty((*rest.shape, dpoles.shape[2]))
         for i, rows in enumerate(self._rows):
-            inside = np.einsum("bmk,bm->bk", self._bases[i], rest[:, rows])
-            weights = solve_upper(self._triangles[i], inside) / self._norms[i]
-            amplitudes = self._amplitudes(weights[:, self._known :])
+            amplitudes = self._amplitudes(self._weights(i, rest)[:, self._known :])
             slope = self._clock[rows, None] * self._decay[:, rows]
             out[:, rows] = (slope @ (amplitudes[:, :, None] * dpoles)).real
         return out * self._weight[:, None]
 
-    def _free_columns(self) -> FloatArray:
-        n = self._poles.shape[1]
-        out = np.empty(self._decay.shape)
-        if n % 2:
-            out[:, :, 0] = self._decay[:, :, 0].real
-        for i in range(n % 2, n, 2):
-            first, second = self._decay[:, :, i], self._decay[:, :, i + 1]
-            gap = self._poles[:, i] - self._poles[:, i + 1]
-            out[:, :, i] = (first + second).real / 2
-            out[:, :, i + 1] = ((first - second) / gap[:, None]).real
+    def fitted(self, rest: FloatArray, where: Stretches) -> FloatArray:
+        """Own terms as they are fitted to `rest` (B, m), at the rows of other stretches (B, N).
+
+        The stretches are the same ones, looked at more or less closely.
+        """
+        columns = _columns(where, self._poles, _decay(where, self._poles))
+        out = np.empty(columns.shape[:2])
+        for i, rows in enumerate(where.rows):
+            out[:, rows] = np.einsum("bmk,bk->bm", columns[:, rows], self._weights(i, rest))
         return out
+
+    def _weights(self, i: int, rest: FloatArray) -> FloatArray:
+        """Coefficients of the own terms of stretch i, fitted to weighted data (B, m)."""
+        inside = np.einsum("bmk,bm->bk", self._bases[i], rest[:, self._rows[i]])
+        return solve_upper(self._triangles[i], inside) / self._norms[i]
 
     def _amplitudes(self, weights: FloatArray) -> ComplexArray:
         """Turn weights of the columns into amplitudes of the exponentials."""
@@ -126,6 +127,25 @@ class OwnTerms:
             half = weights[:, i + 1] / (self._poles[:, i] - self._poles[:, i + 1])
             out[:, i], out[:, i + 1] = weights[:, i] / 2 + half, weights[:, i] / 2 - half
         return out
+
+
+def _decay(stretches: Stretches, poles: ComplexArray) -> ComplexArray:
+    return np.asarray(np.exp(stretches.clock[:, None] * poles[:, None, :]))
+
+
+def _columns(stretches: Stretches, poles: ComplexArray, decay: ComplexArray) -> FloatArray:
+    """Regressors and free responses, shape (B, m, q + n)."""
+    batch, n = poles.shape
+    free = np.empty(decay.shape)
+    if n % 2:
+        free[:, :, 0] = decay[:, :, 0].real
+    for i in range(n % 2, n, 2):
+        first, second = decay[:, :, i], decay[:, :, i + 1]
+        gap = poles[:, i] - poles[:, i + 1]
+        free[:, :, i] = (first + second).real / 2
+        free[:, :, i + 1] = ((first - second) / gap[:, None]).real
+    fixed = np.broadcast_to(stretches.regressors, (batch, *stretches.regressors.shape))
+    return np.concatenate([fixed, free], axis=2)
 
 
 def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 
 _GROWTH = 0.04
-_BINS_AT_REST = 12
+BINS_AT_REST = 12
 # Few different widths: what depends on the width alone is computed once for each.
 _WIDTHS = np.unique((1.19 ** np.arange(80)).astype(np.int64))
 
@@ -31,7 +31,7 @@ class Bins:
         return np.asarray(sums / self.width.reshape(-1, *[1] * (values.ndim - 1)))
 
 
-def response_bins(stop: int, edges: list[int], crossing: int) -> Bins:
+def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BINS_AT_REST) -> Bins:
     """Lay bins over samples 0...stop - 1 of a record.
 
     Parameters
@@ -43,8 +43,10 @@ def response_bins(stop: int, edges: list[int], crossing: int) -> Bins:
     crossing : int
         First lasting motion after an edge, in samples. Bins are single samples there and grow
         by 4 % of the distance from it.
+    at_rest : int, optional
+        Bins before the first edge.
     """
-    bounds = sorted({*np.linspace(0, edges[0], min(_BINS_AT_REST, edges[0]) + 1).astype(int)})
+    bounds = sorted({*np.linspace(0, edges[0], min(at_rest, edges[0]) + 1).astype(int)})
     starts = [*edges, stop]
     onsets = np.array(edges) + crossing
     k = edges[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,11 +19,15 @@ from .noise_level import (
     rest_noise,
     sine_pair,
 )
-from .response_bins import Bins, response_bins
+from .own_terms import Stretches
+from .relaxation import relaxation
+from .response_bins import BINS_AT_REST, Bins, response_bins
 from .separable_fit import KnownFactor, Problem
 from .structure_search import Scales
 
 _CONTINUED = 2  # a drift at rest goes on for this many times the rest
+_BINS_RELAXING = 60
+_BRIEF = 0.05  # of the samples that follow the step
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +51,10 @@ class StepData:
         Lines in the noise, in cycles per sample.
     motion : FirstMotion or None
         None when the output stays at rest.
+    relaxing : bool
+        The output was not at rest before the step: the plant's free response is in it.
+    ending : bool
+        The drift ends after twice the time for which it was seen.
     """
 
     output: FloatArray
@@ -59,6 +67,8 @@ class StepData:
     colour: float
     hum: list[float]
     motion: FirstMotion | None
+    relaxing: bool = False
+    ending: bool = False
 
     @property
     def edge(self) -> int:
@@ -70,6 +80,19 @@ class StepData:
         """Quantised so coarsely that averaging does not remove the rounding."""
         return is_coarse(self.sigma, self.quantum)
 
+    def explanations(self) -> list[StepData]:
+        """Ways to take a slope before the step: as drift, as the plant's own motion, as nothing.
+
+        A drift goes on to the end, or ends after twice the time for which it was seen. Nothing is
+        tried where that was less than a twentieth of what follows.
+        """
+        if not self.drift:
+            return [self]
+        ways = [self, replace(self, ending=True), replace(self, drift=0.0, relaxing=True)]
+        if self.edge <= _BRIEF * (self.output.size - self.edge):
+            ways.append(replace(self, drift=0.0))
+        return ways
+
 
 def step_data(
     output: FloatArray, signal: FloatArray, dt: float, edges: list[tuple[int, int]]
@@ -79,12 +102,13 @@ def step_data(
     quantum = quantisation_step(output)
     sigma, drift = rest_noise(output[:edge], output, quantum)
     hum: list[float] = []
-    colour, quiet = 1.0, output
+    colour, quiet, relaxing = 1.0, output, False
     if edge >= 8:
         index = np.arange(output.size) - edge
         columns = np.stack([np.ones(output.size), index / edge], axis=1)
         line = columns[:edge] @ np.linalg.lstsq(columns[:edge], output[:edge], rcond=None)[0]
         hum = hum_frequencies(output[:edge] - line)
+        curve = None if hum else relaxation(output, edge)
         if hum:
             columns = np.concatenate([columns, _hum_columns(output.size, hum)], axis=1)
             weights = np.linalg.lstsq(columns[:edge], output[:edge], rcond=None)[0]
@@ -92,11 +116,14 @@ def step_data(
             line = columns[:edge] @ weights
             sigma, drift = rest_noise(quiet[:edge], quiet, 0.0)
             sigma = max(sigma, quantum / np.sqrt(12))
+        elif curve is not None:
+            quiet, line, relaxing = output - curve, curve[:edge], True
+            sigma, drift = rest_noise(quiet[:edge], quiet, quantum)[0], 0.0
         colour = colouring(output[:edge] - line, sigma)
     span = float(np.ptp(output))
     sigma = max(sigma, 1e-4 * span)
     motion = first_motion(quiet, edge, sigma, quantum, drift)
-    return StepData(output, signal, dt, edges, sigma, quantum, drift, colour, hum, motion)
+    return StepData(output, signal, dt, edges, sigma, quantum, drift, colour, hum, motion, relaxing)
 
 
 def bare_data(output: FloatArray, signal: FloatArray, dt: float, sigma: float) -> StepData:
@@ -122,20 +149,37 @@ def stop_at(data: StepData, part: float) -> int:
 def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     """Set up the fit of the samples up to `stop`."""
     crossing = data.motion.crossing if data.motion else 0
-    bins = response_bins(stop, [i for i, _ in data.edges if i < stop], crossing)
+    at_rest = _BINS_RELAXING if data.relaxing else BINS_AT_REST
+    bins = response_bins(stop, [i for i, _ in data.edges if i < stop], crossing, at_rest)
     index, size = input_moves(data.input, data.edges, stop)
     moves = _at(index, data.dt)
     columns = fixed_regressors(data)[:stop]
+    own: tuple[Stretches | None, Stretches | None] = None, None
+    if data.relaxing:
+        own = _free_response(data, bins, columns)
+        columns = columns[:, :0]
     problem = Problem(
         bins.average(data.output[:stop]),
         np.sqrt(_weights(data, bins)),
         MoveTrain(_at(bins.first, data.dt), bins.width, data.dt, moves, size),
         bins.average(columns),
         known,
+        own[0],
     )
     single = np.ones(stop, dtype=np.int64)
     drive = MoveTrain(_at(np.arange(stop), data.dt), single, data.dt, moves, size)
-    return Window(data.edge, data.output[:stop], problem, drive, columns, bins)
+    return Window(data.edge, data.output[:stop], problem, drive, columns, bins, own[1])
+
+
+def _free_response(data: StepData, bins: Bins, columns: FloatArray) -> tuple[Stretches, Stretches]:
+    """Own terms of the record, on bins and at every sample: regressors and free response."""
+    # In the middle of a bin: they are narrow beside what is left of the free response there.
+    middle = data.dt * (bins.first + (bins.width - 1) / 2)
+    every = data.dt * np.arange(len(columns), dtype=np.float64)
+    return (
+        Stretches(np.array([0, middle.size]), middle, bins.average(columns)),
+        Stretches(np.array([0, every.size]), every, columns),
+    )
 
 
 def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
@@ -154,16 +198,13 @@ def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
 
 
 def fixed_regressors(data: StepData) -> FloatArray:
-    """Offset, drift if there is one, and hum, shape (N, q).
-
-    A drift ends after twice the time for which it was seen: what a plant has not yet left behind
-    dies away, and a straight line over a long record would be an integrator's doing.
-    """
+    """Offset, drift if there is one, and hum, shape (N, q)."""
     n = data.output.size
     columns = [np.ones((n, 1))]
     if data.drift:
         index = np.arange(n) - data.edge
-        columns.append((np.minimum(index, _CONTINUED * data.edge) / n)[:, None])
+        last = _CONTINUED * data.edge if data.ending else n
+        columns.append((np.minimum(index, last) / n)[:, None])
     if data.hum:
         columns.append(_hum_columns(n, data.hum))
     return np.concatenate(columns, axis=1)

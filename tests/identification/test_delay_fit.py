@@ -146,6 +146,35 @@ def test_hum_and_drift_before_the_step_are_fitted_along():
     assert "drift" in codes(drifting)
 
 
+def after_an_earlier_step(rest: float, before: float) -> cr.Record:
+    """Two lags of 5 and 1 s behind 0.6 s, cut `rest` s before a step, `before` s after another."""
+    plant = cr.delayed_ss(ct.tf([1.5], [5, 6, 1]), dead_time=0.6, dt=0.05)
+    t = 0.05 * np.arange(-200, 1200)
+    u = np.select([t < -before, t < 0], [0.0, 1.0], 3.0)
+    y = plant.simulate(u - u[0]) + 0.01 * np.random.default_rng(0).standard_normal(t.size)
+    return cr.Record(t, u, y).between(-rest, 60)
+
+
+@pytest.mark.parametrize("rest", [1.5, 3.0, 4.0])
+def test_a_plant_still_moving_before_the_step_is_seen_to_move(rest):
+    fit = cr.fit_delay(after_an_earlier_step(rest, before=6)).fit
+    assert "not_at_rest" in codes(fit)
+    assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
+    # known to 0.1 s from rest; 0.2 s where a second and a half tell what the plant was doing
+    assert abs(fit.dead_time - 0.6) < 0.2
+    assert fit.total_delay == pytest.approx(6.6, rel=0.02)
+    assert fit.at_noise_level
+
+
+@pytest.mark.parametrize("rest", [2.0, 6.0])
+def test_a_drift_is_told_from_a_plant_that_moves(rest):
+    settled = after_an_earlier_step(rest, before=60)
+    fit = cr.fit_delay(changed(settled, settled.output + 0.02 * settled.time)).fit
+    assert "drift" in codes(fit)
+    assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
+    assert fit.total_delay == pytest.approx(6.6, rel=0.02)
+
+
 def test_outliers_hardly_move_the_delay():
     for seed in range(3):
         record = rigs.step_record(noise=0.005, seed=seed, before=1000, after=1500)

@@ -134,13 +134,6 @@ def test_five_standard_errors_make_a_drift(seed):
     assert rest_noise(above, np.tile(above, 3), 0.0)[1] == pytest.approx(slope)
 
 
-@pytest.mark.parametrize(("after", "seen"), [(1990, True), (2010, False)])
-def test_a_drift_seen_over_less_than_a_twentieth_is_not_continued(after, seen):
-    before = 0.01 * np.arange(100) + 1e-4 * white(100)
-    drift = rest_noise(before, np.r_[before, np.ones(after)], 0.0)[1]
-    assert (drift > 0) == seen
-
-
 @pytest.mark.parametrize("pole", [0.4, 0.7, 0.95])
 def test_the_correlation_time_of_a_lag(pole):
     found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))

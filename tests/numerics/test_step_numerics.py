@@ -52,16 +52,27 @@ def test_slow_noise_is_no_drift(pole):
     )
 
 
-@pytest.mark.parametrize(("edge", "end"), [(100, 300), (400, 1000)])
-def test_a_drift_goes_on_for_twice_as_long_as_it_was_seen(edge, end):
+def test_a_slope_before_the_step_has_three_explanations_and_a_brief_one_may_be_nothing():
     k = np.arange(1000)
-    output = 0.05 * k + 0.01 * white(1000) + 200.0 * (k >= edge + 20)
-    data = step_data(output, 1.0 * (k >= edge), 1.0, [(edge, 1)])
-    level, drift = fixed_regressors(data).T
+
+    def ways(edge):
+        output = 0.05 * k + 0.01 * white(1000) + 200.0 * (k >= edge + 20)
+        return step_data(output, 1.0 * (k >= edge), 1.0, [(edge, 1)]).explanations()
+
+    level, slope = fixed_regressors(ways(100)[0]).T
     assert_allclose(level, 1.0)
-    slope = np.diff(drift)
-    assert_allclose(slope[: end - 1], slope[0])
-    assert_allclose(slope[end:], 0.0)
+    assert_allclose(np.diff(slope), slope[1] - slope[0])
+    ending = np.diff(fixed_regressors(ways(100)[1])[:, 1])
+    assert_allclose(ending[:299], ending[0])
+    assert_allclose(ending[300:], 0.0)
+    moving = ways(100)[2]
+    assert moving.relaxing
+    assert fixed_regressors(moving).shape == (1000, 1)
+    assert len(ways(100)) == 3
+    # 47 samples are less than a twentieth of the 953 that follow
+    assert [bool(way.drift) for way in ways(47)] == [True, True, False, False]
+    assert len(ways(48)) == 3
+    assert len(step_data(white(1000), 1.0 * (k >= 100), 1.0, [(100, 1)]).explanations()) == 1
 
 
 def test_noise_is_found_beside_outliers_drift_and_quantisation():
