@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-
 SHORT_LABEL = 16
 """Letters of a label that is never broken."""
 

@@ -5,7 +5,8 @@ The rule:
 0. What the output does before the step is noise, hum, a drift, or the plant's own free response;
    where a line and a free response both explain it, the lower information criterion decides.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
-   is the model, and what its residual leaves is compared with the noise before the step.
+   is the model, and what its residual leaves is compared with the noise before the step, or, as
+   long as that is not much louder, with what it leaves long after the step.
 2. Where the residual is noise, the delay is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
    four to eight nearly equal lags and modes of diffusion among them. A zero imitates a smooth
@@ -60,6 +61,11 @@ _UNSEEN = 3.0
 """How far before the delay a beginning that is open may lie, in times from there to the first
 motion. Flows that disperse, diffusion behind lags and parallel paths need up to 2.5."""
 _WILD = 3.0  # standard deviations at which residuals are cut where explanations are compared
+
+_LOUDER = 4.0
+"""How much louder noise may be after the step than before it: slow noise shows little of itself in
+a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less)."""
+_LATE, _FEWEST_LATE = 2.0, 8  # times the rise to 95 %; bins in the later half from there on
 
 _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 """Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
@@ -149,7 +155,7 @@ def fit_output_error(
             [(way, _fit_until(way, way.output.size, few, latest, factor, huber)) for way in ways]
         )
     whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
-    adequate = whole.misfit <= ADEQUATE * data.colour
+    adequate = _is_noise(data, whole)
     if structures is not None:
         found = likelihood_fit(whole, adequate=adequate)
     elif adequate:
@@ -177,6 +183,25 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
         return squares / closest.variance + closest.penalty * terms + needless_charge(best)
 
     return min(ways, key=criterion)[0]
+
+
+def _is_noise(data: StepData, whole: WindowFit) -> bool:
+    """Tell whether the model leaves what was there before the step, or what goes on long after."""
+    if whole.misfit <= ADEQUATE * data.colour:
+        return True
+    if whole.misfit > ADEQUATE * data.colour * _LOUDER:
+        return False
+    state = evaluate(whole.problem, whole.best.structure, whole.best.parameters[None])
+    assert whole.window.bins is not None
+    first = whole.window.bins.first
+    settled = data.edge + _LATE * (stop_at(data, 0.95) - data.edge)
+    late = np.asarray(state.residual[0][first >= settled])
+    moving = state.residual[0][(first >= data.edge) & (first < settled)]
+    if late.size < 2 * _FEWEST_LATE:
+        return False
+    # What a wrong model leaves dies away: it is in the first half.
+    late = late[late.size // 2 :]
+    return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
 
 
 def likelihood_fit(

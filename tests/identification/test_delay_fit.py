@@ -8,6 +8,7 @@ import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from tests import rigs
@@ -348,6 +349,19 @@ def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_mat
     assert sum("no_delay_resolved" in found for found in flags) <= 1
     white = [cr.fit_delay(rigs.step_record(noise=n, seed=1)).fit for n in (0.005, 0.03)]
     assert ["structures_disagree" in codes(fit) for fit in white] == [False, True]
+
+
+def test_slow_noise_that_a_short_rest_hides_is_noise_all_the_same():
+    # 100 samples before the step, and noise of which 39 count as one.
+    plant = cr.delayed_ss(ct.tf([1.5], [1.6, 2.8, 1]), dead_time=1.3, dt=0.05)
+    t = 0.05 * np.arange(-100, 1100)
+    u = np.where(t < 0, 0.0, 2.0)
+    for seed in range(4):
+        e = 0.02 * np.random.default_rng(seed).standard_normal(t.size + 500)
+        slow = lfilter([1.0], [1.0, -0.95], e)[500:]
+        fit = cr.fit_delay(cr.Record(t, u, plant.simulate(u) + slow)).fit
+        assert fit.at_noise_level
+        assert fit.interval[0] <= 1.3 <= fit.interval[1]
 
 
 def test_a_ramped_edge_and_a_noisy_input_are_taken_as_measured():
