@@ -28,6 +28,7 @@ extensions = [
     "sphinx_copybutton",
     "mathml",
     "glossary_links",
+    "breakable",
 ]
 exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints", "*_table.md", "generated/tables"]
 templates_path = ["_templates"]
@@ -119,6 +120,7 @@ default_role = "code"
 # -- look ----------------------------------------------------------------------------------------
 
 html_theme = "furo"
+pygments_dark_style = "github-dark"
 html_title = "ctrl_realize"
 html_static_path = ["_static"]
 html_css_files = ["style.css"]
