@@ -11,7 +11,7 @@ import ctrl_realize as cr
 from tests import rigs
 
 from .flag_case import Codes, FlagCase, Run, codes
-from .worlds import BEFORE, DT, NOISES, PLANTS, step_case, wrong_step
+from .worlds import BEFORE, DT, NOISES, PLANTS, step_case, unit_step, wrong_step
 
 LOW, HIGH = NOISES[:2], NOISES[2:]
 
@@ -94,6 +94,14 @@ def drifting(seed: int) -> Codes:
     record = plain(seed)
     trend = 0.1 * _span(record) * np.asarray(record.time)
     return fit(changed(record, np.ravel(record.output) + trend))
+
+
+def moving(seed: int) -> Codes:
+    """A step as high came a quarter of a second before the record began."""
+    record = step_case("white", _plant(seed), _noise(seed, LOW), seed).record
+    earlier = np.asarray(record.time) + 0.25
+    left = unit_step(_plant(seed), earlier) - 1
+    return fit(changed(record, np.ravel(record.output) + _span(record) * left))
 
 
 def humming(seed: int) -> Codes:
@@ -288,6 +296,9 @@ CASES: list[FlagCase] = [
     _fit("drift", "10 % of the step per s", drifting),
     _fit("drift", "10 % of the step per s", drifting, not_due="R1 to R4, coloured noise 0.1 to 2 %",
          quiet=coloured),
+    _fit("not_at_rest", "the same step 1/4 s before the record", moving),
+    _fit("not_at_rest", "the same step 1/4 s before the record", moving,
+         not_due="R1 to R4, coloured noise 0.1 to 2 %", quiet=coloured),
     _fit("hum", "50 Hz, three noise std high", humming),
     _fit("hum", "50 Hz, three noise std high", humming,
          not_due="R1 to R4, coloured noise 0.1 to 2 %",
