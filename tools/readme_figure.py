@@ -44,8 +44,8 @@ def main() -> None:
     axes["step"].set(
         xlabel="time after the step [ms]",
         ylabel="unit step response [mm/mA]",
-        title=f"dead time {1e3 * fit.dead_time:.1f} ms = {fit.delay:.1f} samples, "
-        f"95 %: {1e3 * low:.1f} to {1e3 * high:.1f} ms",
+        title=f"dead time {1e3 * fit.dead_time:.1f} ms (95 %: {1e3 * low:.1f} to "
+        f"{1e3 * high:.1f} ms)",
     )
     axes["step"].legend(loc="center right", frameon=False)
 
