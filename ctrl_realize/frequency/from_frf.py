@@ -11,7 +11,7 @@ from ..checks import one_of, positive, whole
 from ..errors import DataError
 from ..identification.from_io import ImpulseEstimate
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..numerics.fir_kernels import fit_kernel
+from ..numerics.fir_kernels import cautious_std, fit_kernel
 from ..numerics.lagged import NormalEquations
 from ..numerics.spectra import hold_response
 from ..results import Flag
@@ -124,7 +124,7 @@ def impulse_from_frf(
     return ImpulseEstimate(
         markov,
         step,
-        std=unit * fit.std[0],
+        std=unit * cautious_std(equations, count, fit)[0],
         noise_std=np.array([np.sqrt(fit.noise_variance) * float(np.median(sigma))]),
         method=f"{kernel} kernel on {omega.size} points, {fit.effective:.0f} free parameters",
         rows=2 * omega.size,

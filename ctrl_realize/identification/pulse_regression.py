@@ -24,7 +24,7 @@ from ..numerics.arx import (
     least_squares,
     solve_arx,
 )
-from ..numerics.fir_kernels import fit_kernel
+from ..numerics.fir_kernels import cautious_std, fit_kernel
 from ..numerics.lagged import NormalEquations, normal_equations
 from ..results import Flag
 from ..signals import Record
@@ -102,26 +102,24 @@ def with_prior(
             f"the input excites {excited} of {wanted} lags; the rest is what the prior says",
         )
         flags = (note,)
-    fits = [
-        fit_kernel(
-            NormalEquations(
-                equations.gram,
-                equations.cross[:, [a]],
-                equations.power[[a]][:, [a]],
-                equations.rows,
-                equations.freedom,
-            ),
-            count,
-            kernels[a],
+    single = [
+        NormalEquations(
+            equations.gram,
+            equations.cross[:, [a]],
+            equations.power[[a]][:, [a]],
+            equations.rows,
+            equations.freedom,
         )
         for a in range(p)
     ]
+    fits = [fit_kernel(one, count, kernel) for one, kernel in zip(single, kernels, strict=True)]
+    spread = [cautious_std(one, count, fit) for one, fit in zip(single, fits, strict=True)]
     # Twice the log Bayes factor against no response at all; 6 is "strong" by Kass and Raftery.
     nothing = -equations.freedom / 2 * np.log(np.diag(equations.power))
     silent = 2 * (np.array([fit.evidence for fit in fits]) - nothing) < 6
     return PulseRegression(
         markov=np.stack([fit.markov for fit in fits]),
-        std=np.stack([fit.std for fit in fits]),
+        std=np.stack(spread),
         noise_std=np.sqrt([fit.noise_variance for fit in fits]),
         rows=equations.rows,
         method=f"{', '.join(dict.fromkeys(f.kernel for f in fits))} kernel, "

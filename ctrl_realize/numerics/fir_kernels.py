@@ -84,13 +84,13 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
     KernelFit
     """
     m = equations.gram.shape[0] // lags
-    diagonal = np.full(m * lags, _ROUNDING * np.trace(equations.gram) / (m * lags))
-    equations = replace(equations, gram=equations.gram + np.diag(diagonal))
+    equations = _rounded(equations)
     b, power = equations.cross[:, 0], float(equations.power[0, 0])
     group = -(-lags // COARSE)
     misfit = (power, equations.freedom)
     if kernel == "auto":
-        kernel = _likelier(equations, m, lags)
+        values = {name: _tied(equations, m, lags, name)[1] for name in CHOSEN_FROM}
+        kernel = min(values, key=lambda name: values[name])
     x = _start(equations, m, lags, kernel)
     if group > 1:
         # Most of the way is gone with neighbouring taps tied, at a fraction of the cost.
@@ -98,6 +98,41 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
         x = _search(equations.gram, b, m, lags, 1, *misfit, kernel, x, 0.15)[0]
     else:
         x = _search(equations.gram, b, m, lags, 1, *misfit, kernel, x, 0.7)[0]
+    return _posterior(equations, x, m, lags, kernel)
+
+
+def cautious_std(equations: NormalEquations, lags: int, fit: KernelFit) -> FloatArray:
+    """Standard deviations (m, lags) that do not rest on the smoothness of the prior.
+
+    At each lag the larger one of the fit's own and that under TC, the distance of both means
+    included. Its own takes it for known how smooth a response is and how fast it decays: under SS
+    it misses the truth where the response sets in, and where it dies away more slowly than it
+    began.
+    """
+    if fit.kernel == "TC":
+        return fit.std
+    m = equations.gram.shape[0] // lags
+    equations = _rounded(equations)
+    b, misfit = equations.cross[:, 0], (float(equations.power[0, 0]), equations.freedom)
+    x = _tied(equations, m, lags, "TC")[0]
+    # Tied taps make the decay too fast for the last ones.
+    x = _search(equations.gram, b, m, lags, 1, *misfit, "TC", x, 0.15)[0]
+    other = _posterior(equations, x, m, lags, "TC")
+    return np.maximum(fit.std, np.hypot(other.std, fit.markov - other.markov))
+
+
+def _rounded(equations: NormalEquations) -> NormalEquations:
+    """Add to the squares what rounding leaves of them."""
+    size = equations.gram.shape[0]
+    diagonal = np.full(size, _ROUNDING * np.trace(equations.gram) / size)
+    return replace(equations, gram=equations.gram + np.diag(diagonal))
+
+
+def _posterior(
+    equations: NormalEquations, x: FloatArray, m: int, lags: int, kernel: str
+) -> KernelFit:
+    """Mean and standard deviation of the response, given the hyper-parameters."""
+    b, power = equations.cross[:, 0], float(equations.power[0, 0])
     factor = _factor(x, m, lags, 1, kernel)
     value, C, half, least = _likelihood(equations.gram, b, factor, power, equations.freedom)
     variance = least / equations.freedom
@@ -122,15 +157,11 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
     )
 
 
-def _likelier(equations: NormalEquations, m: int, lags: int) -> str:
-    """Compare kernels on tied taps, where a likelihood costs little."""
+def _tied(equations: NormalEquations, m: int, lags: int, kernel: str) -> tuple[FloatArray, float]:
+    """Search hyper-parameters on tied taps, where a likelihood costs little."""
     tied = _grouped(equations, m, lags, -(-lags // FEW))
     misfit = (float(equations.power[0, 0]), equations.freedom)
-    values = {
-        name: _search(*tied, *misfit, name, _start(equations, m, lags, name), 0.7)[1]
-        for name in CHOSEN_FROM
-    }
-    return min(values, key=lambda name: values[name])
+    return _search(*tied, *misfit, kernel, _start(equations, m, lags, kernel), 0.7)
 
 
 def _shape_count(kernel: str) -> int:
