@@ -58,15 +58,14 @@ MODULES = {
     "identification/realization": "tests/identification/test_realization.py",
     "identification/delay_scan": "tests/identification/test_delay_scan.py",
     "identification/orders": "tests/identification/test_orders.py",
-    "identification/impulses": "tests/identification/test_realization.py "
-    "tests/identification/test_delay_scan.py tests/identification/test_orders.py",
+    "identification/impulses": "tests/identification/test_impulses.py "
+    "tests/identification/test_realization.py",
     "identification/known_dynamics": "tests/identification/test_known_dynamics.py",
     "identification/averaging": "tests/identification/test_averaging.py",
     "identification/fit_flags": "tests/identification/test_delay_fit.py",
 }
+
 # exit codes by which mutmut tells how a mutant ended
-
-
 TIMED_OUT = {36, -24, 24, 152, 255}
 UNTESTED = {5, 33}
 HEAD = ("module", "changes", "tried", "noticed", "endless", "no test", "survived", "minutes")

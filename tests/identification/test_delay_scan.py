@@ -23,7 +23,7 @@ from ctrl_realize.identification.scan_curve import (
 from ctrl_realize.numerics.state_space import markov
 from tests.oracles import dense
 from tests.oracles.plants import modal, valve_pulse
-from tests.rigs import TS
+from tests.rigs import TS, step_record
 
 KINDS = ["clean", "zero-phase", "causal", "unfiltered"]
 
@@ -274,3 +274,22 @@ def test_the_data_of_the_caller_stay_as_they_are():
     before = pulse.copy()
     cr.estimate_delay(pulse, 3, max_delay=50, dt=TS)
     assert np.array_equal(pulse, before)
+
+
+def test_the_card_of_a_scan_names_what_was_found_and_tried():
+    pulse = valve_pulse("zero-phase", seed=1, noise=2e-3, n=361)
+    scan = cr.estimate_delay(pulse, 3, max_delay=60, samples=300, dt=TS).fit
+    assert f"Delay scan: {scan.delay} samples ({1e3 * scan.delay * TS:.5g} ms)" in scan.report()
+    rows = dict(scan._rows())
+    assert rows["samples behind each delay"] == "300"
+    assert rows["direct term"] == ("G[d]" if scan.feedthrough else "0")
+    without = cr.estimate_delay(pulse, 3, max_delay=60, samples=300, dt=TS, feedthrough=False).fit
+    assert dict(without._rows())["direct term"] == "0"
+    assert repr(scan).endswith("order 3>" if not scan.flags else f"{len(scan.flags)} flags>")
+    assert repr(cr.estimate_delay(pulse, 12, max_delay=60, dt=TS).fit).endswith(" flags>")
+
+
+def test_a_scan_of_a_measured_step_tells_the_last_singular_value_beside_the_noise():
+    record = step_record(noise=2e-3, seed=1)
+    scan = cr.identify(record, method="scan", order=2).fit
+    assert dict(scan._rows())["singular value 2"] == f"{scan.noise_ratio:.2f} times the noise"

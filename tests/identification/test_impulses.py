@@ -1,0 +1,100 @@
+"""What realization and scans ask of an impulse response: samples, orders, noise, filters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DelayRangeError, OptionError, OrderError
+from ctrl_realize.identification.impulses import (
+    MAX_WINDOWS,
+    check_order,
+    check_samples,
+    filter_flags,
+    noise_floor,
+    settled_samples,
+)
+
+
+def decay(pole: float, n: int = 2000) -> np.ndarray:
+    return (1 - pole) * pole ** np.arange(n)
+
+
+def impulse(markov: np.ndarray, **beside: object) -> cr.ImpulseResponse:
+    return cr.ImpulseResponse(markov, 0.1, **beside)
+
+
+def test_three_times_the_settling_time_is_used():
+    # 1 - S_k = 0.98^(k+1) falls below 2 % of its range at k = 193
+    assert settled_samples(impulse(decay(0.98)), 3, 0) == pytest.approx(3 * 193, abs=6)
+
+
+def test_a_quick_response_gets_256_samples_or_8_per_order_as_far_as_they_fit():
+    quick = impulse(decay(0.5))
+    assert settled_samples(quick, 3, 0) == 256
+    assert settled_samples(quick, 40, 0) == 320
+    assert settled_samples(impulse(decay(0.5, 200)), 3, 20) == 179
+
+
+def test_each_channel_settles_by_its_own_range():
+    # beside a large quick channel the small slow one would count as settled
+    both = np.stack([1000 * decay(0.5), decay(0.98)])[:, None]
+    alone = settled_samples(impulse(decay(0.98)), 3, 0)
+    assert settled_samples(impulse(both), 3, 0) == alone
+    assert settled_samples(impulse(both.transpose(1, 0, 2)), 3, 0) == alone
+
+
+def test_samples_and_orders_that_do_not_fit_are_refused():
+    short = impulse(decay(0.5, 20))
+    assert check_samples(short, 2, 1, 0, padded=False, what="delay") == 2
+    assert check_samples(short, None, 1, 5, padded=False, what="delay") == 14
+    assert check_samples(short, 14, 1, 5, padded=False, what="delay") == 14
+    with pytest.raises(OptionError, match="samples=1"):
+        check_samples(short, 1, 1, 0, padded=False, what="delay")
+    with pytest.raises(DelayRangeError, match="samples=15 and delay=5 need 21"):
+        check_samples(short, 15, 1, 5, padded=False, what="delay")
+    with pytest.raises(DelayRangeError, match="delay=19 needs more than 20 samples"):
+        check_samples(short, None, 1, 19, padded=False, what="delay")
+    check_order(short, 7, 14, padded=False)
+    for order in (0, 8):
+        with pytest.raises(OrderError, match="1 <= order <= 7"):
+            check_order(short, order, 14, padded=False)
+
+
+def test_the_noise_floor_is_a_singular_value_of_noise_alone():
+    noise = np.random.default_rng(0).standard_normal(400)
+    found = noise_floor(impulse(decay(0.9), noise=noise), 50)
+    hankel = [np.lib.stride_tricks.sliding_window_view(noise[s : s + 99], 50) for s in (0, 301)]
+    largest = [np.linalg.svd(H)[1][0] for H in hankel]
+    assert found >= max(largest) * (1 - 1e-9)
+    assert found < 2 * max(largest)
+    # more rows than the noise has: scaled by the root of the size
+    assert noise_floor(impulse(decay(0.9), noise=noise), 800) == pytest.approx(
+        2 * noise_floor(impulse(decay(0.9), noise=noise), 200)
+    )
+
+
+def test_little_noise_or_several_channels_have_no_floor():
+    noise = np.random.default_rng(0).standard_normal(400)
+    assert noise_floor(impulse(decay(0.9)), 50) is None
+    assert noise_floor(impulse(decay(0.9), noise=noise[:31]), 10) is None
+    assert noise_floor(impulse(decay(0.9), noise=noise[:32]), 10) is not None
+    assert noise_floor(impulse(decay(0.9)[None, None], noise=noise), 50) is None
+
+
+@pytest.mark.parametrize("where", [slice(0, 19), slice(-19, None)])
+def test_windows_reach_from_the_first_to_the_last_sample_of_a_long_rest(where):
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(20 * MAX_WINDOWS * 10)
+    noise[where] *= 1000
+    assert noise_floor(impulse(decay(0.9), noise=noise), 10) > 1.0
+
+
+def test_a_causal_filter_is_told_with_its_delay_in_samples_and_in_time():
+    causal = cr.FilterSpec(5, 1.0, zero_phase=False, dt=0.1)
+    (flag,) = filter_flags(impulse(decay(0.9), filter=causal))
+    assert f"{causal.group_delay:.1f} samples ({1e3 * causal.group_delay * 0.1:.3g} ms)" in str(
+        flag
+    )
+    assert filter_flags(impulse(decay(0.9))) == ()
+    assert filter_flags(impulse(decay(0.9), filter=cr.FilterSpec(5, 1.0, True, 0.1))) == ()
