@@ -46,13 +46,15 @@ class MeanStep:
 def aligned_steps(records: tuple[Record, ...]) -> tuple[StepResponse, ...]:
     """Cut all records at their steps and scale them to a unit step.
 
+    What they do before it stays: drifts and free responses of records add up to those of the mean.
+
     Raises
     ------
     DataError
         Records of different sample times.
     """
     common_sample_time(records)
-    return tuple(unit_step(record) for record in records)
+    return tuple(unit_step(record, remove_drift=False) for record in records)
 
 
 def common_sample_time(records: tuple[Record, ...]) -> float:
@@ -101,7 +103,11 @@ def mean_step(steps: tuple[StepResponse, ...], skip: tuple[int, ...] = ()) -> Me
 
 
 def repeatability(
-    steps: tuple[StepResponse, ...], mean: MeanStep, model: FloatArray, delay: float
+    steps: tuple[StepResponse, ...],
+    mean: MeanStep,
+    model: FloatArray,
+    delay: float,
+    own: FloatArray,
 ) -> Repeatability:
     """Compare every record with the common model, shifted and scaled.
 
@@ -113,9 +119,11 @@ def repeatability(
         Response of the common model, sampled as the mean.
     delay : float
         Its dead time, in s.
+    own : ndarray, shape (N, q)
+        What every record has for itself beside a drift: a level, hum, a free response.
     """
     shifts, errors, gains = np.array(
-        [_shift(step, mean, model) for step in steps], dtype=np.float64
+        [_shift(step, mean, model, own) for step in steps], dtype=np.float64
     ).T
     return compared(
         tuple(step.name or f"record {i}" for i, step in enumerate(steps)),
@@ -217,24 +225,27 @@ def _far_from_the_rest(outputs: FloatArray) -> list[int]:
     return [int(i) for i in np.flatnonzero(size - np.median(size) > _APART * scale)]
 
 
-def _shift(step: StepResponse, mean: MeanStep, model: FloatArray) -> tuple[float, float, float]:
+def _shift(
+    step: StepResponse, mean: MeanStep, model: FloatArray, own: FloatArray
+) -> tuple[float, float, float]:
     """Delay of a record against the model, its standard error (s), and its relative gain."""
     n = min(step.n_samples, mean.output.size - mean.edge)
     y = np.concatenate([step.pre[step.pre.size - mean.edge :], step.output[:n]])
     index = np.arange(y.size, dtype=np.float64)
     slope = np.gradient(model[: y.size])
+    line = index / index.size  # drifts of the records may cancel in their mean
     shift, error, gain = 0.0, np.inf, 1.0
     for _ in range(_MOST_LAGS):
         shape = np.interp(index - shift, index, model[: y.size])
         steep = np.interp(index - shift, index, slope)
-        columns = np.stack([shape, np.ones_like(shape), -steep], axis=1)
+        columns = np.column_stack([shape, -steep, line, own[: y.size]])
         solution = np.linalg.lstsq(columns, y, rcond=None)[0]
         left = y - columns @ solution
         gain = float(solution[0]) or 1.0
-        move = float(solution[2]) / gain
+        move = float(solution[1]) / gain
         shift += float(np.clip(move, -0.2 * mean.edge - 20, 0.2 * mean.edge + 20))
-        variance = float(left @ left) / max(y.size - 3, 1) * correlation_time(left)
-        error = float(np.sqrt(variance * np.linalg.pinv(columns.T @ columns)[2, 2])) / abs(gain)
+        variance = float(left @ left) / max(y.size - columns.shape[1], 1) * correlation_time(left)
+        error = float(np.sqrt(variance * np.linalg.pinv(columns.T @ columns)[1, 1])) / abs(gain)
         if abs(move) < 1e-3:
             break
     return shift * mean.dt, max(error, 1e-12) * mean.dt, gain

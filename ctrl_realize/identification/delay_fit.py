@@ -15,7 +15,7 @@ from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.output_error import OutputErrorFit, fit_output_error
 from ..numerics.separable_fit import KnownFactor, Structure
-from ..numerics.step_problem import StepData, step_data
+from ..numerics.step_problem import StepData, own_regressors, step_data
 from ..signals import Record, StepEdge
 from ..signals.given import as_records, check_complete
 from .any_input_fit import LEAST_MOVE, fit_any_input
@@ -167,7 +167,8 @@ def _fit_mean(
         if data.motion is None:
             raise DataError("the mean of the records does not leave its rest level by 5 sigma")
         fit = fit_output_error(data, latest=latest, **settings)
-        repeats = repeatability(steps, mean, fit.fitted, fit.delay)
+        own = own_regressors(data, fit.poles if fit.relaxing else None)
+        repeats = repeatability(steps, mean, fit.fitted, fit.delay, own)
         apart = delay_outliers(repeats, mean.used)
         if not apart:
             break

@@ -65,7 +65,7 @@ class OwnTerms:
         self._clock = stretches.clock
         self._decay = _decay(stretches, poles)
         self._known = stretches.regressors.shape[1]
-        columns = _columns(stretches, poles, self._decay) * root_weight[:, None]
+        columns = _columns(stretches, self._decay, poles) * root_weight[:, None]
         self._bases: list[FloatArray] = []
         self._triangles: list[FloatArray] = []
         self._norms: list[FloatArray] = []
@@ -108,7 +108,7 @@ class OwnTerms:
 
         The stretches are the same ones, looked at more or less closely.
         """
-        columns = _columns(where, self._poles, _decay(where, self._poles))
+        columns = own_columns(where, self._poles)
         out = np.empty(columns.shape[:2])
         for i, rows in enumerate(where.rows):
             out[:, rows] = np.einsum("bmk,bk->bm", columns[:, rows], self._weights(i, rest))
@@ -129,12 +129,16 @@ class OwnTerms:
         return out
 
 
+def own_columns(stretches: Stretches, poles: ComplexArray) -> FloatArray:
+    """Regressors, and free responses at poles (B, n); shape (B, m, q + n)."""
+    return _columns(stretches, _decay(stretches, poles), poles)
+
+
 def _decay(stretches: Stretches, poles: ComplexArray) -> ComplexArray:
     return np.asarray(np.exp(stretches.clock[:, None] * poles[:, None, :]))
 
 
-def _columns(stretches: Stretches, poles: ComplexArray, decay: ComplexArray) -> FloatArray:
-    """Regressors and free responses, shape (B, m, q + n)."""
+def _columns(stretches: Stretches, decay: ComplexArray, poles: ComplexArray) -> FloatArray:
     batch, n = poles.shape
     free = np.empty(decay.shape)
     if n % 2:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray
+from .arrays import ComplexArray, FloatArray, IntArray
 from .delayed_modes import MoveTrain
 from .first_motion import FirstMotion, first_motion
 from .fit_window import Window
@@ -19,7 +19,7 @@ from .noise_level import (
     rest_noise,
     sine_pair,
 )
-from .own_terms import Stretches
+from .own_terms import Stretches, own_columns
 from .relaxation import relaxation
 from .response_bins import BINS_AT_REST, Bins, response_bins
 from .separable_fit import KnownFactor, Problem
@@ -208,6 +208,19 @@ def fixed_regressors(data: StepData) -> FloatArray:
     if data.hum:
         columns.append(_hum_columns(n, data.hum))
     return np.concatenate(columns, axis=1)
+
+
+def own_regressors(data: StepData, poles: ComplexArray | None) -> FloatArray:
+    """What a record has for itself at every sample, shape (N, q).
+
+    The fixed regressors, and the free response of a plant with poles (n,) where they are given.
+    """
+    fixed = fixed_regressors(data)
+    if poles is None:
+        return fixed
+    clock = data.dt * np.arange(len(fixed), dtype=np.float64)
+    stretch = Stretches(np.array([0, clock.size]), clock, fixed)
+    return np.asarray(own_columns(stretch, poles[None])[0])
 
 
 def _weights(data: StepData, bins: Bins) -> FloatArray:

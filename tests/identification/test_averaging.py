@@ -23,6 +23,7 @@ from ctrl_realize.identification.delay_fit_result import Repeatability
 from tests import rigs
 
 TS = rigs.TS
+LEVEL = np.ones((1600, 1))
 
 
 def records(shapes, amplitudes=None, before=50, dt=0.01, names=None):
@@ -137,7 +138,7 @@ def test_shifts_gains_and_names_of_exact_records_are_found():
     delays, gains = [36.0, 37.0, 38.5], [0.9, 1.0, 1.3]
     made = simulated(delays, [16.0, 8.0, -4.0], gains=gains, names=["a", "", "c"])
     mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
     # linear interpolation of the model: (w Ts)^2 / 8 of the curvature, w = 50 rad/s
     assert_allclose(found.delays / TS, delays, atol=0.01)
     assert_allclose(found.gains, gains, rtol=1e-3)
@@ -150,12 +151,13 @@ def test_errors_and_chi_square_are_those_of_the_noise():
     noise, count = 0.01, 30
     made = simulated([37.0] * count, [16.0] * count, noise=noise)
     mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
     # the scatter of 30 tells sigma to 13 %
     assert np.std(found.delays, ddof=1) == pytest.approx(np.mean(found.errors), rel=0.4)
     slope = np.gradient(model_of(mean, 37.0)) / TS
-    columns = np.stack([model_of(mean, 37.0), np.ones(slope.size), -slope], axis=1)
-    expected = noise * np.sqrt(np.linalg.inv(columns.T @ columns)[2, 2])
+    line = np.linspace(0, 1, slope.size)
+    columns = np.stack([-slope, model_of(mean, 37.0), np.ones(slope.size), line], axis=1)
+    expected = noise * np.sqrt(np.linalg.inv(columns.T @ columns)[0, 0])
     assert_allclose(found.errors, expected, rtol=0.1)
     assert abs(found.delays.mean() / TS - 37) < 4 * expected / TS / np.sqrt(count)
     kept = np.array(mean.used)
@@ -167,12 +169,28 @@ def test_errors_and_chi_square_are_those_of_the_noise():
     assert found.p_value > 0.001
 
 
+def test_what_a_record_has_for_itself_moves_its_delay_no_more_than_noise_does():
+    made = simulated([37.0] * 3, [16.0] * 3, noise=1e-3)
+    mean = mean_step(made)
+    model = model_of(mean, 37.0)
+    own = np.column_stack([LEVEL, np.exp(-np.arange(1600) / 200)])
+    plain = repeatability(made, mean, model, 37 * TS, own)
+    moved = []
+    for i, step in enumerate(made):
+        record = step.record
+        extra = (i - 1) * (0.5 * np.exp(-np.arange(1600) / 200) + 2.0 * record.time)
+        moved.append(cr.Record(record.time, record.input, record.output + extra))
+    found = repeatability(aligned_steps(tuple(moved)), mean, model, 37 * TS, own)
+    assert_allclose(found.delays, plain.delays, atol=1e-3 * TS)
+    assert_allclose(found.errors, plain.errors, rtol=1e-3)
+
+
 def test_delays_that_grow_with_the_amplitude_are_a_trend():
     amplitudes = [4.0, 8.0, 12.0, 16.0, -20.0]
     delays = [37 + 0.5 * abs(a) for a in amplitudes]
     made = simulated(delays, amplitudes, noise=1e-3)
     mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 43.0), 43 * TS)
+    found = repeatability(made, mean, model_of(mean, 43.0), 43 * TS, LEVEL)
     assert found.trend / TS == pytest.approx(0.5, abs=0.05)
     # straight line, weighted, widened by what the line leaves
     weight, size = found.errors**-2, np.abs(np.array(amplitudes))
@@ -186,14 +204,14 @@ def test_delays_that_grow_with_the_amplitude_are_a_trend():
 def test_no_trend_is_told_from_one_amplitude_or_two_records(amplitudes):
     made = simulated([37.0] * len(amplitudes), amplitudes, noise=1e-3)
     mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
     assert (found.trend, found.trend_error) == (0.0, 0.0)
 
 
 def test_a_delay_apart_from_the_others_is_an_outlier():
     made = simulated([37.0, 37.0, 47.0, 37.0, 37.0], [16.0] * 5, noise=2e-3)
     mean = mean_step(made, skip=(2,))
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
     assert found.outlying == ("record 2",)
     # it counts neither for the chi-square nor for the centre
     assert found.p_value > 0.001
@@ -213,7 +231,7 @@ def test_errors_are_those_of_the_delay_and_so_fall_with_the_gain():
         louder.append(cr.Record(record.time, record.input, exact + noise))
     made = aligned_steps(tuple(louder))
     mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
     # correlation and seeds leave 10 %
     assert_allclose(found.errors / found.errors[1], [2, 1, 0.5], rtol=0.15)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -78,6 +79,27 @@ def test_a_trend_shows_in_few_records_too(count):
     apart = [record(k, delay=37 + 2 * (a == 8), amplitude=a) for k, a in enumerate(heights)]
     assert "amplitude_trend" not in codes(cr.fit_delay(alike).fit)
     assert "amplitude_trend" in codes(cr.fit_delay(apart).fit)
+
+
+def moving(seed: int, *, drifts: bool) -> cr.Record:
+    """Two lags behind 0.6 s: a drift of its own, or an earlier step 5 to 9 s before."""
+    rng = np.random.default_rng(seed)
+    t = 0.05 * np.arange(-400, 1000)
+    before = 0.0 if drifts else rng.uniform(-1, 1)
+    u = np.select([t < -rng.uniform(5, 9), t < 0], [0.0, before], 2.0 + before)
+    plant = cr.delayed_ss(ct.tf([1.5], [5, 6, 1]), dead_time=0.6, dt=0.05)
+    y = plant.simulate(u) + 0.01 * rng.standard_normal(t.size)
+    drift = rng.uniform(-0.03, 0.03) * t if drifts else 0.0
+    return cr.Record(t, u, y + drift, name=f"no. {seed}").between(-4, 50)
+
+
+@pytest.mark.parametrize("drifts", [True, False])
+def test_records_that_were_not_at_rest_are_fitted_together(drifts):
+    fit = cr.fit_delay([moving(seed, drifts=drifts) for seed in range(6)]).fit
+    assert ("drift" if drifts else "not_at_rest") in codes(fit)
+    assert "records_differ" not in codes(fit)
+    assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
+    assert fit.total_delay == pytest.approx(6.6, rel=0.01)
 
 
 def test_records_of_different_sample_times_are_refused():
