@@ -52,14 +52,13 @@ MODULES = {
     "numerics/delay_bound": "tests/numerics/test_delay_bound.py",
     "numerics/profile_interval": "tests/numerics/test_step_numerics.py "
     "tests/numerics/test_delay_bound.py",
-    "numerics/step_problem": "tests/identification/test_delay_fit.py",
+    "numerics/step_problem": "tests/numerics/test_step_problem.py",
     "numerics/output_error": "tests/identification/test_delay_fit.py",
     "identification/steps": "tests/identification/test_steps.py",
     "identification/realization": "tests/identification/test_realization.py",
     "identification/delay_scan": "tests/identification/test_delay_scan.py",
     "identification/orders": "tests/identification/test_orders.py",
-    "identification/impulses": "tests/identification/test_impulses.py "
-    "tests/identification/test_realization.py",
+    "identification/impulses": "tests/identification/test_impulses.py",
     "identification/known_dynamics": "tests/identification/test_known_dynamics.py",
     "identification/averaging": "tests/identification/test_averaging.py",
     "identification/fit_flags": "tests/identification/test_delay_fit.py",

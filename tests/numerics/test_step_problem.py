@@ -1,0 +1,115 @@
+"""From the record of a step to least-squares problems: where to stop, what weighs how much."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ctrl_realize.numerics.separable_fit import KnownFactor
+from ctrl_realize.numerics.step_problem import (
+    StepData,
+    fixed_regressors,
+    step_data,
+    step_scales,
+    stop_at,
+    window,
+)
+
+EDGE, DELAY, LAG, DT = 200, 40, 60.0, 0.5
+
+
+def data(*, height: float = 2.0, noise: float = 1e-3, quantum: float = 0.0) -> StepData:
+    """One lag of 60 samples, 40 samples after a step at sample 200 of 1400."""
+    k = np.arange(1400.0)
+    after = np.clip(k - EDGE - DELAY, 0, None)
+    y = height * -np.expm1(-after / LAG) + noise * np.random.default_rng(0).standard_normal(k.size)
+    y = np.round(y / quantum) * quantum if quantum else y
+    return step_data(y, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
+
+
+def reached(part: float) -> float:
+    return EDGE + DELAY - LAG * np.log1p(-part)
+
+
+@pytest.mark.parametrize("height", [2.0, -2.0])
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.63, 0.9])
+def test_a_fit_stops_where_a_part_of_the_excursion_is_made(height, part):
+    # means over nine samples; near its start the response is too short to stop in
+    assert stop_at(data(height=height), part) == pytest.approx(reached(part), abs=5)
+
+
+def test_the_whole_excursion_and_an_output_at_rest_are_fitted_to_the_end():
+    made = data()
+    assert stop_at(made, 1.0) == 1400
+    assert stop_at(replace(made, motion=None), 0.3) == 1400
+    assert stop_at(replace(made, motion=replace(made.motion, span=1e3)), 0.3) == 1400
+
+
+def test_a_response_that_starts_the_wrong_way_stops_where_it_goes_the_other():
+    made = data()
+    wrong = replace(made, motion=replace(made.motion, sign=-made.motion.sign))
+    assert stop_at(wrong, 0.3) == stop_at(made, 0.3)
+
+
+def test_a_fit_holds_ten_samples_behind_the_onset_and_three_behind_the_crossing():
+    made = data()
+    late = replace(made, motion=replace(made.motion, onset=700.6, crossing=0))
+    assert stop_at(late, 0.3) == EDGE + 710
+    late = replace(made, motion=replace(made.motion, onset=0.0, crossing=700))
+    assert stop_at(late, 0.3) == EDGE + 703
+    late = replace(made, motion=replace(made.motion, crossing=1300))
+    assert stop_at(late, 0.3) == 1400
+
+
+def test_scales_come_from_the_first_motion_and_the_63_percent_point():
+    made = data()
+    motion = replace(made.motion, onset=40.0, crossing=50)
+    made = replace(made, motion=motion)
+    scales = step_scales(made, 1400, None)
+    assert scales.onset == 20.0
+    assert scales.rise == pytest.approx(DT * LAG, rel=0.1)
+    assert scales.length == DT * 1200
+    assert scales.latest == DT * 52.5  # 5 % later than the crossing
+    assert step_scales(made, 1400, 10.0).latest == 10.0
+    assert step_scales(made, 1400, 100.0).latest == DT * 52.5
+    near = replace(made, motion=replace(motion, onset=0.0, crossing=3))
+    assert step_scales(near, 1400, None).latest == DT * 4
+    assert step_scales(near, 1400, None).onset == DT / 2
+
+
+def weights(made: StepData) -> tuple[np.ndarray, np.ndarray]:
+    found = window(made, 1400, KnownFactor())
+    return found.bins.width, np.square(found.problem.root_weight)
+
+
+def test_means_weigh_what_they_hold_and_of_coarsely_rounded_samples_hardly_more():
+    width, weight = weights(data())
+    np.testing.assert_allclose(weight, width)
+    assert width.max() > 9
+    made = data(noise=1e-4, quantum=0.05)
+    assert made.coarse
+    width, weight = weights(made)
+    assert weight[width == 1] == pytest.approx(1.0)
+    assert weight.max() < 2.0
+    assert weight[np.argmax(width)] > 1.8
+
+
+def test_without_rest_noise_is_taken_for_white_and_hum_is_not_looked_for():
+    k = np.arange(600.0)
+    y = -np.expm1(-np.clip(k - 20, 0, None) / 40) + 0.01 * np.sin(0.7 * k)
+    made = step_data(y, 1.0 * (k >= 5), DT, [(5, 1)])
+    assert (made.colour, made.hum, made.drift) == (1.0, [], 0.0)
+
+
+def test_regressors_are_a_level_a_drift_that_may_end_and_the_hum():
+    made = replace(data(), drift=0.1)
+    level, slope = fixed_regressors(made).T
+    np.testing.assert_array_equal(level, 1.0)
+    np.testing.assert_allclose(np.diff(slope), 1 / 1400)
+    assert slope[EDGE] == 0
+    ended = fixed_regressors(replace(made, ending=True))[:, 1]
+    np.testing.assert_allclose(ended[EDGE + 2 * EDGE :], ended[-1])
+    np.testing.assert_array_equal(ended[: EDGE + 2 * EDGE], slope[: EDGE + 2 * EDGE])
+    assert fixed_regressors(replace(made, hum=[0.1])).shape == (1400, 4)
