@@ -149,7 +149,7 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
         name = interval_name(system)
         facts.append((name, interval_in_time(*interval)))
     for attribute, label in (
-        ("std", "standard error"),
+        ("std", "standard error, structure given"),
         ("onset", "visible onset"),
         ("total_delay", "total delay of slow signals"),
     ):
