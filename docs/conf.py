@@ -60,6 +60,7 @@ TABLES = {
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",
     ),
+    "fuzz": ("docs/fuzz_table.md", "python -m tests.fuzz.table"),
     "peers": ("docs/peers_table.md", "python -m benchmarks.peers simulated"),
     "peers_measured": ("docs/peers_measured_table.md", "python -m benchmarks.peers measured"),
 }
