@@ -8,6 +8,7 @@ from .arrays import FloatArray
 
 _DITHER = 0.6  # noise, rounding included, in quantisation steps, from which means are unbiased
 _MANY = 50  # samples at rest that are enough to tell the noise
+_TURNS = 3
 _FEW = 8  # samples at rest below which the whole record must tell the noise
 
 
@@ -78,9 +79,7 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     if before.size < _FEW:
         third = np.diff(record, 3) / np.sqrt(20)
         return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0
-    index = np.arange(before.size) - before.size
-    slope, level = np.polyfit(index, before, 1)
-    left = before - level - slope * index
+    slope, left = _robust_line(before, quantum)
     sigma = max(winsorised_sigma(left, quantum, lost=2), floor)
     if before.size < _MANY:
         # A dozen samples tell sigma to a factor of two: the settled half of the record helps.
@@ -89,6 +88,18 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
             sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
     error = sigma * np.sqrt(12 * correlation_time(left) / before.size**3)
     return sigma, float(slope) if abs(slope) > 5 * error else 0.0
+
+
+def _robust_line(values: FloatArray, quantum: float) -> tuple[float, FloatArray]:
+    """Slope per sample, and what the line leaves; wild values count as four standard deviations."""
+    index = np.arange(values.size, dtype=np.float64)
+    tamed = values
+    for _ in range(_TURNS):
+        line = np.polyval(np.polyfit(index, tamed, 1), index)
+        left = values - line
+        limit = 4 * max(mad_sigma(left), 0.5 * quantum)
+        tamed = line + np.clip(left, -limit, limit)
+    return float(line[1] - line[0]), left
 
 
 def correlation_time(residual: FloatArray) -> float:

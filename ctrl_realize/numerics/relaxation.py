@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from .arrays import FloatArray
 from .noise_level import correlation_time
@@ -32,7 +33,8 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
     """
     if edge < FEWEST:
         return None
-    before = output[:edge]
+    # Single wild samples are no curve, the first of a record least of all.
+    before = median_filter(output[:edge], size=5, mode="mirror")
     time = np.arange(output.size) / edge
     line = np.stack([np.ones(edge), time[:edge]], axis=1)
     straight = before - line @ np.linalg.lstsq(line, before, rcond=None)[0]

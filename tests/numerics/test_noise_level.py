@@ -134,6 +134,18 @@ def test_five_standard_errors_make_a_drift(seed):
     assert rest_noise(above, np.tile(above, 3), 0.0)[1] == pytest.approx(slope)
 
 
+def test_wild_samples_make_no_drift_and_hide_none():
+    values = white(300)
+    slope = 0.05
+    for wild in ([0], [0, 5, 299]):
+        spoilt = values.copy()
+        spoilt[wild] += 80
+        assert rest_noise(spoilt, np.tile(spoilt, 3), 0.0)[1] == 0
+        drift = rest_noise(spoilt + slope * np.arange(300), np.tile(spoilt, 3), 0.0)[1]
+        # one standard error of the slope is sqrt(12 / 300^3) = 7e-4
+        assert drift == pytest.approx(slope, abs=3e-3)
+
+
 @pytest.mark.parametrize("pole", [0.4, 0.7, 0.95])
 def test_the_correlation_time_of_a_lag(pole):
     found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))

@@ -30,6 +30,13 @@ def test_a_line_and_noise_are_no_decay():
     assert relaxation(noise(500), 120) is None
 
 
+@pytest.mark.parametrize("at", [0, 1, 60])
+def test_a_wild_sample_is_no_decay(at):
+    values = noise(500)
+    values[at] += 100
+    assert relaxation(values, 120) is None
+
+
 def test_too_few_samples_tell_no_curve():
     decay = np.exp(-np.arange(100) / 10.0)
     assert relaxation(decay + 1e-3 * noise(100), FEWEST) is not None
