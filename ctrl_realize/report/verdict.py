@@ -26,8 +26,7 @@ SEVERE = frozenset(
 )
 """Flags after which the dead time should not be used as it stands."""
 
-SCANNED = Flag(
-    "no_confidence",
+SCANNED = (
     "the dead time is where the misfit of a scan is least, and the interval tells how flat the "
     "misfit is there; neither knows a probability, and fast lags that the order leaves out count "
     "as dead time. The output-error fit gives a 95 % interval",
@@ -191,13 +190,13 @@ def _gain(system: DelayedStateSpace) -> str:
     return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
 
 
-def _flags_of(system: DelayedStateSpace) -> tuple[Flag, ...]:
+def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
     flags: tuple[Flag, ...] = tuple(getattr(system.fit, "flags", ()))
     return (*flags, SCANNED) if isinstance(system.fit, DelayScan) else flags
 
 
 def _level(flags: Sequence[Any]) -> Level:
-    if any(flag.code in SEVERE for flag in flags):
+    if any(getattr(flag, "code", "") in SEVERE for flag in flags):
         return "poor"
     return "caution" if flags else "good"
 
