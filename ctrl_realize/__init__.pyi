@@ -24,9 +24,9 @@ from .identification.bootstrap import bootstrap as bootstrap
 from .identification.campaign import Campaign as Campaign
 from .identification.campaign_row import CampaignRow as CampaignRow
 from .identification.campaign_run import identify_campaign as identify_campaign
-from .identification.channel_fit import ChannelFit as ChannelFit
 from .identification.channel_fit import fit_channels as fit_channels
 from .identification.channel_fit import refine as refine
+from .identification.channel_fit_result import ChannelFit as ChannelFit
 from .identification.channels import ChannelRealization as ChannelRealization
 from .identification.channels import channel_delays as channel_delays
 from .identification.channels import realize_channels as realize_channels

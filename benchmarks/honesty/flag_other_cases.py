@@ -6,12 +6,14 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
+from ctrl_realize.report.verdict import SCANNED, verdict_of
 from tests import rigs
 
 from .flag_case import Codes, FlagCase, Run, codes
 from .worlds import DRIVEN_DT, NOISES, DrivenCase, driven_case, noise_of
 
 LOW, HIGH = NOISES[:2], NOISES[2:]
+FOUR_LAGS = rigs.lag(0.8) * rigs.lag(4) * rigs.lag(9) * rigs.lag(15)
 
 
 def _noise(seed: int, levels: tuple[float, ...] = NOISES) -> float:
@@ -42,6 +44,18 @@ def together(seed: int, *, gains: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Codes:
 
 def pulses(case: DrivenCase, length: int = 120) -> Codes:
     return codes(cr.impulse_from_io(case.record, length))
+
+
+def channels(case: DrivenCase, orders: tuple[int, ...] = (1, 2, 3, 4, 5)) -> Codes:
+    return codes(cr.fit_channels(case.record, orders).fit)
+
+
+def half_silent(seed: int) -> Codes:
+    """Two outputs, one of which is nothing but noise."""
+    case = driven(seed, held=3)
+    noise = np.random.default_rng([seed, 36]).standard_normal(case.record.n_samples)
+    both = np.stack([np.ravel(case.record.output), noise])
+    return codes(cr.fit_channels(cr.Record(case.record.time, case.record.input, both), 2).fit)
 
 
 def unmoved(seed: int, method: str) -> Codes:
@@ -193,6 +207,17 @@ def many_lines(seed: int) -> Codes:
     return codes(cr.check_delay(driven(seed).record, frf=frf_of(rigs.R2, seed, _noise(seed))))
 
 
+def reasons(method: str) -> Run:
+    """Give the codes of the flags behind the reasons of a report's verdict."""
+
+    def run(seed: int) -> Codes:
+        model = cr.identify(rigs.step_record(noise=_noise(seed), seed=seed), method=method)
+        told = verdict_of(model).reasons
+        return frozenset({SCANNED.code} if str(SCANNED) in told else set())
+
+    return run
+
+
 def compared(highest: float) -> Run:
     def run(seed: int) -> Codes:
         frf = frf_of(rigs.R3, seed, _noise(seed), band=(0.1, highest))
@@ -237,7 +262,7 @@ CASES: list[FlagCase] = [
             "max_delay=40, delay 5 to 12", lambda s: fit(driven(s), max_delay=40)),
     _driven("no_delay_resolved", "no delay", lambda s: fit(driven(s, delay=0.0))),
     _driven("structures_disagree", "four lags, noise 0.1 to 2 %",
-            lambda s: fit(driven(s, core=rigs.lag(0.8) * rigs.lag(4) * rigs.lag(9) * rigs.lag(15))),
+            lambda s: fit(driven(s, core=FOUR_LAGS)),
             "one lag", lambda s: fit(driven(s, core=rigs.lag(0.8)))),
     _driven("integrating", "integrator behind a lag",
             lambda s: fit(driven(s, core=rigs.lag(4.0) * ct.tf([1], [1, 1e-6])))),
@@ -261,6 +286,14 @@ CASES: list[FlagCase] = [
                lambda s, method=method: codes(
                    cr.impulse_from_io(driven(s, held=3).record, 60, method=method)))
       for method in ("regularized", "least_squares", "okid")),
+    FlagCase("fit_channels", "highest_order", "orders 1 and 2 of four lags",
+             lambda s: channels(driven(s, core=FOUR_LAGS, held=3), (1, 2)),
+             "orders 1 to 5 of one lag", lambda s: channels(driven(s, core=rigs.lag(0.8)))),
+    FlagCase("fit_channels", "coloured_residual", "AR(1) noise",
+             lambda s: channels(driven(s, "coloured", held=3)), DRIVEN,
+             lambda s: channels(driven(s, held=3))),
+    FlagCase("fit_channels", "no_response", "one output of two is noise", half_silent, DRIVEN,
+             lambda s: channels(driven(s, held=3))),
     _fit_frf("misfit", "R3 with 10 % ripple, noise 0.1 and 0.5 %",
              lambda s: frf_fit(frf_of(rigs.R3, s, _noise(s, LOW), bend=0.1))),
     _fit_frf("misfit", "order 1 of R3, noise 1 and 2 %",
@@ -304,6 +337,8 @@ CASES: list[FlagCase] = [
     FlagCase("check_residuals", "feedback", "noise comes back through gain alone",
              lambda s: closed_loop(s, integral=0.0), "two lags, AR(1) noise",
              lambda s: residuals(s, kind="coloured")),
+    FlagCase("report", "no_confidence", "R3, noise 0.1 to 2 %, by the scan", reasons("scan"),
+             "the same by output error", reasons("output_error")),
     _check("no_correlation", "output that knows nothing of the input", unrelated, DRIVEN, check),
     _check("no_frf_fit", "response of three lines", few_lines, "60 lines", many_lines),
     _check("no_phase_slope", "response of three lines", few_lines, "60 lines", many_lines),

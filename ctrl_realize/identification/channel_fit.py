@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import control as ct
 import numpy as np
@@ -13,18 +12,17 @@ from numpy.typing import ArrayLike
 from ..checks import whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, DataWarning, OrderError
-from ..numerics.arrays import FloatArray, IntArray, read_only
+from ..numerics.arrays import IntArray
 from ..numerics.delay_split import split_delays
-from ..numerics.gramians import balanced_truncation
-from ..numerics.section_fit import MOST_STEPS, fit_sections
+from ..numerics.section_fit import fit_sections
 from ..numerics.sections import in_sections
-from ..results import Flag, Result
+from ..results import Flag
 from ..signals import Record
+from .channel_fit_result import fitted_system
 from .channel_search import ORDERS, Candidate, Search, Shares, experiments
 from .channels import channel_delays, given_delays
 from .from_io import Method, Start, as_group, impulse_from_io
 from .record_simulation import as_delayed
-from .residuals import ResidualCheck, check_residuals
 
 LEVEL = 0.02
 """Part of a channel's largest Markov parameter that counts as response, where delays are to be
@@ -39,81 +37,6 @@ STARTS: tuple[tuple[Start, Method], ...] = (
 model so far still follows the input."""
 STILL = 10
 """Samples that an input stands still at the start of a record for the plant to count as at rest."""
-LAGS = 25
-"""Of the correlations in the residual checks."""
-
-
-@dataclass(frozen=True, eq=False)
-class ChannelFit(Result):
-    """How a model was fitted to records of one or several channels.
-
-    Attributes
-    ----------
-    order : int
-        States of the core.
-    input_delays, output_delays : tuple of int
-        In samples.
-    direct : bool
-        Whether the core has a direct term.
-    bic : dict of int to float
-        Bayesian information criterion of every order tried; of the last one, with its final
-        delays. Smaller is better, 6 less is clear.
-    noise_std : ndarray, shape (p,)
-        Standard deviation of what the model leaves of every output.
-    steps : int
-        Gauss-Newton steps of the last fit.
-    fit_percent : ndarray, shape (p,)
-        ``100 (1 - noise_std / std y)`` of every output, over all records.
-    checks : tuple of ResidualCheck
-        Of every record without gaps.
-    records : tuple of Record
-    choices : tuple of str
-    flags : tuple of Flag
-        Those of the checks, and ``"highest_order"``, ``"not_converged"``, ``"no_response"``.
-
-    Examples
-    --------
-    >>> import control as ct
-    >>> import numpy as np
-    >>> import ctrl_realize as cr
-    >>> plant = cr.delayed_ss(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
-    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
-    >>> y = plant.simulate(u) + 0.05 * noise
-    >>> fit = cr.fit_channels(cr.Record(0.1 * np.arange(500), u, y), 1).fit
-    >>> fit
-    <ChannelFit: order 1, fit 85.7 %>
-    >>> fit.input_delays, fit.noise_std.round(2), fit.checks[0].independent
-    ((5,), array([0.05]), True)
-    """
-
-    order: int
-    input_delays: tuple[int, ...]
-    output_delays: tuple[int, ...]
-    direct: bool
-    bic: dict[int, float]
-    noise_std: FloatArray
-    fit_percent: FloatArray
-    steps: int
-    checks: tuple[ResidualCheck, ...]
-    records: tuple[Record, ...]
-    choices: tuple[str, ...] = ()
-    flags: tuple[Flag, ...] = ()
-
-    def _title(self) -> str:
-        return f"Fit of {len(self.output_delays)} x {len(self.input_delays)} channels"
-
-    def _rows(self) -> list[tuple[str, str]]:
-        return [
-            ("order", f"{self.order}, {'with' if self.direct else 'without'} direct term"),
-            ("delays of the inputs", " ".join(map(str, self.input_delays)) + " samples"),
-            ("delays of the outputs", " ".join(map(str, self.output_delays)) + " samples"),
-            ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
-            ("fit", ", ".join(f"{f:.2f} %" for f in self.fit_percent)),
-        ]
-
-    def __repr__(self) -> str:
-        fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
-        return f"<ChannelFit: order {self.order}, fit {fit} %>"
 
 
 def fit_channels(
@@ -236,7 +159,7 @@ def _from_start(
     best = min(fits, key=lambda c: c.bic)
     moved = search.improved(best, delays=delays is None, direct=feedthrough is None)
     if asked is None or len(asked) > 1:
-        moved = search.lowered(moved, orders)
+        moved = search.lowered(moved, orders, delays=delays is None)
     bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
     flags = silent
     if len(orders) > 1 and best.order == max(asked or ORDERS):
@@ -246,7 +169,9 @@ def _from_start(
                 f"the highest order that was tried, {best.order}, is the best: try higher ones",
             ),
         )
-    return moved.bic, _model(search.finish(moved), group, bic, _choices(moved, bic, shares), flags)
+    return moved.bic, fitted_system(
+        search.finish(moved), group, bic, _choices(moved, bic, shares), flags
+    )
 
 
 def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str, ...]:
@@ -314,7 +239,7 @@ def refine(
     found = fit_sections(
         experiments(group, shares), in_sections(core.A, core.B, core.C, core.D), direct=direct
     )
-    return _model(Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), ())
+    return fitted_system(Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), ())
 
 
 def _orders(order: int | Sequence[int] | None) -> tuple[int, ...] | None:
@@ -339,47 +264,3 @@ def _split(delays: IntArray) -> Shares:
     """Share delays out to inputs and outputs; channels without response follow the others."""
     outputs, inputs = split_delays(delays, delays >= 0)[0]
     return tuple(int(d) for d in inputs), tuple(int(d) for d in outputs)
-
-
-def _model(
-    best: Candidate,
-    group: tuple[Record, ...],
-    bic: dict[int, float],
-    choices: tuple[str, ...],
-    flags: tuple[Flag, ...],
-) -> DelayedStateSpace:
-    """Make the system and say how well it follows the records."""
-    A, B, C, D = best.found.model.matrices()
-    A, B, C, _ = balanced_truncation(A, B, C, best.order)
-    core = ct.ss(A, B, C, D, group[0].dt)
-    system = DelayedStateSpace(core, best.inputs, output_delay=best.outputs)
-    complete = [r for r in group if not r.n_missing]
-    checks = tuple(
-        check_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
-    )
-    seen = {flag.code: flag for check in checks for flag in check.flags}
-    if best.found.steps == MOST_STEPS:
-        seen["not_converged"] = Flag(
-            "not_converged",
-            f"the fit has not settled within {MOST_STEPS} steps: the order is probably too high "
-            "for the data; refine(model, records) goes on from here",
-        )
-    fit = ChannelFit(
-        order=core.nstates,
-        input_delays=best.inputs,
-        output_delays=best.outputs,
-        direct=best.direct,
-        bic=bic,
-        noise_std=read_only(np.sqrt(best.found.variance)),
-        fit_percent=read_only(100 * (1 - np.sqrt(best.found.variance / best.found.spread))),
-        steps=best.found.steps,
-        checks=checks,
-        records=group,
-        choices=choices,
-        flags=(*flags, *seen.values()),
-    )
-    first = group[0]
-    labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}
-    # python-control takes no dots in names
-    name = {"name": first.name.replace(".", "_")} if first.name else {}
-    return system.replace(fit=fit, **labels, **name)

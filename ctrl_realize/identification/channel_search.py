@@ -12,7 +12,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.arx import excited_directions
 from ..numerics.delay_models import OneModel, realize_at
 from ..numerics.lagged import normal_equations
-from ..numerics.section_fit import Experiment, SectionFit, fit_sections
+from ..numerics.section_fit import MOST_STEPS, Experiment, SectionFit, fit_sections
 from ..numerics.sections import Sections, in_sections
 from ..signals import Record
 
@@ -25,6 +25,8 @@ PER_PARAMETER = 3
 """Measured values that each parameter needs at least."""
 ROUGHLY = 0.1
 """Log likelihood to which candidates are fitted; differences of BIC below 2 say nothing."""
+NEARBY = 10
+"""Steps in which a neighbour of a fitted model shows whether it is better."""
 FARTHEST = 200
 """Moves of delays after which the search for them ends."""
 
@@ -121,9 +123,9 @@ class Search:
         """Fit one structure; its start is another fit, or Kung's realization."""
         data = experiments(self._group, shares, ENOUGH_SAMPLES)
         sections = start.found.model if start is not None else self._kung(order, shares)
-        return self._judged(
-            fit_sections(data, sections, direct=direct, enough=ROUGHLY), order, shares, direct
-        )
+        most = MOST_STEPS if start is None else NEARBY
+        found = fit_sections(data, sections, direct=direct, enough=ROUGHLY, most=most)
+        return self._judged(found, order, shares, direct)
 
     def finish(self, best: Candidate) -> Candidate:
         """Fit once more, to all samples."""
@@ -170,13 +172,19 @@ class Search:
             best = better
         return best
 
-    def lowered(self, best: Candidate, orders: Sequence[int]) -> Candidate:
-        """Try lower orders behind the delays that were found."""
+    def lowered(self, best: Candidate, orders: Sequence[int], *, delays: bool) -> Candidate:
+        """Try lower orders behind the delays that were found.
+
+        With one input and output each of them finds its own from there: states that stand for
+        samples of the delay hold it where it is.
+        """
         for order in (n for n in orders if n < best.order):
             try:
                 lower = self.fit(order, (best.inputs, best.outputs), direct=best.direct)
             except OrderError:
                 continue
+            if delays and self._markov.shape[:2] == (1, 1):
+                lower = self.improved(lower, delays=True, direct=False)
             best = min(best, lower, key=lambda c: c.bic)
         return best
 

@@ -64,7 +64,12 @@ class _Point:
 
 
 def fit_sections(
-    data: Sequence[Experiment], start: Sections, *, direct: bool, enough: float = ENOUGH
+    data: Sequence[Experiment],
+    start: Sections,
+    *,
+    direct: bool,
+    enough: float = ENOUGH,
+    most: int = MOST_STEPS,
 ) -> SectionFit:
     """Fit all parameters of a model to experiments.
 
@@ -77,6 +82,8 @@ def fit_sections(
         Whether D is free, else it is zero.
     enough : float
         Gain of log likelihood below which a step is the last one.
+    most : int
+        Steps at most.
     """
     known = [np.isfinite(one.y) for one in data]
     counts = np.sum([k.sum(axis=1) for k in known], axis=0).astype(np.float64)
@@ -108,7 +115,7 @@ def fit_sections(
     gram, slope = _normal(here, data, known, 1 / spread, mask)
     here = at(_stepped(model, mask, _damped(gram, slope, 1e-12)), 1 / spread)
     mask, damping, done = model.free(direct=direct), _DAMPING, 0
-    while done < MOST_STEPS:
+    while done < most:
         weights = 1 / here.variance
         gram, slope = _normal(here, data, known, weights, mask)
         better = None

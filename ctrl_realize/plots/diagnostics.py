@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from ..checks import whole
 from ..errors import OptionError
-from ..identification.channel_fit import ChannelFit
+from ..identification.channel_fit_result import ChannelFit
 from ..identification.channels import ChannelRealization
 from ..identification.cross_check import DelayCheck
 from ..identification.from_io import ImpulseEstimate

@@ -144,6 +144,19 @@ def test_another_start_is_tried_where_the_first_leads_nowhere():
     assert (found.fit.order, found.delay) == (1, 20)
 
 
+def test_a_disturbance_that_drifts_is_told():
+    rng = np.random.default_rng(0)
+    first = record(noise=0.0)
+    drift = np.cumsum(rng.standard_normal((2, 600)), axis=1)
+    drifting = cr.Record(first.time, first.input, first.output + 0.05 * drift)
+    assert "coloured_residual" in {flag.code for flag in cr.fit_channels(drifting, 3).fit.flags}
+
+
+def test_the_highest_order_that_was_tried_is_not_taken_for_enough():
+    codes = {flag.code for flag in cr.fit_channels(record(), [1, 2]).fit.flags}
+    assert "highest_order" in codes
+
+
 @pytest.mark.parametrize("constant", [True, False])
 def test_inputs_that_do_not_excite_are_refused(constant):
     first = record()

@@ -1,0 +1,142 @@
+"""A model of several channels that was fitted to records, and how it came out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+
+from ..delayed import DelayedStateSpace
+from ..numerics.arrays import FloatArray, read_only
+from ..numerics.gramians import balanced_truncation
+from ..results import Flag, Result
+from ..signals import Record
+from .channel_search import Candidate
+from .residuals import ResidualCheck, check_residuals
+
+COLOURED = 0.5
+"""Correlation of neighbouring residuals from which they are said to be coloured."""
+LAGS = 25
+"""Of the correlations in the residual checks."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelFit(Result):
+    """How a model was fitted to records of one or several channels.
+
+    Attributes
+    ----------
+    order : int
+        States of the core.
+    input_delays, output_delays : tuple of int
+        In samples.
+    direct : bool
+        Whether the core has a direct term.
+    bic : dict of int to float
+        Bayesian information criterion of every order tried; of the last one, with its final
+        delays. Smaller is better, 6 less is clear.
+    noise_std : ndarray, shape (p,)
+        Standard deviation of what the model leaves of every output.
+    steps : int
+        Gauss-Newton steps of the last fit.
+    fit_percent : ndarray, shape (p,)
+        ``100 (1 - noise_std / std y)`` of every output, over all records.
+    checks : tuple of ResidualCheck
+        Of every record without gaps.
+    records : tuple of Record
+    choices : tuple of str
+    flags : tuple of Flag
+        Those of the checks, and ``"highest_order"``, ``"no_response"``,
+        ``"coloured_residual"``.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
+    >>> y = plant.simulate(u) + 0.05 * noise
+    >>> fit = cr.fit_channels(cr.Record(0.1 * np.arange(500), u, y), 1).fit
+    >>> fit
+    <ChannelFit: order 1, fit 85.7 %>
+    >>> fit.input_delays, fit.noise_std.round(2), fit.checks[0].independent
+    ((5,), array([0.05]), True)
+    """
+
+    order: int
+    input_delays: tuple[int, ...]
+    output_delays: tuple[int, ...]
+    direct: bool
+    bic: dict[int, float]
+    noise_std: FloatArray
+    fit_percent: FloatArray
+    steps: int
+    checks: tuple[ResidualCheck, ...]
+    records: tuple[Record, ...]
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = ()
+
+    def _title(self) -> str:
+        return f"Fit of {len(self.output_delays)} x {len(self.input_delays)} channels"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [
+            ("order", f"{self.order}, {'with' if self.direct else 'without'} direct term"),
+            ("delays of the inputs", " ".join(map(str, self.input_delays)) + " samples"),
+            ("delays of the outputs", " ".join(map(str, self.output_delays)) + " samples"),
+            ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
+            ("fit", ", ".join(f"{f:.2f} %" for f in self.fit_percent)),
+        ]
+
+    def __repr__(self) -> str:
+        fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
+        return f"<ChannelFit: order {self.order}, fit {fit} %>"
+
+
+def fitted_system(
+    best: Candidate,
+    group: tuple[Record, ...],
+    bic: dict[int, float],
+    choices: tuple[str, ...],
+    flags: tuple[Flag, ...],
+) -> DelayedStateSpace:
+    """Make the system and say how well it follows the records."""
+    A, B, C, D = best.found.model.matrices()
+    A, B, C, _ = balanced_truncation(A, B, C, best.order)
+    core = ct.ss(A, B, C, D, group[0].dt)
+    system = DelayedStateSpace(core, best.inputs, output_delay=best.outputs)
+    complete = [r for r in group if not r.n_missing]
+    checks = tuple(
+        check_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
+    )
+    seen = {flag.code: flag for check in checks for flag in check.flags}
+    neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
+    if neighbours > COLOURED:
+        seen["coloured_residual"] = Flag(
+            "coloured_residual",
+            f"neighbouring residuals are correlated by {neighbours:.2g}: a disturbance that "
+            "drifts, or a plant that is not linear. BIC takes them for independent, so the order "
+            "may be too high, with slow poles that follow the drift: compare a lower order on "
+            "other data",
+        )
+    fit = ChannelFit(
+        order=core.nstates,
+        input_delays=best.inputs,
+        output_delays=best.outputs,
+        direct=best.direct,
+        bic=bic,
+        noise_std=read_only(np.sqrt(best.found.variance)),
+        fit_percent=read_only(100 * (1 - np.sqrt(best.found.variance / best.found.spread))),
+        steps=best.found.steps,
+        checks=checks,
+        records=group,
+        choices=choices,
+        flags=(*flags, *seen.values()),
+    )
+    first = group[0]
+    labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}
+    # python-control takes no dots in names
+    name = {"name": first.name.replace(".", "_")} if first.name else {}
+    return system.replace(fit=fit, **labels, **name)
