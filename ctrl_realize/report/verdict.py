@@ -29,7 +29,7 @@ SEVERE = frozenset(
 SCANNED = (
     "the dead time is where the misfit of a scan is least, and the interval tells how flat the "
     "misfit is there; neither knows a probability, and fast lags that the order leaves out count "
-    "as dead time. The output-error fit gives a 95 % interval",
+    "as dead time. The output-error fit gives a 95 % interval"
 )
 """What any scan leaves open, however good the record."""
 
