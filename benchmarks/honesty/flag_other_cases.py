@@ -6,7 +6,6 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.report.verdict import SCANNED, verdict_of
 from tests import rigs
 
 from .flag_case import Codes, FlagCase, Run, codes
@@ -207,17 +206,6 @@ def many_lines(seed: int) -> Codes:
     return codes(cr.check_delay(driven(seed).record, frf=frf_of(rigs.R2, seed, _noise(seed))))
 
 
-def reasons(method: str) -> Run:
-    """Give the codes of the flags behind the reasons of a report's verdict."""
-
-    def run(seed: int) -> Codes:
-        model = cr.identify(rigs.step_record(noise=_noise(seed), seed=seed), method=method)
-        told = verdict_of(model).reasons
-        return frozenset({SCANNED.code} if str(SCANNED) in told else set())
-
-    return run
-
-
 def compared(highest: float) -> Run:
     def run(seed: int) -> Codes:
         frf = frf_of(rigs.R3, seed, _noise(seed), band=(0.1, highest))
@@ -337,8 +325,6 @@ CASES: list[FlagCase] = [
     FlagCase("check_residuals", "feedback", "noise comes back through gain alone",
              lambda s: closed_loop(s, integral=0.0), "two lags, AR(1) noise",
              lambda s: residuals(s, kind="coloured")),
-    FlagCase("report", "no_confidence", "R3, noise 0.1 to 2 %, by the scan", reasons("scan"),
-             "the same by output error", reasons("output_error")),
     _check("no_correlation", "output that knows nothing of the input", unrelated, DRIVEN, check),
     _check("no_frf_fit", "response of three lines", few_lines, "60 lines", many_lines),
     _check("no_phase_slope", "response of three lines", few_lines, "60 lines", many_lines),
