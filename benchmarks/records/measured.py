@@ -1,0 +1,162 @@
+"""Predict the half of a measured record that a model has not seen, beside subspace methods."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import platform
+import warnings
+from collections.abc import Callable, Iterable
+from datetime import date
+from importlib import metadata
+from pathlib import Path
+
+import control as ct
+import numpy as np
+
+import ctrl_realize as cr
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+SETS = ("hairdryer", "gas_furnace", "exchanger", "robot_arm", "cd_player_mimo")
+ORDERS = (2, 3, 4, 6, 8, 12, 16, 20)
+ROWS = 20
+"""Block rows of the subspace methods."""
+
+Model = Callable[[cr.Record, int], ct.StateSpace]
+
+
+def halves(plant: str) -> tuple[cr.Record, cr.Record]:
+    """Cut a record in the middle."""
+    table = np.loadtxt(DATA / plant / "record.csv", delimiter=",", skiprows=1)
+    signals = table[:, 1:].T
+    m = signals.shape[0] // 2
+    u, y = (signals[0], signals[1]) if m == 1 else (signals[:m], signals[m:])
+    whole = cr.Record(table[:, 0], u, y, name=plant)
+    middle = whole.time[whole.n_samples // 2]
+    return whole.between(whole.time[0], middle), whole.between(middle, np.inf)
+
+
+def centred(record: cr.Record) -> tuple[np.ndarray, np.ndarray]:
+    """Input and output without their means, shape (signals, N)."""
+    u, y = (np.atleast_2d(x) for x in (record.input, record.output))
+    return u - u.mean(axis=1, keepdims=True), y - y.mean(axis=1, keepdims=True)
+
+
+def scanned(record: cr.Record, _: int) -> ct.StateSpace:
+    """Impulse response, and the order and delay that its standard deviations ask for."""
+    if record.n_outputs > 1:
+        raise NotImplementedError
+    impulse = cr.impulse_from_io(record)
+    return cr.scan_orders(impulse, 8, max_delay=10).system()
+
+
+def nfoursid(record: cr.Record, order: int) -> ct.StateSpace:
+    """N4SID of the package nfoursid."""
+    import pandas as pd
+    from nfoursid.nfoursid import NFourSID
+
+    u, y = centred(record)
+    inputs, outputs = ([f"{s}{i}" for i in range(len(x))] for s, x in (("u", u), ("y", y)))
+    frame = pd.DataFrame(np.vstack([u, y]).T, columns=inputs + outputs)
+    method = NFourSID(frame, outputs, inputs, num_block_rows=ROWS)
+    method.subspace_identification()
+    found, _ = method.system_identification(rank=order)
+    return ct.ss(found.a, found.b, found.c, found.d, record.dt)
+
+
+def sippy(method: str) -> Model:
+    """A subspace method of SIPPY."""
+
+    def fit(record: cr.Record, order: int) -> ct.StateSpace:
+        from sippy_unipi import system_identification
+
+        u, y = centred(record)
+        with contextlib.redirect_stdout(io.StringIO()):
+            found = system_identification(
+                y, u, method, SS_fixed_order=order, SS_f=ROWS, SS_p=ROWS,
+                SS_D_required=True, tsample=record.dt,
+            )  # fmt: skip
+        return ct.ss(found.A, found.B, found.C, found.D, record.dt)
+
+    return fit
+
+
+WAYS: dict[str, tuple[Model, Iterable[int]]] = {
+    "ctrl_realize: identify": (lambda record, _: cr.identify(record), (0,)),
+    "ctrl_realize: fit_channels": (lambda record, _: cr.fit_channels(record), (0,)),
+    "ctrl_realize: impulse_from_io, scan_orders": (scanned, (0,)),
+    "nfoursid: N4SID": (nfoursid, ORDERS),
+    "SIPPY: N4SID": (sippy("N4SID"), ORDERS),
+    "SIPPY: CVA": (sippy("CVA"), ORDERS),
+    "SIPPY: PARSIM-K": (sippy("PARSIM-K"), ORDERS),
+}
+
+
+def predicted(way: Model, order: int, first: cr.Record, second: cr.Record) -> float | str:
+    """Mean fit in percent of the outputs that were not seen, or why there is none."""
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            model = way(first, order)
+            return float(cr.check_residuals(model, second).fit_percent.mean())
+    except ImportError:
+        return "not installed"
+    except NotImplementedError:
+        return "-"
+    except cr.errors.UnsuitableSystemError:
+        return "unstable"
+    except Exception as error:
+        return type(error).__name__
+
+
+def cell(name: str, plant: str) -> str:
+    """First half to second, and second to first; of several orders the best and the middle."""
+    way, orders = WAYS[name]
+    first, second = halves(plant)
+    shown = []
+    for fitted, unseen in ((first, second), (second, first)):
+        found = [predicted(way, order, fitted, unseen) for order in orders]
+        good = [max(fit, 0.0) for fit in found if isinstance(fit, float)]
+        if not good:
+            shown.append(str(found[0]))
+            continue
+        middle = np.median(good + [0.0] * (len(found) - len(good)))
+        shown.append(f"{max(good):.1f}" + (f" ({middle:.1f})" if len(found) > 1 else ""))
+    return " / ".join(shown if shown[0][0].isdigit() else dict.fromkeys(shown)) + (
+        " %" if shown[-1][0].isdigit() else ""
+    )
+
+
+def table() -> str:
+    """Make the table in Markdown."""
+    lines = [
+        f"| way | told beforehand | {' | '.join(SETS)} |",
+        "|---" * (2 + len(SETS)) + "|",
+    ]
+    for name, (_, orders) in WAYS.items():
+        told = "order" if len(tuple(orders)) > 1 else "nothing"
+        lines.append(f"| {name} | {told} | {' | '.join(cell(name, p) for p in SETS)} |")
+    versions = ", ".join(
+        f"{package} {metadata.version(package)}"
+        for package in ("ctrl-realize", "control", "numpy", "scipy", "nfoursid", "sippy-unipi")
+        if _installed(package)
+    )
+    lines += [
+        "",
+        "Each cell: fit (NRMSE, mean of the outputs) of the second half of the record by a model "
+        "of the first / of the first half by a model of the second. Where an order is told, the "
+        f"best of the orders {', '.join(map(str, ORDERS))} in hindsight, and in brackets the "
+        "median over them; models that are unstable simulate nothing and count as 0 %. "
+        f"{ROWS} block rows. Made on {date.today()} by `python -m benchmarks.records measured` "
+        f"with Python {platform.python_version()}, {versions}.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _installed(package: str) -> bool:
+    try:
+        metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return False
+    return True
