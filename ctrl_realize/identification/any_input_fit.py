@@ -12,7 +12,7 @@ from scipy.special import chdtrc
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import mad_sigma
-from ..numerics.output_error import OutputErrorFit
+from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.sampled_fit import MOST_SAMPLES, OwnDelay, SampledFit, fit_sampled
 from ..numerics.step_problem import bare_data
 from ..results import Flag

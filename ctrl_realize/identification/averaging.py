@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import correlation_time, mad_sigma
-from ..numerics.output_error import OutputErrorFit
+from ..numerics.output_error_result import OutputErrorFit
 from ..signals import Record, StepResponse
 from .delay_fit_result import Repeatability
 from .steps import unit_step

@@ -13,7 +13,8 @@ from ..checks import one_of, positive
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
-from ..numerics.output_error import OutputErrorFit, fit_output_error
+from ..numerics.output_error import fit_output_error
+from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.separable_fit import KnownFactor, Structure
 from ..numerics.step_problem import StepData, own_regressors, step_data
 from ..signals import Record, StepEdge

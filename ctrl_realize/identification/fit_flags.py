@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..numerics.output_error import OutputErrorFit
+from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from .delay_fit_result import Repeatability

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.lag_chains import lag_sum
-from ..numerics.output_error import OutputErrorFit
+from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from ..signals import Record

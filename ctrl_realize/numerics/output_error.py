@@ -23,103 +23,33 @@ The rule:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from .arrays import ComplexArray, FloatArray
 from .fit_window import WindowFit, fit_window
-from .lag_chains import (
-    FREE_IN_A_CHAIN,
-    LagChain,
-    chain_limits,
-    chain_profile,
-    fit_chains,
-    fit_diffusion,
-    lag_sum,
-    still_improving,
-)
-from .profile_interval import delay_profile, profile_limits
+from .likelihood_interval import chains_of, likelihood_fit
+from .output_error_result import OutputErrorFit, assembled, profile_of
 from .separable_fit import KnownFactor, Structure, evaluate, fit_batch
 from .step_problem import StepData, step_scales, stop_at, window
 from .structure_search import (
     ALL_STRUCTURES,
-    LEAST_CHARGE,
-    PLAUSIBLE,
     SIMPLE_STRUCTURES,
     Candidate,
     choose,
     needless_charge,
     parameter_bounds,
-    plausible,
 )
 
 ADEQUATE = 1.3
 """Residual over noise, in means over bins, up to which a model is taken for right."""
 
-_UNSEEN = 3.0
-"""How far before the delay a beginning that is open may lie, in times from there to the first
-motion. Flows that disperse, diffusion behind lags and parallel paths need up to 2.5."""
 _WILD = 3.0  # standard deviations at which residuals are cut where explanations are compared
 
 _LOUDER = 4.0
 """How much louder noise may be after the step than before it: slow noise shows little of itself in
 a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less)."""
 _LATE, _FEWEST_LATE = 2.0, 8  # times the rise to 95 %; bins in the later half from there on
-
-_LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
-"""Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
-
-
-@dataclass(frozen=True, eq=False)
-class StructureFit:
-    """One line of the table of structures; delays in s, `excess` of the criterion to the best.
-
-    `low` and `high` are the profile-likelihood interval, NaN where it was not needed.
-    """
-
-    structure: Structure
-    delay: float
-    total_delay: float
-    excess: float
-    low: float
-    high: float
-    poles: ComplexArray
-
-
-@dataclass(frozen=True, eq=False)
-class OutputErrorFit:
-    """Delay and model of one record; see the rule in the module's docstring.
-
-    ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
-    The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
-    are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
-    which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
-    longer they are, so that all of the delay may be lags; `open_start`: how smoothly the response
-    begins is open; `relaxing`: the plant was moving before the step, and its free response was
-    fitted along. `std` is that of the chosen structure.
-    """
-
-    delay: float
-    low: float
-    high: float
-    std: float
-    structure: Structure
-    poles: ComplexArray
-    numerator: FloatArray
-    adequate: bool
-    misfit: float
-    residual: float
-    correlation: float
-    structures: tuple[StructureFit, ...]
-    views: tuple[tuple[str, float], ...]
-    fitted: FloatArray
-    profile: tuple[FloatArray, FloatArray]
-    latest: float
-    chain: str = ""
-    endless: bool = False
-    open_start: bool = False
-    relaxing: bool = False
 
 
 def fit_output_error(
@@ -161,7 +91,7 @@ def fit_output_error(
     elif adequate:
         assert data.motion is not None
         onset = data.motion.onset * data.dt
-        found = likelihood_fit(whole, adequate=True, chains=_chains(whole), onset=onset)
+        found = likelihood_fit(whole, adequate=True, chains=chains_of(whole), onset=onset)
     else:
         simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
         chosen = whole.candidates[choose(simple)]
@@ -204,86 +134,6 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
     return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
 
 
-def likelihood_fit(
-    whole: WindowFit,
-    *,
-    adequate: bool,
-    chains: Sequence[LagChain] = (),
-    onset: float | None = None,
-) -> OutputErrorFit:
-    """Take delay and interval from the likelihood (points 1 and 2 of the rule).
-
-    `onset` is the time of the first motion; without it the structures are believed.
-    """
-    chosen = whole.best
-    level = whole.criterion[chosen.structure] + needless_charge(chosen.structure)
-    # Diffusion widens the interval and is never the model: friction, too, looks like it.
-    tanks = [chain for chain in chains if not chain.hidden]
-    better = min(tanks, key=lambda chain: chain.criterion, default=None)
-    if better is not None and better.criterion < level:
-        chosen, level = better.candidate, better.criterion
-    is_chain = better is not None and chosen is better.candidate
-    free, kept = _not_ruled_out(whole, chosen, level, chains, is_chain=is_chain)
-    profiles = {s: _profile(whole, whole.candidates[s]) for s in free}
-    limits = [profile_limits(*profile) for profile in profiles.values()]
-    limits += [chain_limits(chain, whole.scales) for chain in kept]
-    chain = ""
-    if better is not None and is_chain:
-        whole = _with_chain(whole, better)
-        chain = f"chain of {chosen.structure.order} nearly equal lags"
-        profiles[chosen.structure] = chain_profile(better, whole.scales)
-    low = min(chosen.delay, *(ends[0] for ends in limits))
-    high = max(chosen.delay, *(ends[1] for ends in limits))
-    own = profile_limits(*profiles[chosen.structure])
-    if endless := still_improving(tanks):
-        low = whole.scales.earliest
-    open_start = chosen.structure.zeros > 0 and onset is not None
-    if open_start and onset is not None:
-        sample, bounds = whole.scales.dt, whole.scales
-        unseen = _UNSEEN * max(onset - chosen.delay, sample)
-        low = min(low, max(chosen.delay - unseen, bounds.earliest))
-        high = max(high, min(onset + sample, bounds.latest))
-    interval = (low, high, (own[1] - own[0]) / 3.92)
-    found = _result(whole, chosen, adequate, (), profiles, interval)
-    return replace(found, chain=chain, endless=endless, open_start=open_start)
-
-
-def _not_ruled_out(
-    whole: WindowFit,
-    chosen: Candidate,
-    level: float,
-    chains: Sequence[LagChain],
-    *,
-    is_chain: bool,
-) -> tuple[list[Structure], list[LagChain]]:
-    """List the structures and chains that the data cannot rule out beside the chosen one."""
-    more = max(LEAST_CHARGE - whole.penalty, 0.0)
-    charged = {s: value + more * (s.order + s.zeros) for s, value in whole.criterion.items()}
-    of_chain = more * FREE_IN_A_CHAIN
-    own = chosen.structure
-    level += of_chain if is_chain else more * (own.order + own.zeros)
-    free = plausible(whole.candidates, charged, whole.variance, chosen, level)
-    return free, [chain for chain in chains if chain.criterion + of_chain <= level + PLAUSIBLE]
-
-
-def _chains(whole: WindowFit) -> list[LagChain]:
-    """Chains of lags, where so many lags show that there may be more than were tried."""
-    best = whole.best
-    setting = whole.problem, best, whole.scales, whole.variance, whole.penalty
-    tanks = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
-    diffusion = fit_diffusion(*setting) if best.structure.order >= _LAGS_OF_DIFFUSION else []
-    return tanks + diffusion
-
-
-def _with_chain(whole: WindowFit, chain: LagChain) -> WindowFit:
-    structure = chain.candidate.structure
-    return replace(
-        whole,
-        candidates=whole.candidates | {structure: chain.candidate},
-        criterion=whole.criterion | {structure: chain.criterion},
-    )
-
-
 def _robust_fit(
     whole: WindowFit, chosen: Candidate, views: tuple[tuple[str, float], ...]
 ) -> OutputErrorFit:
@@ -291,9 +141,9 @@ def _robust_fit(
     delay = float(np.median([at for _, at in views[:-1]]))
     delays = np.sort([at for _, at in views])
     low, high = float(delays[1]), float(delays[-1])
-    profiles = {chosen.structure: _profile(whole, chosen)}
+    profiles = {chosen.structure: profile_of(whole, chosen)}
     fixed = _with_delay(whole, chosen, delay)
-    return _result(whole, fixed, False, views, profiles, (low, high, (high - low) / 3.92))
+    return assembled(whole, fixed, False, views, profiles, (low, high, (high - low) / 3.92))
 
 
 def _fit_until(
@@ -332,24 +182,6 @@ def _views(
     )
 
 
-def _profile(whole: WindowFit, candidate: Candidate) -> tuple[FloatArray, FloatArray]:
-    return delay_profile(whole.problem, candidate, whole.variance, whole.scales)
-
-
-def _table(
-    whole: WindowFit, profiles: dict[Structure, tuple[FloatArray, FloatArray]]
-) -> tuple[StructureFit, ...]:
-    best = min(whole.criterion.values())
-    lines = []
-    for s, candidate in whole.candidates.items():
-        low, high = profile_limits(*profiles[s]) if s in profiles else (np.nan, np.nan)
-        state = evaluate(whole.problem, s, candidate.parameters[None])
-        total = candidate.delay + lag_sum(candidate.poles, state.numerator[0])
-        excess = whole.criterion[s] - best
-        lines.append(StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles))
-    return tuple(sorted(lines, key=lambda line: line.excess))
-
-
 def _with_delay(whole: WindowFit, candidate: Candidate, delay: float) -> Candidate:
     """Best model of the same structure with a given delay."""
     start = candidate.parameters.copy()
@@ -359,34 +191,3 @@ def _with_delay(whole: WindowFit, candidate: Candidate, delay: float) -> Candida
         whole.problem, candidate.structure, start[None], bounds, delay_fixed=True
     )
     return Candidate(candidate.structure, parameters[0], float(cost[0]))
-
-
-def _result(
-    whole: WindowFit,
-    chosen: Candidate,
-    adequate: bool,
-    views: tuple[tuple[str, float], ...],
-    profiles: dict[Structure, tuple[FloatArray, FloatArray]],
-    interval: tuple[float, float, float],
-) -> OutputErrorFit:
-    state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
-    numerator = state.numerator[0]
-    low, high, std = interval
-    return OutputErrorFit(
-        delay=chosen.delay,
-        low=low,
-        high=high,
-        std=std,
-        structure=chosen.structure,
-        poles=chosen.poles,
-        numerator=numerator,
-        adequate=adequate,
-        misfit=whole.misfit,
-        residual=whole.sigma,
-        correlation=whole.correlation,
-        structures=_table(whole, profiles),
-        views=views,
-        fitted=whole.window.predict(whole.problem, chosen),
-        profile=profiles[chosen.structure],
-        latest=whole.scales.latest,
-    )

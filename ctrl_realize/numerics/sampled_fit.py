@@ -14,8 +14,9 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 from .delayed_modes import SampledInput, SeveralInputs
 from .fit_window import Window, WindowFit, fit_window
+from .likelihood_interval import likelihood_fit
 from .noise_level import correlation_time, quantisation_step, winsorised_sigma
-from .output_error import OutputErrorFit, likelihood_fit
+from .output_error_result import OutputErrorFit
 from .own_terms import OwnTerms, Stretches
 from .pole_factors import parameters_from_poles, poles_from_parameters
 from .separable_fit import KnownFactor, Problem, Structure, respond

@@ -412,5 +412,5 @@ def test_an_output_at_rest_is_refused():
         cr.fit_delay(changed(record, noise))
     with pytest.raises(cr.errors.NoStepError, match="no step in the input"):
         cr.fit_delay(cr.Record(record.time, np.ones(600), record.output))
-    with pytest.raises(cr.errors.DataError, match="records is empty"):
+    with pytest.raises(cr.errors.DataError, match="no records"):
         cr.fit_delay([])

@@ -1,0 +1,118 @@
+"""What an output-error fit has found: delay, interval, model, and the table of structures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from .arrays import ComplexArray, FloatArray
+from .fit_window import WindowFit
+from .lag_chains import lag_sum
+from .profile_interval import delay_profile, profile_limits
+from .separable_fit import Structure, evaluate
+from .structure_search import Candidate
+
+Profile: TypeAlias = tuple[FloatArray, FloatArray]
+"""Delays, and the misfit at each; see `delay_profile`."""
+
+
+@dataclass(frozen=True, eq=False)
+class StructureFit:
+    """One line of the table of structures; delays in s, `excess` of the criterion to the best.
+
+    `low` and `high` are the profile-likelihood interval, NaN where it was not needed.
+    """
+
+    structure: Structure
+    delay: float
+    total_delay: float
+    excess: float
+    low: float
+    high: float
+    poles: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class OutputErrorFit:
+    """Delay and model of one record; see the rule in `output_error`.
+
+    ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
+    The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
+    are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
+    which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
+    longer they are, so that all of the delay may be lags; `open_start`: how smoothly the response
+    begins is open; `relaxing`: the plant was moving before the step, and its free response was
+    fitted along. `std` is that of the chosen structure.
+    """
+
+    delay: float
+    low: float
+    high: float
+    std: float
+    structure: Structure
+    poles: ComplexArray
+    numerator: FloatArray
+    adequate: bool
+    misfit: float
+    residual: float
+    correlation: float
+    structures: tuple[StructureFit, ...]
+    views: tuple[tuple[str, float], ...]
+    fitted: FloatArray
+    profile: tuple[FloatArray, FloatArray]
+    latest: float
+    chain: str = ""
+    endless: bool = False
+    open_start: bool = False
+    relaxing: bool = False
+
+
+def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
+    """Misfit over the delay of one candidate of a window."""
+    return delay_profile(whole.problem, candidate, whole.variance, whole.scales)
+
+
+def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[StructureFit, ...]:
+    best = min(whole.criterion.values())
+    lines = []
+    for s, candidate in whole.candidates.items():
+        low, high = profile_limits(*profiles[s]) if s in profiles else (np.nan, np.nan)
+        state = evaluate(whole.problem, s, candidate.parameters[None])
+        total = candidate.delay + lag_sum(candidate.poles, state.numerator[0])
+        excess = whole.criterion[s] - best
+        lines.append(StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles))
+    return tuple(sorted(lines, key=lambda line: line.excess))
+
+
+def assembled(
+    whole: WindowFit,
+    chosen: Candidate,
+    adequate: bool,
+    views: tuple[tuple[str, float], ...],
+    profiles: dict[Structure, Profile],
+    interval: tuple[float, float, float],
+) -> OutputErrorFit:
+    """Put a result together; `interval` is its lower and upper end and the standard error, in s."""
+    state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
+    numerator = state.numerator[0]
+    low, high, std = interval
+    return OutputErrorFit(
+        delay=chosen.delay,
+        low=low,
+        high=high,
+        std=std,
+        structure=chosen.structure,
+        poles=chosen.poles,
+        numerator=numerator,
+        adequate=adequate,
+        misfit=whole.misfit,
+        residual=whole.sigma,
+        correlation=whole.correlation,
+        structures=_table(whole, profiles),
+        views=views,
+        fitted=whole.window.predict(whole.problem, chosen),
+        profile=profiles[chosen.structure],
+        latest=whole.scales.latest,
+    )
