@@ -128,6 +128,11 @@ def identify_row(
         warnings.simplefilter("always")
         try:
             record = read_source(source)
+            if not record.issiso:
+                raise DataError(
+                    f"{record!r}: a campaign compares the delays of one input and one output; for "
+                    "several channels see fit_channels, which takes several records too"
+                )
             row = replace(row, name=record.name or row.name, amplitude=_amplitude(record))
             key = fingerprint(record, method, options)
             kept = store.load(key) if store is not None else None

@@ -284,6 +284,7 @@ def write_comparison(
 def _kind(system: DelayedStateSpace) -> str:
     names = {
         "DelayFit": "output-error fit of the raw record",
+        "ChannelFit": "output-error fit of all channels",
         "DelayScan": "delay scan by approximate realization",
         "Realization": "approximate realization",
     }

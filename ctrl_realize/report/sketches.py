@@ -142,6 +142,9 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
                 lambda figure: plots.step_plot(step, system, ax=figure),
             )
         )
+    if kind == "ChannelFit" and fit.checks:
+        labels = fit.records[0].output_labels
+        sketches += [_output_sketch(fit, i, label) for i, label in enumerate(labels)]
     if kind == "DelayScan":
         sketches += [
             Sketch(
@@ -169,6 +172,16 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     return sketches
 
 
+def _output_sketch(fit: Any, output: int, label: str) -> Sketch:
+    return Sketch(
+        f"output_{output}",
+        f"The output {label}",
+        "Measured and simulated; below, what is left: beside its own past, and beside the input.",
+        lambda figure: plots.channel_fit_plot(fit, output=output, ax=figure),
+        (6.2, 5.4),
+    )
+
+
 def frf_sketches(
     systems: list[Any],
     frf: ct.FrequencyResponseData | None,
@@ -176,6 +189,8 @@ def frf_sketches(
     caption: str = "Measured, and the model on top. It was not used to find the model.",
 ) -> list[Sketch]:
     """List the figures in frequency: the models alone, or beside a measurement."""
+    if not all(system.issiso() for system in systems):
+        return []  # drawn one channel at a time
     if frf is None:
         return [
             Sketch(

@@ -195,3 +195,11 @@ def test_the_default_fits_all_records_together():
     if campaign.system.fit.structure == (3, 3):
         assert abs(campaign.system.fit.delay - 37) < 4 * 0.16
     assert_allclose(campaign.table()["misfit"], 5e-3, rtol=0.1)
+
+
+def test_records_of_several_channels_are_refused_in_words():
+    u = np.random.default_rng(0).choice([-1.0, 1.0], (2, 200))
+    record = cr.Record(0.1 * np.arange(200), u, u, name="two")
+    (row,) = cr.identify_campaign([record]).rows
+    assert row.error.startswith("DataError")
+    assert "one input and one output" in row.error

@@ -7,6 +7,7 @@ import hashlib
 import re
 from html.parser import HTMLParser
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -151,6 +152,19 @@ def test_figures_of_a_report_are_all_there_and_ids_are_unique(page):
     assert len(figures) == len(pictures) == 5
     ids = [attributes["id"] for _, attributes in tags.seen if "id" in attributes]
     assert len(ids) == len(set(ids))
+
+
+def test_a_report_of_several_channels_draws_every_output(tmp_path):
+    core = ct.ss([[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1)
+    u, noise = np.random.default_rng(0).standard_normal((2, 2, 300))
+    y = cr.DelayedStateSpace(core, (2, 5)).simulate(u) + 0.1 * noise
+    record = cr.Record(0.1 * np.arange(300), u, y, output_labels=["level", "heat"])
+    system = cr.fit_channels(record, 2)
+    path = report.write_identification(tmp_path / "r.html", system, record)
+    text = path.read_text(encoding="utf-8")
+    assert "The output level" in text
+    assert "The output heat" in text
+    assert "output-error fit of all channels" in text
 
 
 def test_hostile_names_stay_text(tmp_path, record, fitted):
