@@ -48,7 +48,7 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
 
 SUBMODULES = {
     "design": "Controllers for plants with dead time.",
-    "plots": "Plots of results; each returns a `control.ControlPlot`.",
+    "plots": "What each of them draws is on [Pictures](../../pictures.md).",
     "bench": "Simulated set-ups with known truth.",
     "report": "HTML reports: one self-contained file, the verdict first.",
     "paper": "Every number that the paper prints.",
