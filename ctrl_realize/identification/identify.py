@@ -11,14 +11,16 @@ import numpy as np
 
 from ..checks import one_of, whole
 from ..delayed import DelayedStateSpace
-from ..errors import DelayRangeError, OptionError
+from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
+from ..results import Flag
 from ..signals import Record, StepResponse
 from ..signals.given import as_records
 from .channel_fit import fit_channels
 from .delay_fit import MOST_ORDER, fit_delay
 from .delay_scan import estimate_delay
 from .orders import scan_orders
+from .residuals import check_residuals
 from .steps import impulse_from_step, unit_step
 
 Method = Literal["output_error", "scan", "paper"]
@@ -121,7 +123,7 @@ def identify(
             )
         return fit_channels(record, order)
     if method == "output_error":
-        return fit_records(
+        system = fit_records(
             record,
             order=order,
             max_delay=max_delay,
@@ -130,6 +132,8 @@ def identify(
             structures=structures,
             include_known=include_known,
         )
+        stepped = np.isfinite(system.fit.onset)
+        return system if stepped or known is not None else _with_residuals_judged(system)
     if not isinstance(record, Record):
         raise OptionError(
             f"method={method!r} takes one record; several go together with method='output_error', "
@@ -139,6 +143,27 @@ def identify(
     if method == "paper":
         return _paper(step, order, max_delay, cutoff_hz, samples, feedthrough)
     return _scan(step, order, max_delay, cutoff_hz, samples, feedthrough)
+
+
+def _with_residuals_judged(system: DelayedStateSpace) -> DelayedStateSpace:
+    """Say so where the plant is more than lags behind a dead time: its residual tells."""
+    fit = system.fit
+    try:
+        follows = [
+            not check_residuals(system, record, lags=min(25, record.n_samples // 3)).independent
+            for record in fit.records
+        ]
+    except UnsuitableSystemError:  # an unstable model simulates nothing
+        return system
+    if not any(follows):
+        return system
+    flag = Flag(
+        "input_in_residual",
+        f"the residual of {sum(follows)} of {len(follows)} record(s) still follows the input: the "
+        "plant is more than lags behind a dead time, or not linear; fit_channels fits any modes "
+        "and zeros",
+    )
+    return system.replace(fit=replace(fit, flags=(*fit.flags, flag)))
 
 
 def _of_several_channels(records: Record | Sequence[Record]) -> bool:
