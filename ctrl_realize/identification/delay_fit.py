@@ -22,7 +22,7 @@ from ..signals.given import as_records, check_complete
 from .any_input_fit import LEAST_MOVE, fit_any_input
 from .averaging import aligned_steps, delay_outliers, mean_step, repeatability, widened
 from .delay_fit_result import DelayFit
-from .fit_flags import fit_flags, repeat_flags
+from .fit_flags import fit_flags, repeat_flags, same_record_flags
 from .fit_summary import fitted_core, summarise
 from .known_dynamics import known_factor
 from .steps import detect_step
@@ -122,6 +122,7 @@ def fit_delay(
     if len(several) > 1:
         way = _fit_mean if _all_step(several) else fit_any_input
         result, fit = way(several, limit, settings)
+        result = replace(result, flags=result.flags + same_record_flags(several))
     else:
         result, fit = _fit_one(several[0], limit, settings)
     core = fitted_core(fit, result.poles)

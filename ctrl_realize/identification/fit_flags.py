@@ -7,6 +7,7 @@ import numpy as np
 from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
+from ..signals import Record
 from .delay_fit_result import Repeatability
 
 _SAMPLES_BESIDE_NOTHING = 0.5
@@ -66,6 +67,27 @@ def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
             )
         )
     return tuple(flags)
+
+
+def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:
+    """Find records whose outputs agree in every digit, which noise never lets happen."""
+    first: dict[bytes, int] = {}
+    again = []
+    for i, record in enumerate(records, 1):
+        values = record.output.tobytes()
+        if values in first:
+            again.append(f"the {i}. is the {first[values]}.")
+        first.setdefault(values, i)
+    if not again:
+        return ()
+    more = f" and {len(again) - 3} more" if len(again) > 3 else ""
+    return (
+        Flag(
+            "same_records",
+            f"{len(again)} of {len(records)} records are others over again ({', '.join(again[:3])}"
+            f"{more}): the standard error counts their noise as independent",
+        ),
+    )
 
 
 def model_flags(

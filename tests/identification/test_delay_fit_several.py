@@ -107,3 +107,11 @@ def test_records_of_different_sample_times_are_refused():
     other = cr.Record(2 * one.time, one.input, one.output)
     with pytest.raises(cr.errors.DataError, match="one sample time"):
         cr.fit_delay([one, other])
+
+
+def test_a_record_that_came_twice_is_told():
+    records = [record(k) for k in range(3)]
+    apart, twice = (cr.fit_delay([*records, more]).fit for more in (record(3), records[1]))
+    assert "same_records" not in codes(apart)
+    (told,) = (str(flag) for flag in twice.flags if flag.code == "same_records")
+    assert "1 of 4 records are others over again (the 4. is the 2.)" in told
