@@ -45,7 +45,7 @@ def bootstrap_plot(
     >>> u = np.where(t < 0.5, 0.0, 2.0)
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
-    >>> again = cr.bootstrap(record, partial(cr.fit_delay, structures=[(1, 1)]), repeats=5)
+    >>> again = cr.bootstrap(record, partial(cr.fit_delay, structures=[(1, 1)]), repeats=30)
     >>> cplt = plots.bootstrap_plot(again)
     >>> [axes.get_xlabel() for axes in cplt.figure.axes]
     ['time [s]', 'dead time [ms]']

@@ -165,17 +165,23 @@ def delay_check_plot(
         for place, view in enumerate(reversed(check.views)):
             bound = view.kind == "upper bound"
             looks = {"color": style.NOISE if bound else style.MODEL, "linewidth": 3.0, **kwargs}
+            if view.doubt:  # it does not count
+                looks = {**looks, "alpha": 0.35}
             lines += axes[0].plot(factor * np.array([view.low, view.high]), [place, place], **looks)
             mark = "<" if bound else "o"
-            axes[0].plot(factor * view.value, place, mark, color=looks["color"], markersize=8)
+            points = {"color": looks["color"], "alpha": looks.get("alpha"), "markersize": 8}
+            axes[0].plot(factor * view.value, place, mark, **points)
         if check.common is not None:
             low, high = (factor * edge for edge in check.common)
             axes[0].axvspan(low, high, color=style.BAND, alpha=0.3, label="all agree", linewidth=0)
-        names = [f"{view.method}\n({view.source})" for view in reversed(check.views)]
+        names = [
+            f"{view.method}\n({view.source}{', in doubt' if view.doubt else ''})"
+            for view in reversed(check.views)
+        ]
         axes[0].set_yticks(range(len(names)), names)
         axes[0].set_ylim(-0.6, len(names) - 0.4)
         axes[0].set_xlabel(f"dead time, or bound ◂ [{unit}]")
-        return style.finished(axes, [lines], title=title, own_figure=ax is None)
+        return style.finished(axes, [lines], title=title, own_figure=ax is None, loc="above")
 
 
 def channel_fit_plot(fit: ChannelFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:

@@ -203,6 +203,7 @@ def _mark_least(axes: Axes, result: DelayScan) -> None:
         textcoords="offset points",
         ha="right" if right else "left",
         color=style.INK,
+        bbox={"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
     )
 
 
