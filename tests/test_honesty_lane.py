@@ -62,7 +62,7 @@ def test_noise_has_the_size_that_is_asked_for(kind):
     assert rest.std() / (16 * case.gain) == pytest.approx(0.01, rel=0.15)
 
 
-@pytest.mark.parametrize("name", worlds.WRONG)
+@pytest.mark.parametrize("name", worlds.WRONG + worlds.MORE_WRONG)
 def test_wrong_structures_rest_until_the_delay_is_over_and_settle_at_one(name):
     time = worlds.DT * (np.arange(2000) - 100.0)
     step = worlds.wrong_step(name, time)

@@ -16,7 +16,7 @@ import ctrl_realize as cr
 from . import driven_intervals, flag_other_cases, flag_step_cases, single, step_intervals
 from .flag_case import FlagCase
 from .trial import Seen, Trial, quietly
-from .worlds import KINDS, NOISES
+from .worlds import KINDS, MORE_WRONG, NOISES, WRONG
 
 Task = tuple[str, str, str, float, int]
 """Study, kind of noise, plant, noise level, seed; of a flag its world, and which side it is."""
@@ -51,7 +51,13 @@ STUDIES: dict[str, Study] = {
 
 def main_tasks(seeds: int) -> list[Task]:
     """Single fits, seed by seed, so that a run that is stopped has seen all worlds alike."""
-    return [("fit", kind, *single.cell(kind, k), k) for k in range(seeds) for kind in KINDS]
+    tasks = [("fit", kind, *single.cell(kind, k), k) for k in range(seeds) for kind in KINDS]
+    # After the others, a sixth as often each, as every other plant of wrong structure.
+    return tasks + [
+        ("fit", "wrong structure", plant, NOISES[k % len(NOISES)], k)
+        for k in range(seeds // len(WRONG))
+        for plant in MORE_WRONG
+    ]
 
 
 def interval_tasks(seeds: int) -> list[Task]:

@@ -29,6 +29,8 @@ WRONG = (
     "static friction",
     "quadratic sensor",
 )
+MORE_WRONG = ("narrow dispersion", "two paths")
+"""Plants of wrong structure that only the single fits meet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +79,7 @@ def step_case(
     kind : str
         One of `KINDS`.
     plant : str
-        One of `PLANTS`, or of `WRONG` where the kind is "wrong structure".
+        One of `PLANTS`, or of `WRONG` and `MORE_WRONG` where the kind is "wrong structure".
     noise : float
         Standard deviation as a part of the step.
     """
@@ -90,7 +92,7 @@ def step_case(
     after_edge = (k - before - at) * DT
     if plant == "static friction":
         at += _pull_loose()
-    shape = wrong_step(plant, after_edge) if plant in WRONG else unit_step(plant, after_edge)
+    shape = (unit_step if plant in PLANTS else wrong_step)(plant, after_edge)
     y = shape + noise * noise_of(kind, k.size, rng)
     y = gain * height * y + 10 * rng.normal() * gain
     if kind == "quantised":
@@ -112,6 +114,10 @@ def wrong_step(name: str, time: np.ndarray) -> np.ndarray:
         return _diffusion(after)
     if name == "dispersion":
         return _dispersion(after)
+    if name == "narrow dispersion":
+        return _dispersion(after, shape=0.4)
+    if name == "two paths":
+        return 0.3 * unit_step("R2", time) + 0.7 * unit_step("R2", time - 40 * DT)
     if name == "slew limit":
         return slew_limited(unit_step("R3", time), 4.0, DT)
     if name == "static friction":
