@@ -27,6 +27,7 @@ from .structure_search import Scales
 
 _CONTINUED = 2  # a drift at rest goes on for this many times the rest
 _BINS_RELAXING = 60
+_MANY = 100
 _BRIEF = 0.05  # of the samples that follow the step
 
 
@@ -78,7 +79,11 @@ class StepData:
     @property
     def coarse(self) -> bool:
         """Quantised so coarsely that averaging does not remove the rounding."""
-        return is_coarse(self.sigma, self.quantum)
+        rest = self.output[: self.edge]
+        # A rest between two levels jumps between both, however little noise there is: that is no
+        # dither, which takes more levels (95 % of its samples are within two, half a step high).
+        two_levels = rest.size >= _MANY and np.ptp(rest) < 1.5 * self.quantum
+        return bool(is_coarse(self.sigma, self.quantum) or two_levels)
 
     def explanations(self) -> list[StepData]:
         """Ways to take a slope before the step: as drift, as the plant's own motion, as nothing.

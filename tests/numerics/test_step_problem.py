@@ -96,6 +96,15 @@ def test_means_weigh_what_they_hold_and_of_coarsely_rounded_samples_hardly_more(
     assert weight[np.argmax(width)] > 1.8
 
 
+def test_a_rest_that_jumps_between_two_levels_is_coarse_and_a_dithered_one_is_not():
+    k = np.arange(1400)
+    noise = np.random.default_rng(1).standard_normal(k.size)
+    step = -40.0 * np.expm1(-np.clip(k - EDGE - DELAY, 0, None) / LAG)
+    for level, size, coarse in ((0.5, 0.2, True), (0.0, 0.2, True), (0.5, 0.7, False)):
+        y = np.round(level + step + size * noise)
+        assert step_data(y, 1.0 * (k >= EDGE), DT, [(EDGE, 1)]).coarse is coarse
+
+
 def test_without_rest_noise_is_taken_for_white_and_hum_is_not_looked_for():
     k = np.arange(600.0)
     y = -np.expm1(-np.clip(k - 20, 0, None) / 40) + 0.01 * np.sin(0.7 * k)
