@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from .numerics.arrays import FloatArray
@@ -90,3 +92,16 @@ def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
         shown = ", ".join(f"{value:.{digits}g}" for value in row[:most])
         rows.append(shown + (", …" if row.size > most else ""))
     return "; ".join(rows)
+
+
+def in_percent(fits: Iterable[float]) -> str:
+    """Write how much of each output a model explains.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import in_percent
+    >>> in_percent([98.761, float("-inf")])
+    '98.76 %, undefined: the output is constant'
+    """
+    constant = "undefined: the output is constant"
+    return ", ".join(f"{fit:.2f} %" if np.isfinite(fit) else constant for fit in fits)

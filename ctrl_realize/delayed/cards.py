@@ -56,7 +56,8 @@ class DelayedCards(CoreAndDelays):
             ("poles of the core", _few(self._core.poles())),
         ]
         if self._core.issiso():
-            rows.append(("DC gain", f"{float(np.real(self._core.dcgain())):.6g}"))
+            gain = float(np.real(self._core.dcgain()))
+            rows.append(("DC gain", f"{gain:.6g}" if np.isfinite(gain) else "none: it integrates"))
         if self.fit is not None:
             rows.append(("fit", self._fit_line().strip("<>")))
         return html_card(f"DelayedStateSpace{name}", rows)

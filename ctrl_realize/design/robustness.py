@@ -131,11 +131,12 @@ class RobustnessCheck(Result):
         return "Robust stability"
 
     def _rows(self) -> list[tuple[str, str]]:
+        worst = f"{self.performance:.4g}" if np.isfinite(self.performance) else "unbounded"
         return [
             ("nominal loop", "stable" if self.nominal.stable else "UNSTABLE"),
             ("all plants within the bound", "stable" if self.robust else "NOT guaranteed"),
             ("bound may grow by", f"{self.margin:.4g} (at {self.omega_critical:.4g} rad/s)"),
-            ("worst sensitivity peak", f"{self.performance:.4g} (nominal {self.nominal.ms:.4g})"),
+            ("worst sensitivity peak", f"{worst} (nominal {self.nominal.ms:.4g})"),
         ]
 
     def __repr__(self) -> str:

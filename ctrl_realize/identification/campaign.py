@@ -249,6 +249,16 @@ class Campaign(Result):
     def _rows(self) -> list[tuple[str, str]]:
         summary = self.statistics()
         best = self.best
+        spread = [
+            ("variance", f"{summary.variance:.3g} samples^2"),
+            (
+                "95 % interval of the mean",
+                f"{summary.interval[0]:.2f}...{summary.interval[1]:.2f} samples (scatter between "
+                "records only: a bias that all share is not in it)",
+            ),
+        ]
+        if not np.isfinite(summary.variance):
+            spread = [("scatter", "unknown: one record has none")]
         return [
             ("identified", f"{len(self.good)} of {len(self.rows)} records"),
             (
@@ -256,12 +266,7 @@ class Campaign(Result):
                 f"{summary.mean:.2f} samples = {in_time(summary.mean * self.dt, 4)} "
                 f"({summary.dropped} of {len(self.good)} left out)",
             ),
-            ("variance", f"{summary.variance:.3g} samples^2"),
-            (
-                "95 % interval of the mean",
-                f"{summary.interval[0]:.2f}...{summary.interval[1]:.2f} samples (scatter between "
-                "records only: a bias that all share is not in it)",
-            ),
+            *spread,
             ("best record", f"{best.name} (misfit {best.misfit:.3g})"),
         ]
 

@@ -12,6 +12,7 @@ from ..numerics.arrays import FloatArray, read_only
 from ..numerics.gramians import balanced_truncation
 from ..results import Flag, Result
 from ..signals import Record
+from ..wording import in_percent
 from .channel_search import Candidate
 from .residuals import ResidualCheck, check_residuals
 
@@ -87,7 +88,7 @@ class ChannelFit(Result):
             ("delays of the inputs", " ".join(map(str, self.input_delays)) + " samples"),
             ("delays of the outputs", " ".join(map(str, self.output_delays)) + " samples"),
             ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
-            ("fit", ", ".join(f"{f:.2f} %" for f in self.fit_percent)),
+            ("fit", in_percent(self.fit_percent)),
         ]
 
     def __repr__(self) -> str:

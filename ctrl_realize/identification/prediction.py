@@ -12,6 +12,7 @@ from ..numerics.arrays import FloatArray, read_only
 from ..numerics.correlation import autoregression, fit_percent, predict_ahead
 from ..results import Result
 from ..signals import Record
+from ..wording import in_percent
 from .record_simulation import Start, simulate_record
 
 NOISE_ORDER = 20
@@ -53,7 +54,7 @@ class Prediction(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         return [
-            ("fit", ", ".join(f"{f:.2f} %" for f in self.fit_percent)),
+            ("fit", in_percent(self.fit_percent)),
             ("order of the noise", ", ".join(map(str, self.noise_order))),
         ]
 

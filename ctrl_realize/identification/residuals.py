@@ -23,6 +23,7 @@ from ..numerics.correlation import (
 from ..results import Flag, Result
 from ..signals import Record
 from ..signals.given import as_record
+from ..wording import in_percent
 from .record_simulation import Start, simulate_record
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ class ResidualCheck(Result):
     def _rows(self) -> list[tuple[str, str]]:
         level = f"{100 * self.confidence:g} %"
         return [
-            ("fit", ", ".join(f"{f:.2f} %" for f in self.fit_percent)),
+            ("fit", in_percent(self.fit_percent)),
             ("residual rms", ", ".join(f"{r:.4g}" for r in _rms(self.residual))),
             ("white", f"{'yes' if self.white else 'no'} (at {level})"),
             ("free of the input", f"{'yes' if self.independent else 'no'} (at {level})"),

@@ -83,13 +83,16 @@ def campaign_verdict(campaign: Campaign) -> Verdict:
     own = tuple(campaign.flags)
     flags = (*own, *_flags_of(system))
     summary = campaign.statistics()
+    scatter = "unknown: one record has none"
+    if np.isfinite(summary.variance):
+        scatter = f"{np.sqrt(summary.variance):.2g} samples"
     facts = [
         ("records", f"{len(campaign.good)} of {len(campaign.rows)} identified"),
         (
             "trimmed mean of their delays",
             f"{summary.mean:.2f} samples, {in_time(summary.mean * campaign.dt, 4)}",
         ),
-        ("scatter (std)", f"{np.sqrt(summary.variance):.2g} samples"),
+        ("scatter (std)", scatter),
         *facts_of(system),
     ]
     level = _level(flags)
