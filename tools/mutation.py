@@ -48,7 +48,8 @@ MODULES = {
     "numerics/process_step": "tests/numerics/test_process_step.py",
     "numerics/pole_factors": "tests/numerics/test_pole_factors.py",
     "numerics/separable_fit": "tests/numerics/test_separable_fit.py",
-    "numerics/structure_search": "tests/numerics/test_separable_fit.py",
+    "numerics/structure_search": "tests/numerics/test_structure_search.py "
+    "tests/numerics/test_separable_fit.py",
     "numerics/delay_bound": "tests/numerics/test_delay_bound.py",
     "numerics/profile_interval": "tests/numerics/test_step_numerics.py "
     "tests/numerics/test_delay_bound.py",

@@ -9,6 +9,7 @@ import ctrl_realize as cr
 from ctrl_realize.errors import DelayRangeError, OptionError, OrderError
 from ctrl_realize.identification.impulses import (
     MAX_WINDOWS,
+    as_impulse,
     check_order,
     check_samples,
     filter_flags,
@@ -23,6 +24,17 @@ def decay(pole: float, n: int = 2000) -> np.ndarray:
 
 def impulse(markov: np.ndarray, **beside: object) -> cr.ImpulseResponse:
     return cr.ImpulseResponse(markov, 0.1, **beside)
+
+
+def test_an_array_needs_a_sample_time_and_a_response_has_its_own():
+    made = as_impulse(decay(0.5, 20), 0.1)
+    assert (made.dt, made.n_samples) == (0.1, 20)
+    assert as_impulse(made, None) is made
+    assert as_impulse(made, 0.1) is made
+    with pytest.raises(OptionError, match="leave dt out"):
+        as_impulse(made, 0.2)
+    with pytest.raises(OptionError, match="give its sample time"):
+        as_impulse(decay(0.5, 20), None)
 
 
 def test_three_times_the_settling_time_is_used():

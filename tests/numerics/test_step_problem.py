@@ -10,6 +10,7 @@ import pytest
 from ctrl_realize.numerics.separable_fit import KnownFactor
 from ctrl_realize.numerics.step_problem import (
     StepData,
+    bare_data,
     fixed_regressors,
     step_data,
     step_scales,
@@ -122,3 +123,42 @@ def test_regressors_are_a_level_a_drift_that_may_end_and_the_hum():
     np.testing.assert_allclose(ended[EDGE + 2 * EDGE :], ended[-1])
     np.testing.assert_array_equal(ended[: EDGE + 2 * EDGE], slope[: EDGE + 2 * EDGE])
     assert fixed_regressors(replace(made, hum=[0.1])).shape == (1400, 4)
+
+
+def test_hum_is_found_at_rest_and_taken_off_before_the_noise_is_measured():
+    k = np.arange(1400.0)
+    line = 0.05 * np.sin(2 * np.pi * 0.063 * k + 1)
+    made = step_data(data().output + line, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
+    assert made.hum == pytest.approx([0.063], rel=1e-3)
+    assert made.sigma == pytest.approx(1e-3, rel=0.2)
+    assert made.motion.crossing == pytest.approx(data().motion.crossing, abs=2)
+    # rounding is not less noise than it is
+    coarse = np.round((data().output + line) / 0.02) * 0.02
+    found = step_data(coarse, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
+    assert found.sigma >= 0.02 / np.sqrt(12) * (1 - 1e-9)
+
+
+def test_a_window_drives_its_models_at_every_sample_with_the_record_s_clock():
+    found = window(data(), 900, KnownFactor())
+    assert found.drive.dt == DT
+    assert found.output.size == 900
+    assert (found.problem.drive.dt, found.start) == (DT, EDGE)
+
+
+def test_a_record_without_a_step_starts_at_its_first_sample():
+    y = np.arange(5.0)
+    bare = bare_data(y, y, DT, 0.3)
+    assert (bare.edges, bare.sigma, bare.quantum, bare.drift) == ([(0, 1)], 0.3, 0.0, 0.0)
+    assert (bare.colour, bare.hum, bare.motion, bare.edge) == (1.0, [], None, 0)
+
+
+def test_a_slope_at_rest_has_several_explanations_and_none_needs_none():
+    made = data()
+    assert made.explanations() == [made]
+    ways = replace(made, drift=0.1).explanations()
+    assert [(way.drift, way.ending, way.relaxing) for way in ways] == [
+        (0.1, False, False), (0.1, True, False), (0.0, False, True),
+    ]  # fmt: skip
+    # a rest of less than a twentieth of what follows tells little
+    short = replace(made, drift=0.1, edges=[(50, 1)]).explanations()
+    assert [(way.drift, way.relaxing) for way in short[3:]] == [(0.0, False)]

@@ -1,0 +1,149 @@
+"""Structures of a fit: their starts, bounds, criteria, and which the data leave standing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from ctrl_realize.numerics.pole_factors import parameters_from_poles
+from ctrl_realize.numerics.separable_fit import Structure
+from ctrl_realize.numerics.structure_search import (
+    ALL_STRUCTURES,
+    FASTEST,
+    PLAUSIBLE,
+    SLOWER_WITH_ZEROS,
+    Candidate,
+    Scales,
+    _neighbour_starts,
+    _pattern_starts,
+    _pole_patterns,
+    _worth_a_search,
+    choose,
+    criteria,
+    needless_charge,
+    parameter_bounds,
+    plausible,
+)
+
+SCALES = Scales(onset=2.0, rise=0.5, length=10.0, dt=0.01, latest=3.0, earliest=0.25)
+
+
+def candidate(n: int, r: int, cost: float = 1.0, poles: object = None) -> Candidate:
+    at = -np.arange(1.0, n + 1) if poles is None else np.asarray(poles)
+    found = np.concatenate([[1.5], parameters_from_poles(at.astype(np.complex128))])
+    return Candidate(Structure(n, r), found, cost)
+
+
+@pytest.mark.parametrize("structure", ALL_STRUCTURES, ids=str)
+def test_every_start_lies_inside_the_bounds(structure):
+    bounds = parameter_bounds(structure, SCALES)
+    for start in _pattern_starts(structure, SCALES):
+        assert start.size == 1 + structure.order == bounds.low.size == bounds.high.size
+        assert np.all(start > bounds.low)
+        assert np.all(start < bounds.high)
+
+
+def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
+    low, high = (
+        getattr(parameter_bounds(Structure(1, 1), SCALES), side) for side in ("low", "high")
+    )
+    assert_allclose([low[0], high[0]], [0.25, 3.0])
+    assert_allclose(np.exp([low[1], high[1]]), [1e-5, FASTEST / 0.01])
+    beside_a_zero = parameter_bounds(Structure(3, 2), SCALES)
+    assert_allclose(
+        np.exp(beside_a_zero.low), np.exp([0.25, np.log(1e-5), np.log(1e-3), np.log(0.005)])
+    )
+    assert_allclose(np.exp(beside_a_zero.high[1:3]), SLOWER_WITH_ZEROS / 0.01)
+
+
+def test_starts_are_two_delays_times_the_patterns_and_one_delay_with_zeros():
+    delays = {start[0] for start in _pattern_starts(Structure(3, 3), SCALES)}
+    assert delays == {0.8, 2.0}
+    assert {start[0] for start in _pattern_starts(Structure(3, 2), SCALES)} == {1.4}
+    assert len(_pattern_starts(Structure(3, 3), SCALES)) == 8
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
+def test_patterns_are_equal_lags_slow_ones_and_ringing_pairs_all_stable(order):
+    rise = 2.0
+    patterns = _pole_patterns(order, SCALES)
+    assert len(patterns) == (3 if order == 1 else 4)
+    assert all(poles.size == order and poles.real.max() < 0 for poles in patterns)
+    # equal lags, together as long as the rise
+    assert_allclose(np.mean(patterns[0].real), -order * rise, rtol=0.2 if order == 1 else 1e-12)
+    assert np.ptp(patterns[0].real) <= 0.4 * order * rise * (1 + 1e-12)
+    # the slowest pole is a bit faster than the rise, and a twelfth of that
+    assert np.abs(patterns[1]).min() == pytest.approx(1.2 * rise)
+    assert np.abs(patterns[2]).min() == pytest.approx(0.1 * rise)
+    for poles, low, high in ((patterns[1], 5, 8), (patterns[2], 1.2, 6)):
+        fast = np.sort(np.abs(poles))[1:] / rise
+        assert np.all((fast >= low - 1e-9) & (fast <= high + 1e-9))
+    ringing = _pole_patterns(order, Scales(2.0, 0.5, 10.0, 0.01, 3.0, ringing=0.7))
+    assert len(ringing) == (3 if order == 1 else 5)
+    for poles, size, damping in zip(ringing[3:], (1.3 * rise, 0.7), (0.2, 0.1), strict=False):
+        assert_allclose(np.abs(poles[:2]), size, rtol=2e-3)
+        assert_allclose(poles[0], np.conj(poles[1]))
+        assert -poles[0].real / abs(poles[0]) == pytest.approx(damping, rel=0.01)
+
+
+def test_neighbours_are_one_zero_less_and_one_pole_less():
+    known = {s: candidate(s.order, s.relative_degree) for s in (Structure(2, 1), Structure(2, 2))}
+    assert _neighbour_starts(Structure(1, 1), SCALES, known) == []
+    (only,) = _neighbour_starts(Structure(3, 3), SCALES, known)
+    added = parameters_from_poles(np.array([-1.0, -2.0, -20.0], dtype=np.complex128))
+    assert_allclose(only, [1.5, *added], atol=1e-12)
+    assert len(_neighbour_starts(Structure(3, 2), SCALES, known)) == 2
+    (fewer_zeros,) = _neighbour_starts(Structure(2, 1), SCALES, {Structure(2, 2): candidate(2, 2)})
+    assert_array_equal(fewer_zeros, candidate(2, 2).parameters)
+
+
+class Data:
+    data = np.zeros(400)
+
+
+def test_more_poles_are_searched_for_where_the_last_one_helped():
+    def found(two: float, three: float) -> dict[Structure, Candidate]:
+        return {Structure(2, 2): candidate(2, 2, two), Structure(3, 3): candidate(3, 3, three)}
+
+    # four of 400 samples: 1 %
+    assert _worth_a_search(Data, Structure(4, 4), found(100.0, 98.5))
+    assert not _worth_a_search(Data, Structure(4, 4), found(100.0, 99.5))
+    assert not _worth_a_search(Data, Structure(4, 3), found(100.0, 50.0))
+    several = {**found(100.0, 99.5), Structure(3, 2): candidate(3, 2, 90.0)}
+    assert _worth_a_search(Data, Structure(4, 4), several)
+
+
+def test_the_criterion_charges_every_parameter_with_the_log_of_the_samples():
+    both = {
+        s: candidate(s.order, s.relative_degree, 50.0) for s in (Structure(2, 2), Structure(3, 1))
+    }
+    found = criteria(both, 2.0, 100.0)
+    assert found[Structure(2, 2)] == pytest.approx(25 + 4 * np.log(100))
+    assert found[Structure(3, 1)] == pytest.approx(25 + 7 * np.log(100))
+
+
+def test_zeros_and_a_fourth_pole_must_be_worth_it():
+    assert [needless_charge(Structure(n, r)) for n, r in ((3, 3), (3, 1), (4, 4), (5, 4))] == [
+        0, 12, 4, 14,
+    ]  # fmt: skip
+    simple, zero, fourth = Structure(3, 3), Structure(3, 2), Structure(4, 4)
+    assert choose({simple: 100.0, zero: 94.5, fourth: 96.5}) == simple
+    assert choose({simple: 100.0, zero: 93.5, fourth: 96.5}) == zero
+    assert choose({simple: 100.0, zero: 94.5, fourth: 95.5}) == fourth
+
+
+def test_what_is_near_the_best_is_plausible_and_so_are_lags_that_fit_no_worse():
+    chosen = candidate(3, 2, 100.0)
+    shapes = [(3, 2), (1, 1), (2, 2), (2, 1), (4, 4), (5, 5)]
+    all_of = {Structure(n, r): candidate(n, r, 1000.0) for n, r in shapes}
+    all_of[chosen.structure] = chosen
+    all_of[Structure(2, 2)] = candidate(2, 2, 100.0 + PLAUSIBLE * 0.5)
+    all_of[Structure(4, 4)] = candidate(4, 4, 50.0)
+    values = dict(zip(all_of, [60.0, 900.0, 900.0, 69.0, 900.0, 71.0], strict=True))
+    left = plausible(all_of, values, 0.5, chosen, 60.0)
+    # itself; lags within 10 variances; within 10 of the best. Not: more, or four lags that fit
+    assert set(left) == {chosen.structure, Structure(2, 2), Structure(2, 1)}
+    # a chosen one whose simplicity counts: others have theirs counted as well
+    assert Structure(5, 5) not in plausible(all_of, values, 0.5, chosen, 68.0)
+    assert Structure(5, 5) in plausible(all_of, values, 0.5, chosen, 70.0)
