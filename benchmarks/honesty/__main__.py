@@ -46,6 +46,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after these")
     parser.add_argument("--only", nargs="+", default=(), help="families to run; all are tabulated")
     parser.add_argument("--store", type=Path, help="folder of finished cases; a run goes on there")
+    parser.add_argument("--tables", action="store_true", help="of all the store has; run nothing")
     parser.add_argument("--note", default="", help="a sentence for the caption")
     parser.add_argument("--output", type=Path, help="Markdown file to write")
     return parser.parse_args()
@@ -63,6 +64,8 @@ def main() -> None:
 
     def seen(part: str, tasks: list[Task]) -> list[Seen]:
         store = Store(None if given.store is None else given.store / f"{part}.jsonl")
+        if given.tables:
+            return list(store.seen.values())
         return run(tasks, store, given.jobs, deadline, given.only)
 
     made = {
