@@ -16,8 +16,9 @@ from ..wording import in_percent
 from .channel_search import Candidate
 from .residuals import ResidualCheck, check_residuals
 
-COLOURED = 0.5
-"""Correlation of neighbouring residuals from which they are said to be coloured."""
+COLOURED, WANDERING = 0.5, 0.97
+"""Correlation of neighbouring residuals from which they are said to be coloured, and to wander
+as what an integrator makes of noise does."""
 LAGS = 25
 """Of the correlations in the residual checks."""
 
@@ -115,12 +116,17 @@ def fitted_system(
     seen = {flag.code: flag for check in checks for flag in check.flags}
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
     if neighbours > COLOURED:
+        advice = (
+            "the output wanders like an integral: fit differences of input and output (np.diff of "
+            "both), or a frequency response (spectral_frf, fit_frf)"
+            if neighbours > WANDERING
+            else "compare a lower order on other data"
+        )
         seen["coloured_residual"] = Flag(
             "coloured_residual",
             f"neighbouring residuals are correlated by {neighbours:.2g}: a disturbance that "
             "drifts, or a plant that is not linear. BIC takes them for independent, so the order "
-            "may be too high, with slow poles that follow the drift: compare a lower order on "
-            "other data",
+            f"may be too high, with slow poles that follow the drift; {advice}",
         )
     fit = ChannelFit(
         order=core.nstates,
