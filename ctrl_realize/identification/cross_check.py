@@ -66,8 +66,8 @@ class DelayCheck(Result):
 
     `agree` is true when one dead time lies in the interval of every dead-time view that counts and
     not above any upper bound; `common` is then the interval of such dead times. Otherwise `common`
-    is None and `conflicts` names the pairs that cannot both be right. Views in doubt count only
-    where all are.
+    is None and `conflicts` names the pairs that cannot both be right. Where every view is in
+    doubt, nothing is agreed on and there are no conflicts.
 
     Attributes
     ----------
@@ -138,7 +138,9 @@ class DelayCheck(Result):
                     f"({interval_in_time(view.low, view.high)}{sign})",
                 )
             )
-        if self.common is None:
+        if self.common is None and not self.conflicts:
+            words = "no: every view is in doubt"
+        elif self.common is None:
             words = "no: " + "; ".join(f"{a} against {b}" for a, b in self.conflicts)
         else:
             words = f"yes, on {interval_in_time(*self.common)}"
@@ -149,7 +151,7 @@ class DelayCheck(Result):
         return rows
 
     def __repr__(self) -> str:
-        verdict = "agree" if self.agree else "do not agree"
+        verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"
         return f"<DelayCheck: {len(self.views)} views that {verdict}>"
 
 
@@ -306,9 +308,8 @@ def _doubt(flags: tuple[Flag, ...]) -> str:
 
 
 def _counted(views: Sequence[DelayView]) -> list[DelayView]:
-    """Leave out the views in doubt, unless no other sees the dead time."""
-    clear = [view for view in views if not view.doubt]
-    return clear if any(view.kind == "dead time" for view in clear) else list(views)
+    """Leave out the views in doubt."""
+    return [view for view in views if not view.doubt]
 
 
 def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> None:
@@ -343,6 +344,8 @@ def _verdict(
     """Find the dead times that no view rules out, or the pairs that rule each other out."""
     views = _counted(views)
     times = [view for view in views if view.kind == "dead time"]
+    if not views:
+        return None, ()
     low = max((view.low for view in times), default=0.0)
     high = min(view.high for view in views)
     if low <= high:

@@ -105,10 +105,20 @@ def test_a_view_in_doubt_is_shown_and_does_not_count():
     assert "narrowest" in check.report()
 
 
-def test_where_all_are_in_doubt_all_count():
-    low, high = replace(view("a", 1, 2), doubt="x"), replace(view("b", 4, 5), doubt="y")
-    assert _verdict([low, high]) == (None, (("a", "b"),))
-    assert DelayCheck((low, high), False, None, (("a", "b"),), 0.1).rely_on is None
+def test_where_all_are_in_doubt_nothing_is_agreed_on():
+    low, high = replace(view("a", 1, 2), doubt="x"), replace(view("b", 1, 5), doubt="y")
+    assert _verdict([low, high]) == (None, ())
+
+
+def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
+    rng = np.random.default_rng(0)
+    u, y = rng.standard_normal((2, 1500))
+    check = cr.check_delay(cr.Record(0.01 * np.arange(1500), u, y))
+    assert not check.agree
+    assert check.common is None
+    assert check.rely_on is None
+    assert "every view is in doubt" in check.report()
+    assert repr(check).endswith("that are in doubt>")
 
 
 def test_a_shift_of_the_record_is_a_shift_of_the_views_and_a_scale_is_none(both):
