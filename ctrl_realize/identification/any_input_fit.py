@@ -13,7 +13,8 @@ from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import mad_sigma
 from ..numerics.output_error_result import OutputErrorFit
-from ..numerics.sampled_fit import MOST_SAMPLES, OwnDelay, SampledFit, fit_sampled
+from ..numerics.sampled_data import MOST_SAMPLES
+from ..numerics.sampled_fit import OwnDelay, SampledFit, fit_sampled
 from ..numerics.step_problem import bare_data
 from ..results import Flag
 from ..signals import Record

@@ -168,6 +168,15 @@ def fit_window(
     )
 
 
+def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
+    """Add structures to a fit; noise and data stay those of the structures before."""
+    candidates = search(fit.problem, structures, fit.scales, fit.candidates)
+    samples = (fit.window.output.size - fit.window.start) / fit.correlation
+    criterion = criteria(candidates, fit.variance, samples)
+    criterion = {s: value + fit.problem.own_count(s.order) for s, value in criterion.items()}
+    return replace(fit, candidates=candidates, criterion=criterion)
+
+
 def _clipped(error: FloatArray, least: float) -> FloatArray:
     """Residuals clipped at 1.345 sigma and scaled up again by the part that was not."""
     limit = _HUBER * max(mad_sigma(error), least)

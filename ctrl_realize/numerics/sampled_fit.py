@@ -11,88 +11,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray
-from .delayed_modes import SampledInput, SeveralInputs
-from .fit_window import Window, WindowFit, fit_window
-from .likelihood_interval import likelihood_fit
+from .arrays import FloatArray
+from .fit_window import Window, WindowFit, extended, fit_window
+from .likelihood_interval import chains_of, likelihood_fit
 from .noise_level import correlation_time, quantisation_step, winsorised_sigma
 from .output_error_result import OutputErrorFit
-from .own_terms import OwnTerms, Stretches
+from .own_terms import OwnTerms
 from .pole_factors import parameters_from_poles, poles_from_parameters
+from .sampled_data import SampledData, cut
 from .separable_fit import KnownFactor, Problem, Structure, respond
 from .structure_search import Candidate, Scales, search
-
-MOST_SAMPLES = 4000
-"""Longer records are cut: every sample counts, so that time grows with the length."""
-
-MOST_IN_ALL = 12000
-"""Samples of all records together; beyond that every record is cut to its share."""
 
 WHITE = 3.0
 """Correlation time of the residual, in samples, up to which a model is taken for right."""
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
+MORE_LAGS = (Structure(4, 4), Structure(5, 5))
+"""Tried as well where three poles are chosen: zeros beside them imitate further lags."""
 _RISES = (2.0, 10.0, 50.0)
 _ONSETS = (1.0, 5.0, 20.0)
 _SMALLEST = 1e-4
 _UNLIKE = 1.3  # ratio of noise levels from which records are weighted
 _BEYOND = 1.5  # of a first-order model's delay: no model's delay is later
+_SLOW = 10.0  # times delay and lag: periods from there on tell little of the plant
+_CALMER = 0.5  # of the variance, colour included, that must be left for them to be fitted along
 _TURNS = 6
-
-
-@dataclass(frozen=True, eq=False)
-class SampledData:
-    """Records with any input, cut, without the samples that depend on unknown input.
-
-    Attributes
-    ----------
-    inputs, outputs : tuple of ndarray
-        Of every record, from its first sample on; the mean of the input is taken out.
-    starts : tuple of int
-        Samples before these are reached by input from before the record.
-    scales : tuple of float
-        Noise level of every record over the mean one. A linear plant is the same for input and
-        output divided by it, and the records then count as they should.
-    dt : float
-        Sample time in s.
-    """
-
-    inputs: tuple[FloatArray, ...]
-    outputs: tuple[FloatArray, ...]
-    starts: tuple[int, ...]
-    scales: tuple[float, ...]
-    dt: float
-
-    @property
-    def counts(self) -> list[int]:
-        """Samples of every record that are fitted."""
-        return [y.size - start for y, start in zip(self.outputs, self.starts, strict=True)]
-
-    @property
-    def edges(self) -> IntArray:
-        """Bounds of the records in what is fitted, one after the other."""
-        return np.concatenate([[0], np.cumsum(self.counts)]).astype(np.int64)
-
-    def problem(self, known: KnownFactor) -> Problem:
-        """Set up the fit of all records together."""
-        clocks = [self.dt * np.arange(count, dtype=np.float64) for count in self.counts]
-        shapes = [_own_shapes(clock, known) for clock in clocks]
-        m = int(self.edges[-1])
-        drive = SeveralInputs(
-            tuple(
-                SampledInput(u / scale, self.dt)
-                for u, scale in zip(self.inputs, self.scales, strict=True)
-            ),
-            self.starts,
-        )
-        joined = np.concatenate(
-            [
-                y[start:] / scale
-                for y, start, scale in zip(self.outputs, self.starts, self.scales, strict=True)
-            ]
-        )
-        stretches = Stretches(self.edges, np.concatenate(clocks), np.concatenate(shapes))
-        return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, stretches)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +64,7 @@ class SampledFit:
 
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnDelay:
         """Shift and scale the common model to fit one record best, seen before or not."""
-        one = _cut([output], [signal], self.data.dt)
+        one = cut([output], [signal], self.data.dt)
         start = min(max(self.data.starts), output.size // 2)
         return _own_delay(replace(one, starts=(start,)), self.fit, self.known)
 
@@ -153,9 +96,10 @@ def fit_sampled(
     What was before a record is an initial state, which is eliminated with level and drift. What
     was on its way through the dead time is not known: the first samples are left out, as many as
     one and a half delays of the first-order model that fits best, half the record at most.
+    Where the residual is coloured and slow cosines take half of it, they are own terms as well.
     """
     factor = known or KnownFactor()
-    data = _cut(outputs, inputs, dt)
+    data = cut(outputs, inputs, dt)
     n = max(y.size for y in data.outputs)
     limit = 0.25 * n * dt if latest is None else latest
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs))
@@ -171,9 +115,20 @@ def fit_sampled(
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
         whole = _fit(data, factor, tried, scales, huber)
-    fit = likelihood_fit(whole, adequate=whole.correlation <= WHITE)
+    if whole.correlation > WHITE:
+        without = replace(data, period=_SLOW * (rough.delay + lag))
+        calm = _fit(without, factor, tried, scales, huber)
+        if calm.variance < _CALMER * whole.variance:
+            data, whole = without, calm
+    if structures is None and whole.best.structure.order == ORDERS[-1].order:
+        whole = extended(whole, MORE_LAGS)
+    chains = chains_of(whole) if structures is None else []
+    fit = likelihood_fit(whole, adequate=whole.correlation <= WHITE, chains=chains)
+    if fit.chain:
+        left = correlation_time(whole.window.output - fit.fitted)
+        fit = replace(fit, correlation=left, adequate=left <= WHITE)
     # The noise is not known from a rest; correlation is what shows in means over bins.
-    fit = replace(fit, misfit=float(np.sqrt(whole.correlation)))
+    fit = replace(fit, misfit=float(np.sqrt(fit.correlation)))
     parts = np.split(fit.fitted, data.edges[1:-1])
     return SampledFit(
         fit,
@@ -182,31 +137,6 @@ def fit_sampled(
         _explained(whole),
         factor,
     )
-
-
-def _cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) -> SampledData:
-    """Cut long records; the shortest keep all they have."""
-    lengths = np.minimum([y.size for y in outputs], MOST_SAMPLES)
-    share = MOST_SAMPLES
-    while np.minimum(lengths, share).sum() > MOST_IN_ALL and share > MOST_IN_ALL // len(lengths):
-        share = max(int(0.9 * share), MOST_IN_ALL // len(lengths))
-    lengths = np.minimum(lengths, share)
-    return SampledData(
-        tuple(u[:n] - float(np.mean(u[:n])) for u, n in zip(inputs, lengths, strict=True)),
-        tuple(y[:n] for y, n in zip(outputs, lengths, strict=True)),
-        (0,) * len(lengths),
-        (1.0,) * len(lengths),
-        dt,
-    )
-
-
-def _own_shapes(clock: FloatArray, known: KnownFactor) -> FloatArray:
-    """Level, drift, and the free responses of what is known, shape (m, q)."""
-    shapes = [np.ones_like(clock), clock / max(float(clock[-1]), 1e-300)]
-    for pole in known.poles[known.poles.imag >= 0]:
-        wave = np.exp(pole * clock)
-        shapes += [wave.real] if pole.imag == 0 else [wave.real, wave.imag]
-    return np.stack(shapes, axis=1)
 
 
 def _fit(

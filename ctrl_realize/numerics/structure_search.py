@@ -66,7 +66,10 @@ class Candidate:
 
 
 def search(
-    problem: Problem, structures: Iterable[Structure], scales: Scales
+    problem: Problem,
+    structures: Iterable[Structure],
+    scales: Scales,
+    beside: dict[Structure, Candidate] | None = None,
 ) -> dict[Structure, Candidate]:
     """Find the best fit of every structure.
 
@@ -79,8 +82,10 @@ def search(
     structures : iterable of Structure
         Smaller orders and larger relative degrees are fitted first.
     scales : Scales
+    beside : dict of Structure to Candidate, optional
+        What was found before; it is in the answer as well.
     """
-    found: dict[Structure, Candidate] = {}
+    found = dict(beside or {})
     for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
         starts = _neighbour_starts(structure, scales, found)
         if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
@@ -182,19 +187,21 @@ def plausible(
     """List what the data cannot rule out.
 
     That is what is within 10 of the best criterion, or of `level`, that of the chosen with its
-    simplicity counted; and chains of up to three lags that fit no worse, for noise hides lags,
-    but does not remove them.
+    simplicity counted; and lags without zeros that fit no worse, up to three of them or one more
+    than were chosen, for noise hides lags, but does not remove them.
     """
     limit = min(*criterion.values(), level) + PLAUSIBLE
     weighed = level + PLAUSIBLE
     fits = chosen.cost + PLAUSIBLE * variance
+    own = chosen.structure
+    lags = max(3, own.order + 1 if own.zeros == 0 else 0)
     return [
         s
         for s, value in criterion.items()
         if value <= limit
         or value + needless_charge(s) <= weighed
         or candidates[s] is chosen
-        or (s.zeros == 0 and s.order <= 3 and candidates[s].cost <= fits)
+        or (s.zeros == 0 and s.order <= lags and candidates[s].cost <= fits)
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -69,3 +70,35 @@ def test_a_long_record_is_cut_and_says_so():
     fit = cr.fit_delay(cut_from_operation("prbs", R1, seed=0, n=4500), structures=[(1, 1)]).fit
     assert fit.time.size < 4000
     assert "cut" in [flag.code for flag in fit.flags]
+
+
+def random_binary(poles, noise, disturbance=0.0, seed=0):
+    """Lags behind 0.8 s under a random binary input; per cent of noise, and a slow sine."""
+    rng = np.random.default_rng(seed)
+    t = 0.05 * np.arange(2000)
+    u = np.repeat(rng.choice([-1.0, 1.0], 100), 20)
+    plant = ct.tf([float(np.prod(poles))], np.poly(-np.asarray(poles)))
+    y = cr.delayed_ss(plant, dead_time=0.8, dt=0.05).simulate(u)
+    y = y + noise * rng.standard_normal(t.size) + disturbance * np.sin(2 * np.pi * t / 60)
+    return cr.Record(t, u, y)
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.03])
+def test_many_lags_are_no_dead_time_under_any_input(noise):
+    five = cr.fit_delay(random_binary([1, 1.5, 2, 3, 5], noise)).fit
+    assert five.interval[0] <= 0.8 <= five.interval[1]
+    # three poles with two zeros, the best of the smaller models, say 1.15 s
+    assert abs(five.dead_time - 0.8) < 0.2
+    eight = cr.fit_delay(random_binary([3.0] * 8, noise)).fit
+    assert eight.interval[0] <= 0.8 <= eight.interval[1]
+    assert abs(eight.dead_time - 0.8) < 0.05
+    assert eight.order == 8
+    assert eight.at_noise_level
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_slow_disturbance_does_not_move_the_dead_time(seed):
+    # a fifth of the response, over a period of 60 s: the fit was half a second late
+    fit = cr.fit_delay(random_binary([0.5, 1.25], 0.02, disturbance=0.2, seed=seed)).fit
+    assert fit.interval[0] <= 0.8 <= fit.interval[1]
+    assert abs(fit.dead_time - 0.8) < 0.1
