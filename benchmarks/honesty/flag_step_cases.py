@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import control as ct
 import numpy as np
+from scipy.special import gammainc
 
 import ctrl_realize as cr
 from tests import rigs
@@ -67,6 +68,12 @@ def wrong(name: str, levels: tuple[float, ...]) -> Run:
         return shaped(wrong_step(name, _clock(30.0 + seed % 15)), seed, _noise(seed, levels))
 
     return run
+
+
+def twelve_lags(seed: int) -> Codes:
+    """More equal lags than chains of them are tried for."""
+    t = np.clip(_clock(30.0 + seed % 15), 0, None)
+    return shaped(gammainc(12, 2 * np.pi * 20.0 * t), seed, _noise(seed, LOW))
 
 
 def integrating(seed: int) -> Codes:
@@ -287,7 +294,7 @@ CASES: list[FlagCase] = [
          not_due="R1, noise 0.1 %",
          quiet=lambda s: fit(step_case("white", "R1", 0.001, s).record)),
     _fit("no_delay_resolved", "no delay, noise 1 and 2 %", lambda s: fit(undelayed(s))),
-    _fit("many_lags", "diffusion, noise 0.1 and 0.5 %", wrong("diffusion", LOW)),
+    _fit("many_lags", "twelve equal lags of 20 Hz, noise 0.1 and 0.5 %", twelve_lags),
     _fit("onset_open", "dispersion, noise 0.1 and 0.5 %", wrong("dispersion", LOW)),
     _fit("integrating", "integrator behind a lag of 5 Hz", integrating),
     _fit("not_settled", "record ends one time constant after the delay", unsettled),
