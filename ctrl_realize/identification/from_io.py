@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..checks import one_of, whole
 from ..errors import DataError, DataWarning, OptionError
 from ..numerics.arrays import FloatArray, read_only
+from ..numerics.onset import correlation_onset
 from ..results import Flag, Result
 from ..signals import ImpulseResponse, Record
 from ..signals.given import as_records
@@ -28,6 +29,9 @@ SHORTEST, LONGEST = 100, 1 / 3
 
 MOST_UNKNOWNS = 400
 """Most lags of all inputs together to which the length grows by itself; time goes with its cube."""
+
+SURE = 0.999
+"""Chance that no output seems to follow an input that it does not follow."""
 
 TAIL = 0.05
 """Part of the largest Markov parameter that may be left at the end of the window."""
@@ -132,9 +136,9 @@ def impulse_from_io(
     records : Record or sequence of Record
         One or several experiments on the same plant, with the same sample time and channels.
     length : int, optional
-        Number of Markov parameters; the response must have died away within it. Default: 100,
-        doubled until it has, up to a third of the longest record and 400 over the number of
-        inputs.
+        Number of Markov parameters; the response must have died away within it. Default: 100, or
+        twice the lag at which the last output begins to follow an input, doubled until it has, up
+        to a third of the longest record and 400 over the number of inputs.
     method : {"auto", "regularized", "least_squares", "okid"}
         ``"auto"`` is ``"okid"`` where that halves the error of ``"regularized"`` on the last
         third of the data, unseen, and ``"regularized"`` otherwise. ``"regularized"`` weighs the
@@ -207,7 +211,11 @@ def impulse_from_io(
     group = as_group(records)
     longest = max(record.n_samples for record in group)
     most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].n_inputs), 2)
-    count = min(SHORTEST, most) if length is None else whole(length, "length", 2)
+    if length is None:
+        # A window that ends before the response begins would show nothing, and no tail either.
+        count = min(max(SHORTEST, 2 * _latest_onset(group, most)), most)
+    else:
+        count = whole(length, "length", 2)
     chosen = choose_estimate(group, count, start) if method == "auto" else None
     while True:
         found = _estimate(group, count, start, chosen, (method, kernel, arx_order))
@@ -231,6 +239,22 @@ def impulse_from_io(
         flags=flags,
         name=group[0].name,
     )
+
+
+def _latest_onset(group: tuple[Record, ...], lags: int) -> int:
+    """Lag at which the last of the outputs begins to follow an input; 0 where none does."""
+    record = max(group, key=lambda one: one.n_samples)
+    if record.n_missing:
+        return 0
+    u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
+    moving = [row for row in u if np.ptp(row) > 0]
+    onsets = [
+        correlation_onset(drive, row, lags, SURE).onset
+        for drive in moving
+        for row in y
+        if np.ptp(row) > 0
+    ]
+    return max([0, *onsets])
 
 
 def _estimate(

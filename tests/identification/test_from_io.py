@@ -344,3 +344,16 @@ def test_measured_plants_have_the_delay_that_their_authors_state(
     table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
     g = cr.impulse_from_io(cr.Record(*table.T), length, **options)
     assert cr.estimate_delay(g, 2, max_delay=15).delay == delay
+
+
+@pytest.mark.parametrize("delay", [110, 250])
+def test_a_response_that_begins_behind_the_first_window_is_found(delay):
+    rng = np.random.default_rng(0)
+    plant = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01), delay)
+    u = rng.choice([-1.0, 1.0], 1000)
+    y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
+    g = cr.impulse_from_io(cr.Record(0.01 * np.arange(1000), u, y))
+    assert g.n_samples > delay + 50
+    # the largest value is 0.1 behind the delay, its noise 0.05 / sqrt(700)
+    assert abs(int(np.argmax(g.markov)) - delay - 1) <= 1
+    assert np.abs(g.markov[: delay - 5]).max() < 0.02
