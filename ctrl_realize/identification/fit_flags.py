@@ -8,6 +8,7 @@ from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from ..signals import Record
+from ..wording import in_time, interval_in_time
 from .delay_fit_result import Repeatability
 
 _SAMPLES_BESIDE_NOTHING = 0.5
@@ -135,7 +136,7 @@ def _disagreement(dt: float, fit: OutputErrorFit) -> Flag | None:
         width = fit.high - fit.low
         if width <= 0.3 * max(fit.delay, dt):
             return None
-        apart = [f"{name} {delay:.4g} s" for name, delay in fit.views if not _near(fit, delay)]
+        apart = [f"{name} {in_time(delay)}" for name, delay in fit.views if not _near(fit, delay)]
         return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
     own = next(line for line in fit.structures if line.structure == fit.structure)
     wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
@@ -143,8 +144,8 @@ def _disagreement(dt: float, fit: OutputErrorFit) -> Flag | None:
         return None
     return Flag(
         "structures_disagree",
-        f"the chosen structure puts the dead time in {own.low:.4g} ... {own.high:.4g} s, others "
-        f"that the data cannot rule out in {fit.low:.4g} ... {fit.high:.4g} s: dead time and "
+        f"the chosen structure puts the dead time in {interval_in_time(own.low, own.high)}, others "
+        f"that the data cannot rule out in {interval_in_time(fit.low, fit.high)}: dead time and "
         "fast lags look alike; only the total delay is firm",
     )
 
@@ -157,7 +158,7 @@ def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
     if fit.low > _SAMPLES_BESIDE_NOTHING * dt:
         return None
     return Flag(
-        "no_delay_resolved", f"a model without dead time fits as well (up to {fit.high:.4g} s)"
+        "no_delay_resolved", f"a model without dead time fits as well (up to {in_time(fit.high)})"
     )
 
 
@@ -177,7 +178,7 @@ def _open_start(fit: OutputErrorFit) -> Flag | None:
     return Flag(
         "onset_open",
         "the best model has a zero, which imitates a smooth beginning: how much of the time up to "
-        f"the first motion is dead time is open, {fit.low:.4g} ... {fit.high:.4g} s; only the "
+        f"the first motion is dead time is open, {interval_in_time(fit.low, fit.high)}; only the "
         "total delay is firm",
     )
 

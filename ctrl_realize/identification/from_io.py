@@ -17,6 +17,7 @@ from ..numerics.onset import correlation_onset
 from ..results import Flag, Result
 from ..signals import ImpulseResponse, Record
 from ..signals.given import as_records
+from ..wording import in_time
 from .pulse_choice import Choice, choose_estimate
 from .pulse_regression import PulseRegression, through_arx, with_prior, without_prior
 
@@ -107,7 +108,7 @@ class ImpulseEstimate(ImpulseResponse, Result):
         gains = np.atleast_2d(self.markov.sum(axis=-1))
         return [
             ("method", self.method),
-            ("length", f"{self.n_samples} samples of {self.dt:g} s, {self.rows} equations"),
+            ("length", f"{self.n_samples} samples of {in_time(self.dt, 6)}, {self.rows} equations"),
             ("sum (gain)", ", ".join(f"{g:.4g}" for g in gains.ravel())),
             ("largest std", f"{self.std.max():.3g}"),
             ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
