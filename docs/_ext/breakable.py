@@ -15,6 +15,8 @@ BEHIND = re.compile(r"(?<=[/_.:(,=])(?=[^/_.:(,=)])")
 def let_code_break(app: Any, doctree: nodes.document, docname: str) -> None:
     if app.builder.format != "html":
         return
+    if docname.startswith("generated/api"):  # names of the reference stay whole
+        return
     for entry in doctree.findall(nodes.entry):
         for code in list(entry.findall(nodes.literal)):
             words = code.astext()
