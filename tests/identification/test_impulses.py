@@ -50,6 +50,9 @@ def test_a_quick_response_gets_256_samples_or_8_per_order_as_far_as_they_fit():
 
 
 def test_each_channel_settles_by_its_own_range():
+    assert settled_samples(impulse(100 * decay(0.98)), 3, 0) == settled_samples(
+        impulse(decay(0.98)), 3, 0
+    )
     # beside a large quick channel the small slow one would count as settled
     both = np.stack([1000 * decay(0.5), decay(0.98)])[:, None]
     alone = settled_samples(impulse(decay(0.98)), 3, 0)
@@ -72,6 +75,10 @@ def test_samples_and_orders_that_do_not_fit_are_refused():
     for order in (0, 8):
         with pytest.raises(OrderError, match="1 <= order <= 7"):
             check_order(short, order, 14, padded=False)
+    square = impulse(np.ones((2, 2, 20)))
+    check_order(square, 14, 14, padded=False)
+    with pytest.raises(OrderError, match="1 <= order <= 14"):
+        check_order(square, 15, 14, padded=False)
 
 
 def test_the_noise_floor_is_a_singular_value_of_noise_alone():

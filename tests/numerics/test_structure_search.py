@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
-from ctrl_realize.numerics.separable_fit import Structure
+from ctrl_realize.numerics.separable_fit import KnownFactor, Structure
+from ctrl_realize.numerics.step_problem import step_data, step_scales, window
 from ctrl_realize.numerics.structure_search import (
     ALL_STRUCTURES,
     FASTEST,
@@ -24,6 +25,8 @@ from ctrl_realize.numerics.structure_search import (
     needless_charge,
     parameter_bounds,
     plausible,
+    refine,
+    search,
 )
 
 SCALES = Scales(onset=2.0, rise=0.5, length=10.0, dt=0.01, latest=3.0, earliest=0.25)
@@ -147,3 +150,43 @@ def test_what_is_near_the_best_is_plausible_and_so_are_lags_that_fit_no_worse():
     # a chosen one whose simplicity counts: others have theirs counted as well
     assert Structure(5, 5) not in plausible(all_of, values, 0.5, chosen, 68.0)
     assert Structure(5, 5) in plausible(all_of, values, 0.5, chosen, 70.0)
+
+
+def step_problem(noise: float = 1e-3):
+    """One lag of 30 samples behind 20, and the candidates of a search in it."""
+    k = np.arange(700.0)
+    y = -np.expm1(-np.clip(k - 120, 0, None) / 30)
+    y = y + noise * np.random.default_rng(0).standard_normal(k.size)
+    made = step_data(y, 1.0 * (k >= 100), 1.0, [(100, 1)])
+    return window(made, 700, KnownFactor()).problem, step_scales(made, 700, None)
+
+
+def test_a_search_finds_the_lag_and_its_neighbours_cost_no_more():
+    problem, scales = step_problem()
+    shapes = [Structure(2, 1), Structure(1, 1), Structure(2, 2)]
+    found = search(problem, shapes, scales)
+    assert list(found) == [Structure(1, 1), Structure(2, 2), Structure(2, 1)]
+    lag = found[Structure(1, 1)]
+    assert lag.delay == pytest.approx(20.0, abs=0.1)
+    assert_allclose(lag.poles, [-1 / 30], rtol=0.01)
+    assert found[Structure(2, 1)].cost <= lag.cost * (1 + 1e-9)
+    assert found[Structure(2, 1)].cost <= found[Structure(2, 2)].cost * (1 + 1e-9)
+
+
+def test_refining_moves_what_may_win_and_leaves_what_is_hopeless():
+    problem, scales = step_problem()
+    found = search(problem, [Structure(1, 1), Structure(2, 2)], scales)
+    best = found[Structure(1, 1)]
+    off = Candidate(best.structure, best.parameters + np.array([0.3, 0.05]), best.cost)
+    hopeless = Candidate(Structure(2, 2), found[Structure(2, 2)].parameters, 10 * best.cost)
+    again = refine(problem, {Structure(2, 2): hopeless, Structure(1, 1): off}, scales)
+    assert again[Structure(2, 2)] is hopeless
+    assert_allclose(again[Structure(1, 1)].parameters, best.parameters, atol=1e-3)
+    assert again[Structure(1, 1)].cost == pytest.approx(best.cost, rel=1e-4)
+    near = Candidate(Structure(2, 2), hopeless.parameters, best.cost * 1.01)
+    assert (
+        refine(problem, {Structure(2, 2): near, Structure(1, 1): best}, scales)[
+            Structure(2, 2)
+        ].cost
+        < 1.01 * best.cost
+    )
