@@ -114,10 +114,11 @@ def fit_channels(
     group = as_group(records)
     asked = _orders(order)
     _check_inputs(group)
-    best: tuple[float, DelayedStateSpace] | None = None
+    best: tuple[float, DelayedStateSpace, bool] | None = None
     refused: DataError | None = None
     at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
-    for start, method in sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else STARTS:
+    starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else STARTS
+    for tried, (start, method) in enumerate(starts, start=1):
         try:
             found = _from_start(group, start, method, asked, delays, feedthrough)
         except DataError as error:
@@ -125,7 +126,9 @@ def fit_channels(
             continue
         if best is None or found[0] < best[0]:
             best = found
-        if all(check.independent for check in best[1].fit.checks):
+        # An output that a start does not see gets a second one.
+        enough = best[2] or tried > 1
+        if enough and all(check.independent for check in best[1].fit.checks):
             break
     if best is None:
         raise refused or DataError("nothing could be fitted")
@@ -139,15 +142,18 @@ def _from_start(
     asked: tuple[int, ...] | None,
     delays: ArrayLike | None,
     feedthrough: bool | None,
-) -> tuple[float, DelayedStateSpace]:
-    """Fit from one estimate of the impulse response; return the criterion and the model."""
+) -> tuple[float, DelayedStateSpace, bool]:
+    """Fit from one estimate of the impulse response.
+
+    Return the criterion, the model, and whether the start showed a response of every output.
+    """
     with warnings.catch_warnings():
         # What the prior has filled in only serves as a start.
         warnings.simplefilter("ignore", DataWarning)
         impulse = impulse_from_io(group, method=method, start=start)
     markov = np.reshape(impulse.markov, (group[0].n_outputs, group[0].n_inputs, -1))
-    silent = tuple(flag for flag in impulse.flags if flag.code == "no_response")
-    if len(silent) == group[0].n_outputs:
+    unseen = sum(flag.code == "no_response" for flag in impulse.flags)
+    if unseen == group[0].n_outputs:
         raise DataError(
             "no output shows a response to the inputs above the noise; are the channels right?"
         )
@@ -161,7 +167,7 @@ def _from_start(
     if asked is None or len(asked) > 1:
         moved = search.lowered(moved, orders, delays=delays is None)
     bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
-    flags = silent
+    flags = _silence(moved)
     if len(orders) > 1 and best.order == max(asked or ORDERS):
         flags += (
             Flag(
@@ -169,8 +175,19 @@ def _from_start(
                 f"the highest order that was tried, {best.order}, is the best: try higher ones",
             ),
         )
-    return moved.bic, fitted_system(
-        search.finish(moved), group, bic, _choices(moved, bic, shares), flags
+    choices = _choices(moved, bic, shares)
+    return moved.bic, fitted_system(search.finish(moved), group, bic, choices, flags), unseen == 0
+
+
+def _silence(best: Candidate) -> tuple[Flag, ...]:
+    """Flag the outputs of which the model explains no more than its parameters would of noise."""
+    found = best.found
+    # What belongs to one output: its C, the initial state, and its row of D.
+    count = 2 * best.order + best.found.model.D.shape[1] * best.direct
+    gain = found.counts * np.log(found.spread / found.variance)
+    return tuple(
+        Flag("no_response", f"output {a} shows no response to the input above the noise")
+        for a in np.flatnonzero(gain < count * np.log(found.counts))
     )
 
 
