@@ -129,6 +129,7 @@ def test_every_public_name_shows_how_it_is_used(reference):
 def test_no_summary_of_the_reference_is_cut_at_an_abbreviation(reference):
     for entry in listed(reference):
         module, _, name = entry.rpartition(".")
-        summary = (getattr(getattr(import_module(module), name), "__doc__", "") or "").split("\n")[0]
+        value = getattr(import_module(module), name)
+        summary = (getattr(value, "__doc__", "") or "").split("\n")[0]
         # The tables of the reference show the words up to the first full stop.
         assert not re.search(r"\b(Figs?|[Ss]ect?|Eqs?|e\.g|i\.e|vs)\. ", summary), entry
