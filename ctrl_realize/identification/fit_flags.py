@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.likelihood_interval import LIKE_A_FLOW, flow_lead
 from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
@@ -163,6 +164,12 @@ def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
 
 
 def _many_lags(fit: OutputErrorFit) -> Flag | None:
+    if fit.chain and fit.structure.order >= LIKE_A_FLOW and not fit.endless:
+        return Flag(
+            "many_lags",
+            f"the model is a {fit.chain}: a flow that disperses looks the same and begins "
+            f"{in_time(flow_lead(fit.poles))} earlier; only the total delay is firm",
+        )
     if not fit.endless:
         return None
     return Flag(

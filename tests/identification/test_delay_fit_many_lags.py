@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.special import gammainc, ndtr
+from scipy.special import gammainc, log_ndtr, ndtr
 
 import ctrl_realize as cr
 from tests import rigs
@@ -94,12 +94,18 @@ def test_a_model_of_eight_lags_responds_as_its_fit():
     assert_allclose(response + model.fit.fitted[0], model.fit.fitted, rtol=0, atol=1e-5 * 16)
 
 
-def dispersion_record(noise: float, *, mean: float, delay: float = 37.0, seed: int = 0):
-    """Step record of a flow that disperses: inverse Gaussian residence times, shape = mean [s]."""
+def dispersion_record(
+    noise: float, *, mean: float, narrow: float = 1.0, delay: float = 37.0, seed: int = 0
+):
+    """Step record of a flow that disperses: inverse Gaussian residence times, in s.
+
+    Their shape is `narrow` times their mean.
+    """
     k = np.arange(-2000, 2600)
     time = np.maximum((k - delay) * TS, 1e-6)
-    root = np.sqrt(mean / time)
-    y = ndtr(root * (time / mean - 1)) + np.exp(2) * ndtr(-root * (time / mean + 1))
+    root = np.sqrt(narrow * mean / time)
+    y = ndtr(root * (time / mean - 1))
+    y += np.exp(2 * narrow + log_ndtr(-root * (time / mean + 1)))
     y = np.where(k > delay, y, 0.0) + noise * np.random.default_rng(seed).standard_normal(k.size)
     return cr.Record(k * TS, (k >= 0).astype(float), y)
 
@@ -116,6 +122,19 @@ def test_a_beginning_that_a_zero_imitates_is_left_open(mean, noise):
     # three times as far before the delay as the first motion is behind it, and a sample after that
     assert fit.delay - low == pytest.approx(3 * (fit.onset / TS - fit.delay))
     assert high == pytest.approx(fit.onset / TS + 1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_flow_that_disperses_little_looks_like_a_chain_of_lags_and_is_covered(seed):
+    fit = cr.fit_delay(dispersion_record(0.005, mean=0.2, narrow=15.0, seed=seed)).fit
+    low, high = fit.delay_interval
+    assert "many_lags" in {flag.code for flag in fit.flags}
+    # Cumulants in time up to the third are equal where the flow begins half of the lags earlier.
+    assert fit.order >= 6
+    lags = float(np.sum(-1 / fit.poles).real) / TS
+    assert low <= max(fit.delay - 0.5 * lags, 0) + 1e-6
+    assert low <= 37 <= high
+    assert fit.delay > 60
 
 
 def test_a_plant_with_a_zero_is_covered_and_one_without_is_not_called_open():
