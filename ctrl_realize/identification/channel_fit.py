@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import control as ct
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import whole
 from ..delayed import DelayedStateSpace
-from ..errors import DataError, DataWarning, OrderError
+from ..errors import DataError, DataWarning, OptionError, OrderError, UnsuitableSystemError
 from ..numerics.arrays import IntArray
 from ..numerics.delay_split import split_delays
 from ..numerics.section_fit import fit_sections
@@ -35,6 +35,8 @@ STARTS: tuple[tuple[Start, Method], ...] = (
 )
 """Estimates of the impulse response to start from: the next one where the residual of the best
 model so far still follows the input."""
+LEAST = 1e-70
+"""Least size of a signal, in its unit."""
 STILL = 10
 """Samples that an input stands still at the start of a record for the plant to count as at rest."""
 
@@ -113,7 +115,7 @@ def fit_channels(
     """
     group = as_group(records)
     asked = _orders(order)
-    _check_inputs(group)
+    _check_signals(group, feedthrough)
     best: tuple[float, DelayedStateSpace, bool] | None = None
     refused: DataError | None = None
     at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
@@ -248,9 +250,11 @@ def refine(
     np.float64(0.8)
     """
     group = as_group(records)
-    _check_inputs(group)
+    _check_signals(group, feedthrough)
     model = as_delayed(system, group[0], stable=False)
     core = model.delay_free
+    if core.nstates == 0:
+        raise UnsuitableSystemError("the system is a pure gain; it has no dynamics to refine")
     direct = bool(np.any(core.D)) if feedthrough is None else bool(feedthrough)
     shares = model.input_delays, model.output_delays
     found = fit_sections(
@@ -259,21 +263,32 @@ def refine(
     return fitted_system(Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), ())
 
 
-def _orders(order: int | Sequence[int] | None) -> tuple[int, ...] | None:
+def _orders(order: int | Iterable[int] | None) -> tuple[int, ...] | None:
     if order is None:
         return None
-    given = order if isinstance(order, Sequence) else (order,)
-    if len(given) == 0:
+    given = order if isinstance(order, Iterable) else (order,)
+    orders = tuple(sorted({whole(n, "order", 1) for n in given}))
+    if not orders:
         raise OrderError("order is empty; needed is at least one order")
-    return tuple(sorted({whole(n, "order", 1) for n in given}))
+    return orders
 
 
-def _check_inputs(group: Sequence[Record]) -> None:
+def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
+    if feedthrough not in (None, True, False):
+        raise OptionError(f"feedthrough={feedthrough!r}; needed is True, False or None")
     for i, record in enumerate(group):
         if np.isnan(record.input).any():
             raise DataError(
                 f"record {i} has gaps in its input: what the plant does then is not known; use "
                 "the records between them, or impulse_from_io"
+            )
+    for name in ("input", "output"):
+        known = [np.atleast_2d(getattr(record, name)) for record in group]
+        size = np.fmax.reduce(np.abs(np.concatenate(known, axis=1)), axis=1)
+        if np.any(size < LEAST):
+            raise DataError(
+                f"{name} {int(np.argmin(size))} stays below {LEAST:g}; squares of it vanish: "
+                "choose another unit, or is it connected?"
             )
 
 

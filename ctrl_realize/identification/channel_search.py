@@ -70,6 +70,8 @@ def experiments(
         found.append(Experiment(v - v.mean(axis=1, keepdims=True), late - level))
         if left is not None:
             left -= samples
+    if not found:
+        raise DataError(f"no record is longer than the delays, {first} samples")
     return found
 
 

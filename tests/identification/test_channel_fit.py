@@ -196,6 +196,11 @@ def test_arguments_that_make_no_sense_are_refused():
         cr.fit_channels(first, 300)
     with pytest.raises(DelayRangeError):
         cr.fit_channels(first, 3, delays=[2, 5])
+    with pytest.raises(OptionError, match="feedthrough='yes'"):
+        cr.fit_channels(first, 3, feedthrough="yes")
+    with pytest.raises(DataError, match="output 1 stays below 1e-70"):
+        cr.fit_channels(cr.Record(first.time, first.input, first.output * [[1.0], [1e-80]]))
+    assert cr.fit_channels(first, np.array([3])).fit.order == 3
 
 
 def test_refining_brings_a_rough_model_to_the_fit(model):
@@ -209,8 +214,14 @@ def test_refining_brings_a_rough_model_to_the_fit(model):
 
 
 def test_refining_asks_for_a_system_that_fits_the_record():
+    first = record()
     with pytest.raises(DataError, match="2 inputs and 2 outputs, the system 1 and 1"):
         cr.refine(cr.delayed_ss(ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT), 0), record())
+    one = cr.Record(first.time, first.input[0], first.output[0])
+    with pytest.raises(UnsuitableSystemError, match="pure gain"):
+        cr.refine(ct.ss([], [], [], [[1.0]], DT), one)
+    with pytest.raises(DataError, match="longer than the delays, 900"):
+        cr.refine(cr.delayed_ss(ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT), 900), one)
     with pytest.raises(UnsuitableSystemError):
         cr.refine(ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), record())
 
