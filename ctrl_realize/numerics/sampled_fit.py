@@ -15,6 +15,7 @@ from .arrays import FloatArray
 from .fit_window import Window, WindowFit, extended, fit_window
 from .likelihood_interval import chains_of, likelihood_fit
 from .noise_level import correlation_time, quantisation_step, winsorised_sigma
+from .onset import correlation_onset
 from .output_error_result import OutputErrorFit
 from .own_terms import OwnTerms
 from .pole_factors import parameters_from_poles, poles_from_parameters
@@ -31,6 +32,7 @@ MORE_LAGS = (Structure(4, 4), Structure(5, 5))
 _RISES = (2.0, 10.0, 50.0)
 _ONSETS = (1.0, 5.0, 20.0)
 _SMALLEST = 1e-4
+_CONFIDENCE = 0.99
 _UNLIKE = 1.3  # ratio of noise levels from which records are weighted
 _BEYOND = 1.5  # of a first-order model's delay: no model's delay is later
 _SLOW = 10.0  # times delay and lag: periods from there on tell little of the plant
@@ -103,7 +105,7 @@ def fit_sampled(
     n = max(y.size for y in data.outputs)
     limit = 0.25 * n * dt if latest is None else latest
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs))
-    rough = _first_order(data.problem(factor), n, dt, limit)
+    rough = _first_order(data.problem(factor), n, dt, limit, _seen(data, limit))
     lag = float(-1.0 / rough.poles[0].real)
     late = int(np.ceil(_BEYOND * rough.delay / dt))
     data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
@@ -173,7 +175,24 @@ def _explained(whole: WindowFit) -> float:
     return (alone - best.cost) / max(whole.variance, 1e-300)
 
 
-def _first_order(problem: Problem, n: int, dt: float, limit: float) -> Candidate:
+def _seen(data: SampledData, limit: float) -> list[float]:
+    """First lag, in samples, at which the output follows the input; empty where none is seen.
+
+    The valleys of an input that moves at every sample are as narrow as the plant is fast, and the
+    delays that are tried otherwise lie too far apart to find one.
+    """
+    found = []
+    for u, y in zip(data.inputs, data.outputs, strict=True):
+        most = int(min(limit / data.dt, u.size // 3))
+        if most > 1 and np.ptp(u) > 0:
+            found.append(correlation_onset(u, y, most, _CONFIDENCE).onset)
+    onsets = [float(lag) for lag in found if lag > 0]
+    return [float(np.median(onsets))] if onsets else []
+
+
+def _first_order(
+    problem: Problem, n: int, dt: float, limit: float, seen: Sequence[float]
+) -> Candidate:
     """Best first-order model from a grid of delays and time constants."""
     tries = [
         search(
@@ -182,7 +201,7 @@ def _first_order(problem: Problem, n: int, dt: float, limit: float) -> Candidate
             Scales(min(onset * dt, limit), min(rise, n / 4) * dt, n * dt, dt, limit),
         )[Structure(1, 1)]
         for rise in _RISES
-        for onset in _ONSETS
+        for onset in (*_ONSETS, *seen)
     ]
     return min(tries, key=lambda candidate: candidate.cost)
 

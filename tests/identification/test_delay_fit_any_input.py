@@ -72,6 +72,19 @@ def test_a_long_record_is_cut_and_says_so():
     assert "cut" in [flag.code for flag in fit.flags]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample(seed):
+    # A lag of ten samples behind 150: the valley is as narrow as the lag.
+    rng = np.random.default_rng(seed)
+    plant = cr.DelayedStateSpace(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT), 150)
+    u = rng.choice([-1.0, 1.0], 1000)
+    y = plant.simulate(u) + 0.05 * rng.standard_normal(1000)
+    fit = cr.fit_delay(cr.Record(DT * np.arange(1000), u, y)).fit
+    assert fit.structure == (1, 1)
+    assert abs(fit.delay - 150) < 0.5
+    assert fit.delay_interval[0] <= 150 <= fit.delay_interval[1]
+
+
 def random_binary(poles, noise, disturbance=0.0, seed=0):
     """Lags behind 0.8 s under a random binary input; per cent of noise, and a slow sine."""
     rng = np.random.default_rng(seed)
