@@ -226,7 +226,9 @@ def test_a_file_of_empty_elements_is_damaged(tmp_path):
 
 
 @pytest.mark.parametrize("read", READERS)
-@pytest.mark.parametrize("path", [None, 3, b"a.csv", io.StringIO("t,u,y\n")], ids=str)
+@pytest.mark.parametrize(
+    "path", [None, 3, b"a.csv", io.StringIO("t,u,y\n")], ids=lambda path: type(path).__name__
+)
 def test_what_is_no_name_of_a_file_is_refused(read, path):
     with pytest.raises(OptionError, match=f"not by {type(path).__name__}"):
         read(path)
