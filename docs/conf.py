@@ -11,6 +11,7 @@ ROOT = HERE.parent
 sys.path.insert(0, str(HERE / "_ext"))
 sys.path.insert(0, str(ROOT))
 
+import flag_table  # noqa: E402
 import public_names  # noqa: E402
 
 import ctrl_realize  # noqa: E402
@@ -76,6 +77,7 @@ for _name, (_file, _command) in TABLES.items():
     _first, _heading, _rest = _text.partition("\n### ")
     (GENERATED / "tables" / f"{_name}.md").write_text(_first)
     (GENERATED / "tables" / f"{_name}_more.md").write_text(_heading.lstrip("\n") + _rest)
+(GENERATED / "tables" / "flags.md").write_text(flag_table.table(ROOT / "ctrl_realize"))
 
 # -- notebooks and code cells --------------------------------------------------------------------
 

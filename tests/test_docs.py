@@ -133,3 +133,15 @@ def test_no_summary_of_the_reference_is_cut_at_an_abbreviation(reference):
         summary = (getattr(value, "__doc__", "") or "").split("\n")[0]
         # The tables of the reference show the words up to the first full stop.
         assert not re.search(r"\b(Figs?|[Ss]ect?|Eqs?|e\.g|i\.e|vs)\. ", summary), entry
+
+
+def test_every_flag_has_its_words_on_the_page_of_flags():
+    spec = importlib.util.spec_from_file_location("flag_table", DOCS / "_ext" / "flag_table.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    listed_flags = module.flags(Path(cr.__file__).parent)
+    assert len({code for code, _, _ in listed_flags}) > 40
+    assert [code for code, _, words in listed_flags if words.strip("… :") == ""] == []
+    for _, function, _ in listed_flags:
+        home, _, name = f"ctrl_realize.{function}".rpartition(".")
+        assert callable(getattr(import_module(home), name)), function
