@@ -96,7 +96,7 @@ def valve(
     >>> print(cr.bench.valve().truth.report())
     Simulated valve: truth
       gain               0.125 mm/mA
-      poles              2.2 Hz, 8 Hz (damping 0.7), 30 Hz, 1e+04 Hz
+      poles              2.2 Hz, 8 Hz (damping 0.7), 30 Hz, 10000 Hz
       dead time          28.906 ms = 37 samples
       total delay at DC  134.42 ms
     """
