@@ -118,8 +118,9 @@ class Realization(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         values = ", ".join(f"{value:.4g}" for value in self.singular_values[: self.order])
+        in_samples = f"({self.delay} samples of {in_time(self.dt, 6)})"
         rows = [
-            ("dead time", f"{in_time(self.delay * self.dt, 5)} ({self.delay} samples)"),
+            ("dead time", f"{in_time(self.delay * self.dt, 5)} {in_samples}"),
             ("Hankel matrix", f"{self.hankel}, {self.samples} samples"),
             ("direct term", f"G[{self.delay}]" if self.feedthrough else "0"),
             ("singular values", f"{values} (next {self.following:.4g})"),

@@ -113,7 +113,7 @@ def test_the_report_says_the_numbers_of_the_result(hankel):
     g = np.concatenate([np.zeros(4), 0.2 * 0.8 ** np.arange(120) + 0.1 * 0.5 ** np.arange(120)])
     fit = cr.realize(g, 2, delay=4, samples=100, hankel=hankel, dt=0.05).fit
     rows = dict(fit._rows())
-    assert rows["dead time"] == "0.2 s (4 samples of 0.05 s)"
+    assert rows["dead time"] == "200 ms (4 samples of 50 ms)"
     assert rows["Hankel matrix"] == f"{hankel}, 100 samples"
     assert rows["direct term"] == "G[4]"
     first, second = fit.singular_values[:2]
