@@ -27,7 +27,7 @@ from .structure_search import Scales
 
 _CONTINUED = 2  # a drift at rest goes on for this many times the rest
 _BINS_RELAXING = 60
-_MANY = 100
+_MANY = 100  # samples at rest in which dither would show more than two levels
 _BRIEF = 0.05  # of the samples that follow the step
 
 
@@ -88,8 +88,8 @@ class StepData:
     def explanations(self) -> list[StepData]:
         """Ways to take a slope before the step: as drift, as the plant's own motion, as nothing.
 
-        A drift goes on to the end, or ends after twice the time for which it was seen. Nothing is
-        tried where that was less than a twentieth of what follows.
+        A drift goes on to the end, or ends after twice the time for which it was seen. That it was
+        nothing is tried where it was seen over less than a twentieth of what follows.
         """
         if not self.drift:
             return [self]
