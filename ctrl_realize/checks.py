@@ -66,3 +66,8 @@ def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:
 def spelled_out(text: str) -> str:
     """Spell out what no encoding takes: file names that are no UTF-8 hold lone surrogates."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def system_name(name: str) -> str:
+    """Make a name that python-control takes: it allows no dots."""
+    return name.replace(".", "_")

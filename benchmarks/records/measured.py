@@ -42,10 +42,14 @@ def centred(record: cr.Record) -> tuple[np.ndarray, np.ndarray]:
     return u - u.mean(axis=1, keepdims=True), y - y.mean(axis=1, keepdims=True)
 
 
+class UnfitRecordError(Exception):
+    """A way that takes no records of this kind."""
+
+
 def scanned(record: cr.Record, _: int) -> ct.StateSpace:
     """Impulse response, and the order and delay that its standard deviations ask for."""
     if record.n_outputs > 1:
-        raise NotImplementedError
+        raise UnfitRecordError
     impulse = cr.impulse_from_io(record)
     return cr.scan_orders(impulse, 8, max_delay=10).system()
 
@@ -101,7 +105,7 @@ def predicted(way: Model, order: int, first: cr.Record, second: cr.Record) -> fl
             return float(cr.check_residuals(model, second).fit_percent.mean())
     except ImportError:
         return "not installed"
-    except NotImplementedError:
+    except UnfitRecordError:
         return "-"
     except cr.errors.UnsuitableSystemError:
         return "unstable"

@@ -9,7 +9,7 @@ from typing import Literal, TypedDict
 import control as ct
 import numpy as np
 
-from ..checks import one_of, positive
+from ..checks import one_of, positive, system_name
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
@@ -96,7 +96,11 @@ def fit_delay(
     where three poles or more are needed, so that many lags are not read as dead time. The modes
     of diffusion widen the interval where they fit as well. Where the best structure has a zero,
     which imitates a smooth beginning, the interval reaches to a sample after the first motion, and
-    three times as far before the delay as the first motion comes after it.
+    three times as far before the delay as the first motion comes after it. One lag more than was
+    chosen is never ruled out, and a chain of six or more may be a flow that disperses.
+
+    A slope before the step is a drift, a drift that ends, the plant's own free response, or
+    nothing: the information criterion decides.
 
     A dead time has no Fisher information in a model with more zeros than the plant: a superfluous
     zero imitates it. That is why the relative degree is chosen, not left free.
@@ -120,7 +124,8 @@ def fit_delay(
     several = _records(records)
     settings: _Settings = {"structures": tried, "known": factor, "huber": loss == "huber"}
     if len(several) > 1:
-        way = _fit_mean if _all_step(several) else fit_any_input
+        # Where every record is a step experiment they can be averaged at it.
+        way = _fit_mean if all(map(_edges, several)) else fit_any_input
         result, fit = way(several, limit, settings)
         result = replace(result, flags=result.flags + same_record_flags(several))
     else:
@@ -133,7 +138,7 @@ def fit_delay(
         dead_time=result.dead_time,
         dt=result.dt,
         fit=result,
-        name=several[0].name.replace(".", "_") or None,
+        name=system_name(several[0].name) or None,
         inputs=list(several[0].input_labels),
         outputs=list(several[0].output_labels),
     )
@@ -202,11 +207,6 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
                 f"record {record.name!r} has {record.n_inputs} inputs and {record.n_outputs} "
                 "outputs; choose one of each when it is made"
             )
-        if record.n_missing:
-            raise DataError(
-                f"record {record.name!r} has {record.n_missing} missing values; an output-error "
-                "fit needs all samples (cut with `between`, or see impulse_from_io)"
-            )
     return several
 
 
@@ -232,14 +232,8 @@ def _structures(structures: Sequence[tuple[int, int]] | None) -> tuple[Structure
 def _step_data(record: Record) -> StepData | None:
     """Data of a step record, None where the input is anything else."""
     signal, output = np.ravel(record.input), np.ravel(record.output)
-    try:
-        edges = detect_step(record).edges
-    except NoStepError:
-        if np.ptp(signal[:-_LAST]) == 0:
-            # It moves at the very end, if at all: there is nothing to fit.
-            raise
-        return None
-    if len(edges) > _MOST_EDGES or not _holds_between(signal, edges):
+    edges = _edges(record)
+    if not edges:
         return None
     data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edges])
     if data.motion is None:
@@ -250,6 +244,19 @@ def _step_data(record: Record) -> StepData | None:
     if len(edges) > 1 and edges[1].index - edges[0].index < _DWELL * data.motion.crossing:
         return None
     return data
+
+
+def _edges(record: Record) -> tuple[StepEdge, ...]:
+    """Edges of a step experiment; none where the input is anything else."""
+    signal = np.ravel(record.input)
+    try:
+        edges = detect_step(record).edges
+    except NoStepError:
+        if np.ptp(signal[:-_LAST]) == 0:
+            # It moves at the very end, if at all: there is nothing to fit.
+            raise
+        return ()
+    return edges if len(edges) <= _MOST_EDGES and _holds_between(signal, edges) else ()
 
 
 def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
@@ -267,19 +274,3 @@ def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
             away.append(np.abs(held - np.median(held)))
     largest = max(abs(edge.amplitude) for edge in edges)
     return bool(np.quantile(np.concatenate(away), 0.9) <= _HOLDS * largest)
-
-
-def _all_step(records: tuple[Record, ...]) -> bool:
-    """Tell whether every record is a step experiment, so that they can be averaged at it."""
-    for record in records:
-        signal = np.ravel(record.input)
-        try:
-            edges = detect_step(record).edges
-        except NoStepError:
-            if np.ptp(signal[:-_LAST]) == 0:
-                # It moves at the very end, if at all: there is nothing to fit.
-                raise
-            return False
-        if len(edges) > _MOST_EDGES or not _holds_between(signal, edges):
-            return False
-    return True

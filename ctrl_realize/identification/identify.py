@@ -9,7 +9,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of, whole
+from ..checks import one_of, system_name, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
@@ -273,11 +273,6 @@ def _named(
         if record.name:
             names["name"] = system_name(record.name)
     return system.replace(**names)
-
-
-def system_name(name: str) -> str:
-    """Make a name that python-control takes: it allows no dots."""
-    return name.replace(".", "_")
 
 
 def _half_risen(step: StepResponse) -> int:

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..checks import system_name
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..signals import MeasuredFRF
@@ -132,7 +133,7 @@ def read_frf(
         return MeasuredFRF(
             _response(table, columns, units),
             _frequency_hz(table, columns["frequency"], units.frequency),
-            name=_system_name(Path(path).stem) if name is None else name,
+            name=system_name(Path(path).stem) if name is None else name,
             **extras,
         )
     except DataError as error:
@@ -245,8 +246,3 @@ def _phase(table: Table, index: int, unit: str | None) -> FloatArray:
             "phase_unit='deg' or 'rad'"
         )
     return values if unit == "rad" else np.deg2rad(values)
-
-
-def _system_name(stem: str) -> str:
-    # python-control keeps dots for its own use
-    return stem.replace(".", "_")
