@@ -1,4 +1,4 @@
-"""Times in words, with a unit that suits them and as many digits as are worth reading."""
+"""Numbers in words: times with a unit that suits them, with as many digits as are worth reading."""
 
 from __future__ import annotations
 
@@ -12,9 +12,17 @@ UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}
 """Name of a unit of time -> how many of it are in a second."""
 
 
-def unit_for(seconds: float) -> str:
-    """Choose s, ms or µs for times up to so many seconds."""
-    return "s" if seconds >= 0.5 else "ms" if seconds >= 0.5e-3 else "µs"
+def time_unit(largest: float) -> tuple[float, str]:
+    """Choose s, ms or µs for times up to `largest` s; returns (units per second, name).
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import time_unit
+    >>> time_unit(3.0), time_unit(0.029)
+    ((1.0, 's'), (1000.0, 'ms'))
+    """
+    name = "s" if largest >= 0.5 else "ms" if largest >= 0.5e-3 else "µs"
+    return UNITS[name], name
 
 
 def in_time(seconds: float, digits: int = 3) -> str:
@@ -30,8 +38,8 @@ def in_time(seconds: float, digits: int = 3) -> str:
         return "unknown" if np.isnan(seconds) else "infinite"
     if seconds == 0:
         return "0 s"
-    name = unit_for(abs(seconds))
-    return f"{_plainly(seconds * UNITS[name], digits)} {name}"
+    factor, name = time_unit(abs(seconds))
+    return f"{_plainly(seconds * factor, digits)} {name}"
 
 
 def interval_in_time(low: float, high: float) -> str:
@@ -50,8 +58,8 @@ def interval_in_time(low: float, high: float) -> str:
     if not (np.isfinite(low) and np.isfinite(high)):
         return f"{in_time(low)} to {in_time(high)}"
     digits = interval_digits(low, high)
-    name = unit_for(max(abs(low), abs(high)))
-    ends = (_in_full(end * UNITS[name], digits) for end in (low, high))
+    factor, name = time_unit(max(abs(low), abs(high)))
+    ends = (_in_full(end * factor, digits) for end in (low, high))
     return f"{' to '.join(ends)} {name}"
 
 
@@ -65,11 +73,9 @@ def interval_digits(low: float, high: float) -> int:
 
 def _in_full(value: float, digits: int) -> str:
     """Write a number with its zeros, which tell how exact it is."""
-    return (
-        f"{value:#.{digits}g}".rstrip(".")
-        if 1e-3 < abs(value) < 10**digits
-        else (_plainly(value, digits))
-    )
+    if 1e-3 < abs(value) < 10**digits:
+        return f"{value:#.{digits}g}".rstrip(".")
+    return _plainly(value, digits)
 
 
 def _plainly(value: float, digits: int) -> str:

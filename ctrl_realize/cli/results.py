@@ -15,8 +15,8 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..io import save_model
 from ..io.atomic import write_text
-from ..plots.style import time_unit
 from ..signals import Record
+from ..wording import time_unit
 from .terminal import printable, table
 
 

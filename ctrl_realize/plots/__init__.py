@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from collections.abc import Callable
 from typing import Any
 
 import control as ct
@@ -10,65 +10,65 @@ import control as ct
 from .. import errors
 from .bootstraps import bootstrap_plot as bootstrap_plot
 from .campaigns import campaign_plot as campaign_plot
-from .design_plots import closed_loop_plot as closed_loop_plot
-from .design_plots import hankel_plot as hankel_plot
-from .design_plots import margins_plot as margins_plot
-from .design_plots import pid_comparison_plot as pid_comparison_plot
-from .design_plots import process_model_plot as process_model_plot
-from .diagnostics import channel_fit_plot as channel_fit_plot
-from .diagnostics import channels_plot as channels_plot
-from .diagnostics import delay_check_plot as delay_check_plot
-from .diagnostics import impulse_estimate_plot as impulse_estimate_plot
-from .diagnostics import prediction_plot as prediction_plot
-from .diagnostics import residual_plot as residual_plot
+from .closed_loops import closed_loop_plot as closed_loop_plot
+from .comparisons import comparison_plot as comparison_plot
+from .delay_checks import delay_check_plot as delay_check_plot
+from .design_models import hankel_plot as hankel_plot
+from .design_models import process_model_plot as process_model_plot
 from .fits import dead_time_plot as dead_time_plot
 from .fits import fit_plot as fit_plot
-from .frequencies import comparison_plot as comparison_plot
+from .frequencies import frf_fit_plot as frf_fit_plot
 from .frequencies import frf_plot as frf_plot
+from .frequencies import truth_plot as truth_plot
+from .impulses import channels_plot as channels_plot
+from .impulses import impulse_estimate_plot as impulse_estimate_plot
 from .impulses import impulse_plot as impulse_plot
-from .others import frf_fit_plot as frf_fit_plot
-from .others import track_plot as track_plot
-from .others import truth_plot as truth_plot
+from .margins import margins_plot as margins_plot
 from .records import onset_plot as onset_plot
 from .records import record_plot as record_plot
 from .records import step_plot as step_plot
-from .robustness_plots import delay_robustness_plot as delay_robustness_plot
-from .robustness_plots import robustness_plot as robustness_plot
-from .robustness_plots import uncertainty_plot as uncertainty_plot
+from .residuals import channel_fit_plot as channel_fit_plot
+from .residuals import prediction_plot as prediction_plot
+from .residuals import residual_plot as residual_plot
+from .robustness import delay_robustness_plot as delay_robustness_plot
+from .robustness import robustness_plot as robustness_plot
+from .robustness import uncertainty_plot as uncertainty_plot
 from .scans import delay_plot as delay_plot
 from .scans import order_plot as order_plot
 from .scans import singular_value_plot as singular_value_plot
+from .tracks import track_plot as track_plot
+from .tuning_rules import pid_comparison_plot as pid_comparison_plot
 
-_DRAWN_BY = {
-    "BalancedReduction": "design_plots:hankel_plot",
-    "Campaign": "campaigns:campaign_plot",
-    "ChannelFit": "diagnostics:channel_fit_plot",
-    "ChannelRealization": "diagnostics:channels_plot",
-    "DelayCheck": "diagnostics:delay_check_plot",
-    "Bootstrap": "bootstraps:bootstrap_plot",
-    "DelayFit": "fits:fit_plot",
-    "DelayRobustness": "robustness_plots:delay_robustness_plot",
-    "DelayScan": "scans:delay_plot",
-    "DelayTrack": "others:track_plot",
-    "FRFComparison": "frequencies:comparison_plot",
-    "FRFFit": "others:frf_fit_plot",
-    "ImpulseEstimate": "diagnostics:impulse_estimate_plot",
-    "ImpulseResponse": "impulses:impulse_plot",
-    "Margins": "design_plots:margins_plot",
-    "MeasuredFRF": "frequencies:frf_plot",
-    "OrderScan": "scans:order_plot",
-    "PIDComparison": "design_plots:pid_comparison_plot",
-    "Prediction": "diagnostics:prediction_plot",
-    "ProcessModel": "design_plots:process_model_plot",
-    "Realization": "scans:singular_value_plot",
-    "Record": "records:record_plot",
-    "ResidualCheck": "diagnostics:residual_plot",
-    "RobustnessCheck": "robustness_plots:robustness_plot",
-    "StepResponse": "records:step_plot",
-    "UncertaintyBound": "robustness_plots:uncertainty_plot",
-    "ValveTruth": "others:truth_plot",
+_DRAWN_BY: dict[str, Callable[..., ct.ControlPlot]] = {
+    "BalancedReduction": hankel_plot,
+    "Bootstrap": bootstrap_plot,
+    "Campaign": campaign_plot,
+    "ChannelFit": channel_fit_plot,
+    "ChannelRealization": channels_plot,
+    "DelayCheck": delay_check_plot,
+    "DelayFit": fit_plot,
+    "DelayRobustness": delay_robustness_plot,
+    "DelayScan": delay_plot,
+    "DelayTrack": track_plot,
+    "FRFComparison": comparison_plot,
+    "FRFFit": frf_fit_plot,
+    "ImpulseEstimate": impulse_estimate_plot,
+    "ImpulseResponse": impulse_plot,
+    "Margins": margins_plot,
+    "MeasuredFRF": frf_plot,
+    "OrderScan": order_plot,
+    "PIDComparison": pid_comparison_plot,
+    "Prediction": prediction_plot,
+    "ProcessModel": process_model_plot,
+    "Realization": singular_value_plot,
+    "Record": record_plot,
+    "ResidualCheck": residual_plot,
+    "RobustnessCheck": robustness_plot,
+    "StepResponse": step_plot,
+    "UncertaintyBound": uncertainty_plot,
+    "ValveTruth": truth_plot,
 }
-"""Class of a result -> module of this package and function that draws it."""
+"""Class of a result -> function that draws it."""
 
 
 def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
@@ -103,11 +103,7 @@ def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
     """
     for kind in type(result).__mro__:
         if kind.__name__ in _DRAWN_BY:
-            module, function = _DRAWN_BY[kind.__name__].split(":")
-            drawn: ct.ControlPlot = getattr(import_module(f".{module}", __name__), function)(
-                result, **kwargs
-            )
-            return drawn
+            return _DRAWN_BY[kind.__name__](result, **kwargs)
     if type(result).__name__ == "FitSummary":
         raise errors.OptionError(
             "a model file keeps the report of a fit and not its curves; identify the record "

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..identification.bootstrap import Bootstrap
 from . import style
+from .scales import time_unit
 
 
 def bootstrap_plot(
@@ -54,24 +55,21 @@ def bootstrap_plot(
     low, high = result.step_band(count)
     own = np.cumsum(np.ravel(result.system.markov(count)))
     dt = float(result.system.dt)
-    with style.context():
-        upper, lower = axes = style.axes_for(ax, 2, size=(8.0, 6.0), sharex=False)
-        factor, unit = style.time_unit(count * dt, upper)
+    with style.canvas(ax, 2, title=title, size=(8.0, 6.0), sharex=False) as (upper, lower):
+        factor, unit = time_unit(count * dt, upper)
         time = factor * dt * np.arange(count)
         upper.fill_between(time, low, high, color=style.BAND, alpha=0.4, label="95 % of the draws")
         looks = {"color": style.MODEL, "label": "model of the data", **kwargs}
         lines = upper.plot(time, own, **looks)
         upper.set_xlabel(f"time [{unit}]")
         upper.set_ylabel("unit step\nresponse")
-        factor, unit = style.time_unit(float(result.dead_times.max()), lower)
+        factor, unit = time_unit(float(result.dead_times.max()), lower)
         lower.hist(factor * result.dead_times, bins="auto", color=style.MEASURED, alpha=0.6)
         for limit in result.interval:
             lower.axvline(factor * limit, color=style.INK, linewidth=1.0)
         lower.set_xlabel(f"dead time [{unit}]")
         lower.set_ylabel("draws")
-        return style.finished(
-            axes, [lines, []], title=title or "", own_figure=ax is None, loc="lower right"
-        )
+        return style.finished([upper, lower], [lines, []], loc="lower right")
 
 
 def _settled(result: Bootstrap) -> int:

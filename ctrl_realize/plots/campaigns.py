@@ -13,7 +13,9 @@ from matplotlib.lines import Line2D
 from ..errors import DataError
 from ..identification.campaign import Campaign
 from ..identification.campaign_row import CampaignRow
+from ..wording import in_time
 from . import style
+from .names import plain
 
 _MOST_NAMES = 24
 _MOST_GROUPS = 8
@@ -68,10 +70,10 @@ def campaign_plot(
     summary = campaign.statistics(trim)
     groups = _groups(campaign)
     looks = {"color": style.MEASURED, "marker": "o", "linestyle": "none", **kwargs}
-    with style.context():
-        listed = groups is None
-        tall = 0.34 * len(campaign.good) + 1.8
-        axes = style.axes_for(ax, size=(8.0, max(tall, 3.2) if listed else 4.8))[0]
+    listed = groups is None
+    size = (8.0, max(0.34 * len(campaign.good) + 1.8, 3.2) if listed else 4.8)
+    name = f"{len(campaign.good)} records, method {campaign.method}"
+    with style.canvas(ax, title=title, default_title=name, size=size) as (axes,):
         if groups is None:
             lines = _by_name(axes, campaign.good, dt, looks)
         else:
@@ -86,17 +88,13 @@ def campaign_plot(
         along(
             summary.mean,
             color=style.MODEL,
-            label=f"trimmed mean {summary.mean:.2f} samples = {style.in_time(summary.mean * dt)}",
+            label=f"trimmed mean {summary.mean:.2f} samples = {in_time(summary.mean * dt)}",
             **reach,
         )
         if truth is not None:
-            name = f"truth {truth:.4g} (simulated)"
-            along(truth, color=style.TRUTH, linestyle=":", label=name, **reach)
-        name = f"{len(campaign.good)} records, method {campaign.method}"
-        return style.finished(
-            [axes], [lines], title=name if title is None else title, own_figure=ax is None,
-            loc="upper left",
-        )  # fmt: skip
+            known = f"truth {truth:.4g} (simulated)"
+            along(truth, color=style.TRUTH, linestyle=":", label=known, **reach)
+        return style.finished([axes], [lines], loc="upper left")
 
 
 def _groups(campaign: Campaign) -> dict[float, list[CampaignRow]] | None:
@@ -137,7 +135,7 @@ def _by_name(
         axes.plot(
             [low, high], [position, position], color=looks["color"], linewidth=1.6, alpha=0.45
         )
-    names = [style.plain(row.name, 34) for row in rows]
+    names = [plain(row.name, 34) for row in rows]
     axes.set_yticks(range(len(rows)), names, fontsize=10)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel("delay [samples]")

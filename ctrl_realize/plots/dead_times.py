@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..delayed import DelayedStateSpace
+from ..wording import in_time, interval_digits, interval_in_time
 from . import style
 
 
@@ -28,10 +29,10 @@ def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None
     """Draw the dead time as a line, its interval as a band; `factor` is in units per s."""
     wait = estimate_of(system)
     interval = interval_of(system)
-    digits = 3 if interval is None else style.interval_digits(*interval)
-    text = f"dead time\n{style.in_time(wait, digits)} = {wait / system.dt:.{digits}g} samples"
+    digits = 3 if interval is None else interval_digits(*interval)
+    text = f"dead time\n{in_time(wait, digits)} = {wait / system.dt:.{digits}g} samples"
     if interval is not None:
-        text += f"\n{style.interval_in_time(*interval)}"
+        text += f"\n{interval_in_time(*interval)}"
         if interval[1] > interval[0]:
             low, high = (factor * bound for bound in interval)
             axes.axvspan(low, high, color=style.BAND, alpha=0.22, linewidth=0)

@@ -12,9 +12,13 @@ from matplotlib.lines import Line2D
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..identification.delay_fit_result import DelayFit
+from ..wording import in_time, interval_digits, interval_in_time
 from . import style
+from .names import plain, wrapped
+from .scales import time_unit
 
 _RULED_OUT = 10.0
+"""Structures with a larger excess are not drawn."""
 _MOST_STRUCTURES = 8
 
 
@@ -59,19 +63,16 @@ def fit_plot(
     ['output', 'residual', '']
     """
     result = _delay_fit(fit)
-    with style.context():
-        rows = evidence_height(result)
-        axes = style.axes_for(ax, 3, size=(8.0, 4.8 + rows), heights=(2.2, 1.2, rows), sharex=False)
-        upper, middle, lower = axes
-        lines = _data_and_model(upper, middle, result, **kwargs)
-        drawn = _evidence(lower, result)
-        name = result.records[0].name if result.records else ""
+    rows = evidence_height(result)
+    rising = result.fitted[-1] >= result.fitted[0]
+    with style.canvas(
+        ax, 3, title=title, default_title=_name(result),
+        size=(8.0, 4.8 + rows), heights=(2.2, 1.2, rows), sharex=False,
+    ) as axes:  # fmt: skip
+        lines = _data_and_model(axes[0], axes[1], result, **kwargs)
+        evidence = _evidence(axes[2], result)
         return style.finished(
-            axes,
-            [*lines, drawn],
-            title=name if title is None else title,
-            own_figure=ax is None,
-            loc="lower right" if result.fitted[-1] >= result.fitted[0] else "upper right",
+            axes, [*lines, evidence], loc="lower right" if rising else "upper right"
         )
 
 
@@ -116,14 +117,9 @@ def dead_time_plot(
     'dead time [ms]'
     """
     result = _delay_fit(fit)
-    with style.context():
-        axes = style.axes_for(ax, size=(8.0, 1.0 + evidence_height(result)))
-        drawn = _evidence(axes[0], result, **kwargs)
-        name = result.records[0].name if result.records else ""
-        return style.finished(
-            axes, [drawn], title=name if title is None else title, own_figure=ax is None,
-            legends=(),
-        )  # fmt: skip
+    size = (8.0, 1.0 + evidence_height(result))
+    with style.canvas(ax, title=title, default_title=_name(result), size=size) as (axes,):
+        return style.finished([axes], [_evidence(axes, result, **kwargs)], legends=())
 
 
 def _delay_fit(given: Any) -> DelayFit:
@@ -135,10 +131,14 @@ def _delay_fit(given: Any) -> DelayFit:
     return result
 
 
+def _name(result: DelayFit) -> str:
+    return result.records[0].name if result.records else ""
+
+
 def _data_and_model(
     upper: Axes, lower: Axes, result: DelayFit, **kwargs: Any
 ) -> list[list[Line2D]]:
-    factor, unit = style.time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
+    factor, unit = time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
     time = factor * result.time
     looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
     label = f"mean of {len(result.records)} records" if _averaged(result) else "measured"
@@ -178,7 +178,7 @@ def _output_label(result: DelayFit) -> str:
     if _averaged(result):  # records of different steps are scaled before they are averaged
         return "unit step\nresponse"
     label = result.records[0].output_labels[0] if result.records else "y"
-    return "output" if label == "y" else style.wrapped(label, 18)
+    return "output" if label == "y" else wrapped(label, 18)
 
 
 def evidence_height(result: DelayFit) -> float:
@@ -204,7 +204,7 @@ def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
     """Draw one row for each structure that is not ruled out, and one for each view."""
     rows = _evidence_rows(result)
     low, high = result.interval
-    factor, unit = style.time_unit(max(high, *(seen for _, seen, _, _ in rows)), axes)
+    factor, unit = time_unit(max(high, *(seen for _, seen, _, _ in rows)), axes)
     axes.axvspan(factor * low, factor * high, color=style.BAND, alpha=0.22, linewidth=0)
     axes.axvline(factor * result.dead_time, color=style.MODEL, linewidth=1.5)
     points: list[Line2D] = []
@@ -214,11 +214,11 @@ def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
             axes.plot(ends, [height, height], color=colour, linewidth=2.5, alpha=0.5)
         looks = {"color": colour, "marker": "o", "linestyle": "none", **kwargs}
         points += axes.plot([factor * seen], [height], **looks)
-    axes.set_yticks(range(len(rows)), [style.plain(name, 40) for name, *_ in rows], fontsize=10)
+    axes.set_yticks(range(len(rows)), [plain(name, 40) for name, *_ in rows], fontsize=10)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel(f"dead time [{unit}]")
-    wait = style.in_time(result.dead_time, style.interval_digits(low, high))
-    said = f"{wait} ({style.interval_in_time(low, high)})"
+    wait = in_time(result.dead_time, interval_digits(low, high))
+    said = f"{wait} ({interval_in_time(low, high)})"
     axes.set_title(said, loc="left", fontsize=11)
     return points

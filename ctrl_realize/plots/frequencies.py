@@ -1,10 +1,8 @@
-"""Plots of frequency responses: measured with their coherence, models on top, the difference."""
+"""Plots of frequency responses: measured with their coherence, models on top."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import control as ct
@@ -12,35 +10,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..errors import DataError, UnsuitableSystemError
-from ..frequency.comparison import FRFComparison
-from ..numerics.arrays import ComplexArray, FloatArray
-from ..numerics.spectra import unwrapped_phase
+from ..bench.truth import ValveTruth
+from ..frequency.frf_fit import FRFFit
+from ..numerics.arrays import FloatArray
+from ..signals import MeasuredFRF
 from . import style
+from .frf_curves import FITTED, TRUSTED_COHERENCE, Curve, curves_of
+from .names import plain
+from .scales import decibel, frequency_axis, phase_ticks
 
-TRUSTED_COHERENCE = 0.95
-_POINTS = 600
-FITTED = "fit, order"
-"""How the name of a fitted response begins."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Curve:
-    """One frequency response, ready to draw."""
-
-    label: str
-    frequency_hz: FloatArray
-    response: ComplexArray
-    phase_deg: FloatArray
-    coherence: FloatArray | None
-    measured: bool
-
-    @property
-    def good(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        if self.coherence is None:
-            return np.ones(self.frequency_hz.size, dtype=np.bool_)
-        good = self.coherence >= TRUSTED_COHERENCE
-        return good if good.any() else np.ones_like(good)
+_FEW_POINTS = 60
+"""So few measured points are drawn as dots as well: what lies between them is not known."""
 
 
 def frf_plot(
@@ -94,55 +74,45 @@ def frf_plot(
     ['gain [dB]', 'phase [deg]']
     """
     items = list(sysdata) if isinstance(sysdata, list | tuple) else [sysdata]
-    curves = _curves(items, frequency_hz, dead_time)
+    curves = curves_of(items, frequency_hz, dead_time)
     coherent = any(curve.coherence is not None for curve in curves)
-    with style.context():
-        rows = 3 if coherent else 2
-        axes = style.axes_for(
-            ax, rows, size=(8.0, 6.6 if coherent else 5.6), heights=(2.0, 2.0, 0.8)[:rows]
-        )
+    rows = 3 if coherent else 2
+    size, heights = (8.0, 6.6 if coherent else 5.6), (2.0, 2.0, 0.8)[:rows]
+    with style.canvas(ax, rows, title=title, size=size, heights=heights) as axes:
         lines: list[list[Line2D]] = [[] for _ in axes]
         models = 0
         for curve in curves:
             looks = {**_looks(curve, models), **kwargs}
             models += not curve.measured
-            for row, values in enumerate((style.decibel(curve.response), curve.phase_deg)):
+            for row, values in enumerate((decibel(curve.response), curve.phase_deg)):
                 lines[row] += _draw(axes[row], curve, values, looks)
             if curve.coherence is not None:
                 lines[2] += axes[2].plot(
                     curve.frequency_hz, curve.coherence, color=looks["color"], linewidth=1.2
                 )
-        _focus(axes[0], [(c, style.decibel(c.response)) for c in curves])
+        _focus(axes[0], [(c, decibel(c.response)) for c in curves])
         _focus(axes[1], [(c, c.phase_deg) for c in curves])
         axes[0].set_ylabel("gain [dB]")
         axes[1].set_ylabel("phase [deg]")
-        style.phase_ticks(axes[1])
+        phase_ticks(axes[1])
         if coherent:
             axes[2].axhline(TRUSTED_COHERENCE, color=style.NOISE, linewidth=1.0, linestyle=":")
             axes[2].set_ylabel("coherence")
             axes[2].set_ylim(-0.02, 1.05)
         for one in axes:
-            style.frequency_axis(one, label=one is axes[-1])
-        return style.finished(axes, lines, title=title, own_figure=ax is None, loc="lower left")
+            frequency_axis(one, label=one is axes[-1])
+        return style.finished(axes, lines, loc="lower left")
 
 
-def comparison_plot(
-    comparison: FRFComparison,
-    *,
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw how far a model's gain and phase are from the measured ones, and the trusted band.
+def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
+    """Draw a fitted frequency response over the measured one.
 
     Parameters
     ----------
-    comparison : FRFComparison
+    fit : FRFFit
     ax : sequence of two Axes, or Figure, optional
-    title : str, optional
-        Default: the names of model and measurement, in a new figure.
     **kwargs
-        Line properties of both curves.
+        Passed on to `frf_plot`.
 
     Returns
     -------
@@ -150,148 +120,50 @@ def comparison_plot(
 
     Examples
     --------
-    >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
     >>> from ctrl_realize import plots
-    >>> model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=0.001)
-    >>> f = np.geomspace(0.1, 10, 40)
+    >>> f = np.geomspace(0.1, 20, 80)
     >>> s = 2j * np.pi * f
-    >>> frf = cr.MeasuredFRF(1.02 * np.exp(-0.03 * s) / (0.08 * s + 1), f)
-    >>> cplt = plots.comparison_plot(cr.compare_frf(model, frf))
-    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
-    ['gain error [dB]', 'phase error [deg]']
+    >>> frf = cr.MeasuredFRF(2 * np.exp(-0.0289 * s) / (0.08 * s + 1) ** 2, f)
+    >>> cplt = plots.frf_fit_plot(cr.fit_frf(frf, 2, dt=0.001).fit)
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['measured', 'fit, order 2']
     """
-    errors = (comparison.gain_error_db, comparison.phase_error_deg)
-    spread: tuple[FloatArray | None, FloatArray | None] = (None, None)
-    if comparison.std is not None:
-        relative = comparison.std / np.abs(comparison.measured)
-        # Of a complex error, half the power is in the gain and half in the phase.
-        spread = (
-            20 / np.log(10) * relative / np.sqrt(2),
-            np.degrees(relative / np.sqrt(2)),
-        )
-    looks = {"color": style.MODEL, "linewidth": 1.5, "label": "model - measured", **kwargs}
-    with style.context():
-        axes = style.axes_for(ax, 2, size=(8.0, 5.2))
-        lines = []
-        for one, error, std in zip(axes, errors, spread, strict=True):
-            one.axvspan(*comparison.band_hz, color=style.TRUTH, alpha=0.10, linewidth=0,
-                        label="trusted band")  # fmt: skip
-            if std is not None:
-                one.fill_between(
-                    comparison.frequency_hz, -2 * std, 2 * std, color=style.NOISE, alpha=0.35,
-                    linewidth=0, label="noise of the FRF (2 std)",
-                )  # fmt: skip
-            one.axhline(0.0, color=style.INK, linewidth=1.0)
-            trusted = np.where(comparison.trusted, error, np.nan)
-            one.plot(comparison.frequency_hz, error, **{**looks, "alpha": 0.3, "label": None})
-            lines.append(list(one.plot(comparison.frequency_hz, trusted, **looks)))
-            inside = np.abs(error[comparison.trusted])
-            limit = 1.6 * max(float(inside.max()), 1e-9)
-            one.set_ylim(-limit, limit)
-        axes[0].set_ylabel("gain error [dB]")
-        axes[1].set_ylabel("phase error [deg]")
-        for one in axes:
-            style.frequency_axis(one, label=one is axes[-1])
-        return style.finished(
-            axes,
-            lines,
-            title=comparison.name if title is None else title,
-            own_figure=ax is None,
-            loc="upper left",
-        )
+    omega = 2 * np.pi * fit.frequency_hz
+    model = np.asarray(fit.core(1j * omega)).reshape(-1) * np.exp(-1j * omega * fit.dead_time)
+    measured = MeasuredFRF(fit.measured, fit.frequency_hz, name=fit.name or "measured")
+    fitted = MeasuredFRF(model, fit.frequency_hz, name=f"{FITTED} {fit.order}")
+    return frf_plot([measured, fitted], ax=ax, dead_time=fit.dead_time, **kwargs)
 
 
-def _curves(
-    items: Sequence[Any], frequency_hz: Sequence[float] | None, dead_time: float | None
-) -> list[_Curve]:
-    for item in items:
-        if not isinstance(item, ct.LTI):
-            raise UnsuitableSystemError(
-                f"got a {type(item).__name__}; needed are systems of python-control or FRFs"
-            )
-        if (item.noutputs, item.ninputs) != (1, 1):
-            raise UnsuitableSystemError(
-                f"{item.name} has {item.ninputs} inputs and {item.noutputs} outputs; draw one "
-                "channel at a time, as system[i, j]"
-            )
-    if not items:
-        raise DataError("no frequency response to draw")
-    data = [item for item in items if isinstance(item, ct.FrequencyResponseData)]
-    grid = _grid(items, data) if frequency_hz is None else np.asarray(frequency_hz, dtype=float)
-    delays = [float(np.max(item.dead_time)) for item in items if hasattr(item, "dead_time")]
-    delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
-    curves = [_curve(item, grid, delay) for item in items]
-    nameless = [curve for curve in curves if re.fullmatch(r"sys\[\d+\]", curve.label)]
-    if len(nameless) == 1:  # python-control's own name says nothing
-        place = curves.index(nameless[0])
-        curves[place] = replace(nameless[0], label="model")
-    return _aligned(curves)
+def truth_plot(truth: ValveTruth, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
+    """Draw the frequency response of a simulated valve, without noise.
+
+    Parameters
+    ----------
+    truth : ValveTruth
+    ax : sequence of two Axes, or Figure, optional
+    **kwargs
+        Passed on to `frf_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> cplt = plots.truth_plot(cr.bench.valve().truth)
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['gain [dB]', 'phase [deg]']
+    """
+    frf = truth.frf(np.geomspace(0.1, 50.0, 500))
+    return frf_plot(frf, ax=ax, dead_time=truth.dead_time, **kwargs)
 
 
-def _grid(items: Sequence[Any], data: Sequence[Any]) -> FloatArray:
-    """Span the measurements; without any, three decades up to where the models end."""
-    if data:
-        ends = np.concatenate([np.asarray(one.omega) for one in data]) / (2 * np.pi)
-        positive = ends[ends > 0]
-        return np.geomspace(positive.min(), positive.max(), _POINTS)
-    sampled = [item for item in items if item.isdtime(strict=True) and item.dt is not True]
-    if sampled:
-        top = min(0.5 / float(item.dt) for item in sampled)
-        return np.geomspace(1e-4 * top, top, _POINTS)
-    poles = np.concatenate([np.abs(item.poles()) for item in items])
-    middle = float(np.median(poles[poles > 0])) / (2 * np.pi) if np.any(poles > 0) else 1.0
-    return np.geomspace(middle / 100, middle * 30, _POINTS)
-
-
-def _curve(item: Any, grid: FloatArray, delay: float) -> _Curve:
-    if isinstance(item, ct.FrequencyResponseData):
-        order = np.argsort(item.omega, kind="stable")
-        frequency = np.asarray(item.omega, dtype=float)[order] / (2 * np.pi)
-        response = np.asarray(item.frdata[0, 0], dtype=complex)[order]
-        coherence = getattr(item, "coherence", None)
-        coherence = None if coherence is None else np.reshape(coherence, -1)[order]
-    else:
-        step = float(item.dt) if item.isdtime(strict=True) else 0.0
-        frequency = grid if step == 0 else grid[grid <= 0.5 / step]
-        response = np.asarray(item(_points(frequency, step))).reshape(-1)
-        coherence = None
-    phase = np.degrees(unwrapped_phase(response, 2 * np.pi * frequency, delay))
-    # A fitted curve is a model, though only its response may be known.
-    measured = isinstance(item, ct.FrequencyResponseData) and not item.name.startswith(FITTED)
-    return _Curve(item.name or "measured", frequency, response, phase, coherence, measured)
-
-
-def _points(frequency_hz: FloatArray, step: float) -> ComplexArray:
-    s = 2j * np.pi * frequency_hz
-    return np.asarray(np.exp(s * step) if step else s, dtype=np.complex128)
-
-
-def _aligned(curves: list[_Curve]) -> list[_Curve]:
-    """Move phases by whole turns, so that they agree with the first model's where it is good."""
-    reference = next((curve for curve in curves if not curve.measured), curves[0])
-    moved = []
-    for curve in curves:
-        first = int(np.argmax(curve.good))
-        there = float(
-            np.interp(curve.frequency_hz[first], reference.frequency_hz, reference.phase_deg)
-        )
-        turns = round((float(curve.phase_deg[first]) - there) / 360)
-        moved.append(
-            _Curve(
-                curve.label,
-                curve.frequency_hz,
-                curve.response,
-                curve.phase_deg - 360 * turns,
-                curve.coherence,
-                curve.measured,
-            )
-        )
-    return moved
-
-
-def _looks(curve: _Curve, models: int) -> dict[str, Any]:
+def _looks(curve: Curve, models: int) -> dict[str, Any]:
     if curve.label.startswith("truth"):
         return {"color": style.TRUTH, "linewidth": 1.5, "linestyle": ":"}
     if curve.measured:
@@ -300,25 +172,18 @@ def _looks(curve: _Curve, models: int) -> dict[str, Any]:
     return {"color": style.model_colour(models), "linestyle": dashes}
 
 
-def _draw(axes: Axes, curve: _Curve, values: FloatArray, looks: dict[str, Any]) -> list[Line2D]:
-    dots: dict[str, Any] = (
-        {"marker": "o", "markersize": 4} if curve.measured and values.size <= 60 else {}
-    )
-    if bool(curve.good.all()):
-        return list(
-            axes.plot(
-                curve.frequency_hz, values, label=style.plain(curve.label, 50), **looks, **dots
-            )
-        )
-    pale = {**looks, "alpha": 0.35, "linewidth": 0.8}
-    axes.plot(curve.frequency_hz, values, **pale)
-    good = np.where(curve.good, values, np.nan)
-    return list(
-        axes.plot(curve.frequency_hz, good, label=style.plain(curve.label, 50), **looks, **dots)
-    )
+def _draw(axes: Axes, curve: Curve, values: FloatArray, looks: dict[str, Any]) -> list[Line2D]:
+    """Draw the good points as `looks` says, and the others pale behind them."""
+    if not curve.good.all():
+        axes.plot(curve.frequency_hz, values, **{**looks, "alpha": 0.35, "linewidth": 0.8})
+        values = np.where(curve.good, values, np.nan)
+    few = curve.measured and values.size <= _FEW_POINTS
+    dots: dict[str, Any] = {"marker": "o", "markersize": 4} if few else {}
+    label = plain(curve.label, 50)
+    return list(axes.plot(curve.frequency_hz, values, label=label, **looks, **dots))
 
 
-def _focus(axes: Axes, drawn: Sequence[tuple[_Curve, FloatArray]]) -> None:
+def _focus(axes: Axes, drawn: Sequence[tuple[Curve, FloatArray]]) -> None:
     """Choose the y axis by what can be trusted; noise may leave it."""
     if all(curve.coherence is None for curve, _ in drawn):
         return

@@ -1,4 +1,4 @@
-"""Plots of impulse responses, measured and of models."""
+"""Plots of impulse responses: measured, estimated, of models, of many channels."""
 
 from __future__ import annotations
 
@@ -12,9 +12,13 @@ from matplotlib.lines import Line2D
 
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
+from ..identification.channels import ChannelRealization
+from ..identification.from_io import ImpulseEstimate
 from ..numerics.arrays import FloatArray
 from ..signals import ImpulseResponse
 from . import style
+from .names import plain
+from .scales import time_unit
 
 
 def impulse_plot(
@@ -62,13 +66,14 @@ def impulse_plot(
                 f"response {impulse.n_outputs} x {impulse.n_inputs}"
             )
     rows, columns = impulse.n_outputs, impulse.n_inputs
-    with style.context():
-        size = (8.0, 4.6) if rows * columns == 1 else (4.0 * columns + 1, 2.6 * rows + 1)
-        axes = style.axes_for(ax, rows, columns=columns, size=size)
-        density = impulse.density.reshape(rows * columns, -1)
-        last = _settled(density) if until is None else int(until / impulse.dt) + 1
-        count = min(max(last, 8), impulse.n_samples)
-        factor, unit = style.time_unit(count * impulse.dt, axes[-1])
+    size = (8.0, 4.6) if rows * columns == 1 else (4.0 * columns + 1, 2.6 * rows + 1)
+    density = impulse.density.reshape(rows * columns, -1)
+    last = _settled(density) if until is None else int(until / impulse.dt) + 1
+    count = min(max(last, 8), impulse.n_samples)
+    with style.canvas(
+        ax, rows, columns=columns, size=size, title=title, default_title=impulse.name
+    ) as axes:
+        factor, unit = time_unit(count * impulse.dt, axes[-1])
         lines = []
         for index, (one, values) in enumerate(zip(axes, density, strict=True)):
             drawn = _one(one, impulse, values[:count], factor, **kwargs)
@@ -84,10 +89,83 @@ def impulse_plot(
                 one.set_ylabel("impulse response [1/s]")
         if impulse.filter is not None:
             axes[-1].set_xlabel(f"time [{unit}]\n(in the data: {impulse.filter})")
-        name = impulse.name if title is None else title
-        return style.finished(
-            axes, lines, columns=columns, title=name, own_figure=ax is None, loc="upper right"
+        return style.finished(axes, lines, columns=columns)
+
+
+def channels_plot(
+    fit: ChannelRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the responses of all channels, with a line where the delay of each ends.
+
+    Parameters
+    ----------
+    fit : ChannelRealization
+    ax : array of Axes (outputs x inputs) or Figure, optional
+    title : str, optional
+    **kwargs
+        Passed on to `impulse_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
+    >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
+    >>> cplt = plots.channels_plot(cr.realize_channels(np.array(late)[:, None, :], 1, dt=0.1).fit)
+    >>> [axes.get_title(loc="right") for axes in cplt.figure.axes]
+    ['input 0 to output 0', 'input 0 to output 1']
+    """
+    drawn = impulse_plot(fit.impulse, ax=ax, title=title, **kwargs)
+    factor, _ = time_unit(1.0, drawn.axes[-1, 0])
+    for place, axes in np.ndenumerate(drawn.axes):
+        if fit.delays[place] >= 0:
+            end = factor * fit.delays[place] * fit.impulse.dt
+            axes.axvline(end, color=style.TRUTH, linestyle=":")
+    return drawn
+
+
+def impulse_estimate_plot(estimate: ImpulseEstimate, *args: Any, **kwargs: Any) -> ct.ControlPlot:
+    """Draw an estimated impulse response in its band of two standard deviations.
+
+    Parameters
+    ----------
+    estimate : ImpulseEstimate
+    *args, **kwargs
+        As for `impulse_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
+    >>> y = 3.0 * np.roll(u, 5) + 0.1 * noise
+    >>> estimate = cr.impulse_from_io(cr.Record(0.01 * np.arange(2000), u, y), 20)
+    >>> cplt = plots.impulse_estimate_plot(estimate)
+    >>> cplt.figure.axes[0].get_ylabel()
+    'impulse response [1/s]'
+    """
+    drawn = impulse_plot(estimate, *args, **kwargs)
+    factor, _ = time_unit(1.0, drawn.axes[-1, 0])
+    time = factor * estimate.time
+    density = estimate.density.reshape(*drawn.axes.shape, -1)
+    spread = 2 * (estimate.std / estimate.dt).reshape(density.shape)
+    for place, axes in np.ndenumerate(drawn.axes):
+        window, middle, wide = axes.get_xlim(), density[place], spread[place]
+        axes.fill_between(
+            time, middle - wide, middle + wide, color=style.BAND, alpha=0.3, linewidth=0
         )
+        axes.set_xlim(window)
+    return drawn
 
 
 def _one(
@@ -114,7 +192,7 @@ def _model(
             markov / model.dt,
             color=style.model_colour(number),
             linestyle=style.DASHES[number % len(style.DASHES)],
-            label="model" if models == 1 else style.plain(model.name),
+            label="model" if models == 1 else plain(model.name),
         )
     )
 

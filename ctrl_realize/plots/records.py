@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import control as ct
@@ -17,9 +18,14 @@ from ..numerics.arrays import FloatArray
 from ..signals import Record, StepResponse
 from . import style
 from .dead_times import mark_dead_time
+from .names import plain, wrapped
+from .scales import time_unit
 
 _FEW_SAMPLES = 60
 """So few samples are drawn as points as well: what lies between them is not known."""
+
+_SHOWN_BEFORE = 0.35
+"""Time shown before a step, as a share of what is shown after it."""
 
 UNIT_STEP = "unit step response\n[output / input]"
 
@@ -50,22 +56,18 @@ def record_plot(
     >>> cplt.axes.shape
     (2, 1)
     """
-    with style.context():
-        upper, lower = axes = style.axes_for(ax, 2, size=(8.0, 5.2), heights=(2.2, 1.0))
-        factor, unit = style.time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
+    with style.canvas(
+        ax, 2, title=title, default_title=record.name, size=(8.0, 5.2), heights=(2.2, 1.0)
+    ) as (upper, lower):
+        factor, unit = time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
         time = factor * record.time
         measured = _signals(upper, time, record.output, record.output_labels, **kwargs)
         driven = _signals(lower, time, record.input, record.input_labels, color=style.INPUT)
         upper.set_ylabel(_axis_label(record.output_labels, "output"))
         lower.set_ylabel(_axis_label(record.input_labels, "input", 16))
         lower.set_xlabel(f"time [{unit}]")
-        return style.finished(
-            axes,
-            [measured, driven],
-            legends=[row for row, n in enumerate((record.n_outputs, record.n_inputs)) if n > 1],
-            title=record.name if title is None else title,
-            own_figure=ax is None,
-        )
+        several = [row for row, n in enumerate((record.n_outputs, record.n_inputs)) if n > 1]
+        return style.finished([upper, lower], [measured, driven], legends=several)
 
 
 def step_plot(
@@ -103,21 +105,15 @@ def step_plot(
     ['measured', 'model']
     """
     steps = _steps(step)
-    with style.context():
-        axes = style.axes_for(ax)
-        factor, unit = style.time_unit(max(float(s.time[-1]) for s in steps), axes[0])
-        lines = _measured_steps(axes[0], steps, factor, **kwargs)
+    longest = max(float(one.time[-1]) for one in steps)
+    rising = steps[0].output[-1] > 0
+    with style.canvas(ax, title=title, default_title=steps[0].name) as (axes,):
+        factor, unit = time_unit(longest, axes)
+        lines = _measured_steps(axes, steps, factor, **kwargs)
         if system is not None:
-            lines += _model_step(axes[0], system, max(float(s.time[-1]) for s in steps), factor)
-        axes[0].set_xlabel(f"time after the step [{unit}]")
-        axes[0].set_ylabel(UNIT_STEP)
-        return style.finished(
-            axes,
-            [lines],
-            title=steps[0].name if title is None else title,
-            own_figure=ax is None,
-            loc="lower right" if steps[0].output[-1] > 0 else "upper right",
-        )
+            lines += _model_step(axes, system, longest, factor)
+        axes.set(xlabel=f"time after the step [{unit}]", ylabel=UNIT_STEP)
+        return style.finished([axes], [lines], loc="lower right" if rising else "upper right")
 
 
 def onset_plot(
@@ -159,32 +155,24 @@ def onset_plot(
     ['measured', 'model']
     """
     steps = _steps(step)
-    with style.context():
-        axes = style.axes_for(ax)
-        shown = _onset_span(steps[0], system) if span is None else float(span)
-        factor, unit = style.time_unit(shown, axes[0])
-        near = [_until(one, shown) for one in steps]
-        lines = _measured_steps(axes[0], near, factor, before=0.35 * shown, **kwargs)
-        axes[0].axvline(0.0, color=style.INPUT, linewidth=1.5, linestyle=":")
-        axes[0].annotate(
+    shown = _onset_span(steps[0], system) if span is None else float(span)
+    before = _SHOWN_BEFORE * shown
+    near = [_until(one, shown) for one in steps]
+    name = f"{steps[0].name}: onset" if steps[0].name else "onset"
+    with style.canvas(ax, title=title, default_title=name) as (axes,):
+        factor, unit = time_unit(shown, axes)
+        lines = _measured_steps(axes, near, factor, before=before, **kwargs)
+        axes.axvline(0.0, color=style.INPUT, linewidth=1.5, linestyle=":")
+        axes.annotate(
             "step", (0.0, 0.94), (-5, 0), xycoords=("data", "axes fraction"),
             textcoords="offset points", ha="right", color=style.INPUT,
         )  # fmt: skip
         if system is not None:
-            lines += _model_step(axes[0], system, shown, factor)
-            mark_dead_time(axes[0], system, factor)
-        axes[0].set_xlim(-0.35 * shown * factor, shown * factor)
-        axes[0].set_xlabel(f"time after the step [{unit}]")
-        axes[0].set_ylabel(UNIT_STEP)
-        return style.finished(
-            axes,
-            [lines],
-            title=(f"{steps[0].name}: onset" if steps[0].name else "onset")
-            if title is None
-            else title,
-            own_figure=ax is None,
-            loc="center left",
-        )
+            lines += _model_step(axes, system, shown, factor)
+            mark_dead_time(axes, system, factor)
+        axes.set_xlim(-before * factor, shown * factor)
+        axes.set(xlabel=f"time after the step [{unit}]", ylabel=UNIT_STEP)
+        return style.finished([axes], [lines], loc="center left")
 
 
 def _signals(
@@ -197,7 +185,7 @@ def _signals(
         looks = {
             "color": style.OTHERS[(index - 1) % len(style.OTHERS)],
             "linewidth": 1.5,
-            "label": style.plain(label),
+            "label": plain(label),
             **first,
             **(kwargs if len(rows) == 1 else {k: v for k, v in kwargs.items() if k != "color"}),
         }
@@ -249,13 +237,7 @@ def _model_step(axes: Axes, system: DelayedStateSpace, until: float, factor: flo
 
 def _until(step: StepResponse, end: float) -> StepResponse:
     count = min(int(np.ceil(end / step.dt)) + 1, step.n_samples)
-    changes = {"time": step.time[:count], "output": step.output[:count]}
-    return StepResponse(
-        **{
-            name: changes.get(name, getattr(step, name))
-            for name in StepResponse.__dataclass_fields__
-        }
-    )
+    return replace(step, time=step.time[:count], output=step.output[:count])
 
 
 def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
@@ -271,4 +253,4 @@ def _axis_label(labels: Sequence[str], kind: str, width: int = 26) -> str:
     if len(labels) > 1:
         return f"{kind}s"
     default = {"output": "y", "input": "u"}[kind]
-    return kind if labels[0] == default else style.wrapped(labels[0], width)
+    return kind if labels[0] == default else wrapped(labels[0], width)

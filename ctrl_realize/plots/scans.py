@@ -16,6 +16,7 @@ from ..identification.delay_scan import DelayScan
 from ..identification.orders import OrderScan
 from ..identification.realization import Realization
 from ..numerics.arrays import FloatArray
+from ..wording import in_time
 from . import style
 
 
@@ -62,21 +63,21 @@ def delay_plot(
             "identify(record, method='scan')"
         )
     looks = {"color": style.MODEL, "label": f"order {result.order}", **kwargs}
-    with style.context():
-        axes = style.axes_for(ax)
-        low, high = result.interval
-        axes[0].axvspan(
+    low, high = result.interval
+    with style.canvas(ax, title=title, default_title=result.impulse.name) as (axes,):
+        axes.axvspan(
             low - 0.5, high + 0.5, color=style.BAND, alpha=0.22, linewidth=0,
             label=f"within 5 %: {low}...{high}",
         )  # fmt: skip
-        lines = list(axes[0].plot(np.arange(result.iae.size), result.iae, **looks))
-        _mark_least(axes[0], result)
+        lines = list(axes.plot(np.arange(result.iae.size), result.iae, **looks))
+        _mark_least(axes, result)
         if result.impulse.filter is not None and result.impulse.filter.group_delay > 0:
-            lag = result.impulse.filter.group_delay
-            style.note(axes[0], f"the filter's delay of {lag:.1f} samples is in it", 0.08)
-        _misfit_axes(axes[0])
-        name = result.impulse.name if title is None else title
-        return style.finished(axes, [lines], title=name, own_figure=ax is None, loc="upper center")
+            note = f"the filter's delay of {result.impulse.filter.group_delay:.1f} samples is in it"
+            axes.text(
+                0.985, 0.08, note, transform=axes.transAxes, ha="right", va="top", fontsize=10
+            )
+        _misfit_axes(axes)
+        return style.finished([axes], [lines], loc="upper center")
 
 
 def singular_value_plot(
@@ -121,16 +122,9 @@ def singular_value_plot(
     """
     result = fit.fit if isinstance(fit, DelayedStateSpace) else fit
     values, order, floor, name = _singular_values(result, count)
-    with style.context():
-        axes = style.axes_for(ax)
-        lines = _singular_values_on(axes[0], values, order, floor, **kwargs)
-        return style.finished(
-            axes,
-            [lines],
-            title=name if title is None else title,
-            own_figure=ax is None,
-            loc="upper right",
-        )
+    with style.canvas(ax, title=title, default_title=name) as (axes,):
+        lines = _singular_values_on(axes, values, order, floor, **kwargs)
+        return style.finished([axes], [lines])
 
 
 def order_plot(
@@ -161,35 +155,39 @@ def order_plot(
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['order 1: 22', 'order 2: 21', 'order 3: 20']
     """
-    with style.context():
-        axes = style.axes_for(ax, 2, size=(8.0, 7.0), heights=(1.5, 1.0), sharex=False)
-        lines: list[Line2D] = []
-        for position, (order, iae, delay) in enumerate(
-            zip(scan.orders, scan.iae, scan.delays, strict=True)
-        ):
-            chosen = order == scan.order
-            shade = 0.75 - 0.6 * position / max(len(scan.orders) - 1, 1)
-            looks = {
-                "color": style.MODEL if chosen else (shade, shade, shade),
-                "linewidth": 2.6 if chosen else 1.2,
-                "label": f"order {order}: {delay}",
-                "zorder": 3 if chosen else 2,
-                **kwargs,
-            }
-            lines += axes[0].plot(np.arange(iae.size), np.where(np.isfinite(iae), iae, np.nan),
-                                  **looks)  # fmt: skip
-            axes[0].plot([delay], [iae[delay]], "o", color=looks["color"], zorder=4)
-        axes[0].legend(title="best delay", loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=10)
-        _misfit_axes(axes[0])
+    with style.canvas(
+        ax, 2, title=title, default_title=scan.impulse.name,
+        size=(8.0, 7.0), heights=(1.5, 1.0), sharex=False,
+    ) as (upper, lower):  # fmt: skip
+        misfits = _misfits_of_orders(upper, scan, kwargs)
         values = np.array([scan.last_singular_value(order) for order in scan.orders])
-        points = _singular_values_on(
-            axes[1], values, scan.order, scan.noise_floor, at=np.array(scan.orders)
-        )
-        axes[1].set_ylabel("singular value\nat the best delay")
-        name = scan.impulse.name if title is None else title
-        return style.finished(
-            axes, [lines, points], title=name, own_figure=ax is None, legends=(1,)
-        )
+        orders = np.array(scan.orders)
+        points = _singular_values_on(lower, values, scan.order, scan.noise_floor, at=orders)
+        lower.set_ylabel("singular value\nat the best delay")
+        return style.finished([upper, lower], [misfits, points], legends=(1,))
+
+
+def _misfits_of_orders(axes: Axes, scan: OrderScan, asked: dict[str, Any]) -> list[Line2D]:
+    """Draw a misfit curve for each order: higher orders darker, the chosen one in colour."""
+    lines: list[Line2D] = []
+    for position, (order, iae, delay) in enumerate(
+        zip(scan.orders, scan.iae, scan.delays, strict=True)
+    ):
+        chosen = order == scan.order
+        shade = 0.75 - 0.6 * position / max(len(scan.orders) - 1, 1)
+        looks = {
+            "color": style.MODEL if chosen else (shade, shade, shade),
+            "linewidth": 2.6 if chosen else 1.2,
+            "label": f"order {order}: {delay}",
+            "zorder": 3 if chosen else 2,
+            **asked,
+        }
+        finite = np.where(np.isfinite(iae), iae, np.nan)
+        lines += axes.plot(np.arange(iae.size), finite, **looks)
+        axes.plot([delay], [iae[delay]], "o", color=looks["color"], zorder=4)
+    axes.legend(title="best delay", loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=10)
+    _misfit_axes(axes)
+    return lines
 
 
 def _mark_least(axes: Axes, result: DelayScan) -> None:
@@ -197,7 +195,7 @@ def _mark_least(axes: Axes, result: DelayScan) -> None:
     axes.plot([result.delay], [least], "o", color=style.MODEL, markersize=8, zorder=4)
     right = result.delay > 0.62 * result.max_delay
     axes.annotate(
-        f"{result.delay} samples = {style.in_time(result.delay * result.dt)}",
+        f"{result.delay} samples = {in_time(result.delay * result.dt)}",
         (result.delay, least),
         (-8 if right else 8, 10),
         textcoords="offset points",

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..delayed import DelayedStateSpace
 from ..identification.campaign import Campaign
-from ..plots.style import time_unit
 from ..results import Result
 from ..signals import Record
+from ..wording import time_unit
 from .page import Column, Row, Table, pairs
 from .provenance import file_sha256, record_sha256
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
+
 import control as ct
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -160,10 +163,16 @@ def test_a_loaded_model_says_why_its_fit_has_no_picture(fitted, tmp_path):
         cr.load_model(tmp_path / "model.json").fit.plot()
 
 
-def test_every_name_of_the_registry_exists():
-    for target in plots._DRAWN_BY.values():
-        module, function = target.split(":")
-        assert callable(getattr(plots, function)), f"{module} has no public {function}"
+def test_every_function_of_the_registry_is_public_and_every_class_exists():
+    classes = {
+        name
+        for module in pkgutil.walk_packages(cr.__path__, "ctrl_realize.")
+        if module.name != "ctrl_realize.__main__"
+        for name in vars(importlib.import_module(module.name))
+    }
+    for name, function in plots._DRAWN_BY.items():
+        assert getattr(plots, function.__name__) is function
+        assert name in classes
 
 
 def test_the_delay_plot_shows_the_misfit_and_its_minimum(scanned):

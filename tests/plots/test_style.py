@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
-import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError
 from ctrl_realize.plots import style
+from ctrl_realize.plots.names import plain
 
 
 @pytest.fixture(autouse=True)
@@ -40,12 +40,8 @@ def test_the_style_holds_inside_and_the_users_settings_are_back_behind():
 
 def test_the_users_settings_are_back_after_an_error():
     before = dict(mpl.rcParams)
-
-    def fails(axes):
+    with pytest.raises(ZeroDivisionError), style.canvas(None, title="never"):
         raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        style.in_one(None, "never", fails)
     assert dict(mpl.rcParams) == before
 
 
@@ -68,26 +64,36 @@ def test_a_figure_of_the_user_after_a_plot_looks_as_before_it(comparison):
     assert axes.spines["top"].get_visible()
 
 
-def test_a_plot_of_one_axes_goes_where_it_is_told():
-    def draw(axes):
-        return axes.plot(np.arange(3.0), label="line")
-
-    new = style.in_one(None, "title", draw)
-    assert new.axes[0, 0].get_title(loc="left") == "title"
-    figure = Figure()
-    given = figure.subplots()
-    inside = style.in_one(given, "title", draw)
+def test_a_title_is_put_on_new_figures_only():
     # The title of a figure that the user made is the user's.
-    assert inside.figure is figure
-    assert inside.axes[0, 0].get_title(loc="left") == ""
-    assert [line.get_label() for line in inside.lines[0, 0]] == ["line"]
-    with pytest.raises(OptionError, match="needs 1"):
-        style.in_one([given, given], "title", draw)
+    for ax, title, shown in (
+        (None, None, "usual"),
+        (None, "mine", "mine"),
+        (None, "", ""),
+        (Figure(), "mine", ""),
+        (Figure().subplots(), "mine", ""),
+    ):
+        with style.canvas(ax, title=title, default_title="usual") as (axes,):
+            pass
+        assert axes.get_title(loc="left") == shown
+
+
+def test_any_plot_can_be_drawn_without_its_title(comparison):
+    assert comparison.plot().axes[0, 0].get_title(loc="left") == "Tuning rules on this plant"
+    assert comparison.plot(title="").axes[0, 0].get_title(loc="left") == ""
+
+
+def test_a_canvas_is_the_axes_that_were_given():
+    given = Figure().subplots(2, 1)
+    with style.canvas(given, 2) as axes:
+        assert axes == list(given)
+    with pytest.raises(OptionError, match="needs 1"), style.canvas(given):
+        pass
 
 
 @pytest.mark.parametrize("letter", ["W", "\u5b57", "a", "\U0001f600"])
 def test_names_of_wide_letters_are_cut_before_they_take_the_axes(letter):
-    shown = style.plain(250 * letter, 34)
+    shown = plain(250 * letter, 34)
     figure = Figure(figsize=(6, 3))
     text = figure.text(0, 0, shown, fontsize=10)
     drawn = text.get_window_extent(FigureCanvasAgg(figure).get_renderer())

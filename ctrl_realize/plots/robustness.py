@@ -11,7 +11,9 @@ from matplotlib.lines import Line2D
 
 from ..design.delay_robustness import DelayRobustness
 from ..design.robustness import RobustnessCheck, UncertaintyBound
+from ..numerics.arrays import FloatArray
 from . import style
+from .scales import HERTZ, time_unit
 
 
 def delay_robustness_plot(
@@ -41,10 +43,9 @@ def delay_robustness_plot(
     >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
     ('dead time of the plant [ms]', 'modulus margin')
     """
-
-    def draw(axes: Axes) -> list[Line2D]:
+    with style.canvas(ax, title=title, default_title="Robustness to the dead time") as (axes,):
         times = found.dead_times
-        factor, unit = style.time_unit(float(times.max()), axes)
+        factor, unit = time_unit(float(times.max()), axes)
         low, high = found.dead_time_interval
         axes.axvspan(low * factor, high * factor, color=style.BAND, alpha=0.2, label="interval")
         axes.axvline(
@@ -60,9 +61,7 @@ def delay_robustness_plot(
             )
         axes.set(xlabel=f"dead time of the plant [{unit}]", ylabel="modulus margin")
         axes.set_ylim(bottom=0)
-        return lines
-
-    return style.in_one(ax, title or "Robustness to the dead time", draw, loc="lower right")
+        return style.finished([axes], [lines], loc="lower right")
 
 
 def uncertainty_plot(
@@ -90,9 +89,8 @@ def uncertainty_plot(
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['bound', 'spread of the systems', 'unsure dead time']
     """
-
-    def draw(axes: Axes) -> list[Line2D]:
-        hertz = found.omega / style.HERTZ
+    with style.canvas(ax, title=title, default_title="Multiplicative uncertainty") as (axes,):
+        hertz = found.omega / HERTZ
         lines = _positive_loglog(axes, hertz, found.bound, color=style.MODEL, label="bound")
         lines += _positive_loglog(
             axes, hertz, found.spread, color=style.MEASURED, label="spread of the systems"
@@ -102,9 +100,7 @@ def uncertainty_plot(
         )
         axes.axhline(1, color=style.INPUT, linewidth=1)
         axes.set(xlabel="frequency [Hz]", ylabel="relative error")
-        return lines
-
-    return style.in_one(ax, title or "Multiplicative uncertainty", draw, loc="upper left")
+        return style.finished([axes], [lines], loc="upper left")
 
 
 def robustness_plot(
@@ -132,10 +128,10 @@ def robustness_plot(
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['|T|', '1 / uncertainty', 'margin 2.59']
     """
-
-    def draw(axes: Axes) -> list[Line2D]:
+    word = "Robustly stable" if found.robust else "Robust stability not guaranteed"
+    with style.canvas(ax, title=title, default_title=word) as (axes,):
         bound = found.uncertainty
-        hertz = bound.omega / style.HERTZ
+        hertz = bound.omega / HERTZ
         lines = _positive_loglog(axes, hertz, found.complementary, color=style.MODEL, label="|T|")
         with np.errstate(divide="ignore"):
             ceiling = 1 / bound.bound
@@ -148,18 +144,16 @@ def robustness_plot(
             linestyle=style.DASHES[0],
             label="1 / uncertainty",
         )
-        at = found.omega_critical / style.HERTZ
+        at = found.omega_critical / HERTZ
         axes.axvline(at, color=style.INPUT, linewidth=1, label=f"margin {found.margin:.3g}")
         axes.set(xlabel="frequency [Hz]", ylabel="magnitude")
         axes.set_ylim(bottom=max(1e-4, float(found.complementary.min())))
         # Far below the critical frequency both curves are flat.
         axes.set_xlim(max(float(hertz[0]), at / 300), float(hertz[-1]))
-        return lines
-
-    word = "Robustly stable" if found.robust else "Robust stability not guaranteed"
-    return style.in_one(ax, title or word, draw)
+        return style.finished([axes], [lines])
 
 
-def _positive_loglog(axes: Any, x: Any, y: Any, **style_: Any) -> list[Any]:
+def _positive_loglog(axes: Axes, x: FloatArray, y: FloatArray, **looks: Any) -> list[Line2D]:
+    """Draw what is positive; a logarithmic axis takes nothing else, and no empty curve."""
     keep = y > 0
-    return list(axes.loglog(x[keep], y[keep], **style_)) if keep.any() else []
+    return list(axes.loglog(x[keep], y[keep], **looks)) if keep.any() else []

@@ -1,0 +1,59 @@
+"""Names that came with the data, made safe to draw."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from contextlib import suppress
+from functools import cache
+from itertools import accumulate
+from textwrap import wrap
+from unicodedata import east_asian_width
+
+import matplotlib as mpl
+from matplotlib.font_manager import FontProperties, findfont, get_font
+
+
+def plain(text: str, longest: int = 80) -> str:
+    r"""Make a name that came with the data safe to draw.
+
+    Dollar signs and a leading underscore are instructions to matplotlib; control characters have
+    no glyph, nor have letters that the user's fonts do not know. `longest` counts letters of
+    ordinary width: a row of "W" is cut sooner, before it leaves no room for the axes.
+
+    Examples
+    --------
+    >>> from ctrl_realize.plots.names import plain
+    >>> print(plain("_price in $\n"))
+    price in \$?
+    """
+    known = _letters(tuple(mpl.rcParams["font.family"]), tuple(mpl.rcParams["font.sans-serif"]))
+    shown = "".join(
+        letter if letter.isprintable() and ord(letter) in known else "?"
+        for letter in text[:1000].lstrip("_")
+    )
+    ends = list(accumulate(map(_width, shown)))
+    if ends and ends[-1] > longest:
+        shown = shown[: bisect_right(ends, longest - 1)] + "…"
+    return shown.replace("$", r"\$") or "signal"
+
+
+@cache
+def _letters(families: tuple[str, ...], sans: tuple[str, ...]) -> frozenset[int]:
+    """Code points that the fonts of these families can draw."""
+    found: set[int] = set()
+    for family in (name for one in families for name in (sans if one == "sans-serif" else (one,))):
+        with suppress(ValueError):  # a font that is not on this machine
+            path = findfont(FontProperties(family=family), fallback_to_default=False)
+            found.update(get_font(path).get_charmap())
+    return frozenset(found)
+
+
+def _width(letter: str) -> float:
+    if letter in "WMwm@%" or east_asian_width(letter) in "WF":
+        return 1.7
+    return 1.25 if letter.isupper() else 1.0
+
+
+def wrapped(text: str, width: int) -> str:
+    """Break a name into at most three short lines."""
+    return "\n".join(wrap(plain(text), width)[:3])

@@ -1,0 +1,176 @@
+"""Plots of what a model says beside what was measured, and of what is left."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ..checks import whole
+from ..errors import OptionError
+from ..identification.channel_fit_result import ChannelFit
+from ..identification.prediction import Prediction
+from ..identification.residuals import ResidualCheck
+from ..numerics.arrays import FloatArray
+from ..signals import Record
+from . import style
+from .names import wrapped
+from .scales import time_unit
+
+
+def residual_plot(
+    check: ResidualCheck,
+    *,
+    output: int = 0,
+    input: int = 0,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw measured and simulated output, and the correlations of what is left with its bounds.
+
+    Parameters
+    ----------
+    check : ResidualCheck
+    output, input : int, optional
+        Channels to show.
+    ax : sequence of three Axes, or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the simulated output.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
+    >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
+    >>> cplt = plots.residual_plot(cr.check_residuals(plant, record))
+    >>> cplt.figure.axes[-1].get_xlabel()
+    'lag [samples]'
+    """
+    row = whole(output, "output", 0, check.fit_percent.size - 1)
+    column = whole(input, "input", 0, check.cross.shape[1] - 1)
+    label = f"simulated, fit {check.fit_percent[row]:.1f} %"
+    simulated = np.atleast_2d(check.simulated)[row]
+    lags = check.lags
+    with style.canvas(
+        ax, 3, title=title, size=(8.0, 7.0), heights=(2.0, 1.0, 1.0), sharex=False
+    ) as axes:
+        above = _signals(axes[0], check.record, simulated, row, label, kwargs)
+        own = _stems(axes[1], lags[lags >= 0], check.autocorrelation[row], check.bound)
+        cross = _stems(axes[2], lags, check.cross[row, column], check.cross_bound[row, column])
+        axes[1].set_ylabel("residual with\nitself")
+        axes[2].set_ylabel("residual with\ninput before")
+        axes[2].set_xlabel("lag [samples]")
+        return style.finished(axes, [above, own, cross], loc="above")
+
+
+def channel_fit_plot(fit: ChannelFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
+    """Draw how a fitted model follows one of its records, and the correlations of what is left.
+
+    Parameters
+    ----------
+    fit : ChannelFit
+    record : int, optional
+        Which of the records without gaps.
+    **kwargs
+        Passed on to `residual_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
+    >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
+    >>> cplt = plots.channel_fit_plot(cr.fit_channels(record, 1).fit)
+    >>> cplt.figure.axes[-1].get_xlabel()
+    'lag [samples]'
+    """
+    if not fit.checks:
+        raise OptionError("all records have gaps; there is no simulation to draw them beside")
+    return residual_plot(fit.checks[whole(record, "record", 0, len(fit.checks) - 1)], **kwargs)
+
+
+def prediction_plot(
+    prediction: Prediction,
+    *,
+    output: int = 0,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw a predicted output over the measured one.
+
+    Parameters
+    ----------
+    prediction : Prediction
+    output : int, optional
+        Channel to show.
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the prediction.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 300))
+    >>> record = cr.Record(0.1 * np.arange(300), u, plant.simulate(u) + 0.05 * noise)
+    >>> cplt = plots.prediction_plot(cr.predict(plant, record, 10))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['measured', '10 ahead, fit 86.6 %']
+    """
+    row = whole(output, "output", 0, prediction.fit_percent.size - 1)
+    label = f"{prediction.steps} ahead, fit {prediction.fit_percent[row]:.1f} %"
+    values = np.atleast_2d(prediction.output)[row]
+    with style.canvas(ax, title=title) as (axes,):
+        lines = _signals(axes, prediction.record, values, row, label, kwargs)
+        return style.finished([axes], [lines], loc="above")
+
+
+def _signals(
+    axes: Axes, record: Record, values: FloatArray, row: int, label: str, looks: dict[str, Any]
+) -> list[Line2D]:
+    """Draw an output as it was measured and as a model says it is."""
+    factor, unit = time_unit(float(np.ptp(record.time)), axes)
+    time = factor * record.time
+    measured = np.atleast_2d(record.output)[row]
+    settings = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": label, **looks}
+    lines = axes.plot(time, measured, color=style.MEASURED, label="measured")
+    lines += axes.plot(time, values, **settings)
+    axes.set_ylabel(wrapped(record.output_labels[row], 16))
+    axes.set_xlabel(f"time [{unit}]")
+    return list(lines)
+
+
+def _stems(axes: Axes, lags: FloatArray, rho: FloatArray, bound: float) -> list[Line2D]:
+    """Draw correlations as upright lines, with the bound that chance alone keeps."""
+    axes.axhspan(-bound, bound, color=style.BAND, alpha=0.3, linewidth=0)
+    axes.vlines(lags, 0, rho, color=style.MEASURED, linewidth=1.5)
+    return list(axes.plot(lags, rho, "o", color=style.MEASURED, markersize=3.5))
