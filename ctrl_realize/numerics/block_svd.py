@@ -16,6 +16,7 @@ from scipy.sparse.linalg import LinearOperator, svds
 
 from .arrays import FloatArray
 from .hankel import BlockHankel, hankel_matrix
+from .svd import thin_svd
 
 Triple: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -105,7 +106,7 @@ def _without_rounding(values: FloatArray, size: int) -> FloatArray:
 
 
 def _dense(h: FloatArray, rows: int, columns: int, count: int) -> Triplets:
-    U, values, Vt = np.linalg.svd(hankel_matrix(h, rows, columns), full_matrices=False)
+    U, values, Vt = thin_svd(hankel_matrix(h, rows, columns))
     leading = _without_rounding(values, values.size)[:count]
     return Triplets(U[:, :count], leading, Vt[:count].T, values[count:], True)
 
@@ -176,7 +177,7 @@ def _golub_kahan(
         B = np.zeros((rows, columns))
         np.fill_diagonal(B, diagonal[:rows])
         np.fill_diagonal(B[:, 1:], above[:rows])
-        left, values, right = np.linalg.svd(B, full_matrices=False)
+        left, values, right = thin_svd(B)
         residuals = above[j] * np.abs(left[-1, :count]) if not exhausted else np.zeros(1)
         if residuals.max() <= max(tol * values[:count][-1], FLOOR * scale):
             return (

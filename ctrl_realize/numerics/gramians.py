@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import FloatArray
+from .svd import thin_svd
 
 MAX_DOUBLINGS = 60
 
@@ -62,7 +63,7 @@ def balanced_truncation(
     if n == 0:
         return A, B, C, np.zeros(0)
     reach, observe = gramian_factor(A, B), gramian_factor(A.T, C.T)
-    U, s, V = np.linalg.svd(observe.T @ reach)
+    U, s, V = thin_svd(observe.T @ reach)
     values = np.zeros(n)
     values[: s.size] = s
     kept = min(order, int(np.sum(s > n * np.finfo(float).eps * s[0])) if s[0] > 0 else 0)
