@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import BoolArray, FloatArray, locked, read_only
 from ..results import Result
 from ..wording import in_time
 
@@ -124,7 +125,7 @@ class DelayTrack(Result):
     low: FloatArray
     high: FloatArray
     gain_ratio: FloatArray
-    tells: FloatArray
+    tells: BoolArray
     dt: float
 
     @property
@@ -150,3 +151,20 @@ class DelayTrack(Result):
 
     def __repr__(self) -> str:
         return f"<DelayTrack: {self.time.size} moments, told at {int(self.tells.sum())}>"
+
+
+def track_of(course: Sequence[TrackedDelay], dt: float) -> DelayTrack:
+    """Put single moments into the arrays of a track."""
+
+    def along(values: Iterable[float]) -> FloatArray:
+        return read_only(np.array(list(values), dtype=np.float64))
+
+    return DelayTrack(
+        time=along(moment.time for moment in course),
+        dead_time=along(moment.dead_time for moment in course),
+        low=along(moment.interval[0] for moment in course),
+        high=along(moment.interval[1] for moment in course),
+        gain_ratio=along(moment.gain_ratio for moment in course),
+        tells=locked(np.array([moment.tells for moment in course])),
+        dt=dt,
+    )

@@ -3,46 +3,34 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import control as ct
 import numpy as np
 
-from ..checks import positive, whole
 from ..delayed import DelayedStateSpace
-from ..errors import DataError, DelayRangeError, OptionError
-from ..numerics.arrays import FloatArray, read_only
+from ..errors import DataError
+from ..numerics.arrays import FloatArray
 from ..numerics.pole_moves import Core, Direction, moved_core, pole_directions, sensitivity_system
 from ..numerics.recursive import DelayBank
+from ..numerics.running_residual import RunningResidual
 from ..numerics.time_axis import EXTREME
 from ..signals import Record
 from ..signals.given import check_complete
-from .tracked import DelayTrack, TrackedDelay
-from .tracker_checks import check_start, doubt, fraction
+from .tracked import DelayTrack, TrackedDelay, track_of
+from .tracker_checks import check_candidates, check_memory, check_start
+from .tracker_solution import LinearisedBank, Solution, solve
 
-SPEED_STD = 0.3
-"""How far a pole is expected to move: prior standard deviation of its relative speed."""
-_LONGEST = 1e12
 MOMENTS = 50
 """Estimates made in one memory."""
 RUN_IN = 2
 """Memories that a renewed bank takes before it is asked."""
 MOVED, LEAP = 0.04, 0.5
 """Relative move of a pole from which the bank is renewed, and the largest that is then made."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Linearised:
-    """A bank of delays about one set of poles, `moved` from those of the starting model.
-
-    Its sums begin at the sample `begin`.
-    """
-
-    bank: DelayBank
-    core: Core
-    directions: list[Direction]
-    moved: FloatArray
-    begin: int = 0
+CLEAR_MOVE = 4.0
+"""Standard deviations that such a move must have."""
+SAMPLES_EACH = 10
+"""Samples for each parameter, behind the largest delay, before anything is solved."""
 
 
 class DelayTracker:
@@ -110,40 +98,25 @@ class DelayTracker:
     ) -> None:
         core = model.delay_free if isinstance(model, DelayedStateSpace) else model
         check_start(core)
-        low = whole(min_delay, "min_delay", 0)
-        high = whole(max_delay, "max_delay", 0)
-        if high <= low:
-            raise DelayRangeError(f"delays {low}...{high} leave nothing to choose from")
+        self._low, self._high = check_candidates(min_delay, max_delay)
         self.dt = float(core.dt)
-        span = positive(memory, "memory", "time in s") / self.dt
-        if span > _LONGEST:
-            raise OptionError(
-                f"memory={memory:g} s is {span:.4g} samples; needed are at most {_LONGEST:g}"
-            )
-        if span <= high:
-            raise DelayRangeError(
-                f"memory={memory:g} s is {span:.4g} samples, and delays up to {high} samples are "
-                "to be seen; needed is a longer memory"
-            )
-        self._low, self._high, self._span = low, high, span
-        self._count = 0
+        self._span = check_memory(memory, self.dt, self._high)
+        self._forgetting = float(np.exp(-1.0 / self._span))
+        self._stride = max(1, round(self._span / MOMENTS))
         self._zeros = np.asarray(core.zeros(), dtype=np.complex128)
         matrices = (core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]))
         directions = pole_directions(core.poles(), self.dt) if dynamics else []
         self._now = self._linearised(matrices, directions, np.zeros(len(directions)))
-        self._next: _Linearised | None = None
-        self._stride = max(1, round(span / MOMENTS))
+        self._next: LinearisedBank | None = None
+        self._count = 0
         self._first = (0.0, 0.0)
+        self._residual = RunningResidual(self._forgetting)
+        # The last moment at which the sums were solved.
         self._variance = 0.0
-        self._move_std = np.full(len(directions), np.inf)
-        # The residual summed since the last estimate; weighted sums of its squares, and of the
-        # squares of its sums from estimate to estimate.
-        self._residuals = (0.0, 0.0, 0.0)
-        self._best: tuple[int, FloatArray, float] | None = None
+        self._solution: Solution | None = None
+        self._told = self._nothing_yet()
+        # Delays of the last memory, NaN where nothing was told.
         self._places: deque[float] = deque(maxlen=MOMENTS)
-        self._told = TrackedDelay(
-            0.0, low, low * self.dt, (low, high), 1.0, np.inf, (), np.inf, False, "no samples yet"
-        )
 
     def __repr__(self) -> str:
         return (
@@ -174,40 +147,31 @@ class DelayTracker:
         self._now.bank.update(moved, seen)
         if self._next is not None:
             self._next.bank.update(moved, seen)
-            if self._count == self._next.begin:
-                self._next.bank.restart()
-            if self._count >= self._next.begin + RUN_IN * self._span:
-                self._now, self._next, self._best = self._next, None, None
-        if self._best is not None:
-            delay, theta, offset = self._best
-            error = seen - offset - self._now.bank.predict(delay, theta)
-            keep = self._now.bank.forgetting
-            run, squares, blocks = self._residuals
-            self._residuals = (run + error, keep * squares + error**2, keep * blocks)
+            self._renew(self._next)
+        if self._solution is not None:
+            reply = self._now.bank.predict(self._solution.delay, self._solution.theta)
+            self._residual.add(seen - self._solution.offset - reply)
         if self._count % self._stride == 0:
-            run, squares, blocks = self._residuals
-            self._residuals = (0.0, squares, blocks + run**2)
-            self._told = self._solve()
-            told = self._told
-            self._places.append(told.dead_time / self.dt if told.tells else np.nan)
-            self._follow_poles()
+            self._residual.close_sum()
+            self._keep(self._solve())
 
     def estimate(self) -> TrackedDelay:
-        """Solve for what the samples so far say."""
-        return self._solve() if self._count else self._told
+        """Tell what the samples so far say; asking changes nothing."""
+        return self._latest()[1]
 
     @property
     def model(self) -> DelayedStateSpace:
-        """Model of the last estimate, which is its `fit`; zeros as in the starting model."""
-        told = self.estimate()
-        now = self._now
-        made = None
-        if self._best is not None and told.gain_ratio:
-            moves = self._best[1][1:] / told.gain_ratio
-            made = moved_core(now.core, self._zeros, now.directions, moves, self.dt)
-        A, B, C, D = now.core if made is None else made[0]
-        core = ct.ss(A, B[:, None], told.gain_ratio * C[None], told.gain_ratio * D, self.dt)
-        return DelayedStateSpace(core, told.delay, fit=told)
+        """Model of the present estimate, which is its `fit`; zeros as in the starting model."""
+        found, told = self._latest()
+        core = self._now.core
+        if found is not None and found.gain:
+            made = moved_core(core, self._zeros, self._now.directions, found.moves, self.dt)
+            core = core if made is None else made[0]
+        A, B, C, D = core
+        gain = told.gain_ratio
+        return DelayedStateSpace(
+            ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt), told.delay, fit=told
+        )
 
     def run(self, record: Record) -> DelayTrack:
         """Take in a whole record, and return the course of the estimate.
@@ -234,111 +198,90 @@ class DelayTracker:
                 f"the record has {record.n_samples} samples, fewer than the {self._stride} "
                 "between two estimates"
             )
-        return DelayTrack(
-            time=read_only(np.array([t.time for t in course])),
-            dead_time=read_only(np.array([t.dead_time for t in course])),
-            low=read_only(np.array([t.interval[0] for t in course], dtype=np.float64)),
-            high=read_only(np.array([t.interval[1] for t in course], dtype=np.float64)),
-            gain_ratio=read_only(np.array([t.gain_ratio for t in course])),
-            tells=np.array([t.tells for t in course]),
-            dt=self.dt,
-        )
+        return track_of(course, self.dt)
 
     def _linearised(
         self, core: Core, directions: list[Direction], moved: FloatArray
-    ) -> _Linearised:
-        bank = DelayBank(
-            *sensitivity_system(*core, directions),
-            self._low,
-            self._high,
-            float(np.exp(-1.0 / self._span)),
-        )
-        return _Linearised(bank, core, directions, moved)
+    ) -> LinearisedBank:
+        system = sensitivity_system(*core, directions)
+        bank = DelayBank(*system, self._low, self._high, self._forgetting)
+        return LinearisedBank(bank, core, directions, moved)
 
-    def _follow_poles(self) -> None:
+    def _renew(self, fresh: LinearisedBank) -> None:
+        """Let a bank that is run in count from its first whole sample, and then take over."""
+        if self._count == fresh.begin:
+            fresh.bank.restart()
+        if self._count >= fresh.begin + RUN_IN * self._span:
+            self._now, self._next, self._solution = fresh, None, None
+
+    def _solve(self) -> Solution | None:
+        """Solve for what the samples so far say; None while there are too few."""
+        if self._count < self._high + SAMPLES_EACH * self._now.n_parameters:
+            return None
+        return solve(self._now, self._variance, self._residual.inflation)
+
+    def _latest(self) -> tuple[Solution | None, TrackedDelay]:
+        """Return what holds now: what was kept, where no sample has come since."""
+        if self._count % self._stride == 0:
+            return self._solution, self._told
+        found = self._solve()
+        return found, self._tell(found)
+
+    def _keep(self, found: Solution | None) -> None:
+        """Go on from what was found, and start a bank about moved poles where they have moved."""
+        self._told = self._tell(found)
+        self._places.append(self._told.dead_time / self.dt if self._told.tells else np.nan)
+        if found is None:
+            return
+        self._solution, self._variance = found, found.variance
+        if self._next is None:
+            self._follow_poles(found)
+
+    def _follow_poles(self, found: Solution) -> None:
         """Start a bank about the moved poles, to take over when it has seen enough."""
         now = self._now
-        if self._next is not None or self._best is None or not now.directions:
+        clear = np.abs(found.moves) > np.maximum(MOVED, CLEAR_MOVE * found.move_std)
+        if not np.any(clear) or not found.sees_reply:
             return
-        theta = self._best[1]
-        moves = theta[1:] / theta[0] if theta[0] else np.zeros(theta.size - 1)
-        clear = np.abs(moves) > np.maximum(MOVED, 4 * self._move_std)
-        if not np.any(clear) or self._told.reason.startswith(("nothing", "the output")):
-            return
-        step = np.clip(np.where(clear, moves, 0.0), -LEAP, LEAP)
+        step = np.clip(np.where(clear, found.moves, 0.0), -LEAP, LEAP)
         made = moved_core(now.core, self._zeros, now.directions, step, self.dt)
-        if made is not None:
-            fresh = self._linearised(*made, now.moved + step)
-            wait = fresh.bank.settling()
-            if wait is not None:
-                self._next = replace(fresh, begin=self._count + wait + self._high + 1)
+        if made is None:
+            return
+        fresh = self._linearised(*made, now.moved + step)
+        wait = fresh.bank.settling()
+        if wait is not None:
+            self._next = replace(fresh, begin=self._count + wait + self._high + 1)
 
-    def _solve(self) -> TrackedDelay:
-        now = self._now
-        bank = now.bank
-        q = 1 + len(now.directions)
-        if self._count < bank.high + 10 * q:
-            return replace(
-                self._told,
-                time=(self._count - 1) * self.dt,
-                reason=f"only {self._count} samples yet",
-            )
-        prior = np.eye(1, q)[0]
-        spread = np.array([1.0, *(SPEED_STD for _ in now.directions)])
-        found = bank.solve(prior, self._variance / spread**2)
-        best = int(np.argmin(found.misfit))
-        freedom = max(bank.weight**2 / bank.weight_squared - q - 1, 1.0)
-        self._variance = found.misfit[best] / bank.weight * (1 + (q + 1) / freedom)
-        self._best = (bank.low + best, found.theta[best], float(found.offset[best]))
-        # Never below what sums of squares can resolve in double precision.
-        noise = max(self._variance * self._inflation(), 1e-14 * found.power, 1e-300)
-        # beyond a thousand nothing is left of a chance, and the quotient might overflow
-        distance = np.minimum(found.misfit - found.misfit[best], 1e3 * noise) / noise
-        chance = np.exp(-distance / 2)
-        below = np.cumsum(chance) / chance.sum()
-        interval = (
-            bank.low + int(np.searchsorted(below, 0.025)),
-            bank.low + min(int(np.searchsorted(below, 0.975)), below.size - 1),
+    def _nothing_yet(self) -> TrackedDelay:
+        low = self._low
+        return TrackedDelay(
+            time=max(self._count - 1, 0) * self.dt,
+            delay=low,
+            dead_time=low * self.dt,
+            interval=(low, self._high),
+            gain_ratio=1.0,
+            gain_std=np.inf,
+            speed_ratios=(),
+            noise_std=np.inf,
+            tells=False,
+            reason=f"only {self._count} samples yet" if self._count else "no samples yet",
         )
-        theta = found.theta[best]
-        gain_std = float(np.sqrt(noise * found.inverse[best, 0, 0]))
-        gain = float(theta[0])
-        moves = theta[1:] / gain if gain else np.zeros(q - 1)
-        spreads = noise * np.diag(found.inverse[best])[1:]
-        self._move_std = np.sqrt(spreads) / abs(gain) if gain else np.full(q - 1, np.inf)
-        speeds = [i for i, (what, _, _) in enumerate(now.directions) if what == "speed"]
-        ratios = tuple(float(np.exp(now.moved[i] + np.clip(moves[i], -2, 2))) for i in speeds)
-        clear = gain / gain_std if gain_std > 0 else np.inf
-        explained = float(found.power - found.misfit[best])
-        reason = doubt(explained / noise, clear, bank.low + best, interval, (self._low, self._high))
-        place = bank.low + best + fraction(found.misfit, best)
-        moved = float(np.abs(moves[speeds]).max(initial=0.0))
-        if not reason and moved > SPEED_STD:
-            reason = (
-                f"a pole has moved by {100 * np.expm1(moved):.0f} %, too far for the model that "
-                "changes are counted from; it is being renewed"
-            )
+
+    def _tell(self, found: Solution | None) -> TrackedDelay:
+        if found is None:
+            return self._nothing_yet()
         return TrackedDelay(
             time=(self._count - 1) * self.dt,
-            delay=bank.low + best,
-            dead_time=place * self.dt,
-            interval=self._with_trail(interval, place),
-            gain_ratio=gain,
-            gain_std=gain_std,
-            speed_ratios=ratios,
-            noise_std=float(np.sqrt(self._variance)),
-            tells=not reason,
-            reason=reason,
+            delay=found.delay,
+            dead_time=found.place * self.dt,
+            interval=self._with_trail(found.interval, found.place),
+            gain_ratio=found.gain,
+            gain_std=found.gain_std,
+            speed_ratios=found.speed_ratios,
+            noise_std=float(np.sqrt(found.variance)),
+            tells=not found.reason,
+            reason=found.reason,
         )
-
-    def _inflation(self) -> float:
-        """Return by how much correlation of the residual lowers the number of samples.
-
-        Sums of B white samples have B times the variance of one; slow errors of the model show
-        in the sums long before they show from sample to sample.
-        """
-        _, squares, blocks = self._residuals
-        return max(blocks / squares, 1.0) if squares > 0 else 1.0
 
     def _with_trail(self, interval: tuple[int, int], place: float) -> tuple[int, int]:
         """Widen an interval by the way that the delay has gone within one memory.

@@ -1,58 +1,38 @@
-"""What a delay tracker can start from, and when it must say that it cannot tell."""
+"""What a delay tracker can start from."""
 
 from __future__ import annotations
 
 import control as ct
 import numpy as np
 
-from ..errors import OptionError, UnsuitableSystemError
-from ..numerics.arrays import FloatArray
+from ..checks import positive, whole
+from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 
-SIGNIFICANT = 16.0
-"""Fall of the misfit in noise variances below which nothing was seen: four sigma."""
-
-
-def doubt(
-    explained: float,
-    gain: float,
-    delay: int,
-    interval: tuple[int, int],
-    candidates: tuple[int, int],
-) -> str:
-    """Say why the data cannot tell the delay; empty when they can.
-
-    Parameters
-    ----------
-    explained : float
-        Fall of the misfit by the best model, in noise variances.
-    gain : float
-        Its gain, in standard deviations.
-    delay : int
-        Its delay in samples.
-    interval, candidates : tuple of int
-        Delays that are left open, and those that were tried.
-    """
-    low, high = candidates
-    if explained < SIGNIFICANT:
-        return "nothing moved within the memory that stands out of the noise"
-    if abs(gain) < 3:
-        return "the output does not follow the input"
-    if delay == high:
-        return f"the best delay is max_delay={high}; try a larger one"
-    if delay == low > 0:
-        return f"the best delay is min_delay={low}; try a smaller one"
-    if interval[1] - interval[0] > (high - low) / 2:
-        return f"any delay from {interval[0]} to {interval[1]} samples fits"
-    return ""
+LONGEST = 1e12
+"""Samples of memory; beyond, the weights of single samples are lost in rounding."""
 
 
-def fraction(misfit: FloatArray, best: int) -> float:
-    """Return where a parabola through the least misfit and its neighbours is lowest, -0.5...0.5."""
-    if not 0 < best < misfit.size - 1:
-        return 0.0
-    before, here, after = misfit[best - 1 : best + 2]
-    bend = before - 2 * here + after
-    return float(np.clip((before - after) / (2 * bend), -0.5, 0.5)) if bend > 0 else 0.0
+def check_candidates(min_delay: int, max_delay: int) -> tuple[int, int]:
+    """Return the first and the last candidate."""
+    low, high = whole(min_delay, "min_delay", 0), whole(max_delay, "max_delay", 0)
+    if high <= low:
+        raise DelayRangeError(f"delays {low}...{high} leave nothing to choose from")
+    return low, high
+
+
+def check_memory(memory: float, dt: float, max_delay: int) -> float:
+    """Return the memory in samples; the largest candidate must lie well within it."""
+    span = positive(memory, "memory", "time in s") / dt
+    if span > LONGEST:
+        raise OptionError(
+            f"memory={memory:g} s is {span:.4g} samples; needed are at most {LONGEST:g}"
+        )
+    if span <= max_delay:
+        raise DelayRangeError(
+            f"memory={memory:g} s is {span:.4g} samples, and delays up to {max_delay} samples are "
+            "to be seen; needed is a longer memory"
+        )
+    return span
 
 
 def check_start(core: ct.StateSpace) -> None:

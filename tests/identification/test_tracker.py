@@ -174,6 +174,20 @@ def test_streaming_and_running_give_the_same():
     assert "told" in track.report()
 
 
+def test_asking_changes_nothing():
+    record, _ = worn_valve(seconds=3, last=37.0)
+    silent, asked = tracker(memory=1.0), tracker(memory=1.0)
+    for number, sample in enumerate(zip(record.input, record.output, strict=True)):
+        silent.update(*sample)
+        asked.update(*sample)
+        if number % 7 == 0:
+            first, again = asked.estimate(), asked.estimate()
+            assert again.gain_ratio == first.gain_ratio
+            assert asked.model.fit.dead_time == first.dead_time
+    assert asked.estimate().gain_ratio == silent.estimate().gain_ratio
+    assert asked.estimate().dead_time == silent.estimate().dead_time
+
+
 def test_a_tracker_goes_on_after_pickling_as_if_nothing_had_happened():
     record, _ = worn_valve(seconds=4, last=37.0)
     one = tracker(memory=1.0)
