@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import OptionError
-from ..numerics.arrays import FloatArray, IntArray, read_only
+from ..numerics.arrays import BoolArray, FloatArray, IntArray, locked, read_only
 from ..results import Result
 from ..wording import in_time, interval_in_time
 from .loops import Loop, open_loop
@@ -62,7 +62,7 @@ class DelayRobustness(Result):
     """
 
     delays: IntArray
-    stable_at: np.ndarray[Any, np.dtype[np.bool_]]
+    stable_at: BoolArray
     modulus_margin: FloatArray
     dead_time_interval: tuple[float, float]
     nominal: int
@@ -92,7 +92,7 @@ class DelayRobustness(Result):
         """Dead times in s that belong to `delays`."""
         return np.asarray(self.delays * self.dt - self.held, dtype=np.float64)
 
-    def _inside(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def _inside(self) -> BoolArray:
         low, high = self.dead_time_interval
         inside = (self.delays >= np.floor((low + self.held) / self.dt + 1e-9)) & (
             self.delays <= np.ceil((high + self.held) / self.dt - 1e-9)
@@ -188,8 +188,8 @@ def delay_robustness(
     found = [_margin(loop, int(d)) for d in delays]
     earlier, later = _room(loop_margins(loop))
     return DelayRobustness(
-        delays=delays,
-        stable_at=np.array(found) > 0,
+        delays=locked(delays),
+        stable_at=locked(np.array(found) > 0),
         modulus_margin=read_only(np.array(found)),
         dead_time_interval=(low, high),
         nominal=nominal,

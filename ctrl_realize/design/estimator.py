@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from ..delayed import DelayedStateSpace
 from ..delayed.chains import augment
-from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..results import Result
 from ..wording import in_numbers
-from .riccati import locked, riccati, weight_matrix
+from .riccati import riccati, weight_matrix
 from .siso import delayed_system
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..checks import real
 from ..errors import OptionError
-from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.crossovers import (
     follow,
     half_turns,
@@ -204,8 +204,6 @@ def _collect(
     gm = 1 / np.abs(at_phases)
     waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / gains
     omega, values = response
-    kept = np.array(values)
-    kept.flags.writeable = False
     return Margins(
         gain_margin=float(gm[np.argmin(np.abs(np.log(gm)))]) if gm.size else float("inf"),
         phase_margin=float(pm[np.argmin(np.abs(pm))]) if pm.size else float("inf"),
@@ -219,7 +217,7 @@ def _collect(
         gain_margins=read_only(gm),
         modulus_crossover=closest,
         dt=dt,
-        response=(read_only(omega), kept),
+        response=(read_only(omega), locked(values)),
         flags=flags,
     )
 

@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics import state_space
-from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.delayed_regulator import line_gain
 from ..results import Result
 from ..wording import in_numbers
-from .riccati import locked, riccati, weight_matrix
+from .riccati import riccati, weight_matrix
 from .siso import delayed_system
 
 

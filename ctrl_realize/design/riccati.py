@@ -41,10 +41,3 @@ def riccati(
         np.atleast_2d(np.asarray(cost, dtype=np.float64)),
         np.asarray(poles, dtype=np.complex128),
     )
-
-
-def locked(values: ComplexArray) -> ComplexArray:
-    """Copy complex values into an array that cannot be written."""
-    kept = np.array(values, dtype=np.complex128)
-    kept.flags.writeable = False
-    return kept

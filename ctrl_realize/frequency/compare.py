@@ -10,7 +10,7 @@ import numpy as np
 from ..checks import band, one_of, real
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
-from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray, locked, read_only
 from ..numerics.bands import running_median, widest_run
 from ..numerics.spectra import hold_response, unwrapped_phase
 from ..results import Flag
@@ -142,14 +142,14 @@ def compare_frf(
         )
     return FRFComparison(
         frequency_hz=read_only(frequency),
-        measured=_locked(measured),
-        model=_locked(model),
+        measured=locked(measured),
+        model=locked(model),
         gain_error_db=read_only(decibels(ratio)),
         phase_error_deg=read_only(np.degrees(error)),
         relative_error=read_only(np.abs(ratio - 1)),
         measured_phase_deg=read_only(np.degrees(model_phase - error)),
         model_phase_deg=read_only(np.degrees(model_phase)),
-        trusted=_locked(good),
+        trusted=locked(good),
         band_hz=(float(frequency[good][0]), float(frequency[good][-1])),
         band_from=source,
         coherence=None if coherence is None else read_only(coherence),
@@ -223,7 +223,7 @@ def _good_points(
     std: FloatArray | None,
     min_coherence: float | None,
     band_hz: tuple[float, float] | None,
-) -> tuple[np.ndarray[Any, np.dtype[np.bool_]], Literal["coherence", "std", "all"]]:
+) -> tuple[BoolArray, Literal["coherence", "std", "all"]]:
     """Find the trusted band."""
     if min_coherence is not None:
         if not 0 <= real(min_coherence, "min_coherence", "value in 0...1") <= 1:
@@ -257,9 +257,3 @@ def _good_points(
             f"there is no trusted band: {wanted}; lower it, or pass band_hz=(low, high)"
         )
     return widest_run(good, frequency), "coherence" if source == "coherence" else "std"
-
-
-def _locked(values: Any) -> Any:
-    copy = np.array(values)
-    copy.flags.writeable = False
-    return copy

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..results import Flag, Result
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class FRFComparison(Result):
     relative_error: FloatArray
     measured_phase_deg: FloatArray
     model_phase_deg: FloatArray
-    trusted: np.ndarray[Any, np.dtype[np.bool_]]
+    trusted: BoolArray
     band_hz: tuple[float, float]
     band_from: Literal["coherence", "std", "all"]
     coherence: FloatArray | None

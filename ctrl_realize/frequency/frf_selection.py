@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..delayed import DelayedStateSpace, delayed_ss
-from ..numerics.arrays import ComplexArray, read_only
+from ..numerics.arrays import locked, read_only
 from ..numerics.rational import chain_state_space
 from ..numerics.rational_bounds import (
     covariance,
@@ -102,24 +102,18 @@ def chosen_model(
         std=best.std,
         interval=interval,
         frequency_hz=read_only(frequency),
-        measured=_locked(points.response),
+        measured=locked(points.response),
         sigma=read_only(points.sigma),
         noise_known=noise_known,
         misfit=misfit,
         matrices=matrices,
-        poles=_locked(poles * unit),
+        poles=locked(poles * unit),
         pole_std=read_only(pole_std * unit),
         structures=tuple(rows),
         name=str(frf.name or "measured"),
         flags=tuple(flags),
     )
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
-
-
-def _locked(values: ComplexArray) -> ComplexArray:
-    locked = np.array(values)
-    locked.flags.writeable = False
-    return locked
 
 
 def _leading_phase(

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
 
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import ComplexArray, FloatArray, locked
 from ..numerics.lag_chains import lag_sum
 from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.step_problem import StepData
@@ -37,8 +35,8 @@ def summarise(
         total_delay=fit.delay + lag_sum(poles[poles != 0], fit.numerator),
         order=fit.structure.order,
         relative_degree=fit.structure.relative_degree,
-        poles=_locked(np.sort_complex(poles)),
-        zeros=_locked(np.sort_complex(zeros)),
+        poles=locked(np.sort_complex(poles)),
+        zeros=locked(np.sort_complex(zeros)),
         gain=float(fit.numerator[0] / np.prod(-poles[poles != 0]).real),
         at_noise_level=fit.adequate,
         misfit=fit.misfit,
@@ -57,11 +55,11 @@ def summarise(
             )
             for line in fit.structures
         ),
-        profile_delay=_locked(fit.profile[0]),
-        profile_excess=_locked(fit.profile[1]),
-        time=_locked(time),
-        measured=_locked(data.output),
-        fitted=_locked(fit.fitted),
+        profile_delay=locked(fit.profile[0]),
+        profile_excess=locked(fit.profile[1]),
+        time=locked(time),
+        measured=locked(data.output),
+        fitted=locked(fit.fitted),
         dt=data.dt,
         records=records,
         choices=_choices(fit),
@@ -106,9 +104,3 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
     if fit.correlation > 1:
         reasons.append(f"the residual is correlated: {fit.correlation:.3g} samples count as one")
     return tuple(reasons)
-
-
-def _locked(values: Any) -> Any:
-    values = np.array(values)
-    values.flags.writeable = False
-    return values

@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from ..errors import DataError, UnsuitableSystemError
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.spectra import unwrapped_phase
 
 TRUSTED_COHERENCE = 0.95
@@ -34,7 +34,7 @@ class Curve:
     measured: bool
 
     @property
-    def good(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def good(self) -> BoolArray:
         """Which points are coherent; all of them where none is, or where nobody knows."""
         if self.coherence is None:
             return np.ones(self.frequency_hz.size, dtype=np.bool_)
