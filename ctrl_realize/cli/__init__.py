@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import typer
 from threadpoolctl import threadpool_limits
@@ -48,6 +50,12 @@ def _common(
     """Models with dead time from measured responses, as python-control state-space systems."""
 
 
+@functools.cache
+def _command() -> Any:
+    """Build the commands once, also where a program calls `main` again and again."""
+    return get_command(app)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -63,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         written. 130: interrupted.
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
-    command = get_command(app)
+    command = _command()
     # Our matrices are small: on a busy machine BLAS threads that wait for each other cost ten
     # times what they save. Processes are what --jobs is for.
     with threadpool_limits(limits=1), warnings.catch_warnings():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -257,7 +258,9 @@ def _checksum(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(canonical.encode("ascii")).hexdigest()
 
 
+@functools.cache
 def _versions() -> dict[str, str]:
+    """Versions of what computed; asked once, as a campaign writes thousands of models."""
     versions = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:

@@ -20,6 +20,9 @@ from .arrays import FloatArray
 SMALLEST = 1e-290
 """Singular values up to here are zero: what is left of underflow, not of a system."""
 
+LARGEST_POLE = 1e150
+"""Singular values that many times smaller than the sample after their matrix are zero, too."""
+
 
 def realize_symmetric(
     values: FloatArray, vectors: FloatArray, last_row: FloatArray | None
@@ -50,7 +53,7 @@ def realize_symmetric(
     unique.
     """
     root = np.sqrt(np.abs(values))
-    inverse = np.divide(1.0, root, out=np.zeros_like(root), where=np.abs(values) > SMALLEST)
+    inverse = _inverse(root, None if last_row is None else np.abs(last_row).max(axis=1)[:, None])
     turn = np.where(vectors[:, :, 0] < 0, -1.0, 1.0)
     sign = np.where(values < 0, -1.0, 1.0)
     shifted = np.matmul(vectors[:, :, :-1], vectors[:, :, 1:].transpose(0, 2, 1))
@@ -90,8 +93,7 @@ def realize_block(
     """
     p, m = channels
     root = np.sqrt(singular_values)
-    # values whose inverse overflows in the products below carry no state either
-    inverse = np.divide(1.0, root, out=np.zeros_like(root), where=singular_values > SMALLEST)
+    inverse = _inverse(root, None if last_rows is None else np.abs(last_rows).max())
     largest = np.abs(V[:m]).argmax(axis=0)
     turn = np.where(V[largest, np.arange(V.shape[1])] < 0, -1.0, 1.0)
     shifted = (U[:-p].T @ U[p:]) * singular_values
@@ -101,6 +103,14 @@ def realize_block(
     B = (turn * root)[:, np.newaxis] * V[:m].T
     C = U[:p] * (turn * root)
     return A, B, C
+
+
+def _inverse(root: FloatArray, next_sample: FloatArray | float | None) -> FloatArray:
+    """Invert roots of singular values; those whose products with A overflow carry no state."""
+    smallest = np.sqrt(SMALLEST)
+    if next_sample is not None:
+        smallest = np.maximum(smallest, np.sqrt(next_sample / LARGEST_POLE))
+    return np.divide(1.0, root, out=np.zeros_like(root), where=root > smallest)
 
 
 def tail_bound(norm_squared: float, leading: FloatArray, size: int) -> float:

@@ -77,13 +77,14 @@ def model(tmp_path_factory):
 
 
 def step_table(rng) -> bytes:
-    """Sixty good samples of a step, one cell of them out of order at times."""
-    k = np.arange(60)
-    y = 1 - 0.8 ** np.clip(k - 15 - rng.randint(0, 5), 0, None)
-    y = y + rng.choice([0.0, 1e-3]) * generator(rng).standard_normal(60)
-    rows = [f"{t / 10:g},{float(t >= 15):g},{v:.6f}" for t, v in zip(k, y, strict=True)]
+    """Some forty good samples of a step, one cell of them out of order at times."""
+    n = rng.randint(25, 60)
+    k = np.arange(n)
+    y = 1 - 0.8 ** np.clip(k - 10 - rng.randint(0, 5), 0, None)
+    y = y + rng.choice([0.0, 1e-3]) * generator(rng).standard_normal(n)
+    rows = [f"{t / 10:g},{float(t >= 10):g},{v:.6f}" for t, v in zip(k, y, strict=True)]
     if sometimes(rng, 3):
-        rows[rng.randrange(60)] = any_text(rng, 8)
+        rows[rng.randrange(n)] = any_text(rng, 8)
     return "\n".join(["t,u,y", *rows]).encode()
 
 

@@ -336,3 +336,12 @@ def test_an_output_that_is_one_spike_at_the_start_is_refused():
     y = np.where(np.arange(26) == 0, 482.0, 0.0)
     with pytest.raises(DataError, match="the output does not follow the input"):
         cr.identify(cr.Record(np.arange(26.0), u, y))
+
+
+def test_a_sample_of_1e_282_before_one_of_1e90_is_no_pole_of_1e372():
+    # of a Hankel matrix that ends just before a sample of another world the pole overflowed
+    g = np.zeros(43)
+    g[8], g[16:] = -7e-282, 1e90
+    with good_end() as scans:
+        scans.append(cr.scan_orders(g, 2, max_delay=7, dt=1.0, samples=16, feedthrough=True))
+    assert np.isfinite(scans[0].iae).all()

@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from tests.fuzz.draws import any_array, any_float, generator, sometimes
+from tests.fuzz.draws import any_array, any_float, chosen, generator, of, sometimes
 from tests.fuzz.lane import fuzz, good_end
 
 
@@ -88,12 +88,22 @@ def test_any_measured_response_is_fitted_or_refused(rng):
         assert np.abs(model.delay_free.poles()).max(initial=0.0) < 1 + 1e-9
 
 
+WAYS = {
+    "kernel": of("TC", "TC", "DC", "other"),
+    "weighting": of("std", "relative", "uniform", "auto"),
+    "hold": of("zoh", "foh"),
+    "band_hz": lambda rng: (any_float(rng), any_float(rng)),
+}
+
+
 @fuzz(40)
 def test_any_measured_response_gives_a_pulse_response_or_is_refused(rng):
     g, f = any_points(rng)
     dt = rng.choice([0.1, 1.0, 1e-9, any_float(rng)])
+    length, std = rng.randint(-1, rng.choice([12, 60])), any_side(rng, g)
+    choice = chosen(rng, WAYS)
     with good_end() as pulses:
-        pulses.append(cr.impulse_from_frf(cr.MeasuredFRF(g, f), dt, length=rng.randint(-1, 60)))
+        pulses.append(cr.impulse_from_frf(cr.MeasuredFRF(g, f, std=std), dt, length, **choice))
     for pulse in pulses:
         assert np.isfinite(pulse.markov).all()
 
