@@ -102,6 +102,16 @@ def text_card(
 ) -> str:
     """Lay out label-value rows as text, choices and flags below them.
 
+    Parameters
+    ----------
+    title : str
+    rows : sequence of (label, value)
+    choices, flags : sequence of str, optional
+
+    Returns
+    -------
+    str
+
     Examples
     --------
     >>> from ctrl_realize.results import text_card
@@ -126,6 +136,15 @@ def html_card(
     flags: Sequence[str] = (),
 ) -> str:
     """Lay out label-value rows as a small HTML table; everything is escaped.
+
+    Parameters
+    ----------
+    title, rows, choices, flags
+        As for `text_card`.
+
+    Returns
+    -------
+    str
 
     Examples
     --------

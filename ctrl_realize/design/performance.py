@@ -77,7 +77,20 @@ def step_responses(
 
 
 def performance(plant: DelayedStateSpace, controller: Any, total_time: float) -> Performance:
-    """Measure a stable loop; `total_time` (s) sets the first guess of how long that takes.
+    """Measure how a stable loop answers steps of its set-point and of a load at the plant's input.
+
+    Parameters
+    ----------
+    plant : DelayedStateSpace
+    controller : system or float
+        Of the plant's sample time, with negative feedback.
+    total_time : float
+        Dead time and lags together, in s: the first guess of how long the loop takes. The
+        responses are computed for longer until they have settled.
+
+    Returns
+    -------
+    Performance
 
     Examples
     --------

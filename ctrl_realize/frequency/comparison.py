@@ -43,6 +43,7 @@ class FRFComparison(Result):
         The hold that was divided out of the model.
     name : str
         Names of model and measurement.
+    flags : tuple of Flag
 
     Examples
     --------

@@ -76,7 +76,7 @@ def stepped_sine_frf(
     -----
     The coherence is that of all samples kept at one frequency,
 
-    .. math:: \gamma^2 = \frac{|\sum_i Y_i \bar U_i|^2}
+    .. math:: \gamma^2 = \frac{|\sum_i Y_i \bar{U}_i|^2}
               {4 \sum_i P_{u,i} \; \sum_i P_{y,i}},
 
     with the phasors :math:`U_i, Y_i` of repeat *i* and the power :math:`P` of sine and misfit.

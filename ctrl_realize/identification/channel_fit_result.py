@@ -15,7 +15,8 @@ from ..results import Flag, Result
 from ..signals import Record
 from ..wording import in_percent
 from .channel_search import Candidate
-from .residuals import ResidualCheck, check_residuals
+from .residual_check import ResidualCheck
+from .residuals import check_residuals
 
 COLOURED, WANDERING = 0.5, 0.97
 """Correlation of neighbouring residuals from which they are said to be coloured, and to wander
@@ -48,7 +49,9 @@ class ChannelFit(Result):
     checks : tuple of ResidualCheck
         Of every record without gaps.
     records : tuple of Record
+        What was fitted.
     choices : tuple of str
+        What was chosen, and why.
     flags : tuple of Flag
         Those of the checks, and ``"highest_order"``, ``"no_response"``,
         ``"coloured_residual"``.

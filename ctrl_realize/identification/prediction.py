@@ -27,6 +27,17 @@ class Prediction(Result):
     compares it with the record. The model is the system plus an autoregression of its residual
     of the order `noise_order`, per output.
 
+    Attributes
+    ----------
+    output : ndarray, shape (N,) or (p, N)
+    fit_percent : ndarray, shape (p,)
+        ``100 (1 - |y - output| / |y - mean y|)`` of every output.
+    steps : int
+        Samples from the last measured output that was used to the one that is predicted.
+    noise_order : tuple of int
+        Of every output; 0 where the residual is white.
+    record : Record
+
     Examples
     --------
     >>> import control as ct
@@ -86,8 +97,9 @@ def predict(
 
     Notes
     -----
-    The autoregression of the residual is fitted to the same record (order 0...20 by BIC), so the
-    figure is one of description; compare models at the same `steps`.
+    The autoregression of the residual is fitted to the same record (order 0...20 by BIC), so that
+    `fit_percent` says how well this record is described, not how well the next one would be
+    predicted. Compare models at the same `steps`.
 
     Examples
     --------

@@ -63,7 +63,7 @@ class DelayTracker:
 
     Notes
     -----
-    Multiple-model estimation of a delay on line in the row of Tuch, Feuer and Palmor (1994) and
+    Multiple-model estimation of a delay on line after Tuch, Feuer and Palmor (1994) and
     Orlov et al. (2002). The regressors are simulated, not measured, outputs, so noise does not
     bias the dynamics. Pole moves enter to first order about a model that is renewed when a pole
     has moved by 4 % or more: a second bank then runs beside the first for two memories and

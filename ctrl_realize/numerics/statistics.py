@@ -73,7 +73,8 @@ def trimmed_statistics(
     Notes
     -----
     The paper pools the 40 delays of its Table 1 and leaves out "the three smallest and highest
-    values", which gives 36.68 -> 37 with variance 2.04 (`ddof` 0) or 2.10 (`ddof` 1) -> 2.
+    values", which gives a mean of 36.68 and a variance of 2.04 (`ddof` 0) or 2.10 (`ddof` 1);
+    printed are 37 and 2.
 
     References
     ----------

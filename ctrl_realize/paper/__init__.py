@@ -70,10 +70,30 @@ FINAL_RECORD = (16.0, 2)
 """Step size in mA and number of the record of least IAE, which gave the final model."""
 
 TABLE_1 = table_1.DELAYS
-"""Estimated delays in samples: record 1-10 x step size 16, 12, 8, 4 mA (Table 1)."""
+"""Estimated delays in samples: record 1-10 x step size 16, 12, 8, 4 mA (Table 1).
+
+:meta hide-value:
+
+Examples
+--------
+>>> from ctrl_realize import paper
+>>> paper.TABLE_1[:2].tolist()
+[[38.0, 37.0, 37.0, 37.0], [37.0, 34.0, 38.0, 38.0]]
+"""
 
 ERRATA = errata.ERRATA
-"""Misprints and open points, with the reading that is implemented."""
+"""Misprints and open points, each an `Erratum` with the reading that is implemented.
+
+The page *The paper, claim by claim* shows them as a table.
+
+:meta hide-value:
+
+Examples
+--------
+>>> from ctrl_realize import paper
+>>> [erratum.code for erratum in paper.ERRATA][:3]
+['E1', 'E2', 'E3']
+"""
 
 
 def table_1_statistics(*, ddof: int = 1) -> TrimmedStatistics:

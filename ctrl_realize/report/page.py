@@ -33,7 +33,14 @@ class PageFigure:
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column; `kind` is "text", "name", "number" or "mono".
+    """Heading of a column.
+
+    Attributes
+    ----------
+    name : str
+        With its unit.
+    kind : {"text", "name", "number", "mono"}
+        How the cells are set: numbers to the right, ``"mono"`` in letters of one width.
 
     Examples
     --------
@@ -48,7 +55,13 @@ class Column:
 
 @dataclass(frozen=True)
 class Row:
-    """Cells of a table as text; `kind` is "", "best" or "failed".
+    """Cells of a table.
+
+    Attributes
+    ----------
+    cells : tuple of str
+    kind : {"", "best", "failed"}
+        How the row stands out.
 
     Examples
     --------
@@ -64,6 +77,18 @@ class Row:
 @dataclass(frozen=True)
 class Table:
     """A table of text.
+
+    Attributes
+    ----------
+    title : str
+        Heading above the table.
+    rows : tuple of Row
+    columns : tuple of Column
+        Headings; empty for a table without.
+    kinds : tuple of str
+        Kinds of the columns of a table without headings, as in `Column`.
+    note : str
+        A sentence below.
 
     Examples
     --------
@@ -91,6 +116,21 @@ class Table:
 class Page:
     """Everything that a report says.
 
+    Attributes
+    ----------
+    title, subtitle : str
+    verdict : Verdict
+        What stands first, from `verdict_of`.
+    version : str
+        Of the package, for the foot of the page.
+    figures : sequence of PageFigure
+        From `Sketch.on_page`.
+    tables : sequence of Table
+    calls : sequence of (name, text)
+        What to type to do it again.
+    simulated : bool
+        Whether the data are simulated; it is then said at the top.
+
     Examples
     --------
     >>> import ctrl_realize as cr
@@ -117,6 +157,17 @@ class Page:
 
 def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) -> Table:
     """Make a table of labels and values.
+
+    Parameters
+    ----------
+    title : str
+    rows : sequence of (label, value)
+    mono : bool, default False
+        Set the values in letters of one width.
+
+    Returns
+    -------
+    Table
 
     Examples
     --------
@@ -151,6 +202,20 @@ def render(page: Page) -> str:
 
 def write_page(path: str | os.PathLike[str], page: Page) -> Path:
     """Write a page to a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+    page : Page
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    OSError
+        The folder is missing or cannot be written.
 
     Examples
     --------

@@ -61,6 +61,18 @@ class Verdict:
 def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Verdict:
     """Judge a model by the flags of its fit.
 
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Model with its `fit`.
+    more_flags : sequence of Flag, optional
+        What else should be known, from a comparison with an FRF for example.
+
+    Returns
+    -------
+    Verdict
+        Its ``level``, ``headline``, ``facts``, ``reasons`` and ``judgement``.
+
     Examples
     --------
     >>> import ctrl_realize as cr
