@@ -30,6 +30,8 @@ extensions = [
     "mathml",
     "glossary_links",
     "breakable",
+    "figures",
+    "entries",
 ]
 exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints", "*_table.md", "generated/tables"]
 templates_path = ["_templates"]
@@ -127,6 +129,7 @@ pygments_dark_style = "github-dark"
 html_title = "ctrl_realize"
 html_static_path = ["_static"]
 html_css_files = ["style.css"]
+html_js_files = ["figures.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {

@@ -1,4 +1,4 @@
-"""Long code in tables may break behind the signs that part its words, and nowhere else."""
+"""Long code in tables and long names in titles break where their words meet, and nowhere else."""
 
 from __future__ import annotations
 
@@ -10,23 +10,30 @@ from docutils import nodes
 LONG = 12
 """Letters from which code may break."""
 BEHIND = re.compile(r"(?<=[/_.:(,=])(?=[^/_.:(,=)])")
+WORDS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)")
 
 
 def let_code_break(app: Any, doctree: nodes.document, docname: str) -> None:
     if app.builder.format != "html":
         return
-    if docname.startswith("generated/api"):  # names of the reference stay whole
+    if docname.startswith("generated/api"):  # in tables of the reference names stay whole
+        for title in list(doctree.findall(nodes.title))[:1]:
+            _break(title, WORDS)
         return
     for entry in doctree.findall(nodes.entry):
         for code in list(entry.findall(nodes.literal)):
-            words = code.astext()
-            if len(words) <= LONG or len(code.children) != 1:
-                continue
-            parts: list[nodes.Node] = []
-            for part in BEHIND.split(words):
-                parts += [nodes.Text(part), nodes.raw("", "<wbr>", format="html")]
-            code.children = []
-            code.extend(parts[:-1])
+            if len(code.astext()) > LONG:
+                _break(code, BEHIND)
+
+
+def _break(element: nodes.TextElement, where: re.Pattern[str]) -> None:
+    if len(element.children) != 1:
+        return
+    parts: list[nodes.Node] = []
+    for part in where.split(element.astext()):
+        parts += [nodes.Text(part), nodes.raw("", "<wbr>", format="html")]
+    element.children = []
+    element.extend(parts[:-1])
 
 
 def setup(app: Any) -> dict[str, bool]:

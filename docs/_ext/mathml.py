@@ -3,14 +3,37 @@
 from __future__ import annotations
 
 from typing import Any
+from xml.etree import ElementTree
 
 from docutils import nodes
 from docutils.utils.math import latex2mathml
 
+NAMESPACE = "http://www.w3.org/1998/Math/MathML"
+ACCENTS = ("\u02c6", "\u02c9", "\u02d9", "\u02dc")
+"""Hat, bar, dot and tilde, as the converter writes them."""
+
 
 def _markup(formula: str, *, block: bool) -> str:
     # The converter knows \ldots only, which \dots means between commas.
-    return latex2mathml.tex2mathml(formula.replace(r"\dots", r"\ldots"), as_block=block)
+    written = latex2mathml.tex2mathml(formula.replace(r"\dots", r"\ldots"), as_block=block)
+    math = ElementTree.fromstring(written.replace("&ApplyFunction;", "\u2061"))
+    _repair(math)
+    ElementTree.register_namespace("", NAMESPACE)
+    return ElementTree.tostring(math, encoding="unicode", short_empty_elements=False)
+
+
+def _repair(math: ElementTree.Element) -> None:
+    """Set an index beside an accented letter, not below it; take the spaces off bars."""
+    for both in list(math.iter(f"{{{NAMESPACE}}}munderover")):
+        letter, index, above = both
+        if above.text in ACCENTS:
+            accented = ElementTree.Element(f"{{{NAMESPACE}}}mover", {"accent": "true"})
+            accented.extend([letter, above])
+            both.tag = f"{{{NAMESPACE}}}msub"
+            both[:] = [accented, index]
+    for sign in math.iter(f"{{{NAMESPACE}}}mo"):
+        if sign.text == "|":
+            sign.attrib.update(lspace="0", rspace="0")
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
