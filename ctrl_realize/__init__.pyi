@@ -30,9 +30,10 @@ from .identification.channel_fit_result import ChannelFit as ChannelFit
 from .identification.channels import ChannelRealization as ChannelRealization
 from .identification.channels import channel_delays as channel_delays
 from .identification.channels import realize_channels as realize_channels
-from .identification.cross_check import DelayCheck as DelayCheck
-from .identification.cross_check import DelayView as DelayView
 from .identification.cross_check import check_delay as check_delay
+from .identification.cross_validation import cross_validate as cross_validate
+from .identification.delay_check import DelayCheck as DelayCheck
+from .identification.delay_check import DelayView as DelayView
 from .identification.delay_fit import fit_delay as fit_delay
 from .identification.delay_fit_result import DelayFit as DelayFit
 from .identification.delay_scan import DelayScan as DelayScan
@@ -44,11 +45,10 @@ from .identification.orders import OrderScan as OrderScan
 from .identification.orders import scan_orders as scan_orders
 from .identification.prediction import Prediction as Prediction
 from .identification.prediction import predict as predict
-from .identification.realization import Realization as Realization
 from .identification.realization import realize as realize
-from .identification.residuals import ResidualCheck as ResidualCheck
+from .identification.realization_result import Realization as Realization
+from .identification.residual_check import ResidualCheck as ResidualCheck
 from .identification.residuals import check_residuals as check_residuals
-from .identification.residuals import cross_validate as cross_validate
 from .identification.steps import detect_step as detect_step
 from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step

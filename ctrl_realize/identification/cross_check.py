@@ -1,10 +1,6 @@
-"""One delay, seen in many ways: a table, and whether they agree."""
+"""Estimate one delay in every way that the data allow."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,147 +8,26 @@ from ..checks import whole
 from ..errors import CtrlRealizeError, DataError
 from ..numerics.onset import correlation_onset, phase_slope
 from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
-from ..results import Flag, Result
+from ..results import Flag
 from ..signals import MeasuredFRF, Record
 from ..signals.given import check_complete
-from ..wording import in_time, interval_in_time
+from .delay_check import DelayCheck, DelayView, common_dead_time
 from .delay_fit import fit_delay
 from .delay_fit_result import DelayFit
 from .delay_scan import estimate_delay
 from .from_io import impulse_from_io
 from .steps import impulse_from_step, unit_step
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-Kind = Literal["dead time", "upper bound"]
 TOP_BAND = 1 / 3
 """Part of the band, from its upper end, where the slope of the phase is taken."""
 MOST_LAGS = 1000
+"""Lags up to which a cross-correlation is looked at."""
+UNSEEN = 0.01
+"""Chance that a cross-correlation stands out where there is none."""
 NO_LEVEL = "its interval tells how flat the misfit is, not how far off the delay can be"
 """What a scan leaves open on any record: its set holds the truth in fewer than half of them."""
-_DOUBTS = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_leads")
-
-
-@dataclass(frozen=True)
-class DelayView:
-    """One way to look at the delay, in s.
-
-    ``low <= value <= high``. A view of kind ``"dead time"`` estimates the dead time itself; an
-    ``"upper bound"`` sees the dead time and part of the lags: the dead time is not above `high`.
-    A view with a `doubt` says of itself that its data do not carry it, or, as a scan, that its
-    interval claims no level; it is shown and does not count in the verdict.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> view = cr.DelayView("fit", "sine sweep", "dead time", 0.0289, 0.0285, 0.0294)
-    >>> view.low, view.value, view.high
-    (0.0285, 0.0289, 0.0294)
-    """
-
-    method: str
-    source: str
-    kind: Kind
-    value: float
-    low: float
-    high: float
-    doubt: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class DelayCheck(Result):
-    """Delay from several methods side by side.
-
-    `agree` is true when one dead time lies in the interval of every dead-time view that counts and
-    not above any upper bound; `common` is then the interval of such dead times. Otherwise `common`
-    is None and `conflicts` names the pairs that cannot both be right. Where every view is in
-    doubt, nothing is agreed on and there are no conflicts.
-
-    Attributes
-    ----------
-    views : tuple of DelayView
-    agree : bool
-    common : tuple of float or None
-        In s.
-    conflicts : tuple of (str, str)
-    rely_on : str or None
-        Method of the view to take the dead time from: the narrowest interval among those that
-        count. None where they do not agree, or none sees the dead time itself.
-    dt : float or None
-        Sample time of the record in s.
-    flags : tuple of Flag
-        What could not be done, and why.
-
-    Examples
-    --------
-    >>> import control as ct
-    >>> import numpy as np
-    >>> import ctrl_realize as cr
-    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
-    >>> rng = np.random.default_rng(0)
-    >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
-    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
-    >>> print(f"{check.common[0]:.3f} to {check.common[1]:.3f} s, take that of the {check.rely_on}")
-    0.113 to 0.126 s, take that of the output error
-    """
-
-    views: tuple[DelayView, ...]
-    agree: bool
-    common: tuple[float, float] | None
-    conflicts: tuple[tuple[str, str], ...]
-    dt: float | None
-    flags: tuple[Flag, ...] = ()
-
-    @property
-    def rely_on(self) -> str | None:
-        """Method whose interval of the dead time is the narrowest of those that count."""
-        times = [view for view in _counted(self.views) if view.kind == "dead time"]
-        if not self.agree or not times:
-            return None
-        return min(times, key=lambda view: view.high - view.low).method
-
-    def table(self) -> pd.DataFrame:
-        """Tabulate the views, one row each, in s and in samples."""
-        import pandas as pd
-
-        rows = pd.DataFrame([vars(view) for view in self.views]).set_index("method")
-        if self.dt is not None:
-            rows["samples"] = rows["value"] / self.dt
-        return rows
-
-    def _title(self) -> str:
-        return "Delay seen in several ways"
-
-    def _rows(self) -> list[tuple[str, str]]:
-        rows = []
-        for view in self.views:
-            samples = "" if self.dt is None else f" = {view.value / self.dt:.4g} samples"
-            sign = "" if view.kind == "dead time" else ", upper bound"
-            sign += "; in doubt" if view.doubt else ""
-            rows.append(
-                (
-                    f"{view.method} ({view.source})",
-                    f"{in_time(view.value, 4)}{samples} "
-                    f"({interval_in_time(view.low, view.high)}{sign})",
-                )
-            )
-        if self.common is None and not self.conflicts:
-            words = "no: every view is in doubt"
-        elif self.common is None:
-            words = "no: " + "; ".join(f"{a} against {b}" for a, b in self.conflicts)
-        else:
-            words = f"yes, on {interval_in_time(*self.common)}"
-        rows.append(("they agree", words))
-        if self.rely_on is not None:
-            rows.append(("rely on", f"{self.rely_on}: the narrowest interval of those that count"))
-        rows += [(f"{view.method} in doubt", view.doubt) for view in self.views if view.doubt]
-        return rows
-
-    def __repr__(self) -> str:
-        verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"
-        return f"<DelayCheck: {len(self.views)} views that {verdict}>"
+DOUBTFUL = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_leads")
+"""Flags by which a method says that its data do not carry its answer."""
 
 
 def check_delay(
@@ -227,7 +102,7 @@ def check_delay(
         _from_frf(frf, views, flags)
     if not views:
         raise DataError("no method found a delay: " + "; ".join(map(str, flags)))
-    common, conflicts = _verdict(views)
+    common, conflicts = common_dead_time(views)
     return DelayCheck(
         views=tuple(views),
         agree=common is not None,
@@ -249,8 +124,7 @@ def _from_record(
     if not record.issiso:
         raise DataError(f"{record!r} has several channels; needed is one input and one output")
     dt = record.dt
-    total, model_order = 0.1 * record.n_samples * dt, 2
-    stepped = False
+    total, model_order, stepped = 0.1 * record.n_samples * dt, 2, False
     try:
         fit: DelayFit = fit_delay(record).fit
     except CtrlRealizeError as problem:
@@ -268,17 +142,20 @@ def _from_record(
         views.append(_scan(record, stepped, most, order or model_order, total))
     except CtrlRealizeError as problem:
         flags.append(Flag("no_scan", f"scan: {problem}"))
-    if stepped:
-        return
+    if not stepped:
+        _from_correlation(record, most, views, flags)
+
+
+def _from_correlation(record: Record, most: int, views: list[DelayView], flags: list[Flag]) -> None:
     lags = int(min(MOST_LAGS, max(most, 20), record.n_samples // 4))
-    seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 0.99)
+    seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 1 - UNSEEN)
     if seen.onset < 0:
         flags.append(
             Flag("no_correlation", f"cross-correlation: nothing stands out up to lag {lags}")
         )
         return
     # Behind a hold, what is seen at lag k for the first time came within the sample before.
-    value = seen.onset * dt
+    value = seen.onset * record.dt
     views.append(DelayView("cross-correlation", "record", "upper bound", value, 0.0, value))
 
 
@@ -304,12 +181,7 @@ def _scan(record: Record, stepped: bool, most: int, order: int, total: float) ->
 
 def _doubt(flags: tuple[Flag, ...]) -> str:
     """Return what a method says against its own answer."""
-    return "; ".join(str(flag) for flag in flags if flag.code in _DOUBTS)
-
-
-def _counted(views: Sequence[DelayView]) -> list[DelayView]:
-    """Leave out the views in doubt."""
-    return [view for view in views if not view.doubt]
+    return "; ".join(str(flag) for flag in flags if flag.code in DOUBTFUL)
 
 
 def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> None:
@@ -331,32 +203,5 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> No
         return
     phase = unwrap_with_dead_time(omega, values, dead_time_from_phase(omega, values))
     slope, std = phase_slope(omega, phase, TOP_BAND)
-    views.append(
-        DelayView(
-            "phase slope", "FRF", "upper bound", slope, max(slope - 2 * std, 0.0), slope + 2 * std
-        )
-    )
-
-
-def _verdict(
-    views: list[DelayView],
-) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
-    """Find the dead times that no view rules out, or the pairs that rule each other out."""
-    views = _counted(views)
-    times = [view for view in views if view.kind == "dead time"]
-    if not views:
-        return None, ()
-    low = max((view.low for view in times), default=0.0)
-    high = min(view.high for view in views)
-    if low <= high:
-        return (low, high), ()
-    pairs = [
-        (times[i], other)
-        for i in range(len(times))
-        for other in [*times[i + 1 :], *(v for v in views if v.kind == "upper bound")]
-    ]
-    return None, tuple(
-        (a.method, b.method)
-        for a, b in pairs
-        if a.low > b.high or (b.kind == "dead time" and b.low > a.high)
-    )
+    low, high = max(slope - 2 * std, 0.0), slope + 2 * std
+    views.append(DelayView("phase slope", "FRF", "upper bound", slope, low, high))

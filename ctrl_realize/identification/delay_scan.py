@@ -17,7 +17,8 @@ from ..numerics.arrays import FloatArray, read_only
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
 from ..wording import in_time
-from .realization import Realization, realize
+from .realization import realize
+from .realization_result import Realization
 from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
 from .scan_surface import Surface, scan_surface
 

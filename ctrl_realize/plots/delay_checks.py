@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from matplotlib.lines import Line2D
 
-from ..identification.cross_check import DelayCheck
+from ..identification.delay_check import DelayCheck
 from ..wording import time_unit
 from . import style
 

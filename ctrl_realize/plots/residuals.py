@@ -13,7 +13,7 @@ from ..checks import whole
 from ..errors import OptionError
 from ..identification.channel_fit_result import ChannelFit
 from ..identification.prediction import Prediction
-from ..identification.residuals import ResidualCheck
+from ..identification.residual_check import ResidualCheck
 from ..numerics.arrays import FloatArray
 from ..signals import Record
 from . import style

@@ -14,7 +14,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..identification.delay_scan import DelayScan
 from ..identification.orders import OrderScan
-from ..identification.realization import Realization
+from ..identification.realization_result import Realization
 from ..numerics.arrays import FloatArray
 from ..wording import in_time
 from . import style

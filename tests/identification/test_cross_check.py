@@ -8,7 +8,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError
-from ctrl_realize.identification.cross_check import DelayCheck, DelayView, _verdict
+from ctrl_realize.identification.delay_check import DelayCheck, DelayView, common_dead_time
 from tests.rigs import R1, R2, step_record
 
 DT = 0.01
@@ -68,7 +68,7 @@ def test_a_step_is_seen_in_three_ways():
 def test_frequency_response_of_another_plant_does_not_agree(both):
     other = cr.check_delay(frf=frequency_response(dead_time=0.4))
     views = (*both.views[:3], *other.views)
-    common, conflicts = _verdict(list(views))
+    common, conflicts = common_dead_time(list(views))
     assert common is None
     assert ("output error", "FRF fit") in conflicts
     check = replace(both, views=views, agree=False, common=None, conflicts=conflicts)
@@ -88,9 +88,9 @@ def test_a_frequency_response_alone_is_enough():
 
 def test_the_verdict_is_the_intersection_of_dead_times_below_all_bounds():
     views = [view("a", 1.0, 3.0), view("b", 2.0, 5.0), view("c", 0.0, 2.5, "upper bound")]
-    assert _verdict(views) == ((2.0, 2.5), ())
+    assert common_dead_time(views) == ((2.0, 2.5), ())
     apart = [*views, view("d", 4.0, 5.0)]
-    common, conflicts = _verdict(apart)
+    common, conflicts = common_dead_time(apart)
     assert common is None
     assert set(conflicts) == {("a", "d"), ("d", "c")}
 
@@ -98,7 +98,7 @@ def test_the_verdict_is_the_intersection_of_dead_times_below_all_bounds():
 def test_a_view_in_doubt_is_shown_and_does_not_count():
     views = [view("a", 1.0, 3.0), view("b", 0.5, 4.0), view("c", 0.0, 2.5, "upper bound")]
     doubted = [*views, replace(view("d", 8.0, 9.0), doubt="says so itself")]
-    assert _verdict(doubted) == _verdict(views) == ((1.0, 2.5), ())
+    assert common_dead_time(doubted) == common_dead_time(views) == ((1.0, 2.5), ())
     check = DelayCheck(tuple(doubted), True, (1.0, 2.5), (), 0.1)
     assert check.rely_on == "a"
     assert "says so itself" in check.report()
@@ -107,7 +107,7 @@ def test_a_view_in_doubt_is_shown_and_does_not_count():
 
 def test_where_all_are_in_doubt_nothing_is_agreed_on():
     low, high = replace(view("a", 1, 2), doubt="x"), replace(view("b", 1, 5), doubt="y")
-    assert _verdict([low, high]) == (None, ())
+    assert common_dead_time([low, high]) == (None, ())
 
 
 def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
@@ -137,7 +137,7 @@ def test_a_shift_of_the_record_is_a_shift_of_the_views_and_a_scale_is_none(both)
 
 def test_two_bounds_never_contradict_each_other():
     views = [view("a", 4.0, 5.0, "upper bound"), view("b", 1.0, 2.0, "upper bound")]
-    assert _verdict(views) == ((0.0, 2.0), ())
+    assert common_dead_time(views) == ((0.0, 2.0), ())
 
 
 def test_what_could_not_be_done_is_said():

@@ -1,0 +1,66 @@
+"""Fits of several models on several records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import DataError
+from ..numerics.correlation import fit_percent
+from ..signals import Record
+from .record_simulation import Start, simulate_record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def cross_validate(
+    systems: dict[str, Any], records: Sequence[Record], *, start: Start = "estimate"
+) -> pd.DataFrame:
+    """Tabulate the fit in percent of several models on several records.
+
+    Parameters
+    ----------
+    systems : dict of str to control.StateSpace
+        Models by name; any that `check_residuals` takes.
+    records : sequence of Record
+        Best those that no model has seen.
+    start : {"estimate", "rest"}
+        As for `check_residuals`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a model, one column a record; the mean over the outputs.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> fast, slow = (ct.ss([[a]], [[1 - a]], [[1.0]], [[0.0]], 1.0) for a in (0.5, 0.8))
+    >>> u = np.random.default_rng(0).standard_normal(200)
+    >>> y = cr.DelayedStateSpace(slow).simulate(u)
+    >>> table = cr.cross_validate(
+    ...     {"fast": fast, "slow": slow}, [cr.Record(np.arange(200.0), u, y, name="day 2")]
+    ... )
+    >>> print(table["day 2"].round(1).to_dict())
+    {'fast': 2.4, 'slow': 100.0}
+    """
+    if not records:
+        raise DataError("records is empty; needed is at least one record")
+    import pandas as pd
+
+    def mean_fit(system: Any, record: Record) -> float:
+        simulated = simulate_record(system, record, start)
+        return float(fit_percent(np.atleast_2d(record.output), simulated).mean())
+
+    names = [record.name or f"record {i}" for i, record in enumerate(records)]
+    return pd.DataFrame(
+        {
+            name: {label: mean_fit(system, record) for label, system in systems.items()}
+            for name, record in zip(names, records, strict=True)
+        }
+    )
