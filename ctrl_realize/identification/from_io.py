@@ -42,7 +42,7 @@ TAIL = 0.05
 class ImpulseEstimate(ImpulseResponse, Result):
     """Estimated unit-pulse response: an `ImpulseResponse` with standard deviations.
 
-    ``markov -+ 2 std`` is the 95 % band of each Markov parameter by itself, under white output
+    ``markov +- 2 std`` is the 95 % band of each Markov parameter by itself, under white output
     noise; errors of neighbours are correlated. `noise_std` is the noise that is left in the
     outputs, per output.
 
@@ -66,8 +66,8 @@ class ImpulseEstimate(ImpulseResponse, Result):
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
     >>> y = 3.0 * np.roll(u, 5) + 0.1 * noise
     >>> estimate = cr.impulse_from_io(cr.Record(0.01 * np.arange(2000), u, y), 20)
-    >>> print(f"{estimate.markov[5]:.3f} -+ {2 * estimate.std[5]:.3f}")
-    2.998 -+ 0.004
+    >>> print(f"{estimate.markov[5]:.3f} +- {2 * estimate.std[5]:.3f}")
+    2.998 +- 0.004
     >>> print(estimate.noise_std.round(2))
     [0.1]
     """

@@ -16,7 +16,7 @@ class TrimmedStatistics:
 
     ``mean`` and ``variance`` are those of the ``count`` values left;
     ``std_error`` is Yuen's, ``winsorized std / ((1 - 2 share) sqrt(n))`` with ``share = trim / n``,
-    and ``interval`` is ``mean -+ t std_error`` with ``count - 1`` degrees of freedom.
+    and ``interval`` is ``mean +- t std_error`` with ``count - 1`` degrees of freedom.
 
     Parameters
     ----------

@@ -10,6 +10,15 @@ from docutils import nodes
 LONG = 12
 """Letters from which code may break."""
 BEHIND = re.compile(r"(?<=[/_.:(,=])(?=[^/_.:(,=)])")
+LINE = 40
+"""Letters from which code in a sentence may break."""
+NUMBERS = (
+    (re.compile(r"(?:-\+|\+-|\u2213) (?=[\d.])"), "\u00b1\u00a0"),
+    (re.compile(r"(?<=[\d)]) (?=(?:%|s|ms|Hz)(?!\w))"), "\u00a0"),
+    (re.compile(r"(?<=\d)\u2013(?=\d)"), "\u2060\u2013\u2060"),
+    (re.compile(r"(?<=\d) (to|\u2026|\.\.\.) (?=-?\d)"), "\u00a0\\1\u00a0"),
+)
+"""What stands between numbers and units -> what does not break there."""
 WORDS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)")
 
 
@@ -24,6 +33,19 @@ def let_code_break(app: Any, doctree: nodes.document, docname: str) -> None:
         for code in list(entry.findall(nodes.literal)):
             if len(code.astext()) > LONG:
                 _break(code, BEHIND)
+        for text in list(entry.findall(nodes.Text)):
+            if not isinstance(text.parent, nodes.literal):
+                text.parent.replace(text, nodes.Text(_kept_together(text.astext())))
+    for code in list(doctree.findall(nodes.literal)):
+        if len(code.astext()) > LINE:
+            _break(code, BEHIND)
+
+
+def _kept_together(words: str) -> str:
+    """Keep a number with its unit and a range in one line; write the sign of both ways as one."""
+    for pattern, instead in NUMBERS:
+        words = pattern.sub(instead, words)
+    return words
 
 
 def _break(element: nodes.TextElement, where: re.Pattern[str]) -> None:
