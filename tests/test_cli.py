@@ -231,6 +231,17 @@ def test_hostile_names_of_files_reach_neither_terminal_nor_page(folder, tmp_path
     assert "<b>$x" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
+def test_a_file_named_as_a_formula_is_a_name_in_the_table_too(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = ["=cmd|' calc'!A1.csv", "+1;=2.csv"]
+    for number, name in enumerate(names):
+        Path(name).write_bytes((folder / f"step_{number}.csv").read_bytes())
+    assert main(["identify", *names, "-o", "out", *FAST]) == 0
+    rows = pd.read_csv(tmp_path / "out" / "records.csv", index_col="record")
+    assert list(rows.index) == ["'=cmd|' calc'!A1", "'+1;'=2"]
+    assert rows["delay"].notna().all()
+
+
 @pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["demo"]])
 def test_help_has_examples_and_exit_codes(command, capsys):
     assert main([*command, "--help"]) == 0

@@ -10,7 +10,7 @@ import typer
 
 from ..frequency import compare_frf
 from ..io import load_model, read_frf
-from ..io.atomic import write_text
+from ..io.csv_files import write_csv
 from ..report import write_comparison
 from .inputs import check_files, typed_call
 from .staging import appearing
@@ -76,7 +76,7 @@ def compare(
         for name, unit in units.items():
             words += [f"--{name.replace('_', '-')}", unit]
         with appearing(output) as folder:
-            write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
+            write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
             write_comparison(
                 folder / "report.html",
                 system,

@@ -8,7 +8,7 @@ import pandas as pd
 
 from .. import paper, plots
 from ..io import save_model
-from ..io.atomic import write_text
+from ..io.csv_files import write_csv
 from ..plots.fits import evidence_height
 from ..report import Column, Page, Row, Sketch, Table, pairs, verdict_of, write_page
 from ..report.provenance import own_version, record_sha256, versions
@@ -47,7 +47,7 @@ def _write_tables(folder: Path, result: DemoResult) -> None:
     printed = pd.DataFrame(paper.TABLE_1, columns=[f"printed_{s}" for s in sizes])
     both = pd.concat([delays, printed], axis=1)
     both.index = pd.RangeIndex(1, len(both) + 1, name="number")
-    write_text(folder / "table_1.csv", both.to_csv())
+    write_csv(folder / "table_1.csv", both, index=True)
     frf = result.frf
     columns = {
         "frequency_hz": frf.frequency_hz,
@@ -56,10 +56,10 @@ def _write_tables(folder: Path, result: DemoResult) -> None:
         "coherence": frf.coherence,
         "std": frf.std,
     }
-    write_text(folder / "frf_simulated.csv", pd.DataFrame(columns).to_csv(index=False))
+    write_csv(folder / "frf_simulated.csv", pd.DataFrame(columns), index=False)
     record = result.records[shown(result)]
     signals = {"time_s": record.time, "input": record.input, "output": record.output}
-    write_text(folder / "record_simulated.csv", pd.DataFrame(signals).to_csv(index=False))
+    write_csv(folder / "record_simulated.csv", pd.DataFrame(signals), index=False)
 
 
 def demo_sketches(result: DemoResult) -> list[Sketch]:

@@ -14,7 +14,7 @@ from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..io import save_model
-from ..io.atomic import write_text
+from ..io.csv_files import write_csv
 from ..signals import Record
 from ..wording import time_unit
 from .terminal import printable, table
@@ -45,7 +45,7 @@ def write_record_files(
         figures=folder / "figures",
     )
     if comparison is not None:
-        write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
+        write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
 
 
 def write_campaign_files(
@@ -62,7 +62,7 @@ def write_campaign_files(
     system = campaign.system
     note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
     save_model(folder / "model.json", system, settings=settings, note=note)
-    write_text(folder / "records.csv", campaign.table().to_csv())
+    write_csv(folder / "records.csv", campaign.table(), index=True)
     save_models(folder, campaign, settings)
     report.write_campaign(
         folder / "report.html",
@@ -76,7 +76,7 @@ def write_campaign_files(
         figures=folder / "figures",
     )
     if comparison is not None:
-        write_text(folder / "frf_comparison.csv", comparison.table().to_csv(index=False))
+        write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
 
 
 def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -> None:
