@@ -5,14 +5,20 @@ from __future__ import annotations
 import contextlib
 import io
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 import control as ct
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import ctrl_realize as cr
+from ctrl_realize import cli
 from ctrl_realize.cli import main
+from ctrl_realize.report import sketches
 from tests.fuzz.draws import any_bytes, any_text, generator, some, sometimes
 from tests.fuzz.lane import ends, fuzz, good_end
 from tests.fuzz.test_text_files import any_table, frf_table, mutated
@@ -45,12 +51,31 @@ OPTIONS = [
 ]
 
 
-def run(arguments: list[str]) -> tuple[int, str]:
-    """Run the command line as a user would; return exit code and what it complained."""
+def run(arguments: list[str], *, rendered: bool = True) -> tuple[int, str]:
+    """Run the command line as a user would; return exit code and what it complained.
+
+    Not `rendered`: figures are laid out by our code, but Matplotlib puts no ink on them, which
+    would be nine tenths of a case.
+    """
     complaints = io.StringIO()
-    with contextlib.redirect_stderr(complaints), contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.redirect_stderr(complaints))
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        # looking for libraries of threads takes 3 ms: most of what `main` does with odd words
+        stack.enter_context(patch.object(cli, "threadpool_limits", _one_thread))
+        if not rendered:
+            stack.enter_context(patch.object(sketches, "laid_out", _without_ink))
         code = main(arguments)
     return code, complaints.getvalue()
+
+
+def _one_thread(limits: int) -> contextlib.AbstractContextManager[None]:
+    return contextlib.nullcontext()
+
+
+def _without_ink(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure:
+    draw(Figure(figsize=size))
+    return Figure(figsize=(1, 1), dpi=10)
 
 
 def check(code: int, complaints: str, output: Path) -> None:
@@ -92,12 +117,14 @@ def step_table(rng) -> bytes:
 def test_identify_ends_in_an_exit_code_and_one_complaint(rng, folder):
     content = rng.choice([any_table, mutated, lambda r: any_bytes(r, 60), step_table])(rng)
     (folder / "record.csv").write_bytes(content)
-    output = folder / "out"
+    output, rendered = folder / "out", sometimes(rng, 30)
     shutil.rmtree(output, ignore_errors=True)
     arguments = [word for option in some(rng, rng.choice(OPTIONS), 3) for word in option]
     with contextlib.chdir(folder), good_end(seconds=60) as codes:
         method = [] if "--method" in arguments else ["--method", "scan"]
-        codes.append(run(["identify", "record.csv", "-o", "out", *method, *arguments]))
+        codes.append(
+            run(["identify", "record.csv", "-o", "out", *method, *arguments], rendered=rendered)
+        )
     assert codes, "an error was not caught"
     check(*codes[0], output)
     assert {path.name for path in folder.iterdir()} <= {"record.csv", "out"}

@@ -58,8 +58,7 @@ def test_any_stream_is_followed_or_refused_sample_by_sample(rng):
             pair = (bad[k], after) if k in bad and k % 2 else (before, bad.get(k, after))
             try:
                 tracker.update(*pair)
-            except CtrlRealizeError as error:
-                assert str(error)
+            except CtrlRealizeError:
                 assert not all(abs(value) <= 1e70 for value in pair)
             else:
                 assert np.isfinite(pair).all()
@@ -98,7 +97,8 @@ def test_any_start_of_a_tracker_is_taken_or_refused(rng):
 @fuzz(6)
 def test_a_clean_stream_is_followed_to_its_delay(rng):
     core, delay = rng.choice(CORES[:3]), rng.randint(0, 9)
-    u = np.repeat(generator(rng).choice([-1.0, 1.0], 30), 20) * rng.choice([1.0, 1e-6, 1e20])
+    moves, hold = rng.choice([(15, 20), (30, 7), (30, 20)])
+    u = np.repeat(generator(rng).choice([-1.0, 1.0], moves), hold) * rng.choice([1.0, 1e-6, 1e20])
     y = cr.DelayedStateSpace(core, delay).simulate(u)
     tracker = cr.DelayTracker(core, max_delay=delay + rng.randint(2, 6), memory=20.0)
     with good_end():
