@@ -7,18 +7,18 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..checks import band, one_of, real
+from ..checks import one_of
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
-from ..numerics.arrays import BoolArray, ComplexArray, FloatArray, locked, read_only
-from ..numerics.bands import running_median, widest_run
+from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.spectra import hold_response, unwrapped_phase
 from ..results import Flag
 from .comparison import FRFComparison, decibels, hertz
+from .measured_points import MeasuredPoints, check_single_channel, measured_points
+from .trusted_band import trusted_points
 
-DEFAULT_MIN_COHERENCE = 0.95
-DEFAULT_MAX_RELATIVE_STD = 0.1
-_SMOOTHED_POINTS = 5
+_LEAST = 1e-70
+"""What is smaller is zero: nothing can be put in relation to it."""
 
 
 def compare_frf(
@@ -87,62 +87,32 @@ def compare_frf(
     >>> print(f"{cr.compare_frf(model, frf).max_relative_error:.2%}")
     0.03%
     """
-    _check_single(system, frf)
-    frequency = np.asarray(frf.omega, dtype=np.float64) / (2 * np.pi)
-    measured = np.asarray(frf.frdata[0, 0], dtype=np.complex128)
-    coherence = getattr(frf, "coherence", None)
-    std = getattr(frf, "std", None)
-    if coherence is not None:
-        coherence = np.reshape(coherence, -1)
-    if std is not None:
-        std = np.reshape(std, -1)
-    order = np.argsort(frequency, kind="stable")
-    dt = _sample_time(system)
-    flags: list[Flag] = []
-    # what is smaller is zero: nothing can be put in relation to it
-    usable = np.abs(measured[order]) > 1e-70
-    if dt is not None:
-        usable &= frequency[order] < 0.5 / dt
-        beyond = int(np.sum(frequency >= 0.5 / dt))
-        if beyond:
-            flags.append(
-                Flag(
-                    "beyond_nyquist",
-                    f"{beyond} points at or above the model's Nyquist frequency of "
-                    f"{hertz(0.5 / dt)} are left out",
-                )
-            )
-    kept = order[usable]
-    if kept.size == 0:
-        raise DataError(
-            f"nothing to compare: the FRF has {frequency.size} points from "
-            f"{hertz(frequency.min())} to {hertz(frequency.max())}, none of them non-zero and "
-            "below the model's Nyquist frequency"
+    if not isinstance(system, ct.LTI):
+        raise UnsuitableSystemError(
+            f"system is a {type(system).__name__}; needed is a system of python-control"
         )
-    frequency, measured = frequency[kept], measured[kept]
-    coherence = None if coherence is None else coherence[kept]
-    std = None if std is None else std[kept]
-
+    check_single_channel(system, "system")
+    dt = _sample_time(system)
+    points, flags = _comparable(measured_points(frf), dt)
     used_hold = _hold(system, dt, hold)
-    omega = 2 * np.pi * frequency
+    omega = 2 * np.pi * points.frequency_hz
     model = _evaluate(system, omega, dt)
     if used_hold is not None and dt is not None:
         model = model / hold_response(omega, dt)
-    good, source = _good_points(frequency, measured, coherence, std, min_coherence, band_hz)
-    delay = float(system.dead_time) if isinstance(system, DelayedStateSpace) else 0.0
-    ratio = model / measured
-    first = int(np.argmax(good))
-    error = np.unwrap(np.angle(ratio))
-    error -= 2 * np.pi * np.round(error[first] / (2 * np.pi))
-    model_phase = unwrapped_phase(model, omega, delay)
+    good, source = trusted_points(points, min_coherence, band_hz)
+    ratio = model / points.response
     if not np.all(np.isfinite(ratio)) or np.any(np.abs(ratio) == 0):
         raise UnsuitableSystemError(
             "the model's response is zero or not finite at a measured frequency; is a pole or "
             "zero of it on the grid?"
         )
+    delay = float(system.dead_time) if isinstance(system, DelayedStateSpace) else 0.0
+    model_phase = unwrapped_phase(model, omega, delay)
+    error = _unwrapped_error(ratio, int(np.argmax(good)))
+    trusted_hz = points.frequency_hz[good]
     return FRFComparison(
-        frequency_hz=read_only(frequency),
-        measured=locked(measured),
+        frequency_hz=read_only(points.frequency_hz),
+        measured=locked(points.response),
         model=locked(model),
         gain_error_db=read_only(decibels(ratio)),
         phase_error_deg=read_only(np.degrees(error)),
@@ -150,13 +120,13 @@ def compare_frf(
         measured_phase_deg=read_only(np.degrees(model_phase - error)),
         model_phase_deg=read_only(np.degrees(model_phase)),
         trusted=locked(good),
-        band_hz=(float(frequency[good][0]), float(frequency[good][-1])),
+        band_hz=(float(trusted_hz[0]), float(trusted_hz[-1])),
         band_from=source,
-        coherence=None if coherence is None else read_only(coherence),
-        std=None if std is None else read_only(std),
+        coherence=None if points.coherence is None else read_only(points.coherence),
+        std=None if points.std is None else read_only(points.std),
         hold=used_hold,
         name=f"{_own_name(system, 'model')} and {_own_name(frf, 'measured')}",
-        flags=tuple(flags),
+        flags=flags,
     )
 
 
@@ -166,21 +136,37 @@ def _own_name(system: Any, otherwise: str) -> str:
     return otherwise if not name or name.startswith("sys[") else name
 
 
-def _check_single(system: Any, frf: Any) -> None:
-    if not isinstance(system, ct.LTI):
-        raise UnsuitableSystemError(
-            f"system is a {type(system).__name__}; needed is a system of python-control"
-        )
-    if not isinstance(frf, ct.FrequencyResponseData):
-        raise UnsuitableSystemError(
-            f"frf is a {type(frf).__name__}; needed is a MeasuredFRF or a control FRD"
-        )
-    for thing, what in ((system, "system"), (frf, "frf")):
-        if (thing.noutputs, thing.ninputs) != (1, 1):
-            raise UnsuitableSystemError(
-                f"{what} has {thing.ninputs} inputs and {thing.noutputs} outputs; compare one "
-                f"channel at a time, as {what}[i, j]"
+def _comparable(
+    points: MeasuredPoints, dt: float | None
+) -> tuple[MeasuredPoints, tuple[Flag, ...]]:
+    """Leave out zeros and what a model of this sample time cannot follow."""
+    frequency = points.frequency_hz
+    usable = np.abs(points.response) > _LEAST
+    flags = []
+    if dt is not None:
+        beyond = frequency >= 0.5 / dt
+        usable &= ~beyond
+        if beyond.any():
+            flags.append(
+                Flag(
+                    "beyond_nyquist",
+                    f"{int(beyond.sum())} points at or above the model's Nyquist frequency of "
+                    f"{hertz(0.5 / dt)} are left out",
+                )
             )
+    if not usable.any():
+        raise DataError(
+            f"nothing to compare: the FRF has {frequency.size} points from "
+            f"{hertz(frequency[0])} to {hertz(frequency[-1])}, none of them non-zero and "
+            "below the model's Nyquist frequency"
+        )
+    return points.only(usable), tuple(flags)
+
+
+def _unwrapped_error(ratio: ComplexArray, first: int) -> FloatArray:
+    """Unwrap the phase of model over measured; at the `first` trusted point it is within +-pi."""
+    error = np.unwrap(np.angle(ratio))
+    return np.asarray(error - 2 * np.pi * np.round(error[first] / (2 * np.pi)), dtype=np.float64)
 
 
 def _sample_time(system: Any) -> float | None:
@@ -214,46 +200,3 @@ def _evaluate(system: Any, omega: FloatArray, dt: float | None) -> ComplexArray:
     points = 1j * omega if dt is None else np.exp(1j * omega * dt)
     response = np.asarray(system(points, squeeze=False), dtype=np.complex128)
     return np.asarray(response[0, 0])
-
-
-def _good_points(
-    frequency: FloatArray,
-    measured: ComplexArray,
-    coherence: FloatArray | None,
-    std: FloatArray | None,
-    min_coherence: float | None,
-    band_hz: tuple[float, float] | None,
-) -> tuple[BoolArray, Literal["coherence", "std", "all"]]:
-    """Find the trusted band."""
-    if min_coherence is not None:
-        if not 0 <= real(min_coherence, "min_coherence", "value in 0...1") <= 1:
-            raise OptionError(f"min_coherence={min_coherence!r}; needed is a value in 0...1")
-        if coherence is None:
-            raise OptionError(
-                "min_coherence is given, but the FRF has no coherence; pass band_hz=(low, high)"
-            )
-    if band_hz is not None:
-        low, high = band(band_hz, "band_hz", "frequencies in Hz")
-        inside = (frequency >= low) & (frequency <= high)
-        if not inside.any():
-            raise DataError(
-                f"band_hz={band_hz!r} holds no point; the FRF runs from {hertz(frequency[0])} to "
-                f"{hertz(frequency[-1])}"
-            )
-        return inside, "all"
-    if coherence is not None:
-        limit = DEFAULT_MIN_COHERENCE if min_coherence is None else min_coherence
-        level, source = running_median(coherence, _SMOOTHED_POINTS), "coherence"
-        good = level >= limit
-        wanted = f"a coherence of {limit:g} is reached nowhere"
-    elif std is not None:
-        relative = running_median(std / np.abs(measured), _SMOOTHED_POINTS)
-        good, source = relative <= DEFAULT_MAX_RELATIVE_STD, "std"
-        wanted = f"the standard deviation is above {DEFAULT_MAX_RELATIVE_STD:.0%} everywhere"
-    else:
-        return np.ones(frequency.size, dtype=bool), "all"
-    if not good.any():
-        raise DataError(
-            f"there is no trusted band: {wanted}; lower it, or pass band_hz=(low, high)"
-        )
-    return widest_run(good, frequency), "coherence" if source == "coherence" else "std"

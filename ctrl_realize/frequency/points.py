@@ -5,17 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..checks import band, one_of
-from ..errors import DataError, OptionError, UnsuitableSystemError
+from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
+from .measured_points import measured_points
 
 _SMOOTHED_POINTS = 9
+"""Neighbours over which standard deviations are smoothed; odd."""
+_MANY_POINTS = 50
+"""Points from which on they are."""
 _SIGNIFICANT = 6.0
-_LEAST = 1e-70  # what is smaller is zero: its squares vanish
+"""Mean power over that of noise, in ``1 / sqrt(points)``, from which there is a signal."""
+_LEAST = 1e-70
+"""What is smaller is zero: its squares vanish."""
 _WIDEST = 1e15
+"""Largest ratio of two frequencies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,21 +51,11 @@ def frf_points(
     below_hz : float
         Points from here on are left out.
     """
-    if not isinstance(frf, ct.FrequencyResponseData):
-        raise UnsuitableSystemError(
-            f"frf is a {type(frf).__name__}; needed is a MeasuredFRF or a control FRD"
-        )
-    if (frf.noutputs, frf.ninputs) != (1, 1):
-        raise UnsuitableSystemError(
-            f"the FRF has {frf.ninputs} inputs and {frf.noutputs} outputs; take one channel at a "
-            "time, as frf[i, j]"
-        )
+    points = measured_points(frf)
     one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
-    order = np.argsort(frf.omega, kind="stable")
-    frequency = np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi)
-    response = np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order]
-    usable = (frequency > _LEAST) & (np.abs(response) > _LEAST) & np.isfinite(response)
-    usable &= frequency < below_hz
+    frequency = points.frequency_hz
+    usable = (frequency > _LEAST) & (np.abs(points.response) > _LEAST)
+    usable &= np.isfinite(points.response) & (frequency < below_hz)
     if band_hz is not None:
         low, high = band(band_hz, "band_hz", "frequencies in Hz")
         usable &= (frequency >= low) & (frequency <= high)
@@ -75,15 +71,11 @@ def frf_points(
             f"the frequencies span a ratio of {span:.3g}; needed is at most {_WIDEST:g} (a unit "
             "wrong, or a value damaged?)"
         )
-    std, coherence = (
-        None if beside is None else np.reshape(beside, -1)[order][usable]
-        for beside in (getattr(frf, "std", None), getattr(frf, "coherence", None))
-    )
-    frequency, response = frequency[usable], response[usable]
-    sigma, known = _sigma(response, std, coherence, weighting)
+    points = points.only(usable)
+    sigma, known = _sigma(points.response, points.std, points.coherence, weighting)
     if known:
-        _check_signal(response, sigma)
-    return FRFPoints(frequency, response, sigma, known)
+        _check_signal(points.response, sigma)
+    return FRFPoints(points.frequency_hz, points.response, sigma, known)
 
 
 def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
@@ -119,7 +111,7 @@ def _sigma(
 
 def _smoothed(std: FloatArray) -> FloatArray:
     """Smooth uncertain standard deviations along frequency where there are many points."""
-    if std.size < 50:
+    if std.size < _MANY_POINTS:
         return std
     half = _SMOOTHED_POINTS // 2
     padded = np.pad(np.log(std), half, mode="reflect")

@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from ..errors import DataError, UnsuitableSystemError
+from ..frequency.measured_points import check_single_channel, measured_points
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.spectra import unwrapped_phase
 
@@ -51,11 +52,7 @@ def curves_of(
             raise UnsuitableSystemError(
                 f"got a {type(item).__name__}; needed are systems of python-control or FRFs"
             )
-        if (item.noutputs, item.ninputs) != (1, 1):
-            raise UnsuitableSystemError(
-                f"{item.name} has {item.ninputs} inputs and {item.noutputs} outputs; draw one "
-                "channel at a time, as system[i, j]"
-            )
+        check_single_channel(item, str(item.name))
     if not items:
         raise DataError("no frequency response to draw")
     data = [item for item in items if isinstance(item, ct.FrequencyResponseData)]
@@ -87,11 +84,8 @@ def _grid(items: Sequence[Any], data: Sequence[Any]) -> FloatArray:
 
 def _curve(item: Any, grid: FloatArray, delay: float) -> Curve:
     if isinstance(item, ct.FrequencyResponseData):
-        order = np.argsort(item.omega, kind="stable")
-        frequency = np.asarray(item.omega, dtype=float)[order] / (2 * np.pi)
-        response = np.asarray(item.frdata[0, 0], dtype=complex)[order]
-        coherence = getattr(item, "coherence", None)
-        coherence = None if coherence is None else np.reshape(coherence, -1)[order]
+        points = measured_points(item)
+        frequency, response, coherence = points.frequency_hz, points.response, points.coherence
     else:
         step = float(item.dt) if item.isdtime(strict=True) else 0.0
         frequency = grid if step == 0 else grid[grid <= 0.5 / step]
