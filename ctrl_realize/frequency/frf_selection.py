@@ -29,12 +29,18 @@ from ..results import Flag
 from .frf_fit import FRFFit, FRFStructure
 from .points import FRFPoints
 
+_POOR_MISFIT = 2.0
+"""Residual over the measured noise from which a word is said."""
 _NEAR_BIC = 8.0
+"""Difference to the best BIC below which a structure widens the interval; beyond, its weight is
+below 2 %."""
 _SHARE = 0.1
 """Part of the dead time by which structures must disagree for a word about it: the interval covers
 all of them in any case, and some other structure nearly always widens a narrow one."""
 _SMALL_WIDTH = 1e-3
+"""Widening in shortest periods below which nothing is said."""
 _ORDER_OF_LEAD = 4
+"""Highest order that is asked whether the response leads."""
 _FAR_BETTER = 0.5
 """Of the square of the misfit."""
 
@@ -49,27 +55,32 @@ def chosen_model(
     dt: float,
     name: str | None,
 ) -> DelayedStateSpace:
-    """Choose the structure, state the uncertainty and build the model."""
+    """Choose the structure, state the uncertainty and build the model.
+
+    Parameters
+    ----------
+    frf : control.FrequencyResponseData
+        As it was measured.
+    data : FRFData
+        Frequencies in units of `unit` rad/s, responses in units of `size`.
+    fits : dict
+        (order, relative degree) -> fit.
+    points : FRFPoints
+        What was fitted, in the measurement's own units.
+    unit, size : float
+    dt : float
+        Sample time of the model in s.
+    name : str or None
+    """
     frequency, noise_known = points.frequency_hz, points.noise_known
-    n_values = 2 * frequency.size
-    rows, scales = [], {}
-    criteria = information_criteria(data, fits)
-    for (n, r), fit in fits.items():
-        n_parameters = 2 * n + 2 - r
-        cost, bic = smallest_cost(data, fit), criteria[n, r]
-        scales[n, r] = residual_variance(data, fit, n_values - n_parameters, noise_known)
-        spread = covariance(data, fit, scales[n, r])[n, n]
-        rows.append(
-            FRFStructure(n, r, float(fit.theta[n]) / unit, float(np.sqrt(spread)) / unit, cost, bic)
-        )
-    rows.sort(key=lambda row: row.bic)
+    rows, scales = _structures(data, fits, unit, noise_known)
     best = rows[0]
     n, r = best.order, best.relative_degree
     chosen = fits[n, r]
     within = _profiles(data, fits, rows, scales, unit)
     interval, flags = _cover(rows, within, data.max_dead_time / unit, 1 / float(frequency[-1]))
     misfit = float(np.sqrt(chosen.cost / (frequency.size - 0.5 * (2 * n + 2 - r))))
-    if noise_known and misfit > 2:
+    if noise_known and misfit > _POOR_MISFIT:
         flags.append(
             Flag(
                 "misfit",
@@ -81,24 +92,14 @@ def chosen_model(
     errors = error_root(data, chosen, scales[n, r], robust=not noise_known)
     poles, pole_std = pole_deviations(chosen, errors)
     A, B, C, D = chain_state_space(chosen.theta, chosen.numerator * size, n)
-    matrices = (read_only(A * unit), read_only(B * unit), read_only(C), read_only(D))
-    dead_time = best.dead_time
-    used = dead_time
+    used = best.dead_time
     if r == 0:
-        # more than any model can hold are refused when it is made
-        used = round(min(dead_time / dt, 1e9)) * dt
-        if abs(used - dead_time) > 1e-9 * dt:
-            flags.append(
-                Flag(
-                    "dead_time_rounded",
-                    "a model with direct term takes whole samples: its dead time is "
-                    f"{1e3 * used:.5g} ms, not {1e3 * dead_time:.5g} ms; a shorter dt rounds less",
-                )
-            )
+        used, rounded = _whole_samples(best.dead_time, dt)
+        flags.extend(rounded)
     result = FRFFit(
         order=n,
         relative_degree=r,
-        dead_time=dead_time,
+        dead_time=best.dead_time,
         std=best.std,
         interval=interval,
         frequency_hz=read_only(frequency),
@@ -106,7 +107,7 @@ def chosen_model(
         sigma=read_only(points.sigma),
         noise_known=noise_known,
         misfit=misfit,
-        matrices=matrices,
+        matrices=(read_only(A * unit), read_only(B * unit), read_only(C), read_only(D)),
         poles=locked(poles * unit),
         pole_std=read_only(pole_std * unit),
         structures=tuple(rows),
@@ -114,6 +115,43 @@ def chosen_model(
         flags=tuple(flags),
     )
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
+
+
+def _structures(
+    data: FRFData, fits: dict[tuple[int, int], RationalFit], unit: float, noise_known: bool
+) -> tuple[list[FRFStructure], dict[tuple[int, int], float]]:
+    """List what was tried, best first, and the residual variance of each."""
+    rows, scales = [], {}
+    criteria = information_criteria(data, fits)
+    for (n, r), fit in fits.items():
+        freedom = 2 * data.s.size - (2 * n + 2 - r)
+        scales[n, r] = residual_variance(data, fit, freedom, noise_known)
+        rows.append(
+            FRFStructure(
+                order=n,
+                relative_degree=r,
+                dead_time=float(fit.theta[n]) / unit,
+                std=float(np.sqrt(covariance(data, fit, scales[n, r])[n, n])) / unit,
+                cost=smallest_cost(data, fit),
+                bic=criteria[n, r],
+            )
+        )
+    return sorted(rows, key=lambda row: row.bic), scales
+
+
+def _whole_samples(dead_time: float, dt: float) -> tuple[float, list[Flag]]:
+    """Round a dead time to samples, and say so where it matters."""
+    # more than any model can hold are refused when it is made
+    used = round(min(dead_time / dt, 1e9)) * dt
+    if abs(used - dead_time) <= 1e-9 * dt:
+        return used, []
+    return used, [
+        Flag(
+            "dead_time_rounded",
+            "a model with direct term takes whole samples: its dead time is "
+            f"{1e3 * used:.5g} ms, not {1e3 * dead_time:.5g} ms; a shorter dt rounds less",
+        )
+    ]
 
 
 def _leading_phase(

@@ -18,10 +18,16 @@ from ..results import Flag
 from .points import FRFPoints, frf_points
 
 _BLOCK = 256
+"""Points whose rows are in memory at once."""
 _STILL_ALIVE = 0.02
+"""Of the largest response, at the highest frequency."""
 _TAIL = 0.05
+"""Of the largest Markov parameter, in the last tenth."""
 _UNEXPLAINED = 0.02
+"""Of the power of the response."""
 _LEAST_NOISE = 1e-3
+"""No FRF is taken to be more exact: hold and aliases are not, and a prior that may trust them
+fully fills the frequencies between the points with anything."""
 
 
 def impulse_from_frf(
@@ -81,8 +87,7 @@ def impulse_from_frf(
     half a period of that frequency are not in it), and ``"starts_late"`` when the lowest
     frequency is above that of one period in `length` (gain and slow modes are then
     extrapolated). ``"cut_off"`` and ``"unexplained"`` tell that `length` is too short, the latter
-    also that the data are noisy. `fit_frf` needs no
-    such care where a model of low order will do.
+    also that the data are noisy. `fit_frf` needs no such care where a model of low order will do.
 
     Examples
     --------
@@ -105,8 +110,7 @@ def impulse_from_frf(
     if hold is not None:
         one_of(hold, "hold", ("zoh",))
     omega = 2 * np.pi * points.frequency_hz
-    response = points.response
-    sigma = points.sigma
+    response, sigma = points.response, points.sigma
     if hold is None:
         response = response * hold_response(omega, step)
         if points.noise_known:
@@ -147,8 +151,6 @@ def _equations(
         target = weight[part] * response[part]
         gram += rows.T @ rows
         cross[:, 0] += rows.T @ np.concatenate([target.real, target.imag])
-    # No FRF is taken to be more exact than a thousandth: hold and aliases are not, and a prior
-    # that may trust them fully fills the frequencies between the points with anything.
     power = np.array([[(1 + _LEAST_NOISE**2) * float(np.sum(np.abs(weight * response) ** 2))]])
     return NormalEquations(gram, cross, power, 2 * angle.size, 2 * angle.size)
 

@@ -10,16 +10,10 @@ import numpy as np
 from ..checks import real
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..numerics.sines import SineFit, dominant_frequency, fit_sines
+from ..numerics.sines import dominant_frequency
 from ..signals import MeasuredFRF, Record
 from ..signals.given import as_records, check_complete
-
-_BATCH_SAMPLES = 300_000
-_STEADY_RATIO = 1.5
-_MIN_PERIODS = 0.9
-_BESIDE = (0.75, 4.5)
-"""Bins of the spectrum beside a line that tell the noise at its frequency; the line and what the
-fit took out with it lie nearer."""
+from .sine_batches import LEAST_SAMPLES, batches, fit_batch, misfit_beside_line
 
 Sweep: TypeAlias = Sequence[Record] | Sequence[Sequence[Record]]
 
@@ -103,13 +97,14 @@ def stepped_sine_frf(
     phasors = np.empty((len(flat), 2), dtype=np.complex128)
     power = np.empty((len(flat), 2))
     relative_variance = np.empty(len(flat))
-    for batch in _batches(flat):
-        fit = _fit_batch([flat[i] for i in batch], starts[batch], settle, free_frequency, drift)
+    for batch in batches(flat):
+        members = [flat[i] for i in batch]
+        fit = fit_batch(members, starts[batch], settle, free_frequency, drift)
         omega[batch], phasors[batch] = fit.omega, fit.phasor
         power[batch] = 0.5 * np.abs(fit.phasor) ** 2 + fit.noise_variance
         # Total variance of a phasor is the trace; that of a ratio adds the relative ones.
         variance = np.trace(fit.phasor_covariance, axis1=2, axis2=3)
-        variance = variance * _colour([flat[i] for i in batch], fit)
+        variance = variance * misfit_beside_line(members, fit)
         relative_variance[batch] = (variance / np.abs(fit.phasor) ** 2).sum(axis=1)
     return _averaged(points, omega, phasors, power, relative_variance, name)
 
@@ -129,8 +124,11 @@ def _as_points(records: Sweep) -> list[list[Record]]:
                     f"{record!r} has several signals; stepped_sine_frf takes one input and one "
                     "output"
                 )
-            if record.n_samples < 8:
-                raise DataError(f"{record!r} is too short for a sine; at least 8 samples")
+            if record.n_samples < LEAST_SAMPLES:
+                raise DataError(
+                    f"{record!r} is too short for a sine; needed are at least {LEAST_SAMPLES} "
+                    "samples"
+                )
             if np.ptp(record.input) == 0:
                 raise DataError(f"the input of {record!r} is constant; there is no sine in it")
     return points
@@ -141,16 +139,7 @@ def _start_frequencies(
 ) -> FloatArray:
     """Give every record a frequency to start from, in rad/s."""
     if frequency_hz is None:
-        starts = np.empty(len(flat))
-        for batch in _batches(flat):
-            inputs = np.stack([np.asarray(flat[i].input).ravel() for i in batch])
-            # The second half: a transient of the input, if any, is over.
-            starts[batch] = dominant_frequency(inputs[:, inputs.shape[1] // 2 :], flat[batch[0]].dt)
-            whole = dominant_frequency(inputs, flat[batch[0]].dt)
-            span = flat[batch[0]].dt * inputs.shape[1]
-            # Fewer than three periods in the half record: the whole one knows better.
-            starts[batch] = np.where(starts[batch] * span < 12 * np.pi, whole, starts[batch])
-        return starts
+        return _strongest_lines(flat)
     given = np.asarray(frequency_hz, dtype=np.float64)
     if given.shape != (len(points),) or not np.all(np.isfinite(given)) or np.any(given <= 0):
         raise OptionError(
@@ -160,99 +149,18 @@ def _start_frequencies(
     return 2 * np.pi * np.repeat(given, [len(point) for point in points])
 
 
-def _batches(flat: list[Record]) -> list[list[int]]:
-    """Group records of one length and sample time, in pieces that fit into memory."""
-    groups: dict[tuple[int, float], list[int]] = {}
-    for index, record in enumerate(flat):
-        groups.setdefault((record.n_samples, record.dt), []).append(index)
-    pieces = []
-    for (n_samples, _), members in groups.items():
-        size = max(1, _BATCH_SAMPLES // n_samples)
-        pieces += [members[i : i + size] for i in range(0, len(members), size)]
-    return pieces
-
-
-def _fit_batch(
-    records: list[Record],
-    starts: FloatArray,
-    settle: float | None,
-    free_frequency: bool,
-    drift: bool,
-) -> SineFit:
-    """Fit records of one length: once where it is settled for sure, then where it really is."""
-    n_samples, dt = records[0].n_samples, records[0].dt
-    time = dt * np.arange(n_samples, dtype=np.float64)
-    signals = np.stack([[record.input, record.output] for record in records])
-    if settle is None:
-        late = np.broadcast_to((np.arange(n_samples) >= n_samples // 2) * 1.0, signals[:, 0].shape)
-        first = fit_sines(
-            time, signals, starts, free_frequency=free_frequency, drift=drift, mask=late
-        )
-        mask = _steady(time, signals, first)
-        starts = first.omega if free_frequency else starts
-    else:
-        kept = (time >= settle - 1e-9 * dt) * 1.0
-        if kept.sum() < 8:
-            raise DataError(
-                f"settle={settle:g} s leaves {int(kept.sum())} samples of {records[0]!r}; "
-                "at least 8 are needed"
-            )
-        mask = np.broadcast_to(kept, signals[:, 0].shape)
-    short = starts * dt * mask.sum(axis=1) < _MIN_PERIODS * 2 * np.pi
-    if short.any():
-        worst = int(np.flatnonzero(short)[0])
-        raise DataError(
-            f"{records[worst]!r} keeps less than one period of {starts[worst] / 2 / np.pi:g} Hz; "
-            "record longer, or state a shorter settle"
-        )
-    return fit_sines(time, signals, starts, free_frequency=free_frequency, drift=drift, mask=mask)
-
-
-def _colour(records: list[Record], fit: SineFit) -> FloatArray:
-    """How much stronger the misfit is beside the line than on average, shape (B, 2); at least 1.
-
-    The covariance of the fit takes the misfit for white, which a sine in slow noise feels most.
-    Where the noise is weaker there than elsewhere, eight bins are too few to say so.
-    """
-    n_samples, dt = records[0].n_samples, records[0].dt
-    time = dt * np.arange(n_samples, dtype=np.float64)
-    signals = np.stack([[record.input, record.output] for record in records])
-    turning = np.exp(1j * fit.omega[:, None] * time)
-    model = (fit.phasor[..., None] * turning[:, None]).real
-    left = signals - model - fit.offset[..., None] - fit.slope[..., None] * time
-    late = left[..., n_samples // 2 :]
-    power = np.abs(np.fft.rfft(late - late.mean(axis=2, keepdims=True))) ** 2
-    bins = np.arange(power.shape[2])
-    away = np.abs(bins - fit.omega[:, None] * dt * late.shape[2] / (2 * np.pi))
-    beside = (away > _BESIDE[0]) & (away < _BESIDE[1]) & (bins > 0)
-    count = np.maximum(beside.sum(axis=1), 1)[:, None]
-    near = (power * beside[:, None]).sum(axis=2) / count
-    average = np.maximum(power[..., 1:].mean(axis=2), np.finfo(float).tiny)
-    return np.asarray(np.maximum(near / average, 1.0), dtype=np.float64)
-
-
-def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
-    """Mark the samples from where on the late half's sine explains the record."""
-    n_samples = time.size
-    turning = np.exp(1j * late.omega[:, None] * time)
-    model = (late.phasor[..., None] * turning[:, None]).real
-    model += late.offset[..., None] + late.slope[..., None] * time
-    blocks = 32
-    edges = np.linspace(0, n_samples, min(blocks, n_samples // 4) + 1).astype(int)
-    squares = np.add.reduceat((signals - model) ** 2, edges[:-1], axis=2) / np.diff(edges)
-    half = squares.shape[2] // 2
-    # Rounding is a misfit, too: without noise nothing but the exact sine would be steady.
-    floor = (1e-6 * np.abs(late.phasor[..., None])) ** 2
-    # The largest of the late blocks, and more: an early one may be as large by chance.
-    late_most = squares[..., half:].max(axis=2, keepdims=True)
-    bound = _STEADY_RATIO * np.maximum(late_most, floor)
-    moving = np.any(squares > bound, axis=1)
-    moving[:, half:] = False
-    settled = np.where(moving.any(axis=1), half - np.argmax(moving[:, half - 1 :: -1], 1), 0)
-    # By then a transient has sunk to the noise; left in, it would still be a bias common to all
-    # repeats. What decays exponentially is gone after the same time once more.
-    start = edges[np.minimum(2 * settled + 1, half)]
-    return np.asarray((np.arange(n_samples) >= start[:, None]) * 1.0)
+def _strongest_lines(flat: list[Record]) -> FloatArray:
+    """Find the strongest line of each input, in rad/s."""
+    starts = np.empty(len(flat))
+    for batch in batches(flat):
+        inputs = np.stack([np.asarray(flat[i].input).ravel() for i in batch])
+        dt, half = flat[batch[0]].dt, inputs.shape[1] // 2
+        # The second half: a transient of the input, if any, is over.
+        late = dominant_frequency(inputs[:, half:], dt)
+        # Fewer than three periods in the half record: the whole one knows better.
+        few = late * dt * inputs.shape[1] < 12 * np.pi
+        starts[batch] = np.where(few, dominant_frequency(inputs, dt), late)
+    return starts
 
 
 def _averaged(

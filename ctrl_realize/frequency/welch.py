@@ -1,0 +1,123 @@
+"""A frequency response from the spectra of overlapping segments."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import get_window
+
+from ..checks import whole
+from ..errors import DataError, OptionError
+from ..numerics.arrays import FloatArray
+from ..numerics.spectra import SpectralSums, independent_segments, segment_sums
+from .spectral_estimate import Estimate, Stream
+
+_LONGEST_DEFAULT_SEGMENT = 8192
+_INDEPENDENT = 1e-6
+"""Smallest eigenvalue of the inputs' coherence matrix at which their shares can be told apart."""
+
+
+def from_segments(
+    stream: Stream,
+    method: str,
+    segment: int | None,
+    window: str | tuple[str, float],
+    overlap: float,
+) -> tuple[Estimate, float]:
+    """Estimate by Welch's method: averaged spectra of overlapping windowed segments.
+
+    Returns the estimate and the sample time.
+    """
+    sums: SpectralSums | None = None
+    taps, hop, dt, longest = np.ones(1), 1, 0.0, 0
+    for u, y, sample_time in stream:
+        dt = sample_time
+        longest = max(longest, u.shape[1])
+        if sums is None and taps.size == 1:
+            taps = _window(segment or _default_segment(u.shape[1]), window)
+            hop = max(1, round(taps.size * (1 - overlap)))
+        if u.shape[1] >= taps.size:
+            part = segment_sums(u, y, taps, hop)
+            sums = part if sums is None else sums + part
+    if sums is None or sums.count < 2:
+        raise DataError(
+            f"records of up to {longest} samples hold {0 if sums is None else sums.count} segments "
+            f"of {taps.size}; at least two are needed: state a shorter segment"
+        )
+    frequency = np.asarray(np.fft.rfftfreq(taps.size, dt), dtype=np.float64)
+    # Zero was removed with the mean; the last line is the Nyquist frequency.
+    lines = slice(1, (taps.size + 1) // 2)
+    averages = independent_segments(taps, hop, sums.count)
+    several = sums.yu.shape[:2] != (1, 1)
+    if several and method != "H1":
+        raise OptionError(f"method={method!r} is for one input and one output; several take 'H1'")
+    estimate = _many_channels if several else _one_channel
+    return estimate(sums, frequency, lines, method, averages), dt
+
+
+def _one_channel(
+    sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
+) -> Estimate:
+    """Divide the spectra of one input and one output."""
+    uu, yy, yu = sums.uu[0, 0, lines].real, sums.yy[0, lines], sums.yu[0, 0, lines]
+    if not np.any(uu > 0):
+        raise DataError("the input is constant: it does not excite the plant")
+    excited = (uu > np.finfo(float).eps ** 2 * uu.max()) & (yy > 0) & (np.abs(yu) > 0)
+    if not excited.any():
+        raise DataError("the output is constant: there is no response to estimate")
+    uu, yy, yu = uu[excited], yy[excited], yu[excited]
+    h1, h2 = yu / uu, yy / yu.conj()
+    response = {"H1": h1, "H2": h2, "Hv": yu / np.abs(yu) * np.sqrt(yy / uu)}[method]
+    coherence = np.minimum(np.abs(yu) ** 2 / (uu * yy), 1.0)
+    std = np.abs(h1) * np.sqrt((1 - coherence) / (coherence * averages))
+    return Estimate(frequency[lines][excited], response, coherence, std)
+
+
+def _many_channels(
+    sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
+) -> Estimate:
+    """Solve ``S_yu = H S_uu`` at every frequency (H1)."""
+    uu = np.moveaxis(sums.uu[..., lines], -1, 0)
+    yu, yy = np.moveaxis(sums.yu[..., lines], -1, 0), sums.yy[:, lines].T
+    m = uu.shape[1]
+    if averages <= m:
+        raise DataError(
+            f"{averages:.3g} independent segments are too few for {m} inputs; state a shorter "
+            "segment"
+        )
+    power = np.einsum("fii->fi", uu).real
+    excited = np.all(power > np.finfo(float).eps ** 2 * power.max(), axis=1)
+    # Inputs that move together cannot be told apart: their matrix is singular.
+    scaled = uu / np.sqrt(np.maximum(power[:, :, None] * power[:, None, :], 1e-300))
+    excited &= np.linalg.eigvalsh(scaled)[:, 0] > _INDEPENDENT
+    if not excited.any():
+        raise DataError(
+            "the inputs do not excite the plant independently: at no frequency can their "
+            "shares be told apart"
+        )
+    uu, yu, yy = uu[excited], yu[excited], yy[excited]
+    inverse = np.linalg.inv(uu)
+    response = yu @ inverse
+    explained = np.einsum("fij,fij->fi", response, yu.conj()).real
+    coherence = np.clip(explained / np.maximum(yy, 1e-300), 0.0, 1.0)
+    left = yy * (1 - coherence) / (averages - m)
+    share = np.einsum("fii->fi", inverse).real
+    std = np.sqrt(left[:, :, None] * share[:, None, :])
+    return Estimate(
+        frequency[lines][excited],
+        np.moveaxis(response, 0, -1),
+        np.moveaxis(np.broadcast_to(coherence[:, :, None], response.shape), 0, -1),
+        np.moveaxis(std, 0, -1),
+    )
+
+
+def _window(length: int, window: str | tuple[str, float]) -> FloatArray:
+    whole(length, "segment", 8)
+    try:
+        return np.asarray(get_window(window, length), dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        raise OptionError(f"window={window!r} is none that scipy knows: {error}") from error
+
+
+def _default_segment(n_samples: int) -> int:
+    length = 1 << max(3, (n_samples // 8).bit_length() - 1)
+    return min(length, _LONGEST_DEFAULT_SEGMENT)
