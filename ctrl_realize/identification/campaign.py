@@ -313,12 +313,12 @@ def _amplitude_trend(rows: tuple[CampaignRow, ...], method: str) -> Flag | None:
     if not chance < 0.01:
         return None
     way = "longer" if correlation > 0 else "shorter"
-    # A scan's bias depends on the noise, which is larger beside a smaller step.
-    doubt = (
-        ""
-        if method == "output_error"
-        else "; or the bias of the scan, which grows with the noise: method='output_error' tells"
-    )
+    # Noise is larger beside a smaller step: a scan's bias grows with it, a fit misses fast lags.
+    doubt = ""
+    if method != "output_error":
+        doubt = "; or the bias of the scan, which grows with the noise: method='output_error' tells"
+    elif len({row.order for row in rows if np.isfinite(row.delay)}) > 1:
+        doubt = "; or a lag that only large steps show above the noise, as the orders differ"
     return Flag(
         "amplitude_trend",
         f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, chance "

@@ -16,6 +16,7 @@ NUMBERS = (
     (re.compile(r"(?:-\+|\+-|\u2213) (?=[\d.])"), "\u00b1\u00a0"),
     (re.compile(r"(?<=[\d)]) (?=(?:%|s|ms|Hz)(?!\w))"), "\u00a0"),
     (re.compile(r"(?<=\d)\u2013(?=\d)"), "\u2060\u2013\u2060"),
+    (re.compile(r"(?<=\d) (?=\d{3}(?!\d))"), "\u00a0"),
     (re.compile(r"(?<=\d) (to|\u2026|\.\.\.) (?=-?\d)"), "\u00a0\\1\u00a0"),
 )
 """What stands between numbers and units -> what does not break there."""
