@@ -22,7 +22,11 @@ from .truth import ValveTruth
 Seed: TypeAlias = np.random.Generator | int | None
 
 _REST_MM = 0.27
+"""Displacement that is shown at rest, at 4 mA."""
+_MOST_MA = 25.0
+"""Largest current that the drive can give."""
 _OVERSAMPLING = 8
+"""Steps within a sample in which friction is simulated."""
 _SINE_SAMPLES = 640
 _SINE_MEAN_MA = 12.0
 
@@ -192,8 +196,12 @@ class Valve:
                 "numbers"
             )
         held = held.astype(np.float64)
-        if not np.all(np.isfinite(held)) or held.min() < 0 or held.max() > 25:
-            raise DataError("current must be finite and in 0-25 mA in every sample")
+        bad = np.flatnonzero(~((held >= 0) & (held <= _MOST_MA)))
+        if bad.size:
+            raise DataError(
+                f"current is {held[bad[0]]:g} mA at sample {bad[0]}; needed is 0-{_MOST_MA:g} mA "
+                "everywhere"
+            )
         time = self.dt * np.arange(held.size, dtype=np.float64)
         generator = np.random.default_rng(rng)
         dead_time = self.truth.dead_time
@@ -275,32 +283,28 @@ class Valve:
         for point, nominal in enumerate(np.geomspace(low, high, points), start=1):
             error = min(abs(frequency_error_hz), 0.01 * nominal)
             frequency_hz = nominal + generator.uniform(-error, error)
-            wanted = (settle + periods / nominal) / (self.dt * _SINE_SAMPLES)
-            dt = self.dt * max(1, int(np.ceil(wanted)))
-            if frequency_hz > 0.4 / dt:
-                raise OptionError(
-                    f"{nominal:g} Hz with periods={periods:g} and settle={settle:g} s does not fit "
-                    f"into {_SINE_SAMPLES} samples of {dt:g} s; ask for less"
-                )
-            time = dt * np.arange(_SINE_SAMPLES, dtype=np.float64)
+            time = self._sine_time(frequency_hz, settle + periods / nominal)
             omega = 2 * np.pi * frequency_hz
             current = _SINE_MEAN_MA + amplitude * np.sin(omega * time)
-            moved = amplitude * response_to_started_sine(core, omega, time, dead_time)
+            moved = mean_mm + amplitude * response_to_started_sine(core, omega, time, dead_time)
+            names = [f"valve_sine_{point:03d}_{repeat}" for repeat in range(1, repeats + 1)]
             sweep.append(
                 tuple(
-                    recorded(
-                        self,
-                        time,
-                        current,
-                        mean_mm + moved,
-                        generator,
-                        f"valve_sine_{point:03d}_{repeat}",
-                        spikes=False,
-                    )
-                    for repeat in range(1, repeats + 1)
+                    recorded(self, time, current, moved, generator, each, spikes=False)
+                    for each in names
                 )
             )
         return tuple(sweep)
+
+    def _sine_time(self, frequency_hz: float, span: float) -> FloatArray:
+        """Sample a sine so slowly that the analyser's samples last for `span` s."""
+        dt = self.dt * max(1, int(np.ceil(span / (self.dt * _SINE_SAMPLES))))
+        if frequency_hz > 0.4 / dt:
+            raise OptionError(
+                f"{frequency_hz:.4g} Hz for {span:.4g} s does not fit into {_SINE_SAMPLES} samples "
+                f"of {dt:g} s; ask for fewer periods or a shorter settle"
+            )
+        return dt * np.arange(_SINE_SAMPLES, dtype=np.float64)
 
     def _with_friction(self, held: FloatArray, dead_time: float) -> FloatArray:
         """Simulate with slew limit and play between actuator and LVDT, on a finer grid."""

@@ -14,12 +14,13 @@ from ..wording import in_time, interval_in_time
 from .loops import Loop, open_loop
 from .margin_result import Margins
 from .margins import loop_margins
-from .siso import delayed_system, held_fraction
+from .siso import delayed_system, held_fraction, interval_of_dead_time
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MAX_DELAYS = 21
+"""Most delays within an interval that are tried."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,8 +28,8 @@ class DelayRobustness(Result):
     """Stability and margins of one controller over a range of dead times.
 
     ``stable`` is true when the loop is stable for every delay within `dead_time_interval` (widened
-    to whole samples and to the nominal delay);
-    `stable_from` and `stable_to` bound the whole range around the nominal delay that is.
+    to whole samples and to the nominal delay); `stable_from` and `stable_to` bound the whole range
+    around the nominal delay in which it is stable.
 
     Attributes
     ----------
@@ -167,18 +168,13 @@ def delay_robustness(
     <DelayRobustness stable in 0.08...0.12 s>
     """
     plant = delayed_system(system, "robustness to the dead time")
-    if dead_time_interval is None:
-        dead_time_interval = getattr(plant.fit, "dead_time_interval", None)
-        if dead_time_interval is None:
-            raise OptionError(
-                "the system carries no interval of its dead time; give "
-                "dead_time_interval=(low, high) in s"
-            )
-    low, high = (float(x) for x in dead_time_interval)
-    if not 0 <= low <= high < np.inf:
+    interval = interval_of_dead_time(plant, dead_time_interval)
+    if interval is None:
         raise OptionError(
-            f"dead_time_interval=({low:g}, {high:g}); needed is 0 <= low <= high in s"
+            "the system carries no interval of its dead time; give "
+            "dead_time_interval=(low, high) in s"
         )
+    low, high = interval
     nominal, dt, held = int(plant.delay), float(plant.dt), held_fraction(plant)
     first = int(np.floor((low + held) / dt + 1e-9))
     last = int(np.ceil((high + held) / dt - 1e-9))
@@ -191,7 +187,7 @@ def delay_robustness(
         delays=locked(delays),
         stable_at=locked(np.array(found) > 0),
         modulus_margin=read_only(np.array(found)),
-        dead_time_interval=(low, high),
+        dead_time_interval=interval,
         nominal=nominal,
         dt=dt,
         stable_from=float(np.maximum(0.0, dt * (nominal - earlier) - held)),

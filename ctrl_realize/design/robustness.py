@@ -10,7 +10,6 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import real
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
@@ -18,9 +17,10 @@ from ..results import Result
 from .loops import open_loop
 from .margin_result import Margins
 from .margins import margins
-from .siso import delayed_system, held_fraction
+from .siso import delayed_system, held_fraction, interval_of_dead_time
 
 GRID_POINTS = 400
+"""Frequencies of a bound where none are given."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -194,7 +194,7 @@ def uncertainty_bound(
     if nominal is None:
         raise OptionError("no systems and no nominal one; give nominal and dead_time_interval")
     plant = delayed_system(nominal, "an uncertainty bound")
-    interval = dead_time_interval or getattr(plant.fit, "dead_time_interval", None)
+    interval = interval_of_dead_time(plant, dead_time_interval)
     if not models and interval is None:
         raise OptionError(
             "no systems to compare and no interval of the dead time; give dead_time_interval in s"
@@ -209,9 +209,7 @@ def uncertainty_bound(
         spread = np.maximum(spread, np.abs(_response(other, grid) / base - 1))
     delay_part = np.zeros(grid.size)
     if interval is not None:
-        low, high = (real(x, "dead_time_interval", "dead time in s") for x in interval)
-        if low > high:
-            raise OptionError(f"dead_time_interval=({low:g}, {high:g}); needed is low <= high")
+        low, high = interval
         wait = plant.dead_time - held_fraction(plant)
         off = max(abs(low - wait), abs(high - wait))
         # |exp(-jx) - 1| grows to 2 at x = pi; beyond that some smaller error reaches 2.

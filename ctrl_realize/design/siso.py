@@ -1,4 +1,4 @@
-"""Checks of the systems that design functions take."""
+"""Checks of the systems and dead times that design functions take."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import band
 from ..delayed import DelayedStateSpace
-from ..errors import UnsuitableSystemError
+from ..errors import OptionError, UnsuitableSystemError
 
 
 def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedStateSpace:
@@ -60,7 +61,10 @@ def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
         return ct.ss([], [], [], float(controller), dt)
     system = proper_ss(controller, purpose)
     if not system.issiso():
-        raise UnsuitableSystemError(f"{purpose} needs a controller with one input and one output")
+        raise UnsuitableSystemError(
+            f"{purpose} needs a controller with one input and one output; {system.name!r} has "
+            f"{system.ninputs} inputs and {system.noutputs} outputs"
+        )
     if system.dt is None:
         return ct.StateSpace(system, dt) if system.nstates else ct.ss([], [], [], system.D, dt)
     if system.dt is True or not np.isclose(system.dt, dt, rtol=1e-6, atol=0.0):
@@ -70,6 +74,27 @@ def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
             "give a controller of the same sample time (a PID has .discretised(dt))"
         )
     return system
+
+
+def interval_of_dead_time(
+    system: DelayedStateSpace, given: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """Return the interval that was given, else that of the identification; None without both.
+
+    Raises
+    ------
+    OptionError
+        No interval of dead times.
+    """
+    interval = getattr(system.fit, "dead_time_interval", None) if given is None else given
+    if interval is None:
+        return None
+    low, high = band(interval, "dead_time_interval", "dead times in s")
+    if not 0 <= low <= high:
+        raise OptionError(
+            f"dead_time_interval=({low:g}, {high:g}); needed is 0 <= low <= high in s"
+        )
+    return low, high
 
 
 def held_fraction(system: DelayedStateSpace) -> float:

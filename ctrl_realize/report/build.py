@@ -31,7 +31,7 @@ from .tables import (
     model_table,
     settings_tables,
 )
-from .verdict import campaign_verdict, comparison_verdict, verdict_of
+from .verdict import Verdict, campaign_verdict, comparison_verdict, verdict_of
 
 
 def write_identification(
@@ -96,30 +96,23 @@ def write_identification(
     ...     print(written.read_text(encoding="utf-8").count("<svg "), "figures")
     7 figures
     """
-    flags = () if comparison is None else comparison.flags
-    sketches = identification_sketches(system, record, frf=frf, comparison=comparison)
-    tables = [*fit_tables(system.fit)]
-    if comparison is not None:
-        tables.append(pairs("Against the measured frequency response", comparison._rows()))
-    tables += [
-        model_table(system),
-        data_table([record], files),
-        *settings_tables(settings),
-        pairs("Versions", versions()),
-    ]
-    if figures is not None:
-        save_sketches(figures, sketches)
-    page = Page(
+    return _write(
+        path,
         title=f"Model of {record.name}" if record.name else "Identified model",
         subtitle=_kind(system),
-        verdict=verdict_of(system, flags),
-        version=own_version(),
-        figures=[sketch.on_page() for sketch in sketches],
-        tables=tables,
+        verdict=verdict_of(system, () if comparison is None else comparison.flags),
+        sketches=identification_sketches(system, record, frf=frf, comparison=comparison),
+        tables=[
+            *fit_tables(system.fit),
+            *_against(comparison),
+            model_table(system),
+            data_table([record], files),
+            *settings_tables(settings),
+        ],
         calls=calls,
         simulated=simulated,
+        figures=figures,
     )
-    return write_page(path, page)
 
 
 def write_campaign(
@@ -186,27 +179,26 @@ def write_campaign(
     sketches = campaign_sketches(campaign, truth=truth)
     if frf is not None:
         sketches += frf_sketches([system], frf, comparison)
-    sketches += more_sketches
-    if figures is not None:
-        save_sketches(figures, sketches)
-    tables = [campaign_table(campaign), amplitude_table(campaign), *more_tables]
-    if comparison is not None:
-        tables.append(pairs("Against the measured frequency response", comparison._rows()))
-    tables += [*fit_tables(system.fit), model_table(system)]
-    if files or records:
-        tables.append(data_table(records, files))
-    tables += [*settings_tables(settings), pairs("Versions", versions())]
-    page = Page(
+    return _write(
+        path,
         title=title,
         subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
         verdict=campaign_verdict(campaign),
-        version=own_version(),
-        figures=[sketch.on_page() for sketch in sketches],
-        tables=tables,
+        sketches=[*sketches, *more_sketches],
+        tables=[
+            campaign_table(campaign),
+            amplitude_table(campaign),
+            *more_tables,
+            *_against(comparison),
+            *fit_tables(system.fit),
+            model_table(system),
+            *([data_table(records, files)] if files or records else []),
+            *settings_tables(settings),
+        ],
         calls=calls,
         simulated=simulated,
+        figures=figures,
     )
-    return write_page(path, page)
 
 
 def write_comparison(
@@ -260,25 +252,55 @@ def write_comparison(
     ...     print(path.read_text().count("<svg "), "figures")
     2 figures
     """
-    sketches = frf_sketches([system], frf, comparison)
-    if figures is not None:
-        save_sketches(figures, sketches)
-    page = Page(
+    return _write(
+        path,
         title=f"{system.name} beside {frf.name}",
         subtitle="a model and a measured frequency response",
         verdict=comparison_verdict(system, comparison),
-        version=own_version(),
-        figures=[sketch.on_page() for sketch in sketches],
+        sketches=frf_sketches([system], frf, comparison),
         tables=[
-            pairs("Against the measured frequency response", comparison._rows()),
+            *_against(comparison),
             model_table(system),
             *([data_table([], files)] if files else []),
-            pairs("Versions", versions()),
         ],
+        calls=calls,
+        simulated=simulated,
+        figures=figures,
+    )
+
+
+def _write(
+    path: str | os.PathLike[str],
+    *,
+    title: str,
+    subtitle: str,
+    verdict: Verdict,
+    sketches: Sequence[Sketch],
+    tables: Sequence[Table],
+    calls: Sequence[tuple[str, str]],
+    simulated: bool,
+    figures: str | os.PathLike[str] | None,
+) -> Path:
+    """Write a page and, if a folder is given, its figures beside it."""
+    if figures is not None:
+        save_sketches(figures, sketches)
+    page = Page(
+        title=title,
+        subtitle=subtitle,
+        verdict=verdict,
+        version=own_version(),
+        figures=[sketch.on_page() for sketch in sketches],
+        tables=[*tables, pairs("Versions", versions())],
         calls=calls,
         simulated=simulated,
     )
     return write_page(path, page)
+
+
+def _against(comparison: FRFComparison | None) -> list[Table]:
+    if comparison is None:
+        return []
+    return [pairs("Against the measured frequency response", comparison._rows())]
 
 
 def _kind(system: DelayedStateSpace) -> str:

@@ -35,13 +35,6 @@ _VARIABLES = {
 }
 
 
-def drawn(
-    draw: Callable[[Figure], Any], key: str, size: tuple[float, float], description: str
-) -> str:
-    """Draw a figure and return it as inline SVG, see `laid_out` and `inline_svg`."""
-    return inline_svg(laid_out(draw, size), key, description)
-
-
 def laid_out(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure:
     """Draw a figure and fix the places of everything in it, so that it can be saved cheaply.
 

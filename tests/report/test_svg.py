@@ -16,13 +16,16 @@ from numpy.testing import assert_array_equal
 
 from ctrl_realize.plots import style
 from ctrl_realize.report.svg import (
-    drawn,
     envelope,
     inline_svg,
     laid_out,
     scales,
     thin_lines,
 )
+
+
+def drawn(draw, key, size, description):
+    return inline_svg(laid_out(draw, size), key, description)
 
 
 def line(figure):
