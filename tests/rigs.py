@@ -24,6 +24,21 @@ def pair(hz: float, zeta: float) -> ct.TransferFunction:
     return ct.tf([w**2], [1, 2 * zeta * w, w**2])
 
 
+DT = 0.1  # sample time in s of the two plants that follow
+TWO_STATES = cr.DelayedStateSpace(
+    ct.ss([[0.8, 0.1], [0.0, 0.6]], [[0.0], [1.0]], [[0.5, 0.1]], [[0.0]], DT), 5
+)
+TWO_INPUTS = cr.DelayedStateSpace(  # and three outputs
+    ct.ss(
+        [[0.8, 0.0], [0.0, 0.5]],
+        [[1.0, 0.3], [0.2, 1.0]],
+        [[0.5, 0.2], [0.1, 0.6], [0.3, 0.3]],
+        np.zeros((3, 2)),
+        DT,
+    ),
+    (2, 4),
+)
+
 R1 = lag(2.0)
 R2 = lag(2.2) * lag(11.0)
 R3 = lag(2.2) * pair(8.0, 0.7)

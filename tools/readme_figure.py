@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -71,9 +70,9 @@ def main() -> None:
     axes["gain"].legend(loc="lower left", frameon=False)
     for name in ("gain", "phase"):
         axes[name].xaxis.set_major_formatter("{x:g}")
-    assert isinstance(system, ct.StateSpace)
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(TARGET, dpi=90)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -6,6 +6,7 @@ import functools
 from collections.abc import Iterable
 from pathlib import Path
 
+import control as ct
 import numpy as np
 from joblib import Parallel, delayed
 
@@ -15,26 +16,28 @@ from tests import rigs
 from . import plants
 from .methods import METHODS, Estimate, run
 
-Cell = tuple[str, str, float, int]
+Shown = tuple[float, bool, float]
+"""Error in samples, whether the interval covers, and its width."""
 
 
-def one(cell: Cell, seed: int, coarser: int, group: str) -> tuple[float, bool, float]:
-    """Error in samples, whether the interval covers, and its width."""
-    method, name, noise, _ = cell
-    plant = (plants.RIGS if group == "rigs" else plants.FACTORIAL)[name]
-    record, truth = plants.record(plant, noise, seed, coarser)
-    estimate = run(method, record, len(plant.poles()))
+def shown(estimate: Estimate, truth: float) -> Shown:
     covers = estimate.low <= truth <= estimate.high
     return estimate.delay - truth, bool(covers), estimate.high - estimate.low
 
 
-def with_known_sensor(seed: int, noise: float) -> tuple[float, bool, float]:
-    """Measure R4 with its sensor's pole given."""
+def one(
+    method: str, plant: ct.TransferFunction, noise: float, coarser: int = 1, *, seed: int
+) -> Shown:
+    """Estimate the delay of one record."""
+    record, truth = plants.record(plant, noise, seed, coarser)
+    return shown(run(method, record, len(plant.poles())), truth)
+
+
+def with_known_sensor(noise: float, *, seed: int) -> Shown:
+    """Estimate the delay of R4 with its sensor's pole given."""
     record, truth = plants.record(plants.RIGS["R4"], noise, seed)
     fit = cr.fit_delay(record, known=plants.SENSOR, structures=[(3, 3)]).fit
-    estimate = Estimate(fit.delay, *fit.delay_interval)
-    covers = estimate.low <= truth <= estimate.high
-    return estimate.delay - truth, bool(covers), estimate.high - estimate.low
+    return shown(Estimate(fit.delay, *fit.delay_interval), truth)
 
 
 def rig_table(seeds: int, noises: Iterable[float], methods: Iterable[str], jobs: int) -> list[str]:
@@ -48,11 +51,11 @@ def rig_table(seeds: int, noises: Iterable[float], methods: Iterable[str], jobs:
         for noise in noises:
             best = plants.bound(plant, noise)
             for method in methods:
-                work = functools.partial(one, (method, name, noise, 0), coarser=1, group="rigs")
+                work = functools.partial(one, method, plant, noise)
                 lines.append(_row(name, noise, method, best, _repeat(work, seeds, jobs)))
             if name == "R4":
                 best = plants.bound(rigs.R3, noise, sensor_known=True)
-                work = functools.partial(with_known_sensor, noise=noise)
+                work = functools.partial(with_known_sensor, noise)
                 rows = _repeat(work, seeds, jobs)
                 lines.append(_row(name, noise, "output error, sensor known", best, rows))
     return lines
@@ -75,8 +78,9 @@ def factorial_table(seeds: int, jobs: int) -> list[str]:
     ]
     errors = {}
     for cell in cells:
-        work = functools.partial(one, cell, coarser=cell[3], group="factorial")
-        found = _repeat(work, seeds, jobs)[:, 0] * cell[3] * rigs.TS * 1e3
+        method, name, noise, coarser = cell
+        work = functools.partial(one, method, plants.FACTORIAL[name], noise, coarser)
+        found = _repeat(work, seeds, jobs)[:, 0] * coarser * rigs.TS * 1e3
         # A method without an answer is charged 100 ms.
         found = np.where(np.isfinite(found), found, 100.0)
         errors[cell] = float(np.log10(max(np.sqrt(np.mean(found**2)), 1e-3)))

@@ -21,6 +21,7 @@ from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say
 
 _MANY = 12
+"""Records from which on all cores are used."""
 _OPTION = typer.Option
 
 
@@ -245,9 +246,9 @@ def _words(
         words += ["--frf", str(frf)]
     if separate:
         words.append("--separate")
-    names = {"output": "response", "delimiter": "delimiter"}
     for name, value in how.keywords.items():
-        option = f"--{names.get(name, name).replace('_', '-')}"
+        # --output is the folder, so the output column has another name here
+        option = "--response" if name == "output" else f"--{name.replace('_', '-')}"
         if value is True:
             words.append(option)
         else:

@@ -11,20 +11,12 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError, UnsuitableSystemError
+from tests.oracles.dense import step_response
 
 DT = 7.8125e-4
 FOPDT = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=2.0)
 SOPDT = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=2.0, second_lag=3.0)
 IPDT = cr.design.ProcessModel(gain=0.5, lag=0.0, dead_time=2.0, integrating=True)
-
-
-def stepped(system, count):
-    A, B, C, D = (np.asarray(M) for M in (system.A, system.B, system.C, system.D))
-    x, out = np.zeros(A.shape[0]), np.empty(count)
-    for k in range(count):
-        out[k] = (C @ x)[0] + D[0, 0]
-        x = A @ x + B[:, 0]
-    return out
 
 
 @pytest.mark.parametrize(
@@ -96,7 +88,7 @@ def test_no_neighbour_of_the_optimal_pi_is_better(valve):
     best = cr.design.pid(plant, "optimal", "PI", max_sensitivity=1.6)
 
     def load_error(controller):
-        return np.abs(stepped(ct.feedback(ct.ss(plant), ct.ss(controller)), 2500)).sum()
+        return np.abs(step_response(ct.feedback(ct.ss(plant), ct.ss(controller)), 2500)).sum()
 
     lowest = load_error(best)
     for share in (0.8, 0.9, 1.1, 1.25):
@@ -126,8 +118,8 @@ def test_table_numbers_are_those_of_brute_force_simulation(valve, kind):
     plant = valve(37)
     table = cr.design.compare_pid(plant, ["simc", "cohen_coon"], [kind])
     for row, controller in zip(table.table().itertuples(), table.controllers, strict=True):
-        setpoint = stepped(ct.feedback(ct.ss(plant) * ct.ss(controller), 1), 4000)
-        load = stepped(ct.feedback(ct.ss(plant), ct.ss(controller)), 4000)
+        setpoint = step_response(ct.feedback(ct.ss(plant) * ct.ss(controller), 1), 4000)
+        load = step_response(ct.feedback(ct.ss(plant), ct.ss(controller)), 4000)
         assert row.iae_setpoint == pytest.approx(np.abs(1 - setpoint).sum() * DT, rel=1e-4)
         assert row.iae_load == pytest.approx(np.abs(load).sum() * DT, rel=1e-4)
         assert row.overshoot == pytest.approx(setpoint.max() - 1, abs=1e-5)

@@ -12,6 +12,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
+from tests.oracles.dense import step_response
 
 DT = 7.8125e-4
 
@@ -21,16 +22,6 @@ class FitWithInterval:
     """Stands for any result of an identification."""
 
     dead_time_interval: tuple[float, float]
-
-
-def stepped(system, count):
-    """Response to a unit step, by the recursion itself."""
-    A, B, C, D = (np.asarray(M) for M in (system.A, system.B, system.C, system.D))
-    x, out = np.zeros(A.shape[0]), np.empty(count)
-    for k in range(count):
-        out[k] = (C @ x)[0] + D[0, 0]
-        x = A @ x + B[:, 0]
-    return out
 
 
 def closed(plant, controller):
@@ -49,8 +40,8 @@ def test_the_set_point_response_is_that_of_the_core_alone_d_samples_later(
     core = valve(0).delay_free if kind == "valve" else cores[kind]
     controller = pi_controller(1.5, 0.1)
     predictor = cr.design.smith_predictor(cr.delayed_ss(core, delay), controller)
-    alone = stepped(ct.feedback(core * controller, 1), 600)
-    found = stepped(closed(cr.delayed_ss(core, delay), predictor), 600 + delay)
+    alone = step_response(ct.feedback(core * controller, 1), 600)
+    found = step_response(closed(cr.delayed_ss(core, delay), predictor), 600 + delay)
     np.testing.assert_array_equal(found[:delay], 0)
     np.testing.assert_allclose(found[delay:], alone, atol=1e-11)  # 600 steps of rounding
 
@@ -114,7 +105,7 @@ def test_a_filtered_predictor_leaves_no_error_after_a_load(valve, pi_controller,
         plant, pi_controller(1.5, 0.1), filter_time=0.05, remove_slow=remove_slow
     )
     assert cr.design.margins(plant, predictor).stable
-    assert abs(stepped(loaded(plant, predictor), 6000)[-1]) < 1e-6
+    assert abs(step_response(loaded(plant, predictor), 6000)[-1]) < 1e-6
 
 
 def test_removing_the_slow_pole_takes_it_out_of_the_load_response(cores):
@@ -125,7 +116,7 @@ def test_removing_the_slow_pole_takes_it_out_of_the_load_response(cores):
     kept = cr.design.smith_predictor(plant, controller, filter_time=0.02)
     taken = cr.design.smith_predictor(plant, controller, filter_time=0.02, remove_slow=True)
     np.testing.assert_allclose(taken.removed_poles, [slow], rtol=1e-12)
-    areas = [np.abs(stepped(loaded(plant, c), 6000)).sum() for c in (kept, taken)]
+    areas = [np.abs(step_response(loaded(plant, c), 6000)).sum() for c in (kept, taken)]
     assert areas[1] < 0.5 * areas[0]
 
 
@@ -137,7 +128,7 @@ def test_an_integrating_core_needs_the_filter_and_then_rejects_loads(cores, pi_c
     found = cr.design.margins(plant, predictor)
     assert found.stable
     assert np.all(np.abs(closed(plant, predictor).poles()) < 1)  # no hidden integrator either
-    assert abs(stepped(loaded(plant, predictor), 40_000)[-1]) < 1e-5
+    assert abs(step_response(loaded(plant, predictor), 40_000)[-1]) < 1e-5
 
 
 def test_a_filter_widens_the_range_of_dead_times(valve, pi_controller):

@@ -9,21 +9,8 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, DataWarning, OptionError
+from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
-DT = 0.1
-PLANT = cr.DelayedStateSpace(
-    ct.ss([[0.8, 0.1], [0.0, 0.6]], [[0.0], [1.0]], [[0.5, 0.1]], [[0.0]], DT), 5
-)
-MIMO = cr.DelayedStateSpace(
-    ct.ss(
-        [[0.8, 0.0], [0.0, 0.5]],
-        [[1.0, 0.3], [0.2, 1.0]],
-        [[0.5, 0.2], [0.1, 0.6], [0.3, 0.3]],
-        np.zeros((3, 2)),
-        DT,
-    ),
-    (2, 4),
-)
 METHODS = [
     {"method": "regularized", "kernel": "TC"},
     {"method": "regularized", "kernel": "DC"},
@@ -33,7 +20,7 @@ METHODS = [
 ]
 
 
-def record(n=600, noise=0.05, seed=0, plant=PLANT, u0=0.0, y0=0.0, **options):
+def record(n=600, noise=0.05, seed=0, plant=TWO_STATES, u0=0.0, y0=0.0, **options):
     rng = np.random.default_rng(seed)
     u = rng.choice([-1.0, 1.0], (n,) if plant.issiso() else (plant.ninputs, n))
     y = plant.simulate(u)
@@ -43,7 +30,7 @@ def record(n=600, noise=0.05, seed=0, plant=PLANT, u0=0.0, y0=0.0, **options):
 
 @pytest.mark.parametrize("options", METHODS)
 def test_the_true_response_lies_in_the_band_of_the_estimate(options):
-    truth = PLANT.markov(50)
+    truth = TWO_STATES.markov(50)
     z = np.concatenate(
         [
             (g.markov - truth)[:30] / g.std[:30]
@@ -68,7 +55,7 @@ def test_std_of_least_squares_is_the_cramer_rao_bound():
 
 
 def test_a_prior_of_decay_beats_least_squares():
-    truth = PLANT.markov(60)
+    truth = TWO_STATES.markov(60)
 
     def error(**options):
         return np.mean(
@@ -116,14 +103,14 @@ def test_shifting_the_output_shifts_the_response():
 def test_exact_data_give_the_exact_response():
     g = cr.impulse_from_io(record(noise=0.0, n=800), 120, method="least_squares")
     # the response has decayed to 0.8^115 = 7e-12 at the end of the window
-    assert_allclose(g.markov, PLANT.markov(120), rtol=0, atol=1e-10)
+    assert_allclose(g.markov, TWO_STATES.markov(120), rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("arx_order", [None, 12])
 def test_okid_of_exact_data_is_one_of_the_models_that_explain_them(arx_order):
     g = cr.impulse_from_io(record(noise=0.0, n=800), 80, method="okid", arx_order=arx_order)
     # a ridge of 1e-9 on sums over 800 samples
-    assert_allclose(g.markov, PLANT.markov(80), rtol=0, atol=1e-5)
+    assert_allclose(g.markov, TWO_STATES.markov(80), rtol=0, atol=1e-5)
 
 
 def test_a_response_that_outlasts_the_window_is_flagged():
@@ -135,10 +122,10 @@ def test_a_response_that_outlasts_the_window_is_flagged():
 
 @pytest.mark.parametrize("options", METHODS)
 def test_three_outputs_and_two_inputs_are_estimated_together(options):
-    g = cr.impulse_from_io(record(plant=MIMO, n=900), 40, **options)
+    g = cr.impulse_from_io(record(plant=TWO_INPUTS, n=900), 40, **options)
     assert g.markov.shape == g.std.shape == (3, 2, 40)
     # 240 numbers: five sigma leaves room for the prior
-    assert np.all(np.abs(g.markov - MIMO.markov(40)) < 5 * g.std + 0.01)
+    assert np.all(np.abs(g.markov - TWO_INPUTS.markov(40)) < 5 * g.std + 0.01)
 
 
 def test_several_records_tell_as_much_as_one_long_one():
@@ -147,7 +134,7 @@ def test_several_records_tell_as_much_as_one_long_one():
     single = cr.impulse_from_io(parts[0], 40, method="least_squares")
     assert joined.rows == 4 * single.rows
     assert_allclose(joined.std, single.std / 2, rtol=0.15)  # excitation differs a little
-    assert np.all(np.abs(joined.markov - PLANT.markov(40)) < 4.5 * joined.std)
+    assert np.all(np.abs(joined.markov - TWO_STATES.markov(40)) < 4.5 * joined.std)
 
 
 def test_missing_samples_take_out_the_equations_that_they_touch():
@@ -160,7 +147,7 @@ def test_missing_samples_take_out_the_equations_that_they_touch():
     g = cr.impulse_from_io(holes, 40, method="least_squares")
     # rows 39...599, less 3 outputs, less the 40 rows that see u[400]
     assert g.rows == 561 - 3 - 40
-    assert np.all(np.abs(g.markov - PLANT.markov(40)) < 4.5 * g.std)
+    assert np.all(np.abs(g.markov - TWO_STATES.markov(40)) < 4.5 * g.std)
 
 
 def test_a_record_with_missing_samples_is_refused_unless_asked_for():
@@ -183,9 +170,9 @@ def test_a_record_with_missing_samples_is_refused_unless_asked_for():
         cr.spectral_frf,
         lambda holes: cr.stepped_sine_frf([holes]),
         cr.check_delay,
-        lambda holes: cr.check_residuals(PLANT, holes),
-        lambda holes: cr.predict(PLANT, holes, 1),
-        lambda holes: cr.DelayTracker(PLANT, max_delay=20, memory=10.0).run(holes),
+        lambda holes: cr.check_residuals(TWO_STATES, holes),
+        lambda holes: cr.predict(TWO_STATES, holes, 1),
+        lambda holes: cr.DelayTracker(TWO_STATES, max_delay=20, memory=10.0).run(holes),
     ],
 )
 def test_what_needs_every_sample_says_that_some_are_missing(work):
@@ -199,14 +186,14 @@ def test_a_start_at_rest_uses_every_sample():
     n = 60
     u = np.zeros(n)
     u[5:] = np.random.default_rng(0).normal(size=n - 5)
-    y = PLANT.simulate(u)
+    y = TWO_STATES.simulate(u)
     one = cr.Record(DT * np.arange(n), u + 3.0, y + 8.0)
     with pytest.raises(DataError, match="start='rest'"):
         cr.impulse_from_io(one, 40, method="least_squares")
     g = cr.impulse_from_io(one, 40, method="least_squares", start="rest")
     assert g.rows == n
     # what lies beyond the window, 0.8^35 = 4e-4 of the response, ends up in the estimate
-    assert_allclose(g.markov, PLANT.markov(40), rtol=0, atol=5e-3)
+    assert_allclose(g.markov, TWO_STATES.markov(40), rtol=0, atol=5e-3)
 
 
 @pytest.mark.parametrize("options", METHODS)
@@ -219,7 +206,7 @@ def test_a_start_at_rest_uses_every_sample():
 )
 def test_an_input_that_does_not_excite_gets_no_answer(options, name, u):
     rng = np.random.default_rng(0)
-    y = PLANT.simulate(u) + 0.1 * rng.standard_normal(400)
+    y = TWO_STATES.simulate(u) + 0.1 * rng.standard_normal(400)
     with pytest.raises(DataError, match="does not excite"):
         cr.impulse_from_io(cr.Record(DT * np.arange(400), u, y), 30, **options)
 
@@ -227,7 +214,7 @@ def test_an_input_that_does_not_excite_gets_no_answer(options, name, u):
 def test_a_prior_that_fills_in_says_so():
     k = np.arange(400)
     u = sum(np.sin(w * k + w**2) for w in (0.1, 0.35, 0.8, 1.3, 2.2))
-    y = PLANT.simulate(u) + 0.01 * np.random.default_rng(0).standard_normal(400)
+    y = TWO_STATES.simulate(u) + 0.01 * np.random.default_rng(0).standard_normal(400)
     one = cr.Record(DT * k, u, y)
     with pytest.raises(DataError, match="does not excite 20 of the 30"):
         cr.impulse_from_io(one, 30, method="least_squares")
@@ -287,7 +274,7 @@ def test_records_that_do_not_belong_together_are_refused():
     with pytest.raises(DataError, match=r"sample time 0\.2 s"):
         cr.impulse_from_io([one, slow], 20)
     with pytest.raises(DataError, match="2 inputs and 3 outputs"):
-        cr.impulse_from_io([one, record(plant=MIMO)], 20)
+        cr.impulse_from_io([one, record(plant=TWO_INPUTS)], 20)
     with pytest.raises(DataError, match="no records"):
         cr.impulse_from_io([], 20)
     flat = cr.Record(one.time, one.input, np.full(600, 3.0))

@@ -10,25 +10,14 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
-DT = 0.1
-PLANT = cr.DelayedStateSpace(
-    ct.ss([[0.8, 0.1], [0.0, 0.6]], [[0.0], [1.0]], [[0.5, 0.1]], [[0.0]], DT), 5
-)
-MIMO = cr.DelayedStateSpace(
-    ct.ss(
-        [[0.8, 0.0], [0.0, 0.5]],
-        [[1.0, 0.3], [0.2, 1.0]],
-        [[0.5, 0.2], [0.1, 0.6], [0.3, 0.3]],
-        np.zeros((3, 2)),
-        DT,
-    ),
-    (2, 4),
-    output_delay=(0, 3, 1),
-)
+MIMO = cr.DelayedStateSpace(TWO_INPUTS.delay_free, (2, 4), output_delay=(0, 3, 1))
 
 
-def record(plant=PLANT, n=1000, noise=0.05, seed=0, colour=0.0, skip=0, drive=0.0, label="rig"):
+def record(
+    plant=TWO_STATES, n=1000, noise=0.05, seed=0, colour=0.0, skip=0, drive=0.0, label="rig"
+):
     rng = np.random.default_rng(seed)
     shape = (n + skip,) if plant.issiso() else (plant.ninputs, n + skip)
     u = lfilter([1], [1, -drive], rng.standard_normal(shape))
@@ -43,14 +32,14 @@ def test_the_true_model_leaves_noise_and_raises_no_alarm(drive, colour):
     alarms = []
     for seed in range(25):
         check = cr.check_residuals(
-            PLANT, record(seed=seed, colour=colour, drive=drive, skip=50), confidence=0.999
+            TWO_STATES, record(seed=seed, colour=colour, drive=drive, skip=50), confidence=0.999
         )
         alarms.append(not check.independent or bool(check.flags))
         assert check.white == (colour == 0)
     assert sum(alarms) <= 1
 
 
-@pytest.mark.parametrize("plant", [PLANT, MIMO], ids=["siso", "mimo"])
+@pytest.mark.parametrize("plant", [TWO_STATES, MIMO], ids=["siso", "mimo"])
 def test_a_record_cut_out_of_the_middle_of_an_experiment_is_explained_from_its_start(plant):
     one = record(plant, noise=0.0, skip=137, n=400)
     check = cr.check_residuals(plant, one)
@@ -65,8 +54,8 @@ def test_a_record_cut_out_of_the_middle_of_an_experiment_is_explained_from_its_s
 def test_a_start_at_rest_is_taken_as_rest():
     n = 300
     u = np.r_[np.full(20, 2.0), np.random.default_rng(0).normal(size=n - 20)]
-    y = PLANT.simulate(u - 2.0) - 4
-    check = cr.check_residuals(PLANT, cr.Record(DT * np.arange(n), u, y), start="rest")
+    y = TWO_STATES.simulate(u - 2.0) - 4
+    check = cr.check_residuals(TWO_STATES, cr.Record(DT * np.arange(n), u, y), start="rest")
     assert_allclose(check.residual, 0, atol=1e-12)
 
 
@@ -80,7 +69,7 @@ def test_residual_and_simulation_add_up_to_the_record():
 
 @pytest.mark.parametrize("delay", [4, 6])
 def test_a_delay_that_is_off_by_one_shows_in_the_cross_correlation(delay):
-    check = cr.check_residuals(PLANT.replace(delay=delay), record())
+    check = cr.check_residuals(TWO_STATES.replace(delay=delay), record())
     assert not check.independent
     assert [flag.code for flag in check.flags] == ["input_in_residual"]
     # the model's first response is missing, or comes too soon: G_1 = 0.1 at the sample after
@@ -125,11 +114,11 @@ def test_a_controller_of_the_same_sample_is_feedback_and_no_wrong_delay(integral
 
 def test_predictions_fall_from_the_noise_model_to_the_simulation():
     one = record(noise=0.1, colour=0.95, n=2000)
-    simulated = cr.check_residuals(PLANT, one).fit_percent[0]
-    fits = [cr.predict(PLANT, one, k).fit_percent[0] for k in (1, 5, 20, 200)]
+    simulated = cr.check_residuals(TWO_STATES, one).fit_percent[0]
+    fits = [cr.predict(TWO_STATES, one, k).fit_percent[0] for k in (1, 5, 20, 200)]
     assert fits[0] > fits[1] > fits[2]
     assert abs(fits[-1] - simulated) < 2.0
-    prediction = cr.predict(PLANT, one, 1)
+    prediction = cr.predict(TWO_STATES, one, 1)
     # what is left one step ahead is the innovation, of 0.1
     assert_allclose(np.std(one.output - prediction.output), 0.1, rtol=0.06)
     assert prediction.noise_order == (1,)
@@ -137,14 +126,14 @@ def test_predictions_fall_from_the_noise_model_to_the_simulation():
 
 
 def test_several_models_are_compared_on_records_that_they_have_not_seen():
-    others = [record(seed=1), record(plant=PLANT, seed=2, n=700, label="day 2")]
-    table = cr.cross_validate({"true": PLANT, "late": PLANT.replace(delay=9)}, others)
+    others = [record(seed=1), record(plant=TWO_STATES, seed=2, n=700, label="day 2")]
+    table = cr.cross_validate({"true": TWO_STATES, "late": TWO_STATES.replace(delay=9)}, others)
     assert table.shape == (2, 2)
     assert (table.loc["true"] > table.loc["late"] + 20).all()
 
 
 def test_results_pickle_report_and_show_in_one_line():
-    check = cr.check_residuals(PLANT, record())
+    check = cr.check_residuals(TWO_STATES, record())
     again = pickle.loads(pickle.dumps(check))
     assert_allclose(again.cross, check.cross, rtol=0)
     assert "free of the input" in check.report()
@@ -154,10 +143,10 @@ def test_results_pickle_report_and_show_in_one_line():
 @pytest.mark.parametrize(
     ("system", "options", "error", "match"),
     [
-        (PLANT, {"lags": 0}, OptionError, "lags"),
-        (PLANT, {"lags": 400}, DataError, "1200 samples"),
-        (PLANT, {"confidence": 1.0}, OptionError, "confidence"),
-        (PLANT, {"start": "zero"}, OptionError, "'rest'"),
+        (TWO_STATES, {"lags": 0}, OptionError, "lags"),
+        (TWO_STATES, {"lags": 400}, DataError, "1200 samples"),
+        (TWO_STATES, {"confidence": 1.0}, OptionError, "confidence"),
+        (TWO_STATES, {"start": "zero"}, OptionError, "'rest'"),
         (MIMO, {}, DataError, "3"),
         (ct.ss([[1.2]], [[1.0]], [[1.0]], [[0.0]], DT), {}, UnsuitableSystemError, "unstable"),
         (ct.tf([1.0], [1.0, 1.0]), {}, UnsuitableSystemError, "not discrete"),
@@ -175,9 +164,9 @@ def test_missing_samples_and_empty_lists_are_refused():
     y[4] = np.nan
     holes = cr.Record(record().time, record().input, y, missing="keep")
     with pytest.raises(DataError, match="1 of this record are missing"):
-        cr.check_residuals(PLANT, holes)
+        cr.check_residuals(TWO_STATES, holes)
     with pytest.raises(DataError, match="empty"):
-        cr.cross_validate({"a": PLANT}, [])
+        cr.cross_validate({"a": TWO_STATES}, [])
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,16 @@ def simulate(A, B, C, D, delay: int, count: int) -> np.ndarray:
     return out
 
 
+def step_response(system, count: int) -> np.ndarray:
+    """Response of a single-channel system to a unit step, by the recursion itself."""
+    A, B, C, D = (np.asarray(M) for M in (system.A, system.B, system.C, system.D))
+    x, out = np.zeros(A.shape[0]), np.empty(count)
+    for k in range(count):
+        out[k] = (C @ x)[0] + D[0, 0]
+        x = A @ x + B[:, 0]
+    return out
+
+
 def scan(markov: np.ndarray, delays, samples: int, orders, window: int, *, padded=False):
     """IAE (orders, delays) and leading singular values (delays, max order) of a SISO scan."""
     g = markov[np.newaxis, np.newaxis]
