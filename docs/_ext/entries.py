@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from docutils import nodes
+
 PRIVATE = re.compile(r", _\w+(=[^,()]*)?(?=[,)])")
 
 
@@ -41,7 +43,15 @@ def _is_internal(base: type) -> bool:
     )
 
 
+def leave_out_object(app: Any, doctree: nodes.document) -> None:
+    """Take away the line which says that a class is a class."""
+    for line in list(doctree.findall(nodes.paragraph)):
+        if line.astext() == "Bases: object":
+            line.parent.remove(line)
+
+
 def setup(app: Any) -> dict[str, bool]:
     app.connect("autodoc-process-signature", hide_private_fields)
     app.connect("autodoc-process-bases", name_public_bases)
+    app.connect("doctree-read", leave_out_object)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

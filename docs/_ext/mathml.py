@@ -37,7 +37,8 @@ def _repair(math: ElementTree.Element) -> None:
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
-    translator.body.append(_markup(node.astext(), block=False))
+    # The joiner keeps a full stop behind the formula from beginning a line.
+    translator.body.append(_markup(node.astext(), block=False) + "\u2060")
     raise nodes.SkipNode
 
 
