@@ -21,6 +21,7 @@ RAISED_BY = {
     "identify": "identify",
     "impulses": "realize",
     "margins": "design.margins",
+    "mode_choice": "identify",
     "pulse_regression": "impulse_from_io",
     "realization": "realize",
     "residuals": "check_residuals",
