@@ -10,7 +10,8 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ..checks import whole
-from ..errors import DataError, UnsuitableSystemError
+from ..errors import DataError
+from ..frequency.measured_points import MeasuredPoints, measured_points
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.crossovers import half_turns
 from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
@@ -91,53 +92,24 @@ def data_loop(
     plant: Any, controller: Any, unstable_poles: int, integrators: int | None
 ) -> DataLoop:
     """Make a `DataLoop` of measured or computed responses, with systems on their grid."""
-    first = plant if isinstance(plant, ct.FrequencyResponseData) else controller
-    other = controller if first is plant else plant
-    if not first.issiso():
-        raise UnsuitableSystemError(
-            f"{first.name!r} has {first.ninputs} inputs and {first.noutputs} outputs; margins are "
-            "for one input and one output"
-        )
-    omega = np.asarray(first.omega, dtype=np.float64)
-    order = np.argsort(omega)
-    order = order[omega[order] > 0]
-    omega = omega[order]
-    values = np.asarray(first.frdata[0, 0], dtype=np.complex128)[order]
-    if omega.size < 3 or np.any(np.diff(omega) <= 0):
-        raise DataError(
-            f"the response has {omega.size} points above 0 rad/s, needed are at least 3 distinct "
-            "ones; average repeated frequencies first"
-        )
-    if np.any(values == 0):
-        raise DataError("the response is 0 at some frequency; leave that point out")
-    std = getattr(first, "std", None)
-    std = None if std is None else np.asarray(std, dtype=np.float64).reshape(-1)[order]
-    known = 0.0
-    if isinstance(other, ct.FrequencyResponseData):
-        if not np.array_equal(np.sort(np.asarray(other.omega)[np.asarray(other.omega) > 0]), omega):
-            raise DataError("the two responses have different frequencies; interpolate one first")
-        beside = np.asarray(other.frdata[0, 0], dtype=np.complex128)
-        beside = beside[np.argsort(other.omega)][-omega.size :]
-        values, std = values * beside, None if std is None else std * np.abs(beside)
-    elif other is not None:
-        loop = open_loop(other)
-        beside = loop(omega)
-        values, std = values * beside, None if std is None else std * np.abs(beside)
-        known = loop.delay
-        if integrators is None and loop.integrators():
-            integrators = loop.integrators() + _read_integrators(omega, values / beside)
-    wait = (
-        dead_time_from_phase(omega, values)
-        if known == 0
-        else known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
-    )
+    data = plant if isinstance(plant, ct.FrequencyResponseData) else controller
+    other = controller if data is plant else plant
+    points = _above_zero(data)
+    _check_points(points)
+    omega, values, std, known = points.omega, points.response, points.std, 0.0
+    if other is not None:
+        beside = _on_grid(other, omega)
+        values = values * beside.values
+        known = beside.delay
+        if integrators is None and beside.integrators:
+            integrators = beside.integrators + _read_integrators(omega, points.response)
+        std = None if std is None else std * np.abs(beside.values)
+    # What is known of the delay is taken out before the rest is searched for.
+    wait = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
     phase = unwrap_with_dead_time(omega, values, wait) + omega * wait
     x = np.log(omega)
-    count = (
-        _read_integrators(omega, values)
-        if integrators is None
-        else whole(integrators, "integrators", 0)
-    )
+    if integrators is None:
+        integrators = _read_integrators(omega, values)
     return DataLoop(
         omega,
         values,
@@ -146,8 +118,45 @@ def data_loop(
         PchipInterpolator(x, np.log(np.abs(values))),
         PchipInterpolator(x, phase),
         whole(unstable_poles, "unstable_poles", 0),
-        count,
+        whole(integrators, "integrators", 0),
     )
+
+
+def _above_zero(data: ct.FrequencyResponseData) -> MeasuredPoints:
+    points = measured_points(data)
+    return points.only(points.frequency_hz > 0)
+
+
+def _check_points(points: MeasuredPoints) -> None:
+    """Refuse what cannot be interpolated."""
+    count = points.frequency_hz.size
+    if count < 3 or np.any(np.diff(points.frequency_hz) <= 0):
+        raise DataError(
+            f"the response has {count} points above 0 rad/s, needed are at least 3 distinct "
+            "ones; average repeated frequencies first"
+        )
+    if np.any(points.response == 0):
+        raise DataError("the response is 0 at some frequency; leave that point out")
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """The other part of a loop on the grid of the data; `delay` in s is what is known of it."""
+
+    values: ComplexArray
+    delay: float = 0.0
+    integrators: int = 0
+
+
+def _on_grid(other: Any, omega: FloatArray) -> _Beside:
+    """Evaluate what stands beside the data in the loop."""
+    if not isinstance(other, ct.FrequencyResponseData):
+        loop = open_loop(other)
+        return _Beside(loop(omega), loop.delay, loop.integrators())
+    points = _above_zero(other)
+    if not np.array_equal(points.omega, omega):
+        raise DataError("the two responses have different frequencies; interpolate one first")
+    return _Beside(points.response)
 
 
 def _read_integrators(omega: FloatArray, values: ComplexArray) -> int:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import control as ct
@@ -23,6 +24,9 @@ from .data_loops import DataLoop, data_loop
 from .loops import Loop, open_loop
 from .margin_intervals import margin_intervals
 from .margin_result import Margins
+
+Curve = Callable[[FloatArray], ComplexArray]
+"""Response of a loop at frequencies in rad/s."""
 
 MARGINAL = 1e-9
 """Distance to -1 below which the closed loop counts as being on the border of stability."""
@@ -115,25 +119,40 @@ def loop_margins(loop: Loop) -> Margins:
     """Margins of a loop that is made already."""
     omega, values = follow(loop, loop.grid())
     count, marginal = closed_loop_count(loop, omega)
-    gains, phases = _crossings(loop, omega, values)
+    crossings = _crossings(loop, omega, values)
     if loop.dt:
-        phases = _with_ends(loop, phases)
-    distance, at = smallest_distance(lambda w: 1 + loop(w), omega)
-    start = abs(1 + loop(np.zeros(1))[0])
-    if start < distance:
-        distance, at = float(start), 0.0
-    flags = _stability_flags(count, marginal)
-    stable = count == 0 and not marginal and distance > MARGINAL
-    return _collect(
-        gains, loop(gains), phases, loop(phases), distance, at, stable, count, loop.dt, flags,
-        (omega, values),
-    )  # fmt: skip
+        crossings = replace(crossings, phases=_with_ends(loop, crossings.phases))
+    start = float(abs(1 + loop(np.zeros(1))[0]))
+    if start < crossings.distance:
+        crossings = replace(crossings, distance=start, closest=0.0)
+    plain = _collect(loop, crossings, count, marginal, loop.dt)
+    # So close to -1 the count cannot tell the side.
+    stable = plain.stable and crossings.distance > MARGINAL
+    return replace(plain, stable=stable, delay_margin=plain.delay_margin if stable else np.nan)
 
 
-def _crossings(
-    loop: Loop, omega: FloatArray, values: ComplexArray
-) -> tuple[FloatArray, FloatArray]:
-    return unit_crossings(loop, omega, values), negative_axis_crossings(loop, omega, values)
+@dataclass(frozen=True)
+class _Crossings:
+    """Where a loop on the grid `omega` has gain 1, phase -180 deg, and is closest to -1."""
+
+    omega: FloatArray
+    values: ComplexArray
+    gains: FloatArray
+    phases: FloatArray
+    distance: float
+    closest: float
+
+
+def _crossings(loop: Curve, omega: FloatArray, values: ComplexArray) -> _Crossings:
+    distance, closest = smallest_distance(lambda w: 1 + loop(w), omega)
+    return _Crossings(
+        omega,
+        values,
+        unit_crossings(loop, omega, values),
+        negative_axis_crossings(loop, omega, values),
+        distance,
+        closest,
+    )
 
 
 def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
@@ -180,64 +199,53 @@ def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
         )
     if count:
         return (
-            Flag("unstable", f"the closed loop has {count} unstable poles; the margins say how "
-                 "far it is from being stable"),
-        )  # fmt: skip
+            Flag(
+                "unstable",
+                f"the closed loop has {count} unstable poles; the margins say how far it is from "
+                "being stable",
+            ),
+        )
     return ()
 
 
-def _collect(
-    gains: FloatArray,
-    at_gains: ComplexArray,
-    phases: FloatArray,
-    at_phases: ComplexArray,
-    distance: float,
-    closest: float,
-    stable: bool,
-    count: int,
-    dt: float,
-    flags: tuple[Flag, ...],
-    response: tuple[FloatArray, ComplexArray],
-) -> Margins:
+def _collect(loop: Curve, at: _Crossings, count: int, marginal: bool, dt: float) -> Margins:
+    """Read the margins off the crossings of a loop whose unstable poles are counted."""
     # -1 is half a turn away: the angle of -L is the margin itself, in -180...180.
-    pm = np.degrees(np.angle(-at_gains))
-    gm = 1 / np.abs(at_phases)
-    waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / gains
-    omega, values = response
+    pm = np.degrees(np.angle(-loop(at.gains)))
+    gm = 1 / np.abs(loop(at.phases))
+    waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / at.gains
+    stable = count == 0 and not marginal
     return Margins(
         gain_margin=float(gm[np.argmin(np.abs(np.log(gm)))]) if gm.size else float("inf"),
         phase_margin=float(pm[np.argmin(np.abs(pm))]) if pm.size else float("inf"),
-        modulus_margin=distance,
+        modulus_margin=at.distance,
         delay_margin=float(waits.min(initial=np.inf)) if stable else float("nan"),
         stable=stable,
         unstable_poles=count,
-        gain_crossovers=read_only(gains),
-        phase_crossovers=read_only(phases),
+        gain_crossovers=read_only(at.gains),
+        phase_crossovers=read_only(at.phases),
         phase_margins=read_only(pm),
         gain_margins=read_only(gm),
-        modulus_crossover=closest,
+        modulus_crossover=at.closest,
         dt=dt,
-        response=(read_only(omega), locked(values)),
-        flags=flags,
+        response=(read_only(at.omega), locked(at.values)),
+        flags=_stability_flags(count, marginal),
     )
 
 
 def _from_data(loop: DataLoop) -> Margins:
-    omega, values = loop.dense()
-    gains = unit_crossings(loop, omega, values)
-    phases = negative_axis_crossings(loop, omega, values)
-    distance, at = smallest_distance(lambda w: 1 + loop(w), omega)
     count, marginal = loop.closed_loop_count()
-    stable = count == 0 and not marginal
-    flags = (*_stability_flags(count, marginal), *loop.flags())
-    plain = _collect(
-        gains, loop(gains), phases, loop(phases), distance, at, stable, count, 0.0, flags,
-        (omega, values),
-    )  # fmt: skip
+    plain = _collect(loop, _crossings(loop, *loop.dense()), count, marginal, 0.0)
+    plain = replace(plain, flags=(*plain.flags, *loop.flags()))
     if loop.std is None:
         return plain
     intervals = margin_intervals(loop, plain)
-    if stable and intervals["modulus_margin"][0] == 0:
-        flags = (*flags, Flag("within_noise", "-1 lies within the noise of the response: another "
-                              "measurement may find the closed loop unstable"))  # fmt: skip
+    flags = plain.flags
+    if plain.stable and intervals["modulus_margin"][0] == 0:
+        unsure = Flag(
+            "within_noise",
+            "-1 lies within the noise of the response: another measurement may find the closed "
+            "loop unstable",
+        )
+        flags = (*flags, unsure)
     return replace(plain, intervals=intervals, flags=flags)

@@ -13,7 +13,9 @@ from ..numerics.closed_loop import damped_circle, step_on_circle
 from .loops import open_loop
 
 LONGEST = 2**19
+"""Most samples of a response."""
 SETTLED = 1e-4
+"""Range of the last part of a response, relative, in which it counts as settled."""
 
 
 @dataclass(frozen=True)

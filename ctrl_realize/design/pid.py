@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,17 @@ from ..errors import OptionError, UnsuitableSystemError
 from .margins import margins
 from .pid_controller import DISCRETIZATIONS, PIDController
 from .pid_optimal import optimal
-from .pid_rules import MODEL_RULES, SYSTEM_RULES, Parameters, ultimate
+from .pid_rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
 from .process_model import ProcessModel
 from .reduction import reduce_fopdt, reduce_sopdt
 from .siso import delayed_system
 
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
+FINE = 1000
+"""Samples within the total time of a process model, so many that sampling does not matter."""
+SETTLED = 10_000
+"""Samples behind the delay after which a step response has the sign of the gain."""
 
 
 def pid(
@@ -88,7 +93,7 @@ def pid(
     one_of(rule, "rule", RULES)
     one_of(kind, "kind", KINDS)
     one_of(method, "method", DISCRETIZATIONS)
-    known = MODEL_RULES[rule][1] if rule in MODEL_RULES else SYSTEM_RULES[rule]
+    known = kinds_of(rule)
     if kind not in known:
         raise OptionError(f"rule={rule!r} has no {kind}; it knows {', '.join(known)}")
     ratio = real(derivative_filter, "derivative_filter", "td / tf")
@@ -126,8 +131,7 @@ def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, f
             step = positive(dt, "dt", "sample time in s")
             return system.system(step), step
         # A continuous controller is tuned on a plant sampled so finely that it does not matter.
-        total = system.lag + system.second_lag + system.dead_time
-        return system.system(total / 1000), 0.0
+        return system.system(system.total_time / FINE), 0.0
     plant = delayed_system(system, "a PID controller")
     if dt is not None:
         raise OptionError(
@@ -148,31 +152,20 @@ def _model(
     else:
         found = (reduce_sopdt if second else reduce_fopdt)(plant, method=reduction)
     # A controller output held over a sample is half a sample old on average.
-    return ProcessModel(
-        found.gain,
-        found.lag,
-        found.dead_time + step / 2,
-        found.second_lag,
-        found.integrating,
-        found.method,
-        found.error,
-    )
+    return replace(found, dead_time=found.dead_time + step / 2)
 
 
 def _total_time(system: Any, plant: DelayedStateSpace) -> float:
     if isinstance(system, ProcessModel):
-        return system.lag + system.second_lag + system.dead_time
-    model = reduce_sopdt(plant)
-    return model.lag + model.second_lag + model.dead_time + float(plant.dt)
+        return system.total_time
+    return reduce_sopdt(plant).total_time + float(plant.dt)
 
 
 def _ultimate(plant: DelayedStateSpace, kind: str) -> Parameters:
-    found = margins(plant)
-    reverse = bool(np.real(plant.step(plant.delay + 10_000)[-1]) < 0)
-    if reverse:
-        found = margins(-plant)
     if np.any(np.abs(np.asarray(plant.delay_free.poles())) > 1 + 1e-9):
         raise UnsuitableSystemError("the plant is unstable; it has no ultimate gain to start from")
+    reverse = bool(np.real(plant.step(plant.delay + SETTLED)[-1]) < 0)
+    found = margins(-plant if reverse else plant)
     if found.gain_margins.size == 0:
         raise UnsuitableSystemError("the plant never turns by 180 deg: it has no ultimate gain")
     at = int(np.argmin(found.gain_margins))

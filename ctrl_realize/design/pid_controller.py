@@ -106,12 +106,8 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         if h == 0:
             return 0.0, 1.0, self.kp / self.ti, 0.0
         share = self.kp * h / self.ti
-        return (
-            1.0,
-            1.0,
-            share,
-            share * {"forward": 0.0, "tustin": 0.5, "backward": 1.0}[self.method],
-        )
+        direct = {"forward": 0.0, "tustin": 0.5, "backward": 1.0}[self.method]
+        return 1.0, 1.0, share, share * direct
 
     def _derivative(self, h: float) -> tuple[float, float, float, float]:
         if h == 0:
@@ -132,26 +128,16 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         return self._again(dt=0.0)
 
     def _again(self, **changes: Any) -> PIDController:
-        settings: dict[str, Any] = {
-            "dt": self.dt,
-            "method": self.method,
-            "rule": self.rule,
-            "model": self.model,
-            "name": self.name,
-        }
-        return PIDController(self.kp, self.ti, self.td, self.tf, **{**settings, **changes})
+        settings = {**self._settings(), **changes}
+        return PIDController(self.kp, self.ti, self.td, self.tf, **settings)
+
+    def _settings(self) -> dict[str, Any]:
+        """All that makes this controller, beside its four parameters."""
+        names = ("dt", "method", "rule", "model", "name")
+        return {name: getattr(self, name) for name in names}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (
-            (self.kp, self.ti, self.td, self.tf),
-            {
-                "dt": self.dt,
-                "method": self.method,
-                "rule": self.rule,
-                "model": self.model,
-                "name": self.name,
-            },
-        )
+        return _rebuild, ((self.kp, self.ti, self.td, self.tf), self._settings())
 
     def __deepcopy__(self, memo: dict[int, Any]) -> PIDController:
         return self._again()

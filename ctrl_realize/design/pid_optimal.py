@@ -25,10 +25,15 @@ from .pid_controller import PIDController
 from .pid_rules import INF, Parameters
 
 LONGEST = 2**18
+"""Most samples of a load response."""
 
 
 @dataclass(frozen=True)
 class _Problem:
+    """The plant's response on two sets of points: on `omega` for the limit on the sensitivity, on
+    `circle` for the step response of `count` samples; `distance` is 1 / Ms, `sign` the gain's.
+    """
+
     plant: DelayedStateSpace
     distance: float
     filter_ratio: float

@@ -149,4 +149,9 @@ SYSTEM_RULES: dict[str, tuple[str, ...]] = {
     "ziegler_nichols_ultimate": ("P", "PI", "PID"),
     "optimal": ("P", "PI", "PD", "PID"),
 }
-"""Rules that look at the frequency response of the plant itself."""
+"""Rules that look at the frequency response of the plant itself, and the kinds that they know."""
+
+
+def kinds_of(rule: str) -> tuple[str, ...]:
+    """Return the kinds of controller that a rule knows."""
+    return MODEL_RULES[rule][1] if rule in MODEL_RULES else SYSTEM_RULES[rule]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..checks import one_of
+from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..results import Result
 from .margin_result import Margins
@@ -15,13 +17,14 @@ from .margins import margins
 from .performance import Performance, performance
 from .pid import KINDS, RULES, pid, reference_plant
 from .pid_controller import PIDController
-from .pid_rules import MODEL_RULES, SYSTEM_RULES
+from .pid_rules import kinds_of
 from .process_model import ProcessModel
 
 if TYPE_CHECKING:
     import pandas as pd
 
 UNSTABLE = Performance(float("inf"), float("inf"), float("nan"), float("inf"))
+"""What a loop achieves that does not settle."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,9 +162,8 @@ def compare_pid(
     made: list[tuple[PIDController, Margins, Performance]] = []
     refused: list[tuple[str, str, str]] = []
     for rule in rules or RULES:
-        known = MODEL_RULES[rule][1] if rule in MODEL_RULES else SYSTEM_RULES[rule]
         for kind in kinds:
-            if kind not in known:
+            if kind not in kinds_of(rule):
                 continue
             try:
                 controller = pid(system, rule, kind, **options)
@@ -171,29 +173,20 @@ def compare_pid(
                 continue
             sampled = controller if controller.dt else controller.discretised(plant.dt)
             found = margins(plant, sampled)
-            made.append(
-                (
-                    controller,
-                    found,
-                    performance(plant, sampled, total) if found.stable else UNSTABLE,
-                )
-            )
+            reached = performance(plant, sampled, total) if found.stable else UNSTABLE
+            made.append((controller, found, reached))
     if not made:
-        raise OptionError(
-            "no rule could tune this plant: "
-            + (
-                "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
-                or "none was given"
-            )
-        )
+        reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
+        raise OptionError(f"no rule could tune this plant: {reasons or 'none knows these kinds'}")
     controllers, found_margins, found_performance = zip(*made, strict=True)
     return PIDComparison(controllers, found_margins, found_performance, tuple(refused))
 
 
-def _span(system: Any, plant: Any) -> float:
+def _span(system: Any, plant: DelayedStateSpace) -> float:
+    """Guess how long the plant takes, in s."""
     if isinstance(system, ProcessModel):
-        return system.lag + system.second_lag + system.dead_time
-    poles = abs(plant.delay_free.poles())
+        return system.total_time
+    poles = np.abs(plant.delay_free.poles())
     slow = poles[poles < 1 - 1e-9]
-    slowest = -1 / log(slow.max()) if slow.size and slow.max() > 0 else 1.0
+    slowest = -1 / np.log(slow.max()) if slow.size and slow.max() > 0 else 1.0
     return float(plant.dt * (plant.delay + 2 * slowest + 4))

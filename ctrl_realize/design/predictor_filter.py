@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import solve_sylvester
 
 from ..numerics.arrays import FloatArray
 from ..numerics.modes import Part
@@ -74,8 +75,6 @@ def removed_part(filter_: Filter, removed: Part) -> FloatArray:
     -------
     ndarray, shape (k, 1)
     """
-    from scipy.linalg import solve_sylvester
-
     A, B, _, _ = filter_
     removed_A, removed_B, removed_C = removed
     # A X - X A_s + B C_s = 0

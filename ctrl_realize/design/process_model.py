@@ -98,7 +98,14 @@ class ProcessModel(Result):
         """dead_time / (dead_time + lag): near 0 lag-dominated, near 1 delay-dominated."""
         return self.dead_time / (self.dead_time + self.lag) if self.dead_time else 0.0
 
-    def _formula(self) -> str:
+    @property
+    def total_time(self) -> float:
+        """Dead time and lags together, in s."""
+        return self.lag + self.second_lag + self.dead_time
+
+    @property
+    def formula(self) -> str:
+        """The transfer function as text, times in s."""
         lags = [f"({T:.4g} s + 1)" for T in (self.lag, self.second_lag) if T]
         below = ["s"] * self.integrating + lags
         return f"{self.gain:.4g} exp(-{self.dead_time:.4g} s) / {' '.join(below)}"
@@ -107,10 +114,10 @@ class ProcessModel(Result):
         return "Process model"
 
     def _rows(self) -> list[tuple[str, str]]:
-        rows = [("model", self._formula()), ("found by", self.method)]
+        rows = [("model", self.formula), ("found by", self.method)]
         if np.isfinite(self.error):
             rows.append(("step error (rms)", f"{100 * self.error:.3g} %"))
         return rows
 
     def __repr__(self) -> str:
-        return f"<ProcessModel {self._formula()}>"
+        return f"<ProcessModel {self.formula}>"

@@ -95,7 +95,7 @@ def compare_frf(
     dt = _sample_time(system)
     points, flags = _comparable(measured_points(frf), dt)
     used_hold = _hold(system, dt, hold)
-    omega = 2 * np.pi * points.frequency_hz
+    omega = points.omega
     model = _evaluate(system, omega, dt)
     if used_hold is not None and dt is not None:
         model = model / hold_response(omega, dt)

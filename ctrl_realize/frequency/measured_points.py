@@ -21,6 +21,11 @@ class MeasuredPoints:
     coherence: FloatArray | None
     std: FloatArray | None
 
+    @property
+    def omega(self) -> FloatArray:
+        """The same frequencies in rad/s."""
+        return 2 * np.pi * self.frequency_hz
+
     def only(self, kept: BoolArray) -> MeasuredPoints:
         """Keep the points that are marked."""
         return MeasuredPoints(

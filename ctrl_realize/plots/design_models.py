@@ -82,7 +82,7 @@ def process_model_plot(
             time * factor,
             model.step(time),
             color=style.MODEL,
-            label=plain(repr(model)[14:-1]),
+            label=plain(model.formula),
         )
         axes.set(xlabel=f"time [{unit}]", ylabel="step response")
         return style.finished([axes], [lines], loc="lower right")
