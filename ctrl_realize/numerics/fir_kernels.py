@@ -259,6 +259,8 @@ def _search(
     shapes = _shape_count(kernel)
     low = np.tile([np.log(0.1 / span)] * shapes + [-80.0], m)
     high = np.tile([np.log(3.0)] * shapes + [80.0], m)
+    # Where one point weighs 1e77 times as much as another, the prior is narrow from the start.
+    low[shapes :: shapes + 1] = np.minimum(-80.0, start[shapes :: shapes + 1] - 40.0)
 
     def misfit(x: FloatArray) -> float:
         factor = _factor(x, m, lags, group, kernel)
@@ -272,8 +274,8 @@ def _search(
     steps = np.tile([size] * shapes + [2 * size], m)
     inside = np.clip(start, low, high)
     scales = slice(shapes, None, shapes + 1)
-    while misfit(inside) >= _WORST and inside[scales].max() > low[shapes]:
-        inside[scales] = np.maximum(inside[scales] - 3.0, low[shapes])
+    while misfit(inside) >= _WORST and (inside[scales] > low[scales]).any():
+        inside[scales] = np.maximum(inside[scales] - 3.0, low[scales])
     # Steps go inward where the start lies at a bound, or the simplex would be flat there.
     steps = np.where(inside + steps > high, -steps, steps)
     simplex = np.vstack([inside, inside + np.diag(steps)])

@@ -345,3 +345,14 @@ def test_a_sample_of_1e_282_before_one_of_1e90_is_no_pole_of_1e372():
     with good_end() as scans:
         scans.append(cr.scan_orders(g, 2, max_delay=7, dt=1.0, samples=16, feedthrough=True))
     assert np.isfinite(scans[0].iae).all()
+
+
+@pytest.mark.parametrize("tiny", [1e-39, 1e-67])
+def test_one_point_that_weighs_more_than_all_others_gives_a_finite_pulse_response(tiny):
+    # with weights relative to the response the prior had to be narrower than its search went
+    f = np.geomspace(0.004, 0.4, 24)
+    g = 1 / (1 + 3j * f)
+    g[5] = tiny
+    with good_end() as pulses:
+        pulses.append(cr.impulse_from_frf(cr.MeasuredFRF(g, f), 1.0, 53, weighting="relative"))
+    assert np.isfinite(pulses[0].markov).all()
