@@ -36,11 +36,12 @@ from .identification.delay_check import DelayCheck as DelayCheck
 from .identification.delay_check import DelayView as DelayView
 from .identification.delay_fit import fit_delay as fit_delay
 from .identification.delay_fit_result import DelayFit as DelayFit
-from .identification.delay_scan import DelayScan as DelayScan
 from .identification.delay_scan import estimate_delay as estimate_delay
-from .identification.from_io import ImpulseEstimate as ImpulseEstimate
+from .identification.delay_scan_result import DelayScan as DelayScan
 from .identification.from_io import impulse_from_io as impulse_from_io
+from .identification.from_step import impulse_from_step as impulse_from_step
 from .identification.identify import identify as identify
+from .identification.impulse_estimate import ImpulseEstimate as ImpulseEstimate
 from .identification.orders import OrderScan as OrderScan
 from .identification.orders import scan_orders as scan_orders
 from .identification.prediction import Prediction as Prediction
@@ -50,7 +51,6 @@ from .identification.realization_result import Realization as Realization
 from .identification.residual_check import ResidualCheck as ResidualCheck
 from .identification.residuals import check_residuals as check_residuals
 from .identification.steps import detect_step as detect_step
-from .identification.steps import impulse_from_step as impulse_from_step
 from .identification.steps import unit_step as unit_step
 from .identification.tracked import DelayTrack as DelayTrack
 from .identification.tracked import TrackedDelay as TrackedDelay

@@ -6,7 +6,8 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.identification.steps import impulse_from_step, unit_step
+from ctrl_realize.identification.from_step import impulse_from_step
+from ctrl_realize.identification.steps import unit_step
 from ctrl_realize.numerics.state_space import markov
 
 TS = 7.8125e-4

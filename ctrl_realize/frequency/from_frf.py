@@ -9,7 +9,7 @@ import numpy as np
 
 from ..checks import one_of, positive, whole
 from ..errors import DataError
-from ..identification.from_io import ImpulseEstimate
+from ..identification.impulse_estimate import ImpulseEstimate
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.fir_kernels import cautious_std, fit_kernel
 from ..numerics.lagged import NormalEquations

@@ -19,7 +19,7 @@ from ..errors import CtrlRealizeError, DataError
 from ..results import Flag
 from ..signals import Record
 from .delay_fit_result import DelayFit
-from .delay_scan import DelayScan
+from .delay_scan_result import DelayScan
 from .identify import Method, identify
 from .packed_model import PackedModel
 from .steps import detect_step

@@ -16,7 +16,7 @@ from ..numerics.delay_split import split_delays
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
 from .channel_cores import Assembly, aligned_core, cores_by_columns, cores_by_rows, misfit
-from .from_io import ImpulseEstimate
+from .impulse_estimate import ImpulseEstimate
 from .impulses import as_impulse, channels
 from .realization import HANKEL
 

@@ -16,7 +16,8 @@ from .delay_fit import fit_delay
 from .delay_fit_result import DelayFit
 from .delay_scan import estimate_delay
 from .from_io import impulse_from_io
-from .steps import impulse_from_step, unit_step
+from .from_step import impulse_from_step
+from .steps import unit_step
 
 TOP_BAND = 1 / 3
 """Part of the band, from its upper end, where the slope of the phase is taken."""

@@ -16,33 +16,13 @@ from ..numerics.arrays import FloatArray, read_only
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
 from .delay_scan import best_of
-from .from_io import ImpulseEstimate
 from .impulses import filter_flags
+from .order_choice import suggest_order
 from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
 from .scan_surface import Surface, scan_surface
 
 if TYPE_CHECKING:
     import pandas as pd
-
-ABOVE_NOISE = 1.3
-"""Singular values above 1.3 times the largest of pure noise belong to the plant; below it a scan
-follows the noise and is flagged. (The largest gap finds too few of them, the Gavish-Donoho
-threshold hundreds.)"""
-
-WORTH_ONE, WORTH_TWO = 1.3, 4.0
-"""Factors by which one more order, or two together, must lower the misfit. A filter that is left
-in low-noise data adds singular values above the noise that hardly lower it, and realizing them
-moves the delay: 24 samples instead of 37 on a simulated third-order valve at 0.02 % noise."""
-
-WITHIN, MATTERS, WORTH_MORE = 1.0, 0.1, 3.0
-"""Of the sum of the standard deviations of an estimated response: below it a model is as good as
-the response is known, and below a tenth of it a better one means nothing. Between them one order
-more must lower the misfit by a factor of three: standard deviations are cautious. On 24 simulated
-records of four plants the true order is within 0.9, one less beyond 1.7 or three times higher, but
-where noise of half the output hides the last order."""
-
-AS_GOOD = 1.1
-"""Without known noise: a misfit of up to 1.1 times the least one is as good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +226,7 @@ def scan_orders(
     rounding = surface.rounding
     delays = tuple(best_delay(row, rounding) for row in surface.iae)
     last = [surface.singular_value(k, d) for k, d in zip(surface.orders, delays, strict=True)]
-    chosen = _suggest(surface, np.array(last))
+    chosen = suggest_order(surface, np.array(last))
     i = surface.orders.index(chosen)
     return OrderScan(
         orders=surface.orders,
@@ -276,33 +256,3 @@ def _orders(orders: int | Iterable[int]) -> tuple[int, ...]:
             raise OptionError("orders is empty; needed is at least one order")
         return tuple(tried)
     return tuple(range(1, whole(orders, "orders", 1) + 1))
-
-
-def _suggest(surface: Surface, last: FloatArray) -> int:
-    """Choose the order whose singular values stand out, and are worth it."""
-    orders = surface.orders
-    misfits = surface.iae.min(axis=1)
-    if surface.noise_floor:
-        above = np.flatnonzero(last > ABOVE_NOISE * surface.noise_floor)
-        most = int(above[-1]) if above.size else 0
-        chosen = 0
-        while chosen < most:
-            floor = surface.rounding
-            if misfits[chosen] > WORTH_ONE * misfits[chosen + 1] + floor:
-                chosen += 1
-            elif chosen + 2 <= most and misfits[chosen] > WORTH_TWO * misfits[chosen + 2] + floor:
-                chosen += 2
-            else:
-                break
-        return orders[chosen]
-    if isinstance(surface.impulse, ImpulseEstimate):
-        share = misfits / surface.impulse.std[..., : surface.window].sum()
-        if share.min() <= WITHIN:
-            chosen = int(np.argmax(share <= WITHIN))
-            while chosen + 1 < share.size and share[chosen] > max(
-                MATTERS, WORTH_MORE * share[chosen + 1]
-            ):
-                chosen += 1
-            return orders[chosen]
-    as_good = misfits <= AS_GOOD * misfits.min() + surface.rounding
-    return orders[int(np.flatnonzero(as_good)[0])]

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
 from ..identification.channels import ChannelRealization
-from ..identification.from_io import ImpulseEstimate
+from ..identification.impulse_estimate import ImpulseEstimate
 from ..numerics.arrays import FloatArray
 from ..signals import ImpulseResponse
 from . import style

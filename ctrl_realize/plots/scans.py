@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
-from ..identification.delay_scan import DelayScan
+from ..identification.delay_scan_result import DelayScan
 from ..identification.orders import OrderScan
 from ..identification.realization_result import Realization
 from ..numerics.arrays import FloatArray

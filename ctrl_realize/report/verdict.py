@@ -11,7 +11,7 @@ import numpy as np
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
-from ..identification.delay_scan import DelayScan
+from ..identification.delay_scan_result import DelayScan
 from ..plots.dead_times import estimate_of, interval_of
 from ..results import Flag
 from ..wording import in_time, interval_in_time

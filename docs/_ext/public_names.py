@@ -19,7 +19,9 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "Each step of the method is a plain function.",
         (
             "ctrl_realize.identification.steps",
+            "ctrl_realize.identification.from_step",
             "ctrl_realize.identification.from_io",
+            "ctrl_realize.identification.impulse_estimate",
             "ctrl_realize.identification.from_frf",
         ),
     ),
