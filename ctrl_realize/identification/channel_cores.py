@@ -107,22 +107,15 @@ def cores_by_rows(
 ) -> Assembly:
     """Realize every output by itself, behind tapped input lines."""
     markov = channels(data)
-    # An entry without response follows the line as it is, and adds no tap to it.
-    first = np.where(found >= 0, found, found.max() + 1).min(axis=0)
-    first = np.where((found >= 0).any(axis=0), first, 0)
-    full = np.where(found >= 0, found, first)
-    parts: list[Matrices] = []
-    flags: list[Flag] = []
-    for i in range(full.shape[0]):
-        part, notes = _realized(data, _aligned(markov[[i]], full[[i]]), order, options)
-        parts.append(part)
-        flags += notes
+    first, full = _first_taps(found, axis=0)
+    rows = [_aligned(markov[[i]], full[[i]]) for i in range(full.shape[0])]
+    parts, flags = _each_alone(data, rows, order, options)
     return Assembly(
         joined_rows(parts, full - first),
         tuple(int(d) for d in first),
         (0,) * full.shape[0],
         tuple(part[0].shape[0] for part in parts),
-        _unique(flags),
+        flags,
     )
 
 
@@ -134,23 +127,33 @@ def cores_by_columns(
 ) -> Assembly:
     """Realize every input by itself, in front of tapped output lines."""
     markov = channels(data)
-    first = np.where(found >= 0, found, found.max() + 1).min(axis=1)
-    first = np.where((found >= 0).any(axis=1), first, 0)
-    full = np.where(found >= 0, found, first[:, None])
-    parts: list[Matrices] = []
-    flags: list[Flag] = []
-    for j in range(full.shape[1]):
-        part, notes = _realized(data, _aligned(markov[:, [j]], full[:, [j]]), order, options)
-        parts.append(part)
-        flags += notes
+    first, full = _first_taps(found, axis=1)
+    columns = [_aligned(markov[:, [j]], full[:, [j]]) for j in range(full.shape[1])]
+    parts, flags = _each_alone(data, columns, order, options)
     return Assembly(
         joined_columns(parts, full - first[:, None]),
         (0,) * full.shape[1],
         tuple(int(d) for d in first),
         tuple(part[0].shape[0] for part in parts),
-        _unique(flags),
+        flags,
     )
 
 
-def _unique(flags: list[Flag]) -> tuple[Flag, ...]:
-    return tuple({flag.code: flag for flag in flags}.values())
+def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
+    """Return where each line is tapped first, and the delay of every channel.
+
+    A channel without response follows its line as it is, and adds no tap to it.
+    """
+    known = found >= 0
+    first = np.where(known, found, found.max() + 1).min(axis=axis)
+    first = np.where(known.any(axis=axis), first, 0)
+    return first, np.where(known, found, np.expand_dims(first, axis))
+
+
+def _each_alone(
+    data: ImpulseResponse, aligned: list[FloatArray], order: int, options: dict[str, Any]
+) -> tuple[list[Matrices], tuple[Flag, ...]]:
+    """Realize rows or columns of the channels, and keep one flag of each kind."""
+    realized = [_realized(data, part, order, options) for part in aligned]
+    flags = {flag.code: flag for _, notes in realized for flag in notes}
+    return [core for core, _ in realized], tuple(flags.values())
