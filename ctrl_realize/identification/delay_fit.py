@@ -97,7 +97,9 @@ def fit_delay(
     of diffusion widen the interval where they fit as well. Where the best structure has a zero,
     which imitates a smooth beginning, the interval reaches to a sample after the first motion, and
     three times as far before the delay as the first motion comes after it. One lag more than was
-    chosen is never ruled out, and a chain of six or more may be a flow that disperses.
+    chosen is never ruled out. A flow that disperses (inverse Gaussian residence times, with or
+    without a lag behind it) is fitted to step records as well: it widens the interval where it is
+    not ruled out, and where it is clearly better than all lags the dead time is that before it.
 
     A slope before the step is a drift, a drift that ends, the plant's own free response, or
     nothing: the information criterion decides.

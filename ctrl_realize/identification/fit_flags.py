@@ -6,6 +6,7 @@ import numpy as np
 
 from ..numerics.likelihood_interval import LIKE_A_FLOW, flow_lead
 from ..numerics.output_error_result import OutputErrorFit
+from ..numerics.profile_interval import profile_limits
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from ..signals import Record
@@ -100,6 +101,7 @@ def model_flags(
         _bound(dt, fit, max_delay),
         _nothing(dt, fit),
         _many_lags(fit),
+        _dispersed(fit),
         _open_start(fit),
         _slow(fit, length),
         _inverse(fit),
@@ -139,13 +141,13 @@ def _disagreement(dt: float, fit: OutputErrorFit) -> Flag | None:
             return None
         apart = [f"{name} {in_time(delay)}" for name, delay in fit.views if not _near(fit, delay)]
         return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
-    own = next(line for line in fit.structures if line.structure == fit.structure)
+    low, high = profile_limits(*fit.profile)
     wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
-    if fit.open_start or not wide or fit.high - fit.low <= 2 * (own.high - own.low):
+    if fit.open_start or not wide or fit.high - fit.low <= 2 * (high - low):
         return None
     return Flag(
         "structures_disagree",
-        f"the chosen structure puts the dead time in {interval_in_time(own.low, own.high)}, others "
+        f"the chosen structure puts the dead time in {interval_in_time(low, high)}, others "
         f"that the data cannot rule out in {interval_in_time(fit.low, fit.high)}: dead time and "
         "fast lags look alike; only the total delay is firm",
     )
@@ -176,6 +178,29 @@ def _many_lags(fit: OutputErrorFit) -> Flag | None:
         "many_lags",
         "chains of lags fit the better the longer they are, up to the longest that was tried: any "
         "part of the dead time may be more of such lags; only the total delay is firm",
+    )
+
+
+def _dispersed(fit: OutputErrorFit) -> Flag | None:
+    """Say so where a flow explains the response better than lags."""
+    flow = min(fit.flows, key=lambda flow: flow.excess, default=None)
+    if flow is None or flow.excess >= 0:
+        return None
+    behind = f" and a lag of {in_time(flow.lag)}" if flow.lag else ""
+    kind = (
+        f"a flow that disperses (mean residence time {in_time(flow.mean)}, Peclet number "
+        f"{flow.peclet:.2g}{behind})"
+    )
+    if fit.follows_flow:
+        return Flag(
+            "dispersed_flow",
+            f"{kind} explains the response clearly better than lags: the dead time is that "
+            "before it, and poles and zeros of the model have no meaning of their own",
+        )
+    return Flag(
+        "dispersed_flow",
+        f"{kind} behind a dead time of {in_time(flow.delay)} fits a little better than "
+        "lags: where something flows through the plant, that is the likelier dead time",
     )
 
 
@@ -212,6 +237,9 @@ def _slow(fit: OutputErrorFit, length: float) -> Flag | None:
 
 
 def _inverse(fit: OutputErrorFit) -> Flag | None:
+    if fit.follows_flow:
+        # Zeros on the right make the beginning late, as that of a flow is.
+        return None
     zeros = np.roots(fit.numerator[::-1]) if fit.numerator.size > 1 else np.empty(0)
     right = zeros[zeros.real > 0]
     if not right.size or np.abs(right).min() > 3 * np.abs(fit.poles).max():

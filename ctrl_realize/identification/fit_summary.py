@@ -86,16 +86,24 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
     s = fit.structure
     simple = " with up to three poles" if fit.views else ""
     kind = fit.chain or f"order {s.order}, relative degree {s.relative_degree}"
-    reasons = [
-        f"{kind}: lowest information criterion of {len(fit.structures)} structures{simple}, where "
-        "zeros and a fourth pole must be worth it"
-    ]
+    if fit.follows_flow:
+        reasons = [
+            f"dead time: that of a flow that disperses, which fits clearly better than all "
+            f"{len(fit.structures)} structures; {kind}: follows it with the fewest parameters"
+        ]
+    else:
+        reasons = [
+            f"{kind}: lowest information criterion of {len(fit.structures)} structures{simple}, "
+            "where zeros and a fourth pole must be worth it"
+        ]
     if fit.views:
         reasons.append("dead time: median of five views, as no model leaves only noise")
     else:
         count = sum(line.low == line.low for line in fit.structures)
+        flows = f" and {len(fit.flows)} flow(s)" if fit.flows else ""
         reasons.append(
-            f"interval: profile likelihood of {count} structure(s) that the data cannot rule out"
+            f"interval: profile likelihood of {count} structure(s){flows} that the data cannot "
+            "rule out"
         )
     if fit.open_start:
         reasons.append(

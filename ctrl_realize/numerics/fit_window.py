@@ -12,12 +12,13 @@ from .delayed_modes import HeldInput
 from .noise_level import correlation_time, is_coarse, mad_sigma
 from .own_terms import OwnTerms, Stretches
 from .response_bins import Bins
-from .separable_fit import Problem, Structure, evaluate, respond
+from .separable_fit import Problem, Structure, evaluate, fit_batch, respond
 from .structure_search import (
     Candidate,
     Scales,
     choose,
     criteria,
+    parameter_bounds,
     parameter_charge,
     refine,
     search,
@@ -111,6 +112,22 @@ class WindowFit:
         """Fit of the chosen structure."""
         return self.candidates[choose(self.criterion)]
 
+    def criteria(self, candidates: dict[Structure, Candidate]) -> dict[Structure, float]:
+        """Information criterion of other candidates on the same data."""
+        samples = (self.window.output.size - self.window.start) / self.correlation
+        values = criteria(candidates, self.variance, samples)
+        return {s: value + self.problem.own_count(s.order) for s, value in values.items()}
+
+    def at_delay(self, candidate: Candidate, delay: float) -> Candidate:
+        """Best model of the same structure with a given delay, in s."""
+        start = candidate.parameters.copy()
+        start[0] = delay
+        bounds = parameter_bounds(candidate.structure, self.scales)
+        parameters, cost = fit_batch(
+            self.problem, candidate.structure, start[None], bounds, delay_fixed=True
+        )
+        return Candidate(candidate.structure, parameters[0], float(cost[0]))
+
 
 def fit_window(
     window: Window,
@@ -171,10 +188,7 @@ def fit_window(
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
     """Add structures to a fit; noise and data stay those of the structures before."""
     candidates = search(fit.problem, structures, fit.scales, fit.candidates)
-    samples = (fit.window.output.size - fit.window.start) / fit.correlation
-    criterion = criteria(candidates, fit.variance, samples)
-    criterion = {s: value + fit.problem.own_count(s.order) for s, value in criterion.items()}
-    return replace(fit, candidates=candidates, criterion=criterion)
+    return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
 
 
 def _clipped(error: FloatArray, least: float) -> FloatArray:

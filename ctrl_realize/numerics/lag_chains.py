@@ -95,7 +95,7 @@ def fit_chains(
         Empty where `like` has no positive spread, as with an inverse response.
     """
     chains: list[LagChain] = []
-    moments = _moments(problem, like)
+    moments = time_moments(problem, like)
     if not moments[1] > 0:
         return chains
     for order in range(SHORTEST, LONGEST + 1):
@@ -112,7 +112,7 @@ def fit_diffusion(
     problem: Problem, like: Candidate, scales: Scales, variance: float, penalty: float
 ) -> list[LagChain]:
     """Fit the first eight modes of diffusion; see `fit_chains`. One chain, or none."""
-    moments = _moments(problem, like)
+    moments = time_moments(problem, like)
     if not moments[1] > 0:
         return []
     chain = _chain(problem, LONGEST, _DIFFUSION, moments, scales, variance, penalty)
@@ -163,7 +163,7 @@ def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
     return lag
 
 
-def _moments(problem: Problem, like: Candidate) -> tuple[float, float]:
+def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     """Mean and variance in time of the impulse response, from the cumulants of poles and zeros."""
     numerator = evaluate(problem, like.structure, like.parameters[None]).numerator[0]
     zeros = np.roots(numerator[::-1])

@@ -9,9 +9,10 @@ The rule:
    long as that is not much louder, with what it leaves long after the step.
 2. Where the residual is noise, the delay is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
-   four to eight nearly equal lags and modes of diffusion among them. A zero imitates a smooth
-   beginning: where the best structure has one, the interval reaches to a sample after the first
-   motion, and three times as far before the delay as the first motion comes after it.
+   four to eight nearly equal lags, modes of diffusion and flows that disperse among them. Where
+   such a flow fits clearly better than any lags, the delay is that of the flow. A zero imitates a
+   smooth beginning: where the best structure has one, the interval reaches to a sample after the
+   first motion, and three times as far before the delay as the first motion comes after it.
 3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
    first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
    of up to three poles for the first 63 % and for all of it. The delay is their median.
@@ -28,9 +29,9 @@ from dataclasses import replace
 import numpy as np
 
 from .fit_window import WindowFit, fit_window
-from .likelihood_interval import chains_of, likelihood_fit
+from .likelihood_interval import chains_of, flows_of, likelihood_fit
 from .output_error_result import OutputErrorFit, assembled, profile_of
-from .separable_fit import KnownFactor, Structure, evaluate, fit_batch
+from .separable_fit import KnownFactor, Structure, evaluate
 from .step_problem import StepData, step_scales, stop_at, window
 from .structure_search import (
     ALL_STRUCTURES,
@@ -38,7 +39,6 @@ from .structure_search import (
     Candidate,
     choose,
     needless_charge,
-    parameter_bounds,
 )
 
 ADEQUATE = 1.3
@@ -91,7 +91,10 @@ def fit_output_error(
     elif adequate:
         assert data.motion is not None
         onset = data.motion.onset * data.dt
-        found = likelihood_fit(whole, adequate=True, chains=chains_of(whole), onset=onset)
+        chains = chains_of(whole)
+        found = likelihood_fit(
+            whole, adequate=True, chains=chains, flows=flows_of(whole, chains), onset=onset
+        )
     else:
         simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
         chosen = whole.candidates[choose(simple)]
@@ -142,8 +145,9 @@ def _robust_fit(
     delays = np.sort([at for _, at in views])
     low, high = float(delays[1]), float(delays[-1])
     profiles = {chosen.structure: profile_of(whole, chosen)}
-    fixed = _with_delay(whole, chosen, delay)
-    return assembled(whole, fixed, False, views, profiles, (low, high, (high - low) / 3.92))
+    fixed = whole.at_delay(chosen, delay)
+    interval = low, high, (high - low) / 3.92
+    return assembled(whole, fixed, False, views, profiles, interval, profiles[chosen.structure])
 
 
 def _fit_until(
@@ -180,14 +184,3 @@ def _views(
         ("best model of the whole record", whole.delay),
         ("third-order lag, first 15 %", early.candidates[lags[2]].delay),
     )
-
-
-def _with_delay(whole: WindowFit, candidate: Candidate, delay: float) -> Candidate:
-    """Best model of the same structure with a given delay."""
-    start = candidate.parameters.copy()
-    start[0] = delay
-    bounds = parameter_bounds(candidate.structure, whole.scales)
-    parameters, cost = fit_batch(
-        whole.problem, candidate.structure, start[None], bounds, delay_fixed=True
-    )
-    return Candidate(candidate.structure, parameters[0], float(cost[0]))

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from .arrays import ComplexArray, FloatArray
+from .dispersed_flow import DispersedFlow
 from .fit_window import WindowFit
 from .lag_chains import lag_sum
 from .profile_interval import delay_profile, profile_limits
@@ -44,7 +45,8 @@ class OutputErrorFit:
     which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
     longer they are, so that all of the delay may be lags; `open_start`: how smoothly the response
     begins is open; `relaxing`: the plant was moving before the step, and its free response was
-    fitted along. `std` is that of the chosen structure.
+    fitted along. `flows` that disperse are not ruled out; with `follows_flow` the delay is that of
+    the best of them, and the lags behind it follow it. `std` is that of the chosen structure.
     """
 
     delay: float
@@ -67,6 +69,8 @@ class OutputErrorFit:
     endless: bool = False
     open_start: bool = False
     relaxing: bool = False
+    flows: tuple[DispersedFlow, ...] = ()
+    follows_flow: bool = False
 
 
 def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
@@ -93,8 +97,12 @@ def assembled(
     views: tuple[tuple[str, float], ...],
     profiles: dict[Structure, Profile],
     interval: tuple[float, float, float],
+    profile: Profile,
 ) -> OutputErrorFit:
-    """Put a result together; `interval` is its lower and upper end and the standard error, in s."""
+    """Put a result together; `interval` is its lower and upper end and the standard error, in s.
+
+    `profiles` are those of the table of structures, `profile` that of the delay chosen.
+    """
     state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
     low, high, std = interval
@@ -113,6 +121,6 @@ def assembled(
         structures=_table(whole, profiles),
         views=views,
         fitted=whole.window.predict(whole.problem, chosen),
-        profile=profiles[chosen.structure],
+        profile=profile,
         latest=whole.scales.latest,
     )

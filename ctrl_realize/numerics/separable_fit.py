@@ -112,7 +112,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     known = problem.known
     poles = np.concatenate([free, np.tile(known.poles, (batch, 1))], axis=1)
     static, mode, slope = problem.drive.modes(parameters[:, 0], poles)
-    residues, gain, dresidues = _partial_fractions(poles, known.numerator, count)
+    residues, gain, dresidues = partial_fractions(poles, known.numerator, count)
     # Columns of one size: the powers of s differ by many decades.
     size = np.abs(residues).sum(axis=1) + np.abs(gain)
     basis = (mode @ (residues / size[:, None])).real + static[:, :, None] * (gain / size)[:, None]
@@ -161,7 +161,7 @@ def respond(
     free = poles_from_parameters(parameters[None, 1:])[0]
     poles = np.concatenate([free, known.poles[None]], axis=1)
     static, mode, _ = drive.modes(parameters[:1], poles)
-    residues, gain, _ = _partial_fractions(poles, known.numerator, numerator.size)
+    residues, gain, _ = partial_fractions(poles, known.numerator, numerator.size)
     return np.asarray(
         (mode[0] @ (residues[0] @ numerator)).real + static[0] * (gain[0] @ numerator)
     )
@@ -257,7 +257,7 @@ def _damped_step(
     return step / excess[:, None], excess <= 1.0
 
 
-def _partial_fractions(
+def partial_fractions(
     poles: ComplexArray, known: FloatArray, count: int
 ) -> tuple[ComplexArray, FloatArray, ComplexArray]:
     """Expand s^i K(s) / (s a(s)), i = 0...count - 1.

@@ -52,6 +52,8 @@ class StepData:
         Lines in the noise, in cycles per sample.
     motion : FirstMotion or None
         None when the output stays at rest.
+    quiet : ndarray, shape (N,)
+        Output without hum and without what was still moving before the step.
     relaxing : bool
         The output was not at rest before the step: the plant's free response is in it.
     ending : bool
@@ -68,6 +70,7 @@ class StepData:
     colour: float
     hum: list[float]
     motion: FirstMotion | None
+    quiet: FloatArray
     relaxing: bool = False
     ending: bool = False
 
@@ -128,12 +131,14 @@ def step_data(
     span = float(np.ptp(output))
     sigma = max(sigma, 1e-4 * span)
     motion = first_motion(quiet, edge, sigma, quantum, drift)
-    return StepData(output, signal, dt, edges, sigma, quantum, drift, colour, hum, motion, relaxing)
+    return StepData(
+        output, signal, dt, edges, sigma, quantum, drift, colour, hum, motion, quiet, relaxing
+    )
 
 
 def bare_data(output: FloatArray, signal: FloatArray, dt: float, sigma: float) -> StepData:
     """Data of a record without a step: nothing is known from samples at rest."""
-    return StepData(output, signal, dt, [(0, 1)], sigma, 0.0, 0.0, 1.0, [], None)
+    return StepData(output, signal, dt, [(0, 1)], sigma, 0.0, 0.0, 1.0, [], None, output)
 
 
 def stop_at(data: StepData, part: float) -> int:
@@ -143,7 +148,7 @@ def stop_at(data: StepData, part: float) -> int:
         return n
     motion, edge = data.motion, data.edge
     width = int(np.clip(0.02 * (n - edge), 1, 9))
-    moved = np.convolve(data.output - motion.rest, np.ones(width) / width, "same")
+    moved = np.convolve(data.quiet - motion.rest, np.ones(width) / width, "same")
     reached = np.flatnonzero(moved[edge:] * motion.sign > part * motion.span)
     if not reached.size:
         reached = np.flatnonzero(np.abs(moved[edge:]) > part * motion.span)
