@@ -14,6 +14,7 @@ DOUBTS = (
     "structures_disagree",
     "no_delay_resolved",
     "many_lags",
+    "dispersed_flow",
     "onset_open",
     "delay_at_bound",
 )
