@@ -40,6 +40,8 @@ def let_code_break(app: Any, doctree: nodes.document, docname: str) -> None:
     for code in list(doctree.findall(nodes.literal)):
         if len(code.astext()) > LINE:
             _break(code, BEHIND)
+        elif len(code.astext()) <= LONG:
+            code["classes"].append("whole")
 
 
 def _kept_together(words: str) -> str:
