@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError
-from .sniff import MAX_COLUMNS, MAX_NAME
+from .checks import MAX_COLUMNS, MAX_NAME
 from .tables import Column, Table
 from .units import split_unit
 

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from ..errors import FileFormatError, MissingFileError, OptionError
 
+MAX_COLUMNS = 10_000
+MAX_NAME = 200
+"""Letters of a column's name that are kept."""
 MAX_BYTES = 2 * 2**30
 """Largest data file that is read unless the caller says more."""
 

@@ -11,8 +11,10 @@ from typing import Any
 
 from ..errors import DataWarning, FileFormatError
 from .checks import read_tail
-from .sniff import NUMBER, TextLayout, TextOptions, sniff, split_line
+from .sniff import TextLayout, sniff
 from .tables import Column, Table
+from .text_cells import NUMBER, split_line
+from .text_options import TextOptions
 
 _TAIL_BYTES = 1 << 16
 _TAIL_LINES = 50

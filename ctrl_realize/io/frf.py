@@ -16,8 +16,8 @@ from ..numerics.arrays import ComplexArray, FloatArray
 from ..signals import MeasuredFRF
 from .checks import MAX_BYTES
 from .columns import check_lengths, find_column, has_header, named, plain_name
-from .sniff import TextOptions
 from .tables import Table, read_table
+from .text_options import TextOptions
 from .units import plain_unit
 
 _NAMES = {

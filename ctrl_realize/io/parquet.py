@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import FileFormatError
-from .checks import check_size
-from .sniff import MAX_COLUMNS, MAX_NAME
+from .checks import MAX_COLUMNS, MAX_NAME, check_size
 from .tables import Column, Table
 from .units import split_unit
 

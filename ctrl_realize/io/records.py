@@ -26,8 +26,8 @@ from .columns import (
     holds_numbers,
     named,
 )
-from .sniff import TextOptions
 from .tables import Table, read_table
+from .text_options import TextOptions
 from .time_column import time_in_seconds
 
 TIME_NAMES = frozenset(

@@ -13,7 +13,8 @@ import numpy as np
 from ..errors import DataError, FileFormatError
 from ..numerics.arrays import FloatArray
 from .checks import read_head, usable_file
-from .sniff import MISSING, NUMBER, TextOptions
+from .text_cells import MISSING, NUMBER
+from .text_options import TextOptions
 
 _NOT_READABLE = {
     b"\x89HDF": "an HDF5 file (MATLAB's v7.3 is one): save with save(..., '-v7') or as CSV",

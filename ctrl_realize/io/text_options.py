@@ -1,0 +1,49 @@
+"""What a caller can say about a text table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..checks import whole
+from ..errors import OptionError
+
+_IN_NUMBERS = {"delimiter": frozenset("0123456789eE"), "comment": frozenset("0123456789eE.,+-")}
+
+
+@dataclass(frozen=True)
+class TextOptions:
+    """What the caller says about a text table; ``"auto"`` is found out."""
+
+    delimiter: str = "auto"
+    decimal: str = "auto"
+    encoding: str = "auto"
+    comment: str | None = "auto"
+    header: bool | str = "auto"
+    skip_rows: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("delimiter", "decimal", "encoding"):
+            if not isinstance(getattr(self, name), str):
+                raise OptionError(f"{name}={getattr(self, name)!r} must be text, such as 'auto'")
+        if self.delimiter != "auto" and (len(self.delimiter) != 1 or self.delimiter in "\r\n\"'"):
+            raise OptionError(f"delimiter={self.delimiter!r} must be one character or 'auto'")
+        if self.decimal not in ("auto", ".", ","):
+            raise OptionError(f"decimal={self.decimal!r} must be '.', ',' or 'auto'")
+        if self.comment not in ("auto", None) and not (
+            isinstance(self.comment, str) and len(self.comment) == 1
+        ):
+            raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")
+        for name in ("delimiter", "comment"):
+            if str(getattr(self, name)) in _IN_NUMBERS[name]:
+                raise OptionError(f"{name}={getattr(self, name)!r} would cut numbers in two")
+        if self.header not in (True, False, "auto"):
+            raise OptionError(f"header={self.header!r} must be True, False or 'auto'")
+        whole(self.skip_rows, "skip_rows", 0)
+        if self.encoding != "auto":
+            try:
+                # also refuses the codecs of Python that are no encodings of text: zlib, rot13
+                b"1".decode(self.encoding)
+            except UnicodeError:
+                pass
+            except (LookupError, ValueError, TypeError) as error:
+                raise OptionError(f"encoding={self.encoding!r} is not known") from error
