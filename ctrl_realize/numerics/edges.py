@@ -12,6 +12,9 @@ from .arrays import FloatArray
 REST_TOLERANCE = 0.02
 """The input has left its level when it is off by this part of the step (or 5 sigma of noise)."""
 
+PIECE = 200_000
+"""Samples of which the levels before and after are found at a time."""
+
 
 @dataclass(frozen=True)
 class Edge:
@@ -118,7 +121,9 @@ def _side_medians(values: FloatArray, width: int) -> tuple[FloatArray, FloatArra
     """Median of the `width` samples before each sample, and of those from it on."""
     padded = np.concatenate([np.full(width, values[0]), values, np.full(width, values[-1])])
     windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    medians = np.median(windows, axis=1)
+    # in pieces: a median copies its windows, 4 GB for ten million samples
+    pieces = range(0, windows.shape[0], PIECE)
+    medians = np.concatenate([np.median(windows[k : k + PIECE], axis=1) for k in pieces])
     return medians[: values.size], medians[width : width + values.size]
 
 
@@ -127,10 +132,9 @@ def _peaks(jump: FloatArray, threshold: float) -> list[int]:
     found: list[int] = []
     above = np.abs(jump) >= threshold
     sign = np.sign(jump)
-    k = 0
-    while k < jump.size:
-        if not above[k]:
-            k += 1
+    reached = -1
+    for k in np.flatnonzero(above).tolist():
+        if k <= reached:
             continue
         end = k
         while end + 1 < jump.size and above[end + 1] and sign[end + 1] == sign[k]:
@@ -138,7 +142,7 @@ def _peaks(jump: FloatArray, threshold: float) -> list[int]:
         run = np.abs(jump[k : end + 1])
         top = np.flatnonzero(run >= run.max() * (1 - 1e-12))
         found.append(k + int(top[top.size // 2]))
-        k = end + 1
+        reached = end
     return found
 
 

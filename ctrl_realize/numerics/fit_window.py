@@ -10,7 +10,7 @@ import numpy as np
 from .arrays import FloatArray
 from .delayed_modes import HeldInput
 from .noise_level import correlation_time, is_coarse, mad_sigma
-from .own_terms import OwnTerms, Stretches
+from .own_terms import Stretches
 from .response_bins import Bins
 from .separable_fit import Problem, Structure, evaluate, fit_batch, respond
 from .structure_search import (
@@ -71,7 +71,7 @@ class Window:
         model = respond(self.drive, *setting) + self.columns @ state.regression[0]
         if problem.stretches is not None and self.own is not None:
             weight = problem.root_weight
-            terms = OwnTerms(problem.stretches, weight, candidate.poles[None])
+            terms = problem.own_terms(candidate.poles[None])
             rest = weight * (problem.data - respond(problem.drive, *setting))
             model = model + terms.fitted(rest[None], self.own)[0]
         return np.asarray(model)

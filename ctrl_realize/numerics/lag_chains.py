@@ -229,6 +229,7 @@ def _error(
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
     jacobian = _evaluate(problem, candidate.structure, law, x)[2]
     size = np.sqrt((jacobian**2).sum(axis=0))
+    size[size == 0] = 1.0
     on_delay = np.linalg.pinv(jacobian / size)[0] / size[0]
     uneven = law.rates(order, x[2]) * np.exp(_SMALL * np.eye(order) - x[1])
     moves = np.stack([_parameters(rates) for rates in uneven], axis=1)

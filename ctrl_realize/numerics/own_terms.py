@@ -47,43 +47,65 @@ class Stretches:
         return [slice(a, b) for a, b in pairwise(edges)]
 
 
-class OwnTerms:
-    """Own terms of all stretches at B sets of poles, ready to be taken out.
+class FixedTerms:
+    """What does not depend on the plant in the own terms, orthonormalised once.
 
     Parameters
     ----------
     stretches : Stretches
     root_weight : ndarray, shape (m,)
+    """
+
+    def __init__(self, stretches: Stretches, root_weight: FloatArray) -> None:
+        self.stretches = stretches
+        self.weight = root_weight
+        weighted = stretches.regressors * root_weight[:, None]
+        self.parts = [_orthonormal(weighted[rows]) for rows in stretches.rows]
+
+
+class OwnTerms:
+    """Own terms of all stretches at B sets of poles, ready to be taken out.
+
+    Parameters
+    ----------
+    fixed : FixedTerms
     poles : ndarray, shape (B, n)
         Of the plant; conjugates are neighbours, an odd one comes first.
     """
 
-    def __init__(self, stretches: Stretches, root_weight: FloatArray, poles: ComplexArray) -> None:
+    def __init__(self, fixed: FixedTerms, poles: ComplexArray) -> None:
+        stretches = fixed.stretches
+        self._fixed = fixed
         self._rows = stretches.rows
         self._poles = poles
-        self._weight = root_weight
+        self._weight = fixed.weight
         self._clock = stretches.clock
         self._decay = _decay(stretches, poles)
         self._known = stretches.regressors.shape[1]
-        columns = _columns(stretches, self._decay, poles) * root_weight[:, None]
+        columns = _free_columns(self._decay, poles) * self._weight[:, None]
         self._bases: list[FloatArray] = []
         self._triangles: list[FloatArray] = []
+        self._shared: list[FloatArray] = []
         self._norms: list[FloatArray] = []
-        for rows in self._rows:
-            own = columns[:, rows]
-            norm = np.sqrt(np.einsum("bmk,bmk->bk", own, own))
-            norm[norm == 0] = 1.0
-            q, r = np.linalg.qr(own / norm[:, None])
-            self._bases.append(q)
-            self._triangles.append(r)
+        for rows, (q, _, _) in zip(self._rows, fixed.parts, strict=True):
+            own, norm = _normalised(columns[:, rows])
+            shared = q.T @ own
+            own = own - q @ shared
+            # Once more: what is nearly all within the fixed terms loses digits the first time.
+            again = q.T @ own
+            basis, triangle = np.linalg.qr(own - q @ again)
+            self._bases.append(basis)
+            self._triangles.append(triangle)
+            self._shared.append(shared + again)
             self._norms.append(norm)
 
     def without(self, columns: FloatArray) -> FloatArray:
         """Take the own terms out of weighted columns (B, m, k)."""
         left = np.empty_like(columns)
-        for rows, q in zip(self._rows, self._bases, strict=True):
+        for rows, (q, _, _), basis in zip(self._rows, self._fixed.parts, self._bases, strict=True):
             part = columns[:, rows]
-            left[:, rows] = part - q @ (np.swapaxes(q, 1, 2) @ part)
+            part = part - q @ (q.T @ part)
+            left[:, rows] = part - basis @ (np.swapaxes(basis, 1, 2) @ part)
         return left
 
     def moved(self, rest: FloatArray, dpoles: ComplexArray) -> FloatArray:
@@ -116,8 +138,13 @@ class OwnTerms:
 
     def _weights(self, i: int, rest: FloatArray) -> FloatArray:
         """Coefficients of the own terms of stretch i, fitted to weighted data (B, m)."""
-        inside = np.einsum("bmk,bm->bk", self._bases[i], rest[:, self._rows[i]])
-        return solve_upper(self._triangles[i], inside) / self._norms[i]
+        q, r, norm = self._fixed.parts[i]
+        part = rest[:, self._rows[i]]
+        inside = np.einsum("bmk,bm->bk", self._bases[i], part - (part @ q) @ q.T)
+        free = solve_upper(self._triangles[i], inside)
+        known = part @ q - np.einsum("bqk,bk->bq", self._shared[i], free)
+        triangle = np.broadcast_to(r, (len(part), *r.shape))
+        return np.concatenate([solve_upper(triangle, known) / norm, free / self._norms[i]], axis=1)
 
     def _amplitudes(self, weights: FloatArray) -> ComplexArray:
         """Turn weights of the columns into amplitudes of the exponentials."""
@@ -139,7 +166,12 @@ def _decay(stretches: Stretches, poles: ComplexArray) -> ComplexArray:
 
 
 def _columns(stretches: Stretches, decay: ComplexArray, poles: ComplexArray) -> FloatArray:
-    batch, n = poles.shape
+    fixed = np.broadcast_to(stretches.regressors, (len(poles), *stretches.regressors.shape))
+    return np.concatenate([fixed, _free_columns(decay, poles)], axis=2)
+
+
+def _free_columns(decay: ComplexArray, poles: ComplexArray) -> FloatArray:
+    n = poles.shape[1]
     free = np.empty(decay.shape)
     if n % 2:
         free[:, :, 0] = decay[:, :, 0].real
@@ -148,8 +180,21 @@ def _columns(stretches: Stretches, decay: ComplexArray, poles: ComplexArray) -> 
         gap = poles[:, i] - poles[:, i + 1]
         free[:, :, i] = (first + second).real / 2
         free[:, :, i + 1] = ((first - second) / gap[:, None]).real
-    fixed = np.broadcast_to(stretches.regressors, (batch, *stretches.regressors.shape))
-    return np.concatenate([fixed, free], axis=2)
+    return free
+
+
+def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Basis (m, k) of columns of norm 1, triangle (k, k), and their norms before (k,)."""
+    single, norm = _normalised(columns[None])
+    q, r = np.linalg.qr(single[0])
+    return q, r, norm[0]
+
+
+def _normalised(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns (B, m, k) of norm 1, zeros as they are, and their norms (B, k)."""
+    norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
+    norm[norm == 0] = 1.0
+    return columns / norm[:, None], norm
 
 
 def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:

@@ -17,7 +17,6 @@ from .likelihood_interval import chains_of, likelihood_fit
 from .noise_level import correlation_time, quantisation_step, winsorised_sigma
 from .onset import correlation_onset
 from .output_error_result import OutputErrorFit
-from .own_terms import OwnTerms
 from .pole_factors import parameters_from_poles, poles_from_parameters
 from .sampled_data import SampledData, cut
 from .separable_fit import KnownFactor, Problem, Structure, respond
@@ -36,6 +35,7 @@ _CONFIDENCE = 0.99
 _UNLIKE = 1.3  # ratio of noise levels from which records are weighted
 _BEYOND = 1.5  # of a first-order model's delay: no model's delay is later
 _SLOW = 10.0  # times delay and lag: periods from there on tell little of the plant
+_SHORTEST = 40.0  # samples in such a period, lest there be as many cosines as samples
 _CALMER = 0.5  # of the variance, colour included, that must be left for them to be fitted along
 _TURNS = 6
 
@@ -117,8 +117,9 @@ def fit_sampled(
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
         whole = _fit(data, factor, tried, scales, huber)
-    if whole.correlation > WHITE:
-        without = replace(data, period=_SLOW * (rough.delay + lag))
+    period = _SLOW * (rough.delay + lag)
+    if whole.correlation > WHITE and period >= _SHORTEST * dt:
+        without = replace(data, period=period)
         calm = _fit(without, factor, tried, scales, huber)
         if calm.variance < _CALMER * whole.variance:
             data, whole = without, calm
@@ -170,7 +171,7 @@ def _explained(whole: WindowFit) -> float:
     """Chi-square of the forced response: own terms alone against own terms and input."""
     problem, best = whole.problem, whole.best
     assert problem.stretches is not None
-    own = OwnTerms(problem.stretches, problem.root_weight, best.poles[None])
+    own = problem.own_terms(best.poles[None])
     alone = float(np.sum(own.without(problem.data[None, :, None]) ** 2))
     return (alone - best.cost) / max(whole.variance, 1e-300)
 
@@ -212,7 +213,7 @@ def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> Ow
     pole_parameters = parameters_from_poles(fit.poles)
     poles, _ = poles_from_parameters(pole_parameters[None])
     assert problem.stretches is not None
-    own = OwnTerms(problem.stretches, problem.root_weight, poles)
+    own = problem.own_terms(poles)
 
     def response(delay: float) -> FloatArray:
         parameters = np.concatenate([[max(delay, 0.0)], pole_parameters])

@@ -15,13 +15,14 @@ for a whole batch of starts in the same array operations.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import ComplexArray, FloatArray, IntArray
 from .delayed_modes import HeldInput
-from .own_terms import OwnTerms, Stretches, solve_upper
+from .own_terms import FixedTerms, OwnTerms, Stretches, solve_upper
 from .pole_factors import poles_from_parameters
 
 _LONGEST_STEP = 1.5  # of a logarithmic parameter, in one iteration
@@ -51,6 +52,15 @@ class Problem:
     regressors: FloatArray
     known: KnownFactor
     stretches: Stretches | None = None
+
+    @cached_property
+    def _fixed(self) -> FixedTerms:
+        assert self.stretches is not None
+        return FixedTerms(self.stretches, self.root_weight)
+
+    def own_terms(self, poles: ComplexArray) -> OwnTerms:
+        """Own terms of the stretches, which there must be, at poles (B, n)."""
+        return OwnTerms(self._fixed, poles)
 
     def own_count(self, order: int) -> int:
         """Linear terms that all stretches have for themselves, of a model of an order."""
@@ -122,7 +132,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     data = np.tile(weight * problem.data, (batch, 1))
     own = None
     if problem.stretches is not None:
-        own = OwnTerms(problem.stretches, weight, free)
+        own = problem.own_terms(free)
         forced, whole = columns, data
         columns, data = own.without(columns), own.without(data[:, :, None])[:, :, 0]
     norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))

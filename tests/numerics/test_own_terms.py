@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.delayed_modes import SampledInput, SeveralInputs
-from ctrl_realize.numerics.own_terms import OwnTerms, Stretches
+from ctrl_realize.numerics.own_terms import FixedTerms, OwnTerms, Stretches
 from ctrl_realize.numerics.pole_factors import poles_from_parameters
 from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure, evaluate
 
@@ -29,7 +29,7 @@ THETA = {
 def test_what_a_record_has_for_itself_disappears(theta):
     poles, _ = poles_from_parameters(np.array([theta]))
     rng = np.random.default_rng(0)
-    own = OwnTerms(STRETCHES, np.ones(180), poles)
+    own = OwnTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
     data = np.zeros(180)
     for rows in STRETCHES.rows:
         # every real free response: with conjugate amplitudes
@@ -46,7 +46,7 @@ def test_own_terms_are_continued_at_other_times(theta):
     between = Stretches(np.array([0, 50, 90]), np.r_[:50.0, :40.0] + 0.5, np.ones((90, 1)))
     level = Stretches(EDGES, CLOCK, np.ones((180, 1)))
     weight = np.linspace(1, 2, 180)
-    own = OwnTerms(level, weight, poles)
+    own = OwnTerms(FixedTerms(level, weight), poles)
     slow = np.array([1.0, 3.0])  # of the two records, beside their levels 5 and 7
     data, expected = (
         np.repeat(slow, sizes) * np.exp(clock[:, None] * poles[0]).sum(axis=1).real
@@ -59,7 +59,7 @@ def test_own_terms_are_continued_at_other_times(theta):
 
 def test_nothing_else_disappears_and_records_do_not_mix():
     poles, _ = poles_from_parameters(np.array([THETA["three"]]))
-    own = OwnTerms(STRETCHES, np.ones(180), poles)
+    own = OwnTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
     data = np.zeros(180)
     data[:70] = np.random.default_rng(0).normal(size=70)
     left = own.without(data[None, :, None])[0, :, 0]
