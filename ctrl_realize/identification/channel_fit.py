@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import control as ct
 import numpy as np
@@ -19,7 +20,7 @@ from ..numerics.sections import in_sections
 from ..results import Flag
 from ..signals import Record
 from .channel_fit_result import fitted_system
-from .channel_search import ORDERS, Candidate, Search, Shares, experiments
+from .channel_search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, experiments
 from .channels import channel_delays, given_delays
 from .from_io import Method, Start, as_group, impulse_from_io
 from .record_simulation import as_delayed
@@ -116,39 +117,61 @@ def fit_channels(
     group = as_group(records)
     asked = _orders(order)
     _check_signals(group, feedthrough)
-    best: tuple[float, DelayedStateSpace, bool] | None = None
+    return from_starts(group, asked, delays, feedthrough).system
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a start has come to: criterion, model, and whether all outputs showed a response."""
+
+    bic: float
+    system: DelayedStateSpace
+    seen: bool
+    search: Search
+    best: Candidate
+
+
+def from_starts(
+    group: tuple[Record, ...],
+    asked: tuple[int, ...] | None = None,
+    delays: ArrayLike | None = None,
+    feedthrough: bool | None = None,
+    *,
+    most_starts: int = len(STARTS),
+    enough: int = ENOUGH_SAMPLES,
+) -> Outcome:
+    """Fit from one estimate of the impulse response after the other, until nothing is left."""
+    best: Outcome | None = None
     refused: DataError | None = None
     at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
-    starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else STARTS
-    for tried, (start, method) in enumerate(starts, start=1):
+    starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else list(STARTS)
+    for tried, way in enumerate(starts[:most_starts], start=1):
         try:
-            found = _from_start(group, start, method, asked, delays, feedthrough)
+            found = _from_start(group, way, asked, delays, feedthrough, enough)
         except DataError as error:
             refused = refused or error
             continue
-        if best is None or found[0] < best[0]:
+        if best is None or found.bic < best.bic:
             best = found
         # An output that a start does not see gets a second one.
-        enough = best[2] or tried > 1
-        if enough and all(check.independent for check in best[1].fit.checks):
+        clear = best.seen or tried > 1
+        if clear and all(check.independent for check in best.system.fit.checks):
             break
     if best is None:
         raise refused or DataError("nothing could be fitted")
-    return best[1]
+    return best
 
 
 def _from_start(
     group: tuple[Record, ...],
-    start: Start,
-    method: Method,
+    way: tuple[Start, Method],
     asked: tuple[int, ...] | None,
     delays: ArrayLike | None,
     feedthrough: bool | None,
-) -> tuple[float, DelayedStateSpace, bool]:
-    """Fit from one estimate of the impulse response.
-
-    Return the criterion, the model, and whether the start showed a response of every output.
-    """
+    enough: int,
+) -> Outcome:
+    """Fit from one estimate of the impulse response."""
+    start, method = way
     with warnings.catch_warnings():
         # What the prior has filled in only serves as a start.
         warnings.simplefilter("ignore", DataWarning)
@@ -159,7 +182,7 @@ def _from_start(
         raise DataError(
             "no output shows a response to the inputs above the noise; are the channels right?"
         )
-    search = Search(group, markov, max(asked or ORDERS))
+    search = Search(group, markov, max(asked or ORDERS), enough)
     orders = search.orders(asked)
     found = channel_delays(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
     shares = _split(found)
@@ -178,7 +201,8 @@ def _from_start(
             ),
         )
     choices = _choices(moved, bic, shares)
-    return moved.bic, fitted_system(search.finish(moved), group, bic, choices, flags), unseen == 0
+    system = fitted_system(search.finish(moved), group, bic, choices, flags)
+    return Outcome(moved.bic, system, unseen == 0, search, moved)
 
 
 def _silence(best: Candidate) -> tuple[Flag, ...]:

@@ -13,8 +13,9 @@ from ..numerics.arrays import FloatArray, read_only
 from ..numerics.gramians import balanced_truncation
 from ..results import Flag, Result
 from ..signals import Record
-from ..wording import in_percent
+from ..wording import in_percent, in_time, interval_in_time
 from .channel_search import Candidate
+from .delay_fit_result import DelayFit
 from .residual_check import ResidualCheck
 from .residuals import check_residuals
 
@@ -48,6 +49,15 @@ class ChannelFit(Result):
         ``100 (1 - noise_std / std y)`` of every output, over all records.
     checks : tuple of ResidualCheck
         Of every record without gaps.
+    dead_time : float, optional
+        In s, of one input and output that `identify` has fitted; None otherwise.
+    interval : tuple of float, optional
+        In s: dead times that the data do not rule out, of this model and of `lags` unless they
+        leave twice as much.
+    total_delay : float, optional
+        Delay at zero frequency in s.
+    lags : DelayFit, optional
+        The fit of lags behind a dead time, which left too much, and whose place this one takes.
     records : tuple of Record
         What was fitted.
     choices : tuple of str
@@ -83,6 +93,31 @@ class ChannelFit(Result):
     records: tuple[Record, ...]
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
+    dead_time: float | None = None
+    interval: tuple[float, float] | None = None
+    total_delay: float | None = None
+    lags: DelayFit | None = None
+
+    @property
+    def delay(self) -> int | None:
+        """Dead time in samples; None where `identify` has not asked for it."""
+        return None if self.dead_time is None else self.input_delays[0] + self.output_delays[0]
+
+    @property
+    def delay_interval(self) -> tuple[float, float] | None:
+        """Interval of the dead time in samples."""
+        dt = self.records[0].dt
+        return None if self.interval is None else (self.interval[0] / dt, self.interval[1] / dt)
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float] | None:
+        """Interval of the dead time in s, the same as `interval`."""
+        return self.interval
+
+    @property
+    def interval_label(self) -> str:
+        """What `interval` is: it has no probability."""
+        return "not ruled out"
 
     def _title(self) -> str:
         return f"Fit of {len(self.output_delays)} x {len(self.input_delays)} channels"
@@ -94,7 +129,25 @@ class ChannelFit(Result):
             ("delays of the outputs", " ".join(map(str, self.output_delays)) + " samples"),
             ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
             ("fit", in_percent(self.fit_percent)),
+            *self._rows_of_delay(),
         ]
+
+    def _rows_of_delay(self) -> list[tuple[str, str]]:
+        if self.dead_time is None or self.interval is None:
+            return []
+        rows = [
+            ("dead time", f"{in_time(self.dead_time, 4)} = {self.delay} samples"),
+            (self.interval_label, interval_in_time(*self.interval)),
+        ]
+        if self.lags is not None:
+            rows.append(
+                (
+                    "instead of",
+                    f"{self.lags.order} lags behind {in_time(self.lags.dead_time, 4)}, which leave "
+                    f"{self.lags.residual:.3g}",
+                )
+            )
+        return rows
 
     def __repr__(self) -> str:
         fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)

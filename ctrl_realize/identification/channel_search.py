@@ -30,6 +30,11 @@ NEARBY = 10
 FARTHEST = 200
 """Moves of delays after which the search for them ends."""
 
+RULED_OUT = 10.0
+"""Excess of the criterion from which the data rule a delay out, as in `fit_delay`."""
+FARTHEST_PLAUSIBLE = 12
+"""Samples around a delay that are looked at."""
+
 Shares = tuple[tuple[int, ...], tuple[int, ...]]
 
 
@@ -79,11 +84,18 @@ class Search:
     """Fits of one group of records, at any order and delay, from one impulse response.
 
     `markov` (p, m, N) is what the fits start from; channels are scaled to the same size first,
-    or the smallest would be the last to be modelled.
+    or the smallest would be the last to be modelled. All but the last fit see `enough` samples.
     """
 
-    def __init__(self, group: Sequence[Record], markov: FloatArray, top: int) -> None:
+    def __init__(
+        self,
+        group: Sequence[Record],
+        markov: FloatArray,
+        top: int,
+        enough: int = ENOUGH_SAMPLES,
+    ) -> None:
         self._group = group
+        self._enough = enough
         self._markov = markov
         self._top = top
         u, y = (
@@ -123,7 +135,7 @@ class Search:
         self, order: int, shares: Shares, *, direct: bool, start: Candidate | None = None
     ) -> Candidate:
         """Fit one structure; its start is another fit, or Kung's realization."""
-        data = experiments(self._group, shares, ENOUGH_SAMPLES)
+        data = experiments(self._group, shares, self._enough)
         sections = start.found.model if start is not None else self._kung(order, shares)
         most = MOST_STEPS if start is None else NEARBY
         found = fit_sections(data, sections, direct=direct, enough=ROUGHLY, most=most)
@@ -190,6 +202,28 @@ class Search:
             best = min(best, lower, key=lambda c: c.bic)
         return best
 
+    def plausible(self, best: Candidate, independent: float) -> tuple[float, float]:
+        """Dead times in samples, of one input and output, that the data do not rule out.
+
+        Those whose model of the same order has a criterion up to `RULED_OUT` larger, when
+        `independent` samples of the residual count as one. Behind a hold, the first sample of a
+        response without direct term says that the dead time ended within the sample before it.
+        """
+        low, high = _within(best)
+        for direct in {best.direct, False}:
+            for step in (-1, 1):
+                last, missed = best, 0
+                for _ in range(FARTHEST_PLAUSIBLE):
+                    delay = last.inputs[0] + step
+                    if not 0 <= delay < self._markov.shape[-1] // 2 or missed == 2:
+                        break
+                    last = self.fit(best.order, ((delay,), last.outputs), direct=direct, start=last)
+                    missed += 1
+                    if (last.bic - best.bic) / independent <= RULED_OUT:
+                        first, end = _within(last)
+                        low, high, missed = min(low, first), max(high, end), 0
+        return low, high
+
     def _excites(self, order: int) -> bool:
         lags = order + 1
         parts = [np.atleast_2d(r.input) for r in self._group if r.n_samples > lags]
@@ -219,11 +253,17 @@ class Search:
     def _judged(self, found: SectionFit, order: int, shares: Shares, direct: bool) -> Candidate:
         p, m, _ = self._markov.shape
         values = found.counts.sum() / p
-        used = min(self._samples, ENOUGH_SAMPLES)
+        used = min(self._samples, self._enough)
         count = order * (p + m) + (p * m if direct else 0)
         # As if all delays left the same number of samples.
         bic = 2 * found.loss * used / values + count * np.log(used)
         return Candidate(found, order, *shares, direct, float(bic))
+
+
+def _within(found: Candidate) -> tuple[float, float]:
+    """Bounds of the dead time, in samples, of a sampled model of one input and output."""
+    delay = found.inputs[0] + found.outputs[0]
+    return (max(delay - 1.0, 0.0), float(delay)) if found.direct else (delay, delay + 1.0)
 
 
 def _neighbours(inputs: tuple[int, ...], outputs: tuple[int, ...]) -> list[Shares]:

@@ -11,17 +11,17 @@ import numpy as np
 
 from ..checks import one_of, system_name, whole
 from ..delayed import DelayedStateSpace
-from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
-from ..results import Flag
 from ..signals import Record, StepResponse
 from ..signals.given import as_records
 from .channel_fit import fit_channels
 from .delay_fit import MOST_ORDER, fit_delay
 from .delay_scan import estimate_delay
+from .from_step import impulse_from_step
+from .mode_choice import with_modes_judged
 from .orders import scan_orders
-from .residuals import check_residuals
-from .steps import impulse_from_step, unit_step
+from .steps import unit_step
 
 Method = Literal["output_error", "scan", "paper"]
 
@@ -74,8 +74,9 @@ def identify(
     Returns
     -------
     DelayedStateSpace
-        Its `.fit` is a `DelayFit`, a `DelayScan`, or for several channels a `ChannelFit`;
-        `.fit.report()` says what was chosen and why.
+        Its `.fit` is a `DelayFit`, a `DelayScan`, or a `ChannelFit` for several channels and where
+        lags behind a dead time are not enough (see Notes); `.fit.report()` says what was chosen
+        and why.
         The steps before it hang on the fit: ``.fit.impulse.step.record`` for the scans,
         ``.fit.records`` for the fit.
 
@@ -85,6 +86,17 @@ def identify(
         An unknown method, or an argument that the method does not take.
     NoStepError, DataError, OrderError, DelayRangeError
         Data that the method cannot use.
+
+    Notes
+    -----
+    A record of one channel whose input is no step is fitted with lags behind a dead time. Where
+    their residual still follows the input, states with any zeros behind whole samples of delay
+    (`fit_channels`) are fitted to it too. They are taken where the information criterion is
+    smaller by 10 or more: on the same samples, and with autoregressive noise of its own for each.
+    Their `fit` has `dead_time`, `interval` and `total_delay`; the interval spans the delays that
+    are not ruled out at their order and the interval of the lags (``fit.lags``), but for lags
+    that leave more than twice as much.
+    Given `order`, `structures` or `known`, nothing else is tried.
 
     Examples
     --------
@@ -133,7 +145,10 @@ def identify(
             include_known=include_known,
         )
         stepped = np.isfinite(system.fit.onset)
-        return system if stepped or known is not None else _with_residuals_judged(system)
+        if stepped or known is not None:
+            return system
+        asked = order is not None or structures is not None
+        return with_modes_judged(system, max_delay, asked=asked)
     if not isinstance(record, Record):
         raise OptionError(
             f"method={method!r} takes one record; several go together with method='output_error', "
@@ -143,27 +158,6 @@ def identify(
     if method == "paper":
         return _paper(step, order, max_delay, cutoff_hz, samples, feedthrough)
     return _scan(step, order, max_delay, cutoff_hz, samples, feedthrough)
-
-
-def _with_residuals_judged(system: DelayedStateSpace) -> DelayedStateSpace:
-    """Say so where the plant is more than lags behind a dead time: its residual tells."""
-    fit = system.fit
-    try:
-        follows = [
-            not check_residuals(system, record, lags=min(25, record.n_samples // 3)).independent
-            for record in fit.records
-        ]
-    except UnsuitableSystemError:  # an unstable model simulates nothing
-        return system
-    if not any(follows):
-        return system
-    flag = Flag(
-        "input_in_residual",
-        f"the residual of {sum(follows)} of {len(follows)} record(s) still follows the input: the "
-        "plant is more than lags behind a dead time, or not linear; fit_channels fits any modes "
-        "and zeros",
-    )
-    return system.replace(fit=replace(fit, flags=(*fit.flags, flag)))
 
 
 def _of_several_channels(records: Record | Sequence[Record]) -> bool:

@@ -153,14 +153,3 @@ def test_records_of_several_channels_go_to_their_own_fit():
         cr.identify(record, max_delay=9)
     with pytest.raises(DataError):
         cr.identify(record, method="scan")
-
-
-def test_a_plant_that_is_more_than_lags_is_told_to_be():
-    ring = ct.ss(ct.tf([0.1, 0.02], [1, -1.7, 0.9], 0.1) + ct.tf([0.2], [1, 1.2, 0.8], 0.1))
-    u, noise = np.random.default_rng(0).standard_normal((2, 800))
-    y = cr.delayed_ss(ring, 3).simulate(u) + 0.05 * noise
-    record = cr.Record(0.1 * np.arange(800), u, y)
-    assert "input_in_residual" in {flag.code for flag in cr.identify(record).fit.flags}
-    lag = cr.delayed_ss(ct.tf([1.0], [0.8, 1]), dead_time=0.35, dt=0.1).simulate(u)
-    plain = cr.identify(cr.Record(0.1 * np.arange(800), u, lag + 0.05 * noise))
-    assert "input_in_residual" not in {flag.code for flag in plain.fit.flags}
