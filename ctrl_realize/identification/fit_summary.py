@@ -100,10 +100,11 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
         reasons.append("dead time: median of five views, as no model leaves only noise")
     else:
         count = sum(line.low == line.low for line in fit.structures)
-        flows = f" and {len(fit.flows)} flow(s)" if fit.flows else ""
+        kinds = [
+            f"{n} {name}(s)" for n, name in ((count, "structure"), (len(fit.flows), "flow")) if n
+        ]
         reasons.append(
-            f"interval: profile likelihood of {count} structure(s){flows} that the data cannot "
-            "rule out"
+            f"interval: profile likelihood of {' and '.join(kinds)} that the data cannot rule out"
         )
     if fit.open_start:
         reasons.append(
