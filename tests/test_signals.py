@@ -264,3 +264,40 @@ def test_a_bode_plot_shows_a_measurement_only_where_it_was_measured():
 
 def test_printing_a_measurement_does_not_list_its_points():
     assert "\n" not in str(cr.MeasuredFRF(np.ones(500), np.arange(1, 501)))
+
+
+def test_what_lies_under_a_mask_is_missing_and_never_a_sample():
+    values = np.array([0.0, 1.0, 7.0, 3.0])
+    masked = np.ma.array(values, mask=[False, False, True, False])
+    with pytest.raises(DataError, match="output has 1 non-finite sample, the first at index 2"):
+        cr.Record(np.arange(4.0), values, masked)
+    kept = cr.Record(np.arange(4.0), values, masked, missing="keep")
+    np.testing.assert_array_equal(kept.output, [0.0, 1.0, np.nan, 3.0])
+    with pytest.raises(DataError, match="time has 1 non-finite sample"):
+        cr.Record(np.ma.array(np.arange(4), mask=[0, 1, 0, 0]), values, values)
+
+
+def test_masked_values_of_responses_are_refused():
+    masked = np.ma.array([1.0, 2.0, 3.0, 4.0], mask=[0, 0, 1, 0])
+    with pytest.raises(DataError, match="markov has 1 non-finite value"):
+        cr.ImpulseResponse(masked, 0.1)
+    with pytest.raises(DataError, match="response has 1 non-finite"):
+        cr.MeasuredFRF(masked, np.arange(4.0))
+    with pytest.raises(DataError, match="std has 1 non-finite"):
+        cr.MeasuredFRF(masked.data, np.arange(4.0), std=masked)
+
+
+def test_stamps_of_dates_are_refused_with_how_to_make_seconds_of_them():
+    stamps = np.datetime64("2026-01-01") + np.arange(4).astype("m8[s]")
+    with pytest.raises(DataError, match=r"needed are seconds, for instance \(stamps - stamps"):
+        cr.Record(stamps, np.zeros(4), np.zeros(4))
+
+
+@pytest.mark.parametrize("kind", ["i1", "u1", "f2", "f4", ">f4", ">f8", ">i4", "g"])
+def test_arrays_of_every_kind_of_number_are_taken_by_value(kind):
+    values = np.array([0, 1, 100, 3]).astype(kind)
+    strided = np.stack([values, values], axis=1)[::-1, 0][::-1]
+    assert not strided.flags.c_contiguous
+    record = cr.Record(np.arange(4, dtype="f2"), values, strided)
+    np.testing.assert_array_equal(record.output, [0.0, 1.0, 100.0, 3.0])
+    assert record.output.dtype == np.float64

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import whole
-from ..errors import DelayRangeError, OptionError, OrderError
+from ..errors import DataError, DelayRangeError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.delay_models import hankel_size
 from ..numerics.lanczos import largest_magnitude
@@ -20,6 +20,9 @@ SETTLING_BAND = 0.02
 
 MIN_NOISE = 32
 """Samples at rest that are needed to say how large the noise is."""
+
+MOST_WORK = 30_000_000
+"""Delays times samples that a scan takes on by itself; twenty seconds, or a minute at most."""
 
 MAX_WINDOWS = 16
 """Stretches of a long rest that are looked at, evenly spread."""
@@ -87,14 +90,28 @@ def settled_samples(impulse: ImpulseResponse, order: int, max_delay: int) -> int
 
     Three times the settling time of the step response (2 % of its range),
     at least 256 and 8 per order, as far as they fit. More samples hold
-    nothing but noise, and cost time for every delay.
+    nothing but noise, and cost time for every delay: of many delays fewer
+    samples are used, such that a scan ends within a minute.
+
+    Raises
+    ------
+    DataError
+        Too few samples could be used for that many delays.
     """
     fits = impulse.n_samples - 1 - max_delay
     step = np.cumsum(channels(impulse), axis=-1)
     away = np.abs(step - step[..., -1:])
     band = SETTLING_BAND * away.max(axis=-1, keepdims=True)
     settled = int(np.flatnonzero((away > band).any(axis=(0, 1)))[-1:].sum())
-    return min(fits, max(3 * settled, 256, 8 * order))
+    affordable = MOST_WORK // (max_delay + 1)
+    if affordable < min(fits, max(3 * max_delay, 256, 8 * order)):
+        raise DataError(
+            f"a scan of {max_delay + 1} delays over {fits} samples would take hours: the response "
+            "is sampled far more finely than it moves; take every so many samples (of the record, "
+            "behind a low-pass), give max_delay= and samples=, or use fit_delay, which takes "
+            "samples together by itself"
+        )
+    return min(fits, affordable, max(3 * settled, 256, 8 * order))
 
 
 def noise_floor(impulse: ImpulseResponse, size: int) -> float | None:

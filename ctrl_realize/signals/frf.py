@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
-from .record_checks import check_size, numbers
+from .record_checks import check_size, numbers, unmasked
 
 
 class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is untyped
@@ -217,7 +217,7 @@ def _complex_numbers(response: ArrayLike) -> ComplexArray:
         raise DataError("response is no array: its rows have different lengths") from error
     if array.dtype.kind not in "biufc":
         raise DataError(f"response holds {array.dtype} values; needed are complex numbers")
-    return np.asarray(array, dtype=np.complex128)
+    return unmasked(response, np.asarray(array, dtype=np.complex128))
 
 
 def _largest_part(values: ComplexArray) -> FloatArray:

@@ -14,6 +14,7 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.filters import butterworth, butterworth_group_delay
 from ..numerics.time_axis import EXTREME
+from .record_checks import unmasked
 from .step import StepResponse
 
 Sampling = Literal["step-invariant", "impulse-invariant"]
@@ -185,7 +186,7 @@ def _finite(values: ArrayLike, what: str) -> FloatArray:
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":
         raise DataError(f"{what} holds {array.dtype} values; needed are real numbers")
-    numbers = np.asarray(array, dtype=np.float64)
+    numbers = unmasked(values, np.asarray(array, dtype=np.float64))
     bad = ~np.isfinite(numbers)
     if bad.any():
         raise DataError(

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DelayRangeError, OptionError, OrderError
+from ctrl_realize.errors import DataError, DelayRangeError, OptionError, OrderError
 from ctrl_realize.identification.impulses import (
     MAX_WINDOWS,
+    MOST_WORK,
     as_impulse,
     check_order,
     check_samples,
@@ -47,6 +48,20 @@ def test_a_quick_response_gets_256_samples_or_8_per_order_as_far_as_they_fit():
     assert settled_samples(quick, 3, 0) == 256
     assert settled_samples(quick, 40, 0) == 320
     assert settled_samples(impulse(decay(0.5, 200)), 3, 20) == 179
+
+
+def test_of_many_delays_fewer_samples_are_used_so_that_a_scan_ends():
+    slow = impulse(decay(0.9998, 60_000))
+    assert settled_samples(slow, 3, 100) > 50_000
+    assert settled_samples(slow, 3, 2000) == MOST_WORK // 2001
+
+
+def test_more_delays_than_can_be_scanned_are_refused_with_what_to_do():
+    slow = impulse(decay(0.9998, 60_000))
+    with pytest.raises(DataError, match="sampled far more finely than it moves; take every so"):
+        settled_samples(slow, 3, 5000)
+    # who asks for it gets it
+    assert check_samples(slow, 20_000, 3, 5000, padded=False, what="max_delay") == 20_000
 
 
 def test_each_channel_settles_by_its_own_range():

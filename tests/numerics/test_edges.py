@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from ctrl_realize.numerics import edges
 from ctrl_realize.numerics.edges import Edge, despike, difference_noise, find_edges
 
 
@@ -194,3 +195,12 @@ def test_overshoot_of_the_drive_is_part_of_its_edge():
     values = levels((0, 60), (14, 2), (10, 60))
     (found,) = find_edges(values, 3, 0.5)
     assert (found.index, found.amplitude, found.samples) == (60, 10.0, 1)
+
+
+def test_a_long_signal_is_looked_at_in_pieces_without_seams(monkeypatch):
+    values = levels((0, 40), (1, 30), (-2, 50)) + 0.01 * white(120)
+    whole = find_edges(values, 2, 0.1)
+    for piece in (1, 7, 119):
+        monkeypatch.setattr(edges, "PIECE", piece)
+        assert find_edges(values, 2, 0.1) == whole
+    assert len(whole) == 2
