@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,23 +10,28 @@ import numpy as np
 from ..errors import DataError
 from ..numerics.correlation import fit_percent
 from ..signals import Record
+from ..signals.given import as_records
 from .record_simulation import Start, simulate_record
 
 if TYPE_CHECKING:
+    import control as ct
     import pandas as pd
 
 
 def cross_validate(
-    systems: dict[str, Any], records: Sequence[Record], *, start: Start = "estimate"
+    systems: Mapping[str, Any] | ct.StateSpace,
+    records: Record | Sequence[Record],
+    *,
+    start: Start = "estimate",
 ) -> pd.DataFrame:
     """Tabulate the fit in percent of several models on several records.
 
     Parameters
     ----------
-    systems : dict of str to control.StateSpace
-        Models by name; any that `check_residuals` takes.
-    records : sequence of Record
-        Best those that no model has seen.
+    systems : dict of str to control.StateSpace, or control.StateSpace
+        Models by name, or one; any that `check_residuals` takes.
+    records : Record or sequence of Record
+        Best those that no model has seen. Of the same name the second gets a number.
     start : {"estimate", "rest"}
         As for `check_residuals`.
 
@@ -34,6 +39,11 @@ def cross_validate(
     -------
     pandas.DataFrame
         One row a model, one column a record; the mean over the outputs.
+
+    Raises
+    ------
+    DataError
+        No records or models, or something else among them.
 
     Examples
     --------
@@ -49,18 +59,25 @@ def cross_validate(
     >>> print(table["day 2"].round(1).to_dict())
     {'fast': 2.4, 'slow': 100.0}
     """
-    if not records:
-        raise DataError("records is empty; needed is at least one record")
     import pandas as pd
+
+    several = as_records(records)
+    models = systems if isinstance(systems, Mapping) else {_name(systems): systems}
+    if not models:
+        raise DataError("no models; needed is at least one, such as {'mine': model}")
 
     def mean_fit(system: Any, record: Record) -> float:
         simulated = simulate_record(system, record, start)
         return float(fit_percent(np.atleast_2d(record.output), simulated).mean())
 
-    names = [record.name or f"record {i}" for i, record in enumerate(records)]
-    return pd.DataFrame(
-        {
-            name: {label: mean_fit(system, record) for label, system in systems.items()}
-            for name, record in zip(names, records, strict=True)
-        }
-    )
+    columns: dict[str, dict[str, float]] = {}
+    for i, record in enumerate(several):
+        name = record.name or f"record {i}"
+        if name in columns:
+            name = f"{name} ({i})"
+        columns[name] = {label: mean_fit(system, record) for label, system in models.items()}
+    return pd.DataFrame(columns)
+
+
+def _name(system: Any) -> str:
+    return str(getattr(system, "name", None) or "model")

@@ -132,6 +132,16 @@ def test_several_models_are_compared_on_records_that_they_have_not_seen():
     assert (table.loc["true"] > table.loc["late"] + 20).all()
 
 
+def test_one_model_and_one_record_need_no_collection_and_no_record_is_lost_for_its_name():
+    one, other = record(seed=1, label="day"), record(seed=2, label="day")
+    assert cr.cross_validate(TWO_STATES, one).shape == (1, 1)
+    assert list(cr.cross_validate(TWO_STATES, [one, other])) == ["day", "day (1)"]
+    with pytest.raises(DataError, match="needed is a Record"):
+        cr.cross_validate(TWO_STATES, [one.output])
+    with pytest.raises(DataError, match="no models"):
+        cr.cross_validate({}, one)
+
+
 def test_results_pickle_report_and_show_in_one_line():
     check = cr.check_residuals(TWO_STATES, record())
     again = pickle.loads(pickle.dumps(check))
@@ -165,7 +175,7 @@ def test_missing_samples_and_empty_lists_are_refused():
     holes = cr.Record(record().time, record().input, y, missing="keep")
     with pytest.raises(DataError, match="1 of this record are missing"):
         cr.check_residuals(TWO_STATES, holes)
-    with pytest.raises(DataError, match="empty"):
+    with pytest.raises(DataError, match="no records"):
         cr.cross_validate({"a": TWO_STATES}, [])
 
 
