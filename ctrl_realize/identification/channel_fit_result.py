@@ -22,6 +22,8 @@ from .residuals import check_residuals
 COLOURED, WANDERING = 0.5, 0.97
 """Correlation of neighbouring residuals from which they are said to be coloured, and to wander
 as what an integrator makes of noise does."""
+INTEGRATES = 5.0
+"""Time constants that a record lasts, below which its slowest pole may be an integrator."""
 LAGS = 25
 """Of the correlations in the residual checks."""
 
@@ -173,12 +175,20 @@ def fitted_system(
     seen = {flag.code: flag for check in checks for flag in check.flags}
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
     if neighbours > COLOURED:
-        advice = (
-            "the output wanders like an integral: fit differences of input and output (np.diff of "
-            "both), or a frequency response (spectral_frf, fit_frf)"
-            if neighbours > WANDERING
-            else "compare a lower order on other data"
-        )
+        longest = max(r.n_samples for r in group)
+        slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
+        advice = "compare a lower order on other data"
+        if slow and group[0].issiso:
+            advice = (
+                "the slowest pole is slower than the record, as of an integrator: fit_delay (or "
+                "identify) fits those of one input and output"
+            )
+        elif slow or neighbours > WANDERING:
+            advice = (
+                "the output wanders like an integral: fit differences of input and output "
+                "(np.diff of both), each channel by fit_delay, or a frequency response "
+                "(spectral_frf, fit_frf)"
+            )
         seen["coloured_residual"] = Flag(
             "coloured_residual",
             f"neighbouring residuals are correlated by {neighbours:.2g}: a disturbance that "

@@ -144,6 +144,18 @@ def test_another_start_is_tried_where_the_first_leads_nowhere():
     assert (found.fit.order, found.delay) == (1, 20)
 
 
+def test_an_integrator_that_is_not_found_is_told_with_what_finds_it():
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.choice([-1.0, 1.0], 120), 5)
+    level = 0.1 * np.cumsum(np.concatenate([np.zeros(4), u[:-4]]))
+    data = cr.Record(np.arange(600.0), u, level + 0.05 * rng.standard_normal(600))
+    (flag,) = (f for f in cr.fit_channels(data, [1, 2]).fit.flags if f.code == "coloured_residual")
+    assert "integrator: fit_delay" in str(flag)
+    found = cr.identify(data)
+    assert found.fit.delay_interval[0] <= 3 <= found.fit.delay_interval[1]
+    assert_allclose(np.ravel(found.markov(30))[5:], 0.1, rtol=0.05)
+
+
 def test_a_disturbance_that_drifts_is_told():
     rng = np.random.default_rng(0)
     first = record(noise=0.0)
