@@ -1,4 +1,4 @@
-"""Checks of arguments that many public functions share."""
+"""Checks of arguments, and rules for names, that many public functions share."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:
 
 
 def spelled_out(text: str) -> str:
-    """Spell out what no encoding takes: file names that are no UTF-8 hold lone surrogates."""
+    """Make a text that can be written: file names that are no UTF-8 hold lone surrogates."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 

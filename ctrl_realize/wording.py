@@ -83,6 +83,18 @@ def _plainly(value: float, digits: int) -> str:
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
+def in_digits(value: float, digits: int = 4) -> str:
+    """Write a number, and nothing where it is not finite.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import in_digits
+    >>> in_digits(16.00001), in_digits(float("nan"))
+    ('16', '')
+    """
+    return f"{value:.{digits}g}" if np.isfinite(value) else ""
+
+
 def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
     """Write a matrix in one line, its rows apart; long rows are cut.
 

@@ -13,6 +13,7 @@ from ..plots.fits import evidence_height
 from ..report import Column, Page, Row, Sketch, Table, pairs, verdict_of, write_page
 from ..report.provenance import own_version, record_sha256, versions
 from ..report.sketches import save_sketches
+from ..report.tables import comparison_tables, fit_tables
 from .demo_run import DemoResult, shown
 from .demo_tables import OUTCOME, outcome_rows, simulated_table, table_1_columns, table_1_rows
 from .inputs import typed_call
@@ -163,8 +164,8 @@ def demo_page(result: DemoResult, sketches: list[Sketch]) -> Page:
         tables=[
             _outcome(result),
             _table_1(result),
-            pairs("How the final model was found", [*result.fitted.fit._rows(), *_choices(result)]),
-            pairs("Final model and stepped sine", result.comparisons["fitted"]._rows()),
+            *fit_tables(result.fitted.fit, "How the final model was found"),
+            *comparison_tables(result.comparisons["fitted"], "Final model and stepped sine"),
             pairs("The paper's settings", _settings()),
             pairs("The simulated valve", [*result.valve.truth._rows(), ("seed", str(result.seed))]),
             _data(result),
@@ -176,10 +177,6 @@ def demo_page(result: DemoResult, sketches: list[Sketch]) -> Page:
         ],
         simulated=True,
     )
-
-
-def _choices(result: DemoResult) -> list[tuple[str, str]]:
-    return [("choice", choice) for choice in result.fitted.fit.choices]
 
 
 def _outcome(result: DemoResult) -> Table:

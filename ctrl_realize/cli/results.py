@@ -16,7 +16,7 @@ from ..identification.campaign import Campaign
 from ..io import save_model
 from ..io.csv_files import write_csv
 from ..signals import Record
-from ..wording import time_unit
+from ..wording import in_digits, time_unit
 from .terminal import printable, table
 
 
@@ -102,7 +102,7 @@ def campaign_table(campaign: Campaign) -> str:
     rows = []
     for row in campaign.rows:
         if row.model is None:
-            rows.append([printable(row.name), _number(row.amplitude), "", "", "", "",
+            rows.append([printable(row.name), in_digits(row.amplitude), "", "", "", "",
                          printable(row.error or "failed")])  # fmt: skip
             continue
         low, high = row.interval
@@ -110,7 +110,7 @@ def campaign_table(campaign: Campaign) -> str:
         rows.append(
             [
                 printable(row.name),
-                _number(row.amplitude),
+                in_digits(row.amplitude),
                 f"{row.delay:.4g}",
                 f"{scale * row.dead_time:.4g}",
                 f"{scale * low:.4g} ... {scale * high:.4g}",
@@ -121,7 +121,3 @@ def campaign_table(campaign: Campaign) -> str:
     columns = ["record", "step", "delay", f"dead time [{unit}]", f"interval [{unit}]"]
     columns += ["order", "remarks"]
     return table(columns, rows, numbers=(1, 2, 3, 4, 5))
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else ""

@@ -26,6 +26,7 @@ from .tables import (
     Paths,
     amplitude_table,
     campaign_table,
+    comparison_tables,
     data_table,
     fit_tables,
     model_table,
@@ -104,7 +105,7 @@ def write_identification(
         sketches=identification_sketches(system, record, frf=frf, comparison=comparison),
         tables=[
             *fit_tables(system.fit),
-            *_against(comparison),
+            *comparison_tables(comparison),
             model_table(system),
             data_table([record], files),
             *settings_tables(settings),
@@ -189,7 +190,7 @@ def write_campaign(
             campaign_table(campaign),
             amplitude_table(campaign),
             *more_tables,
-            *_against(comparison),
+            *comparison_tables(comparison),
             *fit_tables(system.fit),
             model_table(system),
             *([data_table(records, files)] if files or records else []),
@@ -259,7 +260,7 @@ def write_comparison(
         verdict=comparison_verdict(system, comparison),
         sketches=frf_sketches([system], frf, comparison),
         tables=[
-            *_against(comparison),
+            *comparison_tables(comparison),
             model_table(system),
             *([data_table([], files)] if files else []),
         ],
@@ -295,12 +296,6 @@ def _write(
         simulated=simulated,
     )
     return write_page(path, page)
-
-
-def _against(comparison: FRFComparison | None) -> list[Table]:
-    if comparison is None:
-        return []
-    return [pairs("Against the measured frequency response", comparison._rows())]
 
 
 def _kind(system: DelayedStateSpace) -> str:

@@ -10,25 +10,30 @@ from typing import Any
 import numpy as np
 
 from ..delayed import DelayedStateSpace
+from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..results import Result
 from ..signals import Record
-from ..wording import time_unit
+from ..wording import in_digits, time_unit
 from .page import Column, Row, Table, pairs
 from .provenance import file_sha256, record_sha256
 
 Paths = Sequence[str | os.PathLike[str]]
 
 
-def fit_tables(fit: Any) -> list[Table]:
+def fit_tables(fit: Any, title: str = "How it was found") -> list[Table]:
     """Tell how a model was found, what was chosen and why."""
     if not isinstance(fit, Result):
         return []
-    return [pairs("How it was found", [*fit._rows(), *_choices(fit)])]
+    choices = [("choice", str(choice)) for choice in getattr(fit, "choices", ())]
+    return [pairs(title, [*fit._rows(), *choices])]
 
 
-def _choices(fit: Any) -> list[tuple[str, str]]:
-    return [("choice", str(choice)) for choice in getattr(fit, "choices", ())]
+def comparison_tables(
+    comparison: FRFComparison | None, title: str = "Against the measured frequency response"
+) -> list[Table]:
+    """Tell how far a model is from a measurement, where there is one."""
+    return [] if comparison is None else [pairs(title, comparison._rows())]
 
 
 def model_table(system: DelayedStateSpace) -> Table:
@@ -106,14 +111,14 @@ def campaign_table(campaign: Campaign) -> Table:
     rows = []
     for row in campaign.rows:
         if row.model is None:
-            cells = (row.name, _number(row.amplitude), "", "", "", "", "", row.error or "")
+            cells = (row.name, in_digits(row.amplitude), "", "", "", "", "", row.error or "")
             rows.append(Row(cells, "failed"))
             continue
         low, high = row.interval
         remarks = [flag.code.replace("_", " ") for flag in row.flags]
         cells = (
             row.name,
-            _number(row.amplitude),
+            in_digits(row.amplitude),
             f"{row.delay:.4g}",
             f"{scale * row.dead_time:.4g}",
             f"{scale * low:.4g} to {scale * high:.4g}",
@@ -139,9 +144,9 @@ def amplitude_table(campaign: Campaign) -> Table:
     rows = tuple(
         Row(
             (
-                _number(float(str(amplitude))),
+                in_digits(float(str(amplitude))),
                 str(int(line["records"])),
-                *(_number(float(line[name])) for name in ("delay", "std", "gain", "gain_std")),
+                *(in_digits(float(line[name])) for name in ("delay", "std", "gain", "gain_std")),
             )
         )
         for amplitude, line in table.iterrows()
@@ -152,7 +157,3 @@ def amplitude_table(campaign: Campaign) -> Table:
         columns,
         note="Delays or gains that follow the height are the sign of a nonlinear plant.",
     )
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else ""
