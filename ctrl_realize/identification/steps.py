@@ -14,7 +14,6 @@ from ..numerics.rest import rest_line
 from ..numerics.time_axis import EXTREME
 from ..signals import Record, StepEdge, StepResponse
 from ..signals.given import as_record, check_complete
-from .from_step import impulse_from_step as impulse_from_step
 
 
 def detect_step(
