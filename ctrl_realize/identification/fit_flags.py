@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..numerics.likelihood_interval import LIKE_A_FLOW, flow_lead
+from ..numerics.likelihood_interval import flow_lead
 from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.profile_interval import profile_limits
 from ..numerics.step_problem import StepData
@@ -166,7 +166,7 @@ def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
 
 
 def _many_lags(fit: OutputErrorFit) -> Flag | None:
-    if fit.chain and fit.structure.order >= LIKE_A_FLOW and not fit.endless:
+    if fit.like_flow and not fit.endless:
         return Flag(
             "many_lags",
             f"the model is a {fit.chain}: a flow that disperses looks the same and begins "
@@ -199,8 +199,8 @@ def _dispersed(fit: OutputErrorFit) -> Flag | None:
         )
     return Flag(
         "dispersed_flow",
-        f"{kind} behind a dead time of {in_time(flow.delay)} fits a little better than "
-        "lags: where something flows through the plant, that is the likelier dead time",
+        f"{kind} behind a dead time of {in_time(flow.delay)} fits better than lags: "
+        "where something flows through the plant, that is the likelier dead time",
     )
 
 

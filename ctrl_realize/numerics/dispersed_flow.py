@@ -26,17 +26,16 @@ from .lag_chains import time_moments
 from .separable_fit import Problem, partial_fractions
 from .structure_search import PLAUSIBLE, Candidate, Scales
 
-FLOW_CHARGE = 8.0
-"""What a flow must be worth in the criterion to be believed: a few lags are more common."""
-
-_SPREADS = (0.1, 4.0)
+_CHARGE = 8.0  # what a flow must be worth in the criterion: a few lags are more common
+_SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
+_MINOR = 0.5  # of the lag behind it: a flow that spreads by less may be a second lag as well
 _FREE = 4  # delay, gain, mean, spread; a lag is one more
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 """Starts: parts of a delay that is too long, and of the whole spread in time."""
 _FOLLOWED, _EVALUATIONS = 3, 40  # starts that are improved, and how far
 _SAME = 0.1  # variances by which two ends are one
-_HOPELESS = 100.0  # above what is to be beaten, after the first of them
+_HOPELESS = 300.0  # above what is to be beaten, after the first of them
 _SMALL = 1e-5  # step of the numerical derivatives
 _PROFILE = np.array([0.7, 1.2, 1.7, 2.3, 3.2])  # standard errors from the optimum
 
@@ -46,8 +45,8 @@ class DispersedFlow:
     """Best fit of a flow behind a dead time; times in s.
 
     `mean` is that of the residence time, `spread` its standard deviation over the mean, `lag` the
-    time constant behind it, 0 if there is none. `excess` is its criterion above that of the best
-    lags.
+    time constant behind it, 0 if there is none. `criterion` includes what a flow must be worth,
+    `excess` is it above that of the best lags.
     """
 
     delay: float
@@ -62,6 +61,11 @@ class DispersedFlow:
     def parameters(self) -> int:
         """Free ones beside gain and delay."""
         return 3 if self.lag else 2
+
+    @property
+    def leads(self) -> bool:
+        """Whether the flow, not the lag, makes most of how the response spreads in time."""
+        return self.spread * self.mean >= _MINOR * self.lag
 
     @property
     def peclet(self) -> float:
@@ -168,7 +172,7 @@ def _followed(
         cost = fit.cost(x)
         again = best is not None and abs(cost - best.cost) < _SAME * variance
         if best is None or cost < best.cost:
-            criterion = cost / variance + fit.count * penalty
+            criterion = cost / variance + fit.count * penalty + _CHARGE
             best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
         if again or best.excess > _HOPELESS:
             break

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import ComplexArray
-from .dispersed_flow import FLOW_CHARGE, DispersedFlow, fit_flows, flow_profile
+from .dispersed_flow import DispersedFlow, fit_flows, flow_profile
 from .fit_window import WindowFit
 from .lag_chains import (
     FREE_IN_A_CHAIN,
@@ -45,8 +45,10 @@ _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 
 _BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0, -1))
 
-LIKE_A_FLOW = 6
-"""Lags of a chain from which on a flow that disperses looks the same, where none can be fitted."""
+_LIKE_A_FLOW = 6
+"""Lags of a chain from which on a flow that disperses looks the same, unless one was fitted and is
+out of the question."""
+_OUT_OF_QUESTION = 2 * PLAUSIBLE
 
 
 def flow_lead(poles: ComplexArray) -> float:
@@ -114,7 +116,9 @@ def likelihood_fit(
     high = max(chosen.delay, *(ends[1] for ends in limits))
     if endless := still_improving(tanks):
         low = whole.scales.earliest
-    if choice.chain is not None and not flows and chosen.structure.order >= LIKE_A_FLOW:
+    out = bool(flows) and min(flow.excess for flow in flows) > _OUT_OF_QUESTION
+    like_flow = choice.chain is not None and not out and chosen.structure.order >= _LIKE_A_FLOW
+    if like_flow:
         low = min(low, max(chosen.delay - flow_lead(chosen.poles), whole.scales.earliest))
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start:
@@ -126,6 +130,7 @@ def likelihood_fit(
         found,
         chain=f"chain of {chosen.structure.order} nearly equal lags" if choice.chain else "",
         endless=endless,
+        like_flow=like_flow,
         open_start=open_start,
         flows=tuple(seen),
         follows_flow=choice.flow is not None,
@@ -145,7 +150,7 @@ def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> _Choice:
 def _with_flow(whole: WindowFit, lags: _Choice, flows: Sequence[DispersedFlow]) -> _Choice:
     """Take the delay of a flow that fits clearly better, if lags behind it can follow it."""
     flow = min(flows, key=lambda flow: flow.criterion, default=None)
-    if flow is None or flow.criterion + FLOW_CHARGE >= lags.level:
+    if flow is None or not flow.leads or flow.criterion >= lags.level:
         return lags
     limit = flow.cost + PLAUSIBLE * whole.variance
     pinned = replace(whole.scales, earliest=flow.delay, latest=flow.delay)
@@ -155,7 +160,7 @@ def _with_flow(whole: WindowFit, lags: _Choice, flows: Sequence[DispersedFlow]) 
     if not behind:
         return lags
     model = behind[choose(whole.criteria(behind))]
-    return _Choice(model, flow.criterion + FLOW_CHARGE, flow=flow)
+    return _Choice(model, flow.criterion, flow=flow)
 
 
 def _opened(

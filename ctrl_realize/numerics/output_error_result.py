@@ -43,10 +43,11 @@ class OutputErrorFit:
     The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
     are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
     which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
-    longer they are, so that all of the delay may be lags; `open_start`: how smoothly the response
-    begins is open; `relaxing`: the plant was moving before the step, and its free response was
-    fitted along. `flows` that disperse are not ruled out; with `follows_flow` the delay is that of
-    the best of them, and the lags behind it follow it. `std` is that of the chosen structure.
+    longer they are, so that all of the delay may be lags; `like_flow`: no step tells the chain from
+    a flow that disperses; `open_start`: how smoothly the response begins is open; `relaxing`: the
+    plant was moving before the step, and its free response was fitted along. `flows` that disperse
+    are not ruled out; with `follows_flow` the delay is that of the best of them, and the lags
+    behind it follow it. `std` is that of the chosen structure.
     """
 
     delay: float
@@ -67,6 +68,7 @@ class OutputErrorFit:
     latest: float
     chain: str = ""
     endless: bool = False
+    like_flow: bool = False
     open_start: bool = False
     relaxing: bool = False
     flows: tuple[DispersedFlow, ...] = ()
