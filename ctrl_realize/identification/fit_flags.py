@@ -184,7 +184,7 @@ def _many_lags(fit: OutputErrorFit) -> Flag | None:
 def _dispersed(fit: OutputErrorFit) -> Flag | None:
     """Say so where a flow explains the response better than lags."""
     flow = min(fit.flows, key=lambda flow: flow.excess, default=None)
-    if flow is None or flow.excess >= 0:
+    if flow is None or (flow.excess >= 0 and not fit.follows_flow):
         return None
     behind = f" and a lag of {in_time(flow.lag)}" if flow.lag else ""
     kind = (

@@ -29,7 +29,7 @@ from .structure_search import PLAUSIBLE, Candidate, Scales
 _CHARGE = 8.0  # what a flow must be worth in the criterion: a few lags are more common
 _SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
-_MINOR = 0.5  # of the lag behind it: a flow that spreads by less may be a second lag as well
+_MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
 _FREE = 4  # delay, gain, mean, spread; a lag is one more
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 """Starts: parts of a delay that is too long, and of the whole spread in time."""
@@ -61,11 +61,6 @@ class DispersedFlow:
     def parameters(self) -> int:
         """Free ones beside gain and delay."""
         return 3 if self.lag else 2
-
-    @property
-    def leads(self) -> bool:
-        """Whether the flow, not the lag, makes most of how the response spreads in time."""
-        return self.spread * self.mean >= _MINOR * self.lag
 
     @property
     def peclet(self) -> float:
@@ -139,9 +134,10 @@ def fit_flows(
     Returns
     -------
     list of DispersedFlow
-        Empty where `like` spreads in time by less than a sample, and where the record has a free
-        response, which a flow has no poles for. A short flow before a long lag and a long flow
-        alone are often equally good: both are told.
+        None of them spreads by less than half the lag behind it, where a second lag would do as
+        well. A short flow before a long lag and a long flow alone are often equally good: both are
+        told. Empty where `like` spreads in time by less than a sample, and where the record has a
+        free response, which a flow has no poles for.
     """
     if problem.stretches is not None or not isinstance(problem.drive, MoveTrain):
         return []
@@ -155,7 +151,7 @@ def fit_flows(
     if flows and flows[0].excess - penalty <= PLAUSIBLE:
         plain = _FlowFit(problem, problem.drive, scales, False)
         flows += _followed(plain, target, variance, penalty, level)
-    return flows
+    return [flow for flow in flows if flow.spread * flow.mean >= _MINOR * flow.lag]
 
 
 def _followed(

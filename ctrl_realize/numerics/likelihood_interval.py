@@ -150,7 +150,7 @@ def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> _Choice:
 def _with_flow(whole: WindowFit, lags: _Choice, flows: Sequence[DispersedFlow]) -> _Choice:
     """Take the delay of a flow that fits clearly better, if lags behind it can follow it."""
     flow = min(flows, key=lambda flow: flow.criterion, default=None)
-    if flow is None or not flow.leads or flow.criterion >= lags.level:
+    if flow is None or flow.criterion >= lags.level:
         return lags
     limit = flow.cost + PLAUSIBLE * whole.variance
     pinned = replace(whole.scales, earliest=flow.delay, latest=flow.delay)
