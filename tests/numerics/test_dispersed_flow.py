@@ -119,10 +119,16 @@ def test_bins_change_nothing_that_noise_would_not():
 
 
 def test_what_cannot_come_near_is_given_up_after_one_start():
-    problem, scales, like = flow_problem()
+    problem, scales, like = flow_problem(lag=0.03)
     flows = fit_flows(problem, like, scales, 1e-6, 7.0, -1e9)
     assert len(flows) == 1
     assert flows[0].excess > 1e8
+
+
+def test_a_flow_that_is_little_beside_its_lag_is_left_to_a_second_lag():
+    problem, scales, like = flow_problem(lag=0.3)
+    flows = fit_flows(problem, like, scales, 1e-6, 7.0, np.inf)
+    assert all(flow.lag == 0 and flow.cost > 5 * 1e-6 * problem.data.size for flow in flows)
 
 
 def test_what_does_not_spread_in_time_is_no_flow():
