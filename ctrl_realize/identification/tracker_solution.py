@@ -92,7 +92,8 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
     # Never below what sums of squares can resolve in double precision.
     noise = max(variance * inflation, 1e-14 * found.power, 1e-300)
     interval = _interval(found.misfit - found.misfit[best], noise, bank.low)
-    std = np.sqrt(noise * np.diag(found.inverse[best]))
+    # root by root: the product overflows for an output 1e200 times as large as the input
+    std = np.sqrt(noise) * np.sqrt(np.diag(found.inverse[best]))
     gain, gain_std = float(theta[0]), float(std[0])
     moves = _relative(theta)
     speeds = [i for i, (what, _, _) in enumerate(now.directions) if what == "speed"]

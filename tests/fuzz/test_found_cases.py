@@ -356,3 +356,12 @@ def test_one_point_that_weighs_more_than_all_others_gives_a_finite_pulse_respons
     with good_end() as pulses:
         pulses.append(cr.impulse_from_frf(cr.MeasuredFRF(g, f), 1.0, 53, weighting="relative"))
     assert np.isfinite(pulses[0].markov).all()
+
+
+def test_an_output_1e200_times_as_large_as_the_input_is_followed_without_overflow():
+    tracker = cr.DelayTracker(PLANT, max_delay=10, memory=10.0)
+    with good_end() as told:
+        for k in range(40):
+            tracker.update(2e-144 if k == 5 else 0.0, 1e58 * np.sin(k))
+        told.append(tracker.estimate())
+    assert not np.isnan(told[0].gain_std)
