@@ -242,4 +242,5 @@ def main() -> None:
         arguments.output.write_text(text, encoding="utf-8")
 
 
-main()
+if __name__ == "__main__":
+    main()
