@@ -56,9 +56,5 @@ class DataWarning(CtrlRealizeWarning):
     """The data were usable only in part."""
 
 
-class DelayWarning(CtrlRealizeWarning):
-    """The delay is less certain than it looks."""
-
-
 class ModelWarning(CtrlRealizeWarning):
     """The model has a property that one should know before using it."""

@@ -22,7 +22,7 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "ctrl_realize.identification.from_step",
             "ctrl_realize.identification.from_io",
             "ctrl_realize.identification.impulse_estimate",
-            "ctrl_realize.identification.from_frf",
+            "ctrl_realize.frequency.from_frf",
         ),
     ),
     "identification": (
