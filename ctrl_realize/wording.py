@@ -123,3 +123,15 @@ def in_percent(fits: Iterable[float]) -> str:
     """
     constant = "undefined: the output is constant"
     return ", ".join(f"{fit:.2f} %" if np.isfinite(fit) else constant for fit in fits)
+
+
+def named(kind: str, name: str) -> str:
+    """Call a thing by its name, if it has one.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import named
+    >>> named("record", "valve_16mA"), named("record", "")
+    ("record 'valve_16mA'", 'the record')
+    """
+    return f"{kind} {name!r}" if name else f"the {kind}"

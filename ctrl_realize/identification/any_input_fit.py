@@ -18,6 +18,7 @@ from ..numerics.sampled_fit import OwnDelay, SampledFit, fit_sampled
 from ..numerics.step_problem import bare_data
 from ..results import Flag
 from ..signals import Record
+from ..wording import named
 from .averaging import common_sample_time, compared, delay_outliers, widened
 from .delay_fit_result import DelayFit, Repeatability
 from .fit_flags import repeat_flags, sampled_flags
@@ -83,7 +84,7 @@ def _check_moves(record: Record) -> None:
         moves = float(np.ptp(values[:MOST_SAMPLES]))
         if moves < LEAST_MOVE:
             raise DataError(
-                f"the {name} of record {record.name!r} moves by {moves:.3g} in its first "
+                f"the {name} of {named('record', record.name)} moves by {moves:.3g} in its first "
                 f"{MOST_SAMPLES} samples: there is nothing to fit"
             )
 
@@ -91,7 +92,7 @@ def _check_moves(record: Record) -> None:
 def _named(records: tuple[Record, ...]) -> str:
     if len(records) > 1:
         return f"{len(records)} records"
-    return f"record {records[0].name!r}"
+    return named("record", records[0].name)
 
 
 def _repeatability(

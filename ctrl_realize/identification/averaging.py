@@ -12,6 +12,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import correlation_time, mad_sigma
 from ..numerics.output_error_result import OutputErrorFit
 from ..signals import Record, StepResponse
+from ..wording import named
 from .delay_fit_result import Repeatability
 from .steps import unit_step
 
@@ -63,8 +64,8 @@ def common_sample_time(records: tuple[Record, ...]) -> float:
     for record in records:
         if abs(record.dt - first) > 1e-6 * first:
             raise DataError(
-                f"record {record.name!r} has dt={record.dt:g} s, the first has {first:g} s; "
-                "records that are fitted together need one sample time"
+                f"{named('record', record.name)} has dt={record.dt:g} s, the first has "
+                f"{first:g} s; records that are fitted together need one sample time"
             )
     return first
 

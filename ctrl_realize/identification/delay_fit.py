@@ -19,6 +19,7 @@ from ..numerics.separable_fit import KnownFactor, Structure
 from ..numerics.step_problem import StepData, own_regressors, step_data
 from ..signals import Record, StepEdge
 from ..signals.given import as_records, check_complete
+from ..wording import named
 from .any_input_fit import LEAST_MOVE, fit_any_input
 from .averaging import aligned_steps, delay_outliers, mean_step, repeatability, widened
 from .delay_fit_result import DelayFit
@@ -195,19 +196,19 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
         check_complete(record, "fit_delay")
         if record.n_samples < FEWEST_SAMPLES:
             raise DataError(
-                f"record {record.name!r} has {record.n_samples} samples; a fit of delay, gain and "
-                f"lags needs at least {FEWEST_SAMPLES}"
+                f"{named('record', record.name)} has {record.n_samples} samples; a fit of delay, "
+                f"gain and lags needs at least {FEWEST_SAMPLES}"
             )
         moves = float(np.ptp(record.output))
         if moves < LEAST_MOVE:
             raise DataError(
-                f"the output of record {record.name!r} does not leave its rest level: it moves by "
-                f"{moves:.3g} in all"
+                f"the output of {named('record', record.name)} does not leave its rest level: it "
+                f"moves by {moves:.3g} in all"
             )
         if not record.issiso:
             raise DataError(
-                f"record {record.name!r} has {record.n_inputs} inputs and {record.n_outputs} "
-                "outputs; choose one of each when it is made"
+                f"{named('record', record.name)} has {record.n_inputs} inputs and "
+                f"{record.n_outputs} outputs; choose one of each when it is made"
             )
     return several
 
@@ -240,8 +241,8 @@ def _step_data(record: Record) -> StepData | None:
     data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edges])
     if data.motion is None:
         raise DataError(
-            f"the output of record {record.name!r} does not leave its rest level by 5 sigma "
-            f"({5 * data.sigma:.3g}) for long after the step at {edges[0].time:.6g} s"
+            f"the output of {named('record', record.name)} does not leave its rest level by "
+            f"5 sigma ({5 * data.sigma:.3g}) for long after the step at {edges[0].time:.6g} s"
         )
     if len(edges) > 1 and edges[1].index - edges[0].index < _DWELL * data.motion.crossing:
         return None

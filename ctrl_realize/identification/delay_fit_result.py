@@ -53,6 +53,10 @@ class DelayFit(Result):
         Delay at zero frequency in s; integrators are left out.
     order, relative_degree : int
         Of the model that was chosen.
+    poles, zeros : ndarray of complex
+        Of the continuous model, in rad/s.
+    gain : float
+        Of the model at zero frequency; of one with an integrator, the slope per second.
     at_noise_level : bool
         The residual is as small as the noise before the step.
     misfit : float
@@ -72,6 +76,8 @@ class DelayFit(Result):
         The record that was fitted (the mean, for several) and the model's response to it.
     records : tuple of Record
         What was given.
+    repeatability : Repeatability or None
+        Delay of every record by itself, where there are several.
     dt : float
         Sample time in s.
     choices : tuple of str

@@ -14,6 +14,7 @@ from ..numerics.rest import rest_line
 from ..numerics.time_axis import EXTREME
 from ..signals import Record, StepEdge, StepResponse
 from ..signals.given import as_record, check_complete
+from ..wording import named
 
 
 def detect_step(
@@ -174,7 +175,7 @@ def _labels(record: Record, what: str) -> tuple[str, ...]:
 
 
 def _of(record: Record) -> str:
-    return f"of record {record.name!r}" if record.name else "of the record"
+    return f"of {named('record', record.name)}"
 
 
 def _to_step_edge(edge: Edge, record: Record) -> StepEdge:
