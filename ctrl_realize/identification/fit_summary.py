@@ -11,6 +11,7 @@ from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from ..signals import Record
+from ..wording import interval_in_time
 from .delay_fit_result import DelayFit, StructureRow
 from .fit_flags import INTEGRATOR
 
@@ -99,13 +100,7 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
     if fit.views:
         reasons.append("dead time: median of five views, as no model leaves only noise")
     else:
-        count = sum(line.low == line.low for line in fit.structures)
-        kinds = [
-            f"{n} {name}(s)" for n, name in ((count, "structure"), (len(fit.flows), "flow")) if n
-        ]
-        reasons.append(
-            f"interval: profile likelihood of {' and '.join(kinds)} that the data cannot rule out"
-        )
+        reasons.append(_interval_of(fit))
     if fit.open_start:
         reasons.append(
             "interval widened by the first motion: a zero leaves open how the response begins"
@@ -113,3 +108,17 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
     if fit.correlation > 1:
         reasons.append(f"the residual is correlated: {fit.correlation:.3g} samples count as one")
     return tuple(reasons)
+
+
+def _interval_of(fit: OutputErrorFit) -> str:
+    """Say what the interval is made of: structures of the table, and what reaches beyond them."""
+    ends = [(line.low, line.high) for line in fit.structures if line.low == line.low]
+    text = f"interval: profile likelihood of {len(ends)} structure(s) that the data cannot rule out"
+    low = min((end[0] for end in ends), default=np.inf)
+    high = max((end[1] for end in ends), default=-np.inf)
+    beyond = [
+        f"{name} ({interval_in_time(first, last)})"
+        for name, first, last in fit.beside
+        if first < low or last > high
+    ]
+    return f"{text}, and of {', '.join(beyond)}" if beyond else text

@@ -110,8 +110,12 @@ def likelihood_fit(
         profiles[chosen.structure] = own
     else:
         own = profiles[chosen.structure]
-    limits = [profile_limits(*profile) for profile in (*profiles.values(), *of_flows)]
-    limits += [chain_limits(chain, whole.scales) for chain in kept]
+    limits = [profile_limits(*profile) for profile in profiles.values()]
+    beside = [
+        *(("a flow that disperses", *profile_limits(*profile)) for profile in of_flows),
+        *((chain.name, *chain_limits(chain, whole.scales)) for chain in kept),
+    ]
+    limits += [(first, last) for _, first, last in beside]
     low = min(chosen.delay, *(ends[0] for ends in limits))
     high = max(chosen.delay, *(ends[1] for ends in limits))
     if endless := still_improving(tanks):
@@ -128,7 +132,8 @@ def likelihood_fit(
     found = assembled(whole, chosen, adequate, (), profiles, interval, own)
     return replace(
         found,
-        chain=f"chain of {chosen.structure.order} nearly equal lags" if choice.chain else "",
+        chain=choice.chain.name if choice.chain else "",
+        beside=tuple(beside),
         endless=endless,
         like_flow=like_flow,
         open_start=open_start,

@@ -47,7 +47,8 @@ class OutputErrorFit:
     a flow that disperses; `open_start`: how smoothly the response begins is open; `relaxing`: the
     plant was moving before the step, and its free response was fitted along. `flows` that disperse
     are not ruled out; with `follows_flow` the delay is that of the best of them, and the lags
-    behind it follow it. `std` is that of the chosen structure.
+    behind it follow it. `beside` names what is not in the table of structures and not ruled out,
+    with its interval. `std` is that of the chosen structure.
     """
 
     delay: float
@@ -72,6 +73,7 @@ class OutputErrorFit:
     open_start: bool = False
     relaxing: bool = False
     flows: tuple[DispersedFlow, ...] = ()
+    beside: tuple[tuple[str, float, float], ...] = ()
     follows_flow: bool = False
 
 

@@ -151,3 +151,9 @@ def test_structures_that_are_given_are_believed():
     fit = cr.fit_delay(dispersion_record(0.005, mean=0.08), structures=[(3, 2)]).fit
     assert "onset_open" not in {flag.code for flag in fit.flags}
     assert fit.interval[1] - fit.interval[0] < 5 * TS
+
+
+def test_the_report_names_what_the_interval_reaches_to_beyond_the_table():
+    fit = cr.fit_delay(diffusion_record(0.001)).fit
+    assert min(row.interval[0] for row in fit.structures if row.interval) > fit.interval[0]
+    assert "modes of diffusion" in fit.report()
