@@ -113,12 +113,12 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
 def _interval_of(fit: OutputErrorFit) -> str:
     """Say what the interval is made of: structures of the table, and what reaches beyond them."""
     ends = [(line.low, line.high) for line in fit.structures if line.low == line.low]
-    text = f"interval: profile likelihood of {len(ends)} structure(s) that the data cannot rule out"
+    parts = [f"{len(ends)} structure(s)"] if ends else []
     low = min((end[0] for end in ends), default=np.inf)
     high = max((end[1] for end in ends), default=-np.inf)
-    beyond = [
+    parts += [
         f"{name} ({interval_in_time(first, last)})"
         for name, first, last in fit.beside
         if first < low or last > high
     ]
-    return f"{text}, and of {', '.join(beyond)}" if beyond else text
+    return f"interval: profile likelihood of {', '.join(parts)} that the data cannot rule out"
