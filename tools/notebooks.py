@@ -43,6 +43,10 @@ def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
         for output in cell.outputs:
             if output.output_type == "stream" and output.name == "stderr":
                 raise SystemExit(f"cell {number} wrote to stderr: {output.text[:500]}")
+            if output.output_type == "stream" and kept and kept[-1].output_type == "stream":
+                # What is printed arrives in pieces, as the machine has time.
+                kept[-1].text += output.text
+                continue
             if output.output_type in ("display_data", "execute_result"):
                 output.metadata = {}
                 if "image/png" in output.data:
