@@ -37,8 +37,7 @@ def _repair(math: ElementTree.Element) -> None:
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
-    # The joiner keeps a full stop behind the formula from beginning a line.
-    translator.body.append(_markup(node.astext(), block=False) + "\u2060")
+    translator.body.append(_markup(node.astext(), block=False))
     raise nodes.SkipNode
 
 
@@ -50,6 +49,21 @@ def _block(translator: Any, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+def keep_stops(app: Any, doctree: nodes.document, docname: str) -> None:
+    """Hold a formula and the full stop or comma behind it together."""
+    for formula in list(doctree.findall(nodes.math)):
+        place = formula.parent.index(formula)
+        behind = formula.parent[place + 1 : place + 2]
+        if not behind or not isinstance(behind[0], nodes.Text) or behind[0][:1] not in ".,;:)":
+            continue
+        text = behind[0].astext()
+        formula.parent.replace(behind[0], nodes.Text(text[1:]))
+        held = nodes.inline("", "", classes=["whole"])
+        formula.parent.replace(formula, held)
+        held += [formula, nodes.Text(text[0])]
+
+
 def setup(app: Any) -> dict[str, bool]:
+    app.connect("doctree-resolved", keep_stops)
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
