@@ -42,6 +42,28 @@ def in_time(seconds: float, digits: int = 3) -> str:
     return f"{_plainly(seconds * factor, digits)} {name}"
 
 
+def poles_in_words(poles: Iterable[complex]) -> str:
+    """Write poles in rad/s as an engineer reads them: lags, pairs, integrators.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import poles_in_words
+    >>> poles_in_words([-2.0, -20 + 99j, -20 - 99j, 0.0])
+    'lag 0.5 s, pair at 16.1 Hz (damping 0.2), integrator'
+    """
+    upper = [p for p in map(complex, poles) if p.imag >= 0]
+    return ", ".join(map(_pole_in_words, sorted(upper, key=lambda p: (p == 0, -p.real))))
+
+
+def _pole_in_words(pole: complex) -> str:
+    if pole == 0:
+        return "integrator"
+    size = abs(pole)
+    if pole.imag > 0:
+        return f"pair at {size / (2 * np.pi):.3g} Hz (damping {-pole.real / size:.2g})"
+    return f"{'lag' if pole.real < 0 else 'growing in'} {in_time(1 / size)}"
+
+
 def interval_in_time(low: float, high: float) -> str:
     """Write an interval of times in one unit, with digits that show its width.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
 from ..signals import Record
-from ..wording import in_time, interval_digits, interval_in_time
+from ..wording import in_time, interval_digits, interval_in_time, poles_in_words
 
 
 @dataclass(frozen=True)
@@ -171,6 +171,7 @@ class DelayFit(Result):
             *([("first motion", in_time(self.onset, 4))] if self.onset == self.onset else []),
             ("total delay", f"{in_time(self.total_delay, 5)} (dead time and lags: firm)"),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
+            ("poles", poles_in_words(self.poles)),
             ("gain", f"{self.gain:.6g}"),
             ("residual", f"{self.residual:.3g}, noise {self.noise:.3g} (misfit {self.misfit:.3g})"),
         ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numerics.arrays import FloatArray
 from ..numerics.likelihood_interval import flow_lead
 from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.profile_interval import profile_limits
@@ -14,6 +15,7 @@ from ..wording import in_time, interval_in_time
 from .delay_fit_result import Repeatability
 
 _SAMPLES_BESIDE_NOTHING = 0.5
+_BEYOND = 20.0  # ranges: no overshoot goes as far
 _FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
 
 
@@ -284,8 +286,26 @@ def _disturbances(data: StepData, fit: OutputErrorFit) -> list[Flag | None]:
         )
     error = data.output - fit.fitted
     wild = float(np.mean(np.abs(error) > 5 * max(fit.residual, data.sigma)))
-    if fit.adequate and wild > 0.002:
+    code = _code(data.output)
+    if code:
+        flags.append(Flag("outliers", code))
+    elif fit.adequate and wild > 0.002:
         flags.append(
             Flag("outliers", f"{100 * wild:.2g} % of the samples lie 5 sigma or more off the model")
         )
     return flags
+
+
+def _code(output: FloatArray) -> str:
+    """Name one value far beyond all others that a few samples have, as loggers write for none."""
+    low, high = np.percentile(output, [1, 99])
+    far = np.flatnonzero(
+        (output < low - _BEYOND * (high - low)) | (output > high + _BEYOND * (high - low))
+    )
+    if not far.size or high == low or np.ptp(output[far]) > 0:
+        return ""
+    return (
+        f"{far.size} sample(s), the first at index {far[0]}, are {output[far[0]]:g}, "
+        f"{_BEYOND:g} times the range of the others or more beyond them: if that stands for a "
+        "missing value, interpolate there before the fit, which they spoil"
+    )

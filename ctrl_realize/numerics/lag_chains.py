@@ -150,9 +150,13 @@ def still_improving(chains: Sequence[LagChain]) -> bool:
 def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArray]:
     """Misfit over the delay, as `delay_profile`; with so few parameters it is a parabola."""
     delay = chain.candidate.delay
-    grid = np.clip(delay + chain.error * np.linspace(-3, 3, 13), scales.earliest, scales.latest)
+    # An error may be nothing or infinite where no sample shows anything of the delay.
+    error = float(
+        np.clip(chain.error, 1e-9 * scales.dt, scales.latest - scales.earliest + scales.dt)
+    )
+    grid = np.clip(delay + error * np.linspace(-3, 3, 13), scales.earliest, scales.latest)
     grid = np.unique(np.append(grid, delay))
-    return grid, ((grid - delay) / chain.error) ** 2
+    return grid, ((grid - delay) / error) ** 2
 
 
 def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
@@ -236,6 +240,8 @@ def _error(
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
     jacobian = _evaluate(problem, candidate.structure, law, x)[2]
     size = np.sqrt((jacobian**2).sum(axis=0))
+    if size[0] == 0:
+        return float("inf")
     size[size == 0] = 1.0
     on_delay = np.linalg.pinv(jacobian / size)[0] / size[0]
     uneven = law.rates(order, x[2]) * np.exp(_SMALL * np.eye(order) - x[1])

@@ -414,3 +414,33 @@ def test_an_output_at_rest_is_refused():
         cr.fit_delay(cr.Record(record.time, np.ones(600), record.output))
     with pytest.raises(cr.errors.DataError, match="no records"):
         cr.fit_delay([])
+
+
+def test_a_code_for_missing_samples_is_told_by_its_value():
+    record = rigs.step_record(noise=0.005)
+    y = record.output.copy()
+    y[[700, 2300]] = -9999.0
+    fit = cr.fit_delay(cr.Record(record.time, record.input, y)).fit
+    message = next(str(flag) for flag in fit.flags if flag.code == "outliers")
+    assert "2 sample(s), the first at index 700, are -9999" in message
+    # One wild sample of each kind is no code.
+    y[2300] = 8888.0
+    fit = cr.fit_delay(cr.Record(record.time, record.input, y)).fit
+    assert not any("missing value" in str(flag) for flag in fit.flags)
+
+
+def test_the_report_lists_time_constants():
+    fit = cr.fit_delay(rigs.step_record(rigs.R1, noise=0.001)).fit
+    lag = 1 / abs(fit.poles[0])
+    assert f"lag {1e3 * lag:.3g} ms" in fit.report()
+
+
+@pytest.mark.parametrize(
+    ("n", "edge", "spikes"), [(25, 12, {0: -4.94e-324, 3: -653.0}), (30, 26, {6: -8.6, 29: -3.2})]
+)
+def test_a_chain_of_lags_that_no_sample_shows_is_no_division_by_zero(n, edge, spikes):
+    k = np.arange(n)
+    y = np.where((k > 14) & (edge == 12), -3.2 * (k - 14), 0.0)
+    y[list(spikes)] = list(spikes.values())
+    fit = cr.fit_delay(cr.Record(1e-6 * k, np.where(k < edge, 0.0, -16.0), y)).fit
+    assert 0 <= fit.interval[0] <= fit.delay * fit.dt <= fit.interval[1]
