@@ -30,8 +30,8 @@ RAISED_BY = {
 """File of the source -> public function whose results carry the flag."""
 
 COMPOSED = {
-    "outliers": "… sample(s), the first at index …, are …, far beyond the others: if that stands for a "
-    "missing value, interpolate there before the fit, which they spoil",
+    "outliers": "… sample(s), the first at index …, are …, far beyond the others: if that stands "
+    "for a missing value, interpolate there before the fit, which they spoil",
     "outlying_records": "left out of the mean: …",
     "structured_misfit": "no model leaves only noise: the plant is not linear or has more dynamics "
     "than the model; the dead time is the median of several views and the interval spans them",
