@@ -28,7 +28,9 @@ def wilson(hits: float, runs: int, z: float = 1.96) -> tuple[float, float]:
     centre = rate + z**2 / (2 * runs)
     half = z * np.sqrt(rate * (1 - rate) / runs + z**2 / (4 * runs**2))
     scale = 1 + z**2 / runs
-    return max(float((centre - half) / scale), 0.0), min(float((centre + half) / scale), 1.0)
+    low, high = float((centre - half) / scale), float((centre + half) / scale)
+    # Of none and of all the end is exact; rounding makes it 1e-16.
+    return max(low, 0.0) if hits else 0.0, min(high, 1.0) if hits < runs else 1.0
 
 
 def rate(hits: float, runs: int) -> str:
