@@ -116,6 +116,9 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
             f"{self.line_length} samples, dt = {self.dt:.6g} s>"
         )
 
+    def __str__(self) -> str:
+        return repr(self)
+
     def _repr_html_(self) -> str:
         largest = float(np.abs(self.inner_poles).max(initial=0.0))
         rows = [

@@ -151,6 +151,10 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         words.append(f"dt = {self.dt:.4g} s" if self.dt else "continuous")
         return f"<PIDController {self.name!r}: {', '.join(words)}>"
 
+    def __str__(self) -> str:
+        # python-control's shows matrices, in which nobody finds the parameters again.
+        return f"{self!r}\n\n{super().__str__()}"
+
     def _repr_html_(self) -> str:
         rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]
         if "I" in self.kind:

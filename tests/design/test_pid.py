@@ -223,3 +223,9 @@ def test_a_controller_shows_its_parameters_with_units():
     assert "integral time ti" in card
     assert "100 ms, tustin rule" in card
     assert "none: continuous" in cr.design.PIDController(0.5, 0.2)._repr_html_()
+
+
+def test_a_controller_is_printed_with_its_parameters():
+    controller = cr.design.PIDController(0.5, 0.2, dt=0.01)
+    assert "kp = 0.5, ti = 0.2 s" in str(controller)
+    assert "A = " in str(controller)

@@ -204,7 +204,8 @@ def test_a_predictor_of_a_long_line_shows_in_a_few_words():
     plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), 300, dt=1e-3)
     predictor = cr.design.smith_predictor(plant, cr.design.pid(plant))
     assert (
-        repr(predictor)
+        str(predictor)
+        == repr(predictor)
         == "<DelayLineController 'smith': order 2, line of 300 samples, dt = 0.001 s>"
     )
     card = predictor._repr_html_()
