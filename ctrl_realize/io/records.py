@@ -167,7 +167,10 @@ def read_record(
     except TimeAxisError as error:
         row = re.search(r"row (\d+)", str(error))
         place = f" ({table.place(int(row[1]))})" if row else ""
-        raise TimeAxisError(f"{table.path}{place}: {error}") from error
+        # many stamps twice over: samples that came faster than their clock ticks
+        coarse = np.mean(np.diff(stamps) == 0) > 0.2
+        advice = "; the clock is coarser than the samples, dt= takes its place" if coarse else ""
+        raise TimeAxisError(f"{table.path}{place}: {error}{advice}") from error
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from error
 

@@ -122,6 +122,8 @@ class Table:
             if not pattern.fullmatch(text):
                 what = "a value is missing" if missing else "is not a number"
                 advice = "; decimal=',' or '.' may help" if "," in text or "." in text else ""
+                if "," in text and "." in text:
+                    advice = "; write it without a separator of thousands"
                 if missing:
                     advice = "; missing='keep' keeps a gap in a record"
                 raise DataError(

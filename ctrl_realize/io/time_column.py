@@ -15,6 +15,9 @@ from .units import checked_time_unit, to_seconds
 
 # from here on neighbouring integers are one double
 _EXACT_INTEGERS = 2**53
+# in s since 1970; a clock of seconds needs no check, for it is taken for what it is
+_YEAR_1990, _YEAR_2100 = 6.3e8, 4.1e9
+_TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None) -> FloatArray:
@@ -42,11 +45,27 @@ def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None
         return _from_stamps(table, index, cells)
     if time_format is not None or not holds_numbers(table, index):
         return _from_stamps(table, index, _parsed_dates(table, index, time_format))
+    if unit == "auto" and not table.columns[index].unit:
+        _check_epoch(table, index, cells)
     unit = checked_time_unit((table.columns[index].unit or "s") if unit == "auto" else unit)
     if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
         # nanoseconds since 1970 do not fit into a double, their differences do
         return to_seconds((cells - cells[0]).astype(np.float64), unit)
     return to_seconds(table.numbers(index), unit)
+
+
+def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
+    """Refuse a clock of ms or finer since 1970 that would be taken for one of seconds."""
+    try:
+        first = float(cells[0])
+    except (ValueError, TypeError, OverflowError):
+        return  # told with its line, when the whole column is read
+    units = [unit for unit, ticks in _TICKS.items() if _YEAR_1990 <= first / ticks < _YEAR_2100]
+    if units:
+        raise OptionError(
+            f"{table.path}: {table.title(index)} begins at {first:.6g}, which looks like a clock "
+            f"of {units[0]} since 1970; say time_unit={units[0]!r}, or time_unit='s' if it is not"
+        )
 
 
 def _from_stamps(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> FloatArray:

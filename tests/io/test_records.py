@@ -407,3 +407,32 @@ def test_every_double_comes_back_to_the_last_bit(tmp_path_factory, rows, delimit
     record = cr.read_record(file, dt=1.0)
     assert_array_equal(record.input, [u for u, _ in rows])
     assert_array_equal(record.output, [y for _, y in rows])
+
+
+@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_a_clock_of_ticks_since_1970_is_not_taken_for_seconds(tmp_path, unit, ticks):
+    file = tmp_path / "logger.csv"
+    start = int(1.77e9 * ticks)  # in the year 2026
+    rows = [f"{start + int(k * ticks / 10)},0,{k}" for k in range(5)]
+    file.write_text("time,u,y\n" + "\n".join(rows) + "\n")
+    with pytest.raises(OptionError, match=rf"clock of {unit} since 1970; say time_unit='{unit}'"):
+        read_record(file)
+    assert read_record(file, time_unit=unit).dt == pytest.approx(0.1)
+    assert read_record(file, time_unit="s").dt == pytest.approx(0.1 * ticks)
+    file.write_text(f"time_{unit},u,y\n" + "\n".join(rows) + "\n")
+    assert read_record(file).dt == pytest.approx(0.1)
+
+
+def test_a_clock_coarser_than_the_samples_is_told(tmp_path):
+    file = tmp_path / "logger.csv"
+    file.write_text("time,u,y\n" + "".join(f"{k // 10},0,{k}\n" for k in range(40)))
+    with pytest.raises(TimeAxisError, match="coarser than the samples, dt= takes its place"):
+        read_record(file)
+    assert read_record(file, dt=0.1).n_samples == 40
+
+
+def test_a_separator_of_thousands_is_told(tmp_path):
+    file = tmp_path / "big.csv"
+    file.write_text("Zeit;u;y\n" + "".join(f"{k},0;0,5;1.12{k},5\n" for k in range(5)))
+    with pytest.raises(DataError, match="without a separator of thousands"):
+        read_record(file)
