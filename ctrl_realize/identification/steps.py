@@ -66,6 +66,12 @@ def detect_step(
     if not 0 < share < 1:
         raise OptionError(f"min_share={share:g}; needed is above 0 and below 1")
     found = find_edges(signal, spikes, share)
+    if not found and np.ptp(signal) == 0:
+        raise NoStepError(
+            f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the record "
+            "begins with its step, put samples of the rest before it in front; if not, check which "
+            "column is the input"
+        )
     if not found:
         raise NoStepError(
             f"no step in the input {_of(record)}: it runs from {signal.min():.6g} to "

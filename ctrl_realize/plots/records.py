@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -194,9 +194,16 @@ def _signals(
 
 
 def _steps(given: Any) -> list[StepResponse]:
-    items = [given] if isinstance(given, Record | StepResponse) else list(given)
+    several = isinstance(given, Iterable) and not isinstance(given, ct.InputOutputSystem)
+    items = list(given) if several else [given]
     if not items:
         raise DataError("no step responses to draw")
+    for item in items:
+        if not isinstance(item, Record | StepResponse):
+            raise DataError(
+                f"got a {type(item).__name__}; needed is a Record or StepResponse first, and after "
+                "it the model"
+            )
     return [unit_step(item) if isinstance(item, Record) else item for item in items]
 
 

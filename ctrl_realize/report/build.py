@@ -10,9 +10,11 @@ from typing import Any
 import control as ct
 
 from ..delayed import DelayedStateSpace
+from ..errors import UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..signals import Record
+from ..signals.given import as_record
 from .page import Page, Table, pairs, write_page
 from .provenance import own_version, versions
 from .sketches import (
@@ -79,6 +81,8 @@ def write_identification(
 
     Raises
     ------
+    UnsuitableSystemError, DataError
+        `system` is no model with dead time, or `record` is no record.
     OSError
         The folder is missing or cannot be written.
 
@@ -97,6 +101,12 @@ def write_identification(
     ...     print(written.read_text(encoding="utf-8").count("<svg "), "figures")
     7 figures
     """
+    as_record(record)
+    if not isinstance(system, DelayedStateSpace):
+        raise UnsuitableSystemError(
+            f"system is a {type(system).__name__}; needed is a model with dead time, as identify "
+            "gives it, and after it its record"
+        )
     return _write(
         path,
         title=f"Model of {record.name}" if record.name else "Identified model",

@@ -18,7 +18,8 @@ def as_record(given: Any) -> Record:
     """
     if not isinstance(given, Record):
         raise DataError(
-            f"got a {type(given).__name__}; needed is a Record, such as Record(time, input, output)"
+            f"got a {type(given).__name__}; needed is a Record, such as "
+            "Record(time, input, output) or read_record(path)"
         )
     return given
 
@@ -36,6 +37,9 @@ def as_records(given: Any) -> tuple[Record, ...]:
     several = tuple(given) if isinstance(given, Iterable) else (given,)
     if not several:
         raise DataError("no records; needed is at least one Record")
+    if not isinstance(given, list | tuple) and not isinstance(several[0], Record):
+        # Text, an array or a table is named as what it is, not as its letters, rows or columns.
+        return (as_record(given),)
     return tuple(map(as_record, several))
 
 

@@ -6,6 +6,7 @@ import pickle
 
 import control as ct
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -153,3 +154,14 @@ def test_records_of_several_channels_go_to_their_own_fit():
         cr.identify(record, max_delay=9)
     with pytest.raises(DataError):
         cr.identify(record, method="scan")
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["step.csv", np.zeros(50), pd.DataFrame({"u": np.zeros(50), "y": np.zeros(50)})],
+    ids=["text", "array", "table"],
+)
+def test_what_is_no_record_is_named_as_what_it_is(given):
+    name = type(given).__name__
+    with pytest.raises(DataError, match=rf"got a {name}; needed is a Record.*read_record\(path\)"):
+        cr.identify(given)

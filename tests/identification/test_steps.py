@@ -355,3 +355,9 @@ def test_measured_records_have_one_step_where_it_is(shared_data):
         edge = cr.detect_step(read_record(shared_data / name))
         assert (edge.index, len(edge.edges)) == (index, 1)
         assert_allclose(edge.amplitude, amplitude, atol=0.01)
+
+
+def test_a_record_that_begins_with_its_step_is_told_what_it_lacks():
+    late = 0.01 * np.arange(100)
+    with pytest.raises(NoStepError, match=r"it is 4 throughout.*samples of the rest before it"):
+        cr.detect_step(cr.Record(late, np.full(100, 4.0), late))

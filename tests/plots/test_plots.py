@@ -360,3 +360,8 @@ def test_a_model_without_a_name_of_its_own_is_called_model(measured):
     assert nameless.name.startswith("sys[")
     labels = [t.get_text() for t in plots.frf_plot([measured, nameless]).legend[0, 0].get_texts()]
     assert labels == [measured.name, "model"]
+
+
+def test_a_model_in_the_place_of_the_record_is_told(record, scanned):
+    with pytest.raises(DataError, match="got a DelayedStateSpace; needed is a Record"):
+        plots.step_plot(scanned, record)

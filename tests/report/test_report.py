@@ -13,6 +13,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize import report
+from ctrl_realize.errors import DataError, UnsuitableSystemError
 from ctrl_realize.report.provenance import file_sha256, record_sha256
 from ctrl_realize.report.sketches import identification_sketches
 from ctrl_realize.report.verdict import comparison_verdict, poles_of, verdict_of
@@ -292,3 +293,13 @@ def _pyproject():
     from pathlib import Path
 
     return (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+
+
+def test_arguments_in_another_order_are_told(tmp_path):
+    record = cr.bench.valve(rest=0.5, hold=1.0).step_record(16.0, rng=5)
+    system = cr.delayed_ss(ct.tf([1], [0.08, 1]), 5, dt=record.dt)
+    with pytest.raises(UnsuitableSystemError, match="system is a Record; needed is a model"):
+        report.write_identification(tmp_path / "a.html", record, record)
+    with pytest.raises(DataError, match="got a DelayedStateSpace; needed is a Record"):
+        report.write_identification(tmp_path / "a.html", system, system)
+    assert not list(tmp_path.iterdir())
