@@ -1,0 +1,215 @@
+"""Forms, reductions, design, names, figures: the answers of `StateSpace`, for any delay.
+
+What python-control refuses of its own class, for want of Slycot or of a controllable plant, it
+refuses of ours with the same error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+
+import control as ct
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from tests.host.pairs import CORES, DELAYS, DT, GRID, OTHER, assert_same, pair, quietly
+
+T = DT * np.arange(60)
+Z = np.exp(1j * GRID * DT)
+SLYCOT = ct.slycot_check()
+CVXOPT = ct.cvxopt_check()
+
+
+def form(made):
+    """A canonical form: the system, and the transformation where it is told."""
+    return [made[0].A, made[0].B, made[0].C, made[1]]
+
+
+def drawn(plot):
+    """The lines that a plot of python-control draws."""
+    plt.figure()
+    try:
+        plot()
+        figure = plt.gcf()
+        lines = [line for axes in figure.axes for line in axes.lines]
+        return [np.asarray(line.get_xydata(), dtype=float) for line in lines]
+    finally:
+        plt.close("all")
+
+
+def weights(s):
+    return np.eye(s.nstates), np.eye(s.ninputs)
+
+
+def renamed(s):
+    """Names given after the fact, on a copy."""
+    named = s.copy()
+    named.set_inputs([f"a{k}" for k in range(s.ninputs)])
+    named.set_outputs([f"b{k}" for k in range(s.noutputs)])
+    named.set_states([f"c{k}" for k in range(s.nstates)])
+    return [named.input_labels, named.output_labels, named.state_labels, named(np.exp(0.3j))]
+
+
+def updated(s):
+    named = s.copy()
+    named.update_names(name="other", inputs=[f"a{k}" for k in range(s.ninputs)])
+    return [named.name, named.input_labels, named.output_labels]
+
+
+def connections(system):
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        system.connection_table(show_names=True)
+    return [said.getvalue()]
+
+
+def regulator(s):
+    """A state feedback as python-control wires it up, and what it does in the loop."""
+    K = 0.01 * np.ones((s.ninputs, s.nstates))
+    measured = ct.ss(s.A, s.B, np.eye(s.nstates), 0, s.dt, inputs=s.input_labels, name="all")
+    controller, loop = ct.create_statefbk_iosystem(measured, K)
+    return [controller.input_labels, loop(np.exp(0.3j))]
+
+
+OPERATIONS = {
+    "reachable form": lambda s: form(ct.reachable_form(s)),
+    "observable form": lambda s: form(ct.observable_form(s)),
+    "modal form": lambda s: np.sort_complex(ct.modal_form(s)[0].poles()),
+    "canonical form": lambda s: form(ct.canonical_form(s, "reachable")),
+    "block diagonal": lambda s: np.sort(np.abs(np.linalg.eigvals(ct.bdschur(s.A)[0]))),
+    "observability": lambda s: ct.obsv(s.A, s.C),
+    "gramian": lambda s: ct.gram(s, "c"),
+    "factor of a gramian": lambda s: ct.gram(s, "of"),
+    "Hankel singular values": ct.hankel_singular_values,
+    "balanced reduction": lambda s: ct.balanced_reduction(s, 1),
+    "states removed": lambda s: ct.model_reduction(s, [0], warn_unstable=False),
+    "states kept": lambda s: ct.model_reduction(s, keep_states=[0], method="truncate"),
+    # what they do: of 78 states, each of which counts, python-control keeps 76
+    "minimal": lambda s: ct.minimal_realization(s)(Z),
+    "minimal, method": lambda s: s.minreal()(Z),
+    "sampled": lambda s: ct.sample_system(s, 0.1),
+    "sampled, method": lambda s: s.sample(0.1),
+    "c2d": lambda s: ct.c2d(s, 0.1),
+    "as a transfer function": ct.ss2tf,
+    "its numbers": ct.tfdata,
+    "split": lambda s: list(ct.split_tf(ct.tf(s)).ravel()),
+    "ss2io": lambda s: ct.ss2io(s) if hasattr(ct, "ss2io") else s,
+    "LQR": lambda s: ct.lqr(s, *weights(s)),
+    "discrete LQR": lambda s: ct.dlqr(s, *weights(s)),
+    "LQE": lambda s: ct.dlqe(s, np.eye(s.ninputs), np.eye(s.noutputs)),
+    # of two inputs and 78 states it does not end
+    "pole placement": lambda s: ct.place(
+        s.A, s.B[:, :1], 0.1 + 0.8 * np.arange(s.nstates) / s.nstates
+    ),
+    "Ackermann": lambda s: ct.place_acker(s.A, s.B, 0.1 * np.ones(s.nstates)),
+    "state feedback": regulator,
+    "estimator": lambda s: (
+        ct.create_estimator_iosystem(
+            s, np.eye(s.ninputs), np.eye(s.noutputs), name="seen"
+        ).state_labels
+    ),
+    "describing function": lambda s: (
+        ct.describing_function_response(
+            s, ct.saturation_nonlinearity(1.0), np.linspace(0.5, 4, 5), GRID, warn_nyquist=False
+        ).N_vals
+    ),
+    "margin": lambda s: ct.margin(0.3 * s),
+    "largest gain": lambda s: ct.linfnorm(s),
+    "norm, largest gain": lambda s: ct.system_norm(s, "inf"),
+    "root locus": lambda s: np.sort_complex(
+        ct.root_locus_map(s, gains=[0.0, 0.1]).loci.ravel().round(6)
+    ),
+    "passive": lambda s: bool(ct.ispassive(s)),
+    "passive, method": lambda s: s.ispassive(),
+    "H2 synthesis": lambda s: ct.h2syn(s, 1, 1),
+    "weights on a plant": lambda s: ct.augw(s, w1=ct.tf([1], [1, -0.5], DT)),
+    "common time base": lambda s: ct.common_timebase(s.dt, OTHER.dt),
+    "is a system": lambda s: [ct.issys(s), isinstance(s, ct.InputOutputSystem)],
+    "unwrapped phase": lambda s: ct.unwrap(np.angle(s(Z)).ravel()),
+    "names given later": renamed,
+    "names updated": updated,
+    "places of names": lambda s: [
+        s.find_inputs(s.input_labels[:1]),
+        s.find_outputs(s.output_labels[-1:]),
+        s.find_states(s.state_labels[:1]),
+        s.find_output("none"),
+        s.find_input("none"),
+    ],
+    "table of a response": lambda s: (
+        ct.step_response(s, T).to_pandas().select_dtypes("number").to_numpy()
+    ),
+    "responses put together": lambda s: (
+        ct.combine_time_responses([ct.step_response(s, T), ct.step_response(2 * s, T)]).outputs
+    ),
+    "connections": lambda s: connections(
+        ct.interconnect([s.copy(name="P")], inplist="P", outlist="P")
+    ),
+    "feedback, several": lambda s: ct.feedback(0.02 * s, np.ones((s.ninputs, s.noutputs)), sign=1),
+    "to a power": lambda s: s**3,
+    "inverse": lambda s: s**-1,
+    "divided by itself": lambda s: s / s,
+    "number over it": lambda s: 1 / s,
+    "as an array": lambda s: np.array([[1.0]]) + s,
+    "joined in parallel": lambda s: ct.parallel(s, s, -s),
+    "transposed response": lambda s: (
+        ct.forced_response(
+            s, T, np.ones((T.size, s.ninputs) if s.ninputs > 1 else T.size), transpose=True
+        ).outputs
+    ),
+    "eigenvalues": lambda s: np.sort_complex(np.linalg.eigvals(s.A)),
+    "bode plot": lambda s: drawn(lambda: ct.bode_plot(s, GRID)),
+    "step plot": lambda s: drawn(lambda: ct.step_response(s, T).plot()),
+    "singular value plot": lambda s: drawn(lambda: ct.singular_values_plot(s, GRID)),
+    "Nichols plot": lambda s: drawn(lambda: ct.nichols_plot(s, GRID)),
+    "Nyquist plot": lambda s: drawn(lambda: ct.nyquist_plot(0.05 * s, GRID)),
+}
+
+
+def outcome(operation, system):
+    """What an operation gives, or by which error it ends."""
+    try:
+        return quietly(operation, system)
+    except Exception as error:
+        return f"{type(error).__name__}"
+
+
+# Refused of every discrete StateSpace by python-control 0.10.2.
+NEVER = {
+    "sampled", "sampled, method", "c2d", "Hankel singular values", "states removed", "inverse",
+    "divided by itself", "number over it",
+}  # fmt: skip
+NEEDS_SLYCOT = {
+    "modal form", "block diagonal", "gramian", "factor of a gramian", "balanced reduction",
+    "minimal", "minimal, method", "largest gain", "H2 synthesis",
+}  # fmt: skip
+NEEDS_CVXOPT = {"passive", "passive, method"}
+NAMES = sorted(
+    set(OPERATIONS) - (set() if SLYCOT else NEEDS_SLYCOT) - (set() if CVXOPT else NEEDS_CVXOPT)
+)
+CASES = [
+    (name, core)
+    for name in NAMES
+    for core in CORES
+    # a picture of six channels takes a second, some of Slycot's routines minutes for 78 states
+    if not (name.endswith("plot") or name in NEEDS_SLYCOT) or core in ("siso", "direct")
+]
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize(("name", "core"), CASES)
+def test_the_outcome_is_that_of_state_space(name, core, delay):
+    ours, theirs = pair(core, delay)
+    # python-control searches margins to a millionth; all else is rounding
+    rtol = 1e-5 if name == "margin" else 1e-8
+    assert_same(outcome(OPERATIONS[name], ours), outcome(OPERATIONS[name], theirs), rtol=rtol)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_operation_gives_a_result_of_one_plant_at_least(name):
+    # two errors that agree compare nothing
+    _, theirs = pair("siso", 0)
+    _, direct = pair("direct", 1)
+    ends = [outcome(OPERATIONS[name], system) for system in (theirs, direct)]
+    assert any(not isinstance(end, str) for end in ends) == (name not in NEVER), ends
