@@ -65,19 +65,20 @@ def delay_plot(
     looks = {"color": style.MODEL, "label": f"order {result.order}", **kwargs}
     low, high = result.interval
     with style.canvas(ax, title=title, default_title=result.impulse.name) as (axes,):
+        lines = list(axes.plot(np.arange(result.iae.size), result.iae, **looks))
+        axes.plot(
+            [result.delay], [result.iae[result.delay]], "o", color=style.MODEL, markersize=8,
+            zorder=4, label=f"{result.delay} samples = {in_time(result.delay * result.dt)}",
+        )  # fmt: skip
         axes.axvspan(
             low - 0.5, high + 0.5, color=style.BAND, alpha=0.22, linewidth=0,
             label=f"within 5 %: {low}...{high}",
         )  # fmt: skip
-        lines = list(axes.plot(np.arange(result.iae.size), result.iae, **looks))
-        _mark_least(axes, result)
-        if result.impulse.filter is not None and result.impulse.filter.group_delay > 0:
-            note = f"the filter's delay of {result.impulse.filter.group_delay:.1f} samples is in it"
-            axes.text(
-                0.985, 0.08, note, transform=axes.transAxes, ha="right", va="top", fontsize=10
-            )
         _misfit_axes(axes)
-        return style.finished([axes], [lines], loc="upper center")
+        if result.impulse.filter is not None and result.impulse.filter.group_delay > 0:
+            inside = f", {result.impulse.filter.group_delay:.1f} of them the filter's"
+            axes.set_xlabel(axes.get_xlabel() + inside)
+        return style.finished([axes], [lines], loc="over")
 
 
 def singular_value_plot(
@@ -188,21 +189,6 @@ def _misfits_of_orders(axes: Axes, scan: OrderScan, asked: dict[str, Any]) -> li
     axes.legend(title="best delay", loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=10)
     _misfit_axes(axes)
     return lines
-
-
-def _mark_least(axes: Axes, result: DelayScan) -> None:
-    least = float(result.iae[result.delay])
-    axes.plot([result.delay], [least], "o", color=style.MODEL, markersize=8, zorder=4)
-    right = result.delay > 0.62 * result.max_delay
-    axes.annotate(
-        f"{result.delay} samples = {in_time(result.delay * result.dt)}",
-        (result.delay, least),
-        (-8 if right else 8, 10),
-        textcoords="offset points",
-        ha="right" if right else "left",
-        color=style.INK,
-        bbox={"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
-    )
 
 
 def _misfit_axes(axes: Axes) -> None:

@@ -181,8 +181,9 @@ def finished(
 ) -> ct.ControlPlot:
     """Put the legends on, and bundle everything as python-control's plots do.
 
-    The place `loc` is one of matplotlib's, or "above": outside, at the right, where curves that
-    go everywhere leave no place inside.
+    The place `loc` is one of matplotlib's, or one for curves that go everywhere and leave no
+    place inside: "above" is outside, at the right, and "over" is above the curves, in room that
+    the value axis gets for it, where a title needs the place outside.
     """
     for position in legends:
         if axes[position].get_legend_handles_labels()[1]:
@@ -206,5 +207,19 @@ def _objects(things: Sequence[Any]) -> np.ndarray[Any, np.dtype[np.object_]]:
 def _legend(axes: Axes, loc: Any) -> None:
     if loc == "above":
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    elif loc == "over":
+        _legend_over(axes)
     else:
         axes.legend(loc=loc)
+
+
+def _legend_over(axes: Axes) -> None:
+    """Put the legend above all that is drawn, in room that the value axis gets for it."""
+    count = len(axes.get_legend_handles_labels()[1])
+    assert axes.figure is not None
+    inches = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())
+    columns = count if inches.width > 1.9 * count else 1
+    share = (0.15 + 0.25 * count / columns) / inches.height
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, low + (high - low) / (1.0 - min(share, 0.6)))
+    axes.legend(loc="upper center", ncols=columns)

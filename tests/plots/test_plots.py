@@ -183,6 +183,21 @@ def test_the_delay_plot_shows_the_misfit_and_its_minimum(scanned):
     assert list(point.get_xdata()) == [scanned.fit.delay]
 
 
+@pytest.mark.parametrize("width", [8.0, 3.5])
+def test_the_legend_of_the_delay_plot_hides_no_part_of_its_curve(scanned, width):
+    figure = Figure(figsize=(width, 4.6), layout="constrained")
+    drawn = plots.delay_plot(scanned, ax=figure)
+    figure.draw_without_rendering()
+    legend = drawn.legend[0, 0]
+    assert legend is drawn.axes[0, 0].get_legend()
+    frame = legend.get_window_extent()
+    curve = drawn.lines[0, 0][0]
+    heights = curve.get_transform().transform(curve.get_xydata())[:, 1]
+    assert heights.max() < frame.y0
+    assert frame.x0 > 0
+    assert frame.x1 < figure.bbox.width
+
+
 def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
     # 30 points in three decades: the phase turns by many times between neighbours.
     model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.25, dt=7.8125e-4)
