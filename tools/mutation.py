@@ -54,6 +54,11 @@ MODULES = {
     "numerics/profile_interval": "tests/numerics/test_step_numerics.py "
     "tests/numerics/test_delay_bound.py",
     "numerics/step_problem": "tests/numerics/test_step_problem.py",
+    "numerics/relaxation": "tests/numerics/test_relaxation.py",
+    "numerics/sections": "tests/numerics/test_sections.py",
+    "numerics/section_fit": "tests/numerics/test_section_fit.py",
+    "numerics/own_terms": "tests/numerics/test_own_terms.py",
+    "numerics/svd": "tests/numerics/test_svd.py",
     "numerics/output_error": "tests/identification/test_delay_fit.py",
     "identification/steps": "tests/identification/test_steps.py",
     "identification/realization": "tests/identification/test_realization.py",
