@@ -61,7 +61,7 @@ def identify(
     dt: Annotated[
         float | None, _OPTION(help="Sample time in s, where there is no time column.")
     ] = None,
-    time_unit: Annotated[str | None, _OPTION(help="s, ms, us, ns, min or h.")] = None,
+    time_unit: Annotated[str | None, _OPTION(help="s, ms, us, ns, min, h or day.")] = None,
     delimiter: Annotated[
         str | None, _OPTION(help="Between columns: ',' ';' tab. Default: found out.")
     ] = None,

@@ -86,7 +86,8 @@ def read_record(
     dt : float, optional
         Sample time in s, in place of a time column.
     time_unit : str, optional
-        ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"`` or ``"h"``; ``"auto"``: the header's, or s.
+        ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``; ``"auto"``: the
+        header's, or s.
     time_format : str, optional
         How dates are written, as for `datetime.strptime`, where they are not ISO 8601.
     delimiter, decimal, encoding, comment : str, optional

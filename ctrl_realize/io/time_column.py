@@ -18,6 +18,9 @@ _EXACT_INTEGERS = 2**53
 # in s since 1970; a clock of seconds needs no check, for it is taken for what it is
 _YEAR_1990, _YEAR_2100 = 6.3e8, 4.1e9
 _TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
+# years 2000 to 2060 in days, as Excel and as MATLAB's datenum count them
+_DAY_COUNTS = ((36526.0, 58440.0), (730486.0, 752400.0))
+_HALF_AN_HOUR = 1 / 48
 
 
 def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None) -> FloatArray:
@@ -45,13 +48,17 @@ def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None
         return _from_stamps(table, index, cells)
     if time_format is not None or not holds_numbers(table, index):
         return _from_stamps(table, index, _parsed_dates(table, index, time_format))
-    if unit == "auto" and not table.columns[index].unit:
+    untold = unit == "auto" and not table.columns[index].unit
+    if untold:
         _check_epoch(table, index, cells)
     unit = checked_time_unit((table.columns[index].unit or "s") if unit == "auto" else unit)
     if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
         # nanoseconds since 1970 do not fit into a double, their differences do
         return to_seconds((cells - cells[0]).astype(np.float64), unit)
-    return to_seconds(table.numbers(index), unit)
+    values = table.numbers(index)
+    if untold:
+        _check_day_count(table, index, values)
+    return to_seconds(values, unit)
 
 
 def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
@@ -66,6 +73,23 @@ def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
             f"{table.path}: {table.title(index)} begins at {first:.6g}, which looks like a clock "
             f"of {units[0]} since 1970; say time_unit={units[0]!r}, or time_unit='s' if it is not"
         )
+
+
+def _check_day_count(table: Table, index: int, values: FloatArray) -> None:
+    """Refuse dates as a spreadsheet counts them, which would be taken for seconds.
+
+    A clock of seconds may show such a number too, but then its steps are round.
+    """
+    if not any(low <= values[0] < high for low, high in _DAY_COUNTS):
+        return
+    step = float(values[-1] - values[0]) / max(values.size - 1, 1)
+    if not 0 < step < _HALF_AN_HOUR or abs(float(f"{step:.3g}") / step - 1) < 1e-5:
+        return
+    raise OptionError(
+        f"{table.path}: {table.title(index)} begins at {values[0]:.9g} and runs in steps of "
+        f"{step:.6g}, which looks like dates in days (Excel, datenum); say time_unit='day', or "
+        "time_unit='s' if it is not"
+    )
 
 
 def _from_stamps(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> FloatArray:

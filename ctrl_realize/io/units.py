@@ -14,6 +14,8 @@ TIME_UNITS: dict[str, tuple[float, float]] = {
     "ns": (1.0, 1e9),
     "min": (60.0, 1.0),
     "h": (3600.0, 1.0),
+    # not "d": a column u_d is a disturbance before it is u in days
+    "day": (86400.0, 1.0),
 }
 
 _SPELLINGS = {
@@ -23,6 +25,7 @@ _SPELLINGS = {
     "micros": "us",
     "nsec": "ns", "nanosecond": "ns", "nanoseconds": "ns",
     "minute": "min", "minutes": "min", "hr": "h", "hour": "h", "hours": "h",
+    "days": "day", "tag": "day", "tage": "day",
     "hertz": "hz", "rad_s": "rad/s", "rads": "rad/s", "rad/sec": "rad/s", "rps": "rad/s",
     "degree": "deg", "degrees": "deg", "°": "deg",
     "radian": "rad", "radians": "rad", "decibel": "db",

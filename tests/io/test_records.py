@@ -423,6 +423,24 @@ def test_a_clock_of_ticks_since_1970_is_not_taken_for_seconds(tmp_path, unit, ti
     assert read_record(file).dt == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize("start", [46085.5, 739000.25], ids=["Excel", "datenum"])
+def test_dates_counted_in_days_are_not_taken_for_seconds(tmp_path, start):
+    file = tmp_path / "export.csv"
+    rows = [f"{start + k / 86400:.9f},0,{k}" for k in range(5)]
+    file.write_text("time,u,y\n" + "\n".join(rows) + "\n")
+    with pytest.raises(OptionError, match=r"looks like dates in days.*say time_unit='day'"):
+        read_record(file)
+    assert read_record(file, time_unit="day").dt == pytest.approx(1, rel=1e-4)  # nine decimals
+    file.write_text("time [days],u,y\n" + "\n".join(rows) + "\n")
+    assert read_record(file).dt == pytest.approx(1, rel=1e-4)
+
+
+def test_a_clock_of_seconds_may_show_what_a_day_count_shows(tmp_path):
+    file = tmp_path / "uptime.csv"
+    file.write_text("time,u,y\n" + "".join(f"{46085.5 + k / 1000:.3f},0,{k}\n" for k in range(50)))
+    assert read_record(file).dt == pytest.approx(1e-3)
+
+
 def test_a_clock_coarser_than_the_samples_is_told(tmp_path):
     file = tmp_path / "logger.csv"
     file.write_text("time,u,y\n" + "".join(f"{k // 10},0,{k}\n" for k in range(40)))
