@@ -365,3 +365,23 @@ def test_an_output_1e200_times_as_large_as_the_input_is_followed_without_overflo
             tracker.update(2e-144 if k == 5 else 0.0, 1e58 * np.sin(k))
         told.append(tracker.estimate())
     assert not np.isnan(told[0].gain_std)
+
+
+def test_one_wild_sample_at_rest_before_an_integrator_is_fitted_or_refused():
+    # a chain of lags whose gain has no influence on the fit: 0/0 in the error of its delay
+    n = 25
+    u = np.where(np.arange(n) < 12, 0.0, -16.0)
+    y = np.concatenate([np.zeros(15), -3.2 * np.arange(1, 11)])
+    y[0], y[3] = -4.94e-324, -653.0
+    with good_end(seconds=60):
+        cr.identify(cr.Record(1e-6 * np.arange(n), u, y))
+
+
+def test_a_first_move_at_the_last_sample_behind_a_wild_one_is_fitted_or_refused():
+    # the delay of a chain was known without any error: 0/0 in its profile
+    n = 30
+    u = np.where(np.arange(n) < 26, 0.0, -16.0)
+    y = np.zeros(n)
+    y[6], y[-1] = -8.58913364, -3.2
+    with good_end(seconds=60):
+        cr.identify(cr.Record(1e-6 * np.arange(n), u, y))
