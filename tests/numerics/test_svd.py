@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.svd import thin_svd
@@ -29,5 +30,16 @@ def test_a_matrix_on_which_divide_and_conquer_does_not_end_is_decomposed(monkeyp
     def no_end(*_, **__):
         raise np.linalg.LinAlgError("SVD did not converge")
 
+    drivers = []
+    slow = scipy.linalg.svd
     monkeypatch.setattr(np.linalg, "svd", no_end)
+    monkeypatch.setattr(
+        scipy.linalg, "svd", lambda *a, **k: drivers.append(k["lapack_driver"]) or slow(*a, **k)
+    )
+    check(np.random.default_rng(2).standard_normal((6, 4)))
+    assert drivers == ["gesvd"]
+
+
+def test_the_quick_method_is_the_first(monkeypatch):
+    monkeypatch.setattr(scipy.linalg, "svd", None)
     check(np.random.default_rng(2).standard_normal((6, 4)))
