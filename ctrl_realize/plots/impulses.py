@@ -58,6 +58,11 @@ def impulse_plot(
     >>> cplt.axes[0, 0].get_ylabel()
     'impulse response [1/s]'
     """
+    if not isinstance(impulse, ImpulseResponse):
+        raise DataError(
+            f"got a {type(impulse).__name__}; needed is an ImpulseResponse first, and after it the "
+            "models. The response of a model alone is drawn by control.impulse_response(...).plot()"
+        )
     models = [systems] if isinstance(systems, DelayedStateSpace) else list(systems)
     for model in models:
         if (model.noutputs, model.ninputs) != (impulse.n_outputs, impulse.n_inputs):

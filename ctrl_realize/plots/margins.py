@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
 from ..design.margin_result import Margins
+from ..errors import DataError
 from ..wording import in_time
 from . import style
 from .scales import HERTZ, decibel
@@ -47,6 +48,11 @@ def margins_plot(
     >>> [axes.get_title() or axes.get_ylabel() for axes in cplt.figure.axes]
     ['loop gain [dB]', 'loop phase [deg]', 'imaginary part']
     """
+    if not isinstance(found, Margins):
+        raise DataError(
+            f"got a {type(found).__name__}; needed are the margins of a loop, such as "
+            "design.margins(plant, controller)"
+        )
     omega, values = found.response
     frequency = omega / HERTZ
     gain = decibel(np.abs(values))

@@ -16,6 +16,7 @@ from ..errors import DataError
 from ..identification.steps import unit_step
 from ..numerics.arrays import FloatArray
 from ..signals import Record, StepResponse
+from ..signals.given import as_record
 from . import style
 from .dead_times import mark_dead_time
 from .names import plain, wrapped
@@ -56,6 +57,7 @@ def record_plot(
     >>> cplt.axes.shape
     (2, 1)
     """
+    as_record(record)
     with style.canvas(
         ax, 2, title=title, default_title=record.name, size=(8.0, 5.2), heights=(2.2, 1.0)
     ) as (upper, lower):

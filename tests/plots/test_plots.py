@@ -380,3 +380,12 @@ def test_a_model_without_a_name_of_its_own_is_called_model(measured):
 def test_a_model_in_the_place_of_the_record_is_told(record, scanned):
     with pytest.raises(DataError, match="got a DelayedStateSpace; needed is a Record"):
         plots.step_plot(scanned, record)
+
+
+def test_what_a_plot_is_not_made_for_is_told_with_what_it_needs(record, scanned):
+    with pytest.raises(DataError, match="got a DelayedStateSpace; needed is a Record"):
+        plots.record_plot(scanned)
+    with pytest.raises(DataError, match="needed is an ImpulseResponse first"):
+        plots.impulse_plot(scanned)
+    with pytest.raises(DataError, match=r"such as design\.margins\(plant, controller\)"):
+        plots.margins_plot(scanned)
