@@ -1,6 +1,6 @@
-"""Delay and interval where the residual is noise: of all structures that are not ruled out.
+"""Delay and interval where the residual is noise: of all explanations that are not ruled out.
 
-Points 2 and, for the choice of the model, 1 of the rule in `output_error`.
+Point 2 of the rule in `output_error`.
 """
 
 from __future__ import annotations
@@ -11,39 +11,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import ComplexArray
-from .dispersed_flow import DispersedFlow, fit_flows, flow_profile
+from .delay_choice import Choice, choose_model
+from .dispersed_flow import DispersedFlow, flow_profile
 from .fit_window import WindowFit
 from .lag_chains import (
     FREE_IN_A_CHAIN,
     LagChain,
     chain_limits,
     chain_profile,
-    fit_chains,
-    fit_diffusion,
     still_improving,
 )
-from .output_error_result import OutputErrorFit, assembled, profile_of
+from .output_error_result import OutputErrorFit, Profile, assembled, profile_of
 from .profile_interval import profile_limits
 from .separable_fit import Structure
-from .structure_search import (
-    LEAST_CHARGE,
-    PLAUSIBLE,
-    Candidate,
-    Scales,
-    choose,
-    needless_charge,
-    plausible,
-    search,
-)
+from .structure_search import LEAST_CHARGE, PLAUSIBLE, Scales, plausible
 
 _UNSEEN = 3.0
 """How far before the delay a beginning that is open may lie, in times from there to the first
-motion. Flows that disperse, diffusion behind lags and parallel paths mostly need 1 to 3."""
-
-_LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
-"""Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
-
-_BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0, -1))
+motion. Diffusion behind lags and parallel paths mostly need 1 to 3."""
 
 _LIKE_A_FLOW = 6
 """Lags of a chain from which on a flow that disperses looks the same, unless one was fitted and is
@@ -61,27 +46,6 @@ def flow_lead(poles: ComplexArray) -> float:
     return 0.5 * float(np.sum(1 / np.abs(poles)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Choice:
-    """The model, the criterion to which others are held, and the limits and profile of its own.
-
-    A chain of lags, or lags behind the dead time of a flow, where it is one.
-    """
-
-    model: Candidate
-    level: float
-    chain: LagChain | None = None
-    flow: DispersedFlow | None = None
-
-    @property
-    def parameters(self) -> int:
-        """Free ones beside gain and delay."""
-        if self.flow is not None:
-            return self.flow.parameters
-        own = self.model.structure
-        return FREE_IN_A_CHAIN if self.chain is not None else own.order + own.zeros
-
-
 def likelihood_fit(
     whole: WindowFit,
     *,
@@ -90,46 +54,33 @@ def likelihood_fit(
     flows: Sequence[DispersedFlow] = (),
     onset: float | None = None,
 ) -> OutputErrorFit:
-    """Take delay and interval from the likelihood (points 1 and 2 of the rule).
+    """Take delay and interval from the likelihood.
 
     `onset` is the time of the first motion; without it the structures are believed.
     """
-    # Diffusion widens the interval and is never the model: friction, too, looks like it.
     tanks = [chain for chain in chains if not chain.hidden]
-    choice = _with_flow(whole, _among_lags(whole, tanks), flows)
-    chosen = choice.model
-    more = max(LEAST_CHARGE - whole.penalty, 0.0)
-    free, kept, seen = _not_ruled_out(whole, choice, chains, flows, more)
-    profiles = {s: profile_of(whole, whole.candidates[s]) for s in free}
-    of_flows = [flow_profile(whole.problem, flow, whole.scales, whole.variance) for flow in seen]
-    if choice.flow is not None:
-        own = of_flows[[flow is choice.flow for flow in seen].index(True)]
-    elif choice.chain is not None:
-        own = chain_profile(choice.chain, whole.scales)
+    choice = choose_model(whole, tanks, flows)
+    chosen, scales = choice.model, whole.scales
+    kept = _not_ruled_out(whole, choice, chains, flows)
+    own = kept.profile_of(choice, scales)
+    if choice.chain is not None:
         whole = _with_chain(whole, choice.chain)
-        profiles[chosen.structure] = own
-    else:
-        own = profiles[chosen.structure]
-    limits = [profile_limits(*profile) for profile in profiles.values()]
-    beside = [
-        *(("a flow that disperses", *profile_limits(*profile)) for profile in of_flows),
-        *((chain.name, *chain_limits(chain, whole.scales)) for chain in kept),
-    ]
+        kept.profiles[chosen.structure] = own
+    beside = kept.beside(scales)
+    limits = [profile_limits(*profile) for profile in kept.profiles.values()]
     limits += [(first, last) for _, first, last in beside]
-    low = min(chosen.delay, *(ends[0] for ends in limits))
-    high = max(chosen.delay, *(ends[1] for ends in limits))
+    low = min(chosen.delay, *(first for first, _ in limits))
+    high = max(chosen.delay, *(last for _, last in limits))
     if endless := still_improving(tanks):
-        low = whole.scales.earliest
-    out = bool(flows) and min(flow.excess for flow in flows) > _OUT_OF_QUESTION
-    like_flow = choice.chain is not None and not out and chosen.structure.order >= _LIKE_A_FLOW
-    if like_flow:
-        low = min(low, max(chosen.delay - flow_lead(chosen.poles), whole.scales.earliest))
+        low = scales.earliest
+    if like_flow := _like_a_flow(choice, flows):
+        low = min(low, max(chosen.delay - flow_lead(chosen.poles), scales.earliest))
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start:
-        low, high = _opened(low, high, chosen.delay, onset, whole.scales)
-    ends = profile_limits(*own)
-    interval = (low, high, (ends[1] - ends[0]) / 3.92)
-    found = assembled(whole, chosen, adequate, (), profiles, interval, own)
+        low, high = _opened(low, high, chosen.delay, onset, scales)
+    first, last = profile_limits(*own)
+    interval = low, high, (last - first) / 3.92
+    found = assembled(whole, chosen, adequate, (), kept.profiles, interval, own)
     return replace(
         found,
         chain=choice.chain.name if choice.chain else "",
@@ -137,35 +88,62 @@ def likelihood_fit(
         endless=endless,
         like_flow=like_flow,
         open_start=open_start,
-        flows=tuple(seen),
+        flows=tuple(flow for flow, _ in kept.flows),
         follows_flow=choice.flow is not None,
     )
 
 
-def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> _Choice:
-    """Choose between the structures and the chains."""
-    best = whole.best
-    level = whole.criterion[best.structure] + needless_charge(best.structure)
-    better = min(tanks, key=lambda chain: chain.criterion, default=None)
-    if better is not None and better.criterion < level:
-        return _Choice(better.candidate, better.criterion, better)
-    return _Choice(best, level)
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """What the data cannot rule out: structures and flows with their profiles, and chains."""
+
+    profiles: dict[Structure, Profile]
+    flows: list[tuple[DispersedFlow, Profile]]
+    chains: list[LagChain]
+
+    def profile_of(self, choice: Choice, scales: Scales) -> Profile:
+        """Misfit over the delay of what was chosen."""
+        if choice.chain is not None:
+            return chain_profile(choice.chain, scales)
+        for flow, profile in self.flows:
+            if flow is choice.flow:
+                return profile
+        return self.profiles[choice.model.structure]
+
+    def beside(self, scales: Scales) -> list[tuple[str, float, float]]:
+        """What is not among the structures: its name, and its interval."""
+        flows = (("a flow that disperses", *profile_limits(*profile)) for _, profile in self.flows)
+        chains = ((chain.name, *chain_limits(chain, scales)) for chain in self.chains)
+        return [*flows, *chains]
 
 
-def _with_flow(whole: WindowFit, lags: _Choice, flows: Sequence[DispersedFlow]) -> _Choice:
-    """Take the delay of a flow that fits clearly better, if lags behind it can follow it."""
-    flow = min(flows, key=lambda flow: flow.criterion, default=None)
-    if flow is None or flow.criterion >= lags.level:
-        return lags
-    limit = flow.cost + PLAUSIBLE * whole.variance
-    pinned = replace(whole.scales, earliest=flow.delay, latest=flow.delay)
-    behind = search(whole.problem, _BEHIND_A_FLOW, pinned)
-    # They need not be worth their number: it is known what they stand for.
-    behind = {structure: model for structure, model in behind.items() if model.cost <= limit}
-    if not behind:
-        return lags
-    model = behind[choose(whole.criteria(behind))]
-    return _Choice(model, flow.criterion, flow=flow)
+def _not_ruled_out(
+    whole: WindowFit,
+    choice: Choice,
+    chains: Sequence[LagChain],
+    flows: Sequence[DispersedFlow],
+) -> _Kept:
+    more = max(LEAST_CHARGE - whole.penalty, 0.0)
+    charged = {s: value + more * (s.order + s.zeros) for s, value in whole.criterion.items()}
+    level = choice.level + more * choice.parameters
+    limit = level + PLAUSIBLE
+    free = plausible(whole.candidates, charged, whole.variance, choice.model, level)
+    return _Kept(
+        {s: profile_of(whole, whole.candidates[s]) for s in free},
+        [
+            (flow, flow_profile(whole.problem, flow, whole.scales, whole.variance))
+            for flow in flows
+            if flow.criterion + more * flow.parameters <= limit
+        ],
+        [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit],
+    )
+
+
+def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:
+    """Tell whether the model is a chain so long that it may be a flow, none being ruled out."""
+    if choice.chain is None or choice.model.structure.order < _LIKE_A_FLOW:
+        return False
+    return not flows or min(flow.excess for flow in flows) <= _OUT_OF_QUESTION
 
 
 def _opened(
@@ -177,44 +155,6 @@ def _opened(
         min(low, max(delay - unseen, scales.earliest)),
         max(high, min(onset + scales.dt, scales.latest)),
     )
-
-
-def _not_ruled_out(
-    whole: WindowFit,
-    choice: _Choice,
-    chains: Sequence[LagChain],
-    flows: Sequence[DispersedFlow],
-    more: float,
-) -> tuple[list[Structure], list[LagChain], list[DispersedFlow]]:
-    """List the structures, chains and flows that the data cannot rule out beside the chosen one.
-
-    `more` is charged for every parameter.
-    """
-    charged = {s: value + more * (s.order + s.zeros) for s, value in whole.criterion.items()}
-    level = choice.level + more * choice.parameters
-    free = plausible(whole.candidates, charged, whole.variance, choice.model, level)
-    limit = level + PLAUSIBLE
-    kept = [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit]
-    seen = [flow for flow in flows if flow.criterion + more * flow.parameters <= limit]
-    return free, kept, seen
-
-
-def chains_of(whole: WindowFit) -> list[LagChain]:
-    """Chains of lags, where so many lags show that there may be more than were tried."""
-    best = whole.best
-    setting = whole.problem, best, whole.scales, whole.variance, whole.penalty
-    tanks = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
-    diffusion = fit_diffusion(*setting) if best.structure.order >= _LAGS_OF_DIFFUSION else []
-    return tanks + diffusion
-
-
-def flows_of(whole: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
-    """Flows that disperse, where more than one lag shows."""
-    best = whole.best
-    if best.structure.order < _LAGS_OF_DIFFUSION:
-        return []
-    level = min(*whole.criterion.values(), *(chain.criterion for chain in chains))
-    return fit_flows(whole.problem, best, whole.scales, whole.variance, whole.penalty, level)
 
 
 def _with_chain(whole: WindowFit, chain: LagChain) -> WindowFit:

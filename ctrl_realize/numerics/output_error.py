@@ -28,8 +28,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from .delay_choice import chains_of, flows_of
 from .fit_window import WindowFit, fit_window
-from .likelihood_interval import chains_of, flows_of, likelihood_fit
+from .likelihood_interval import likelihood_fit
 from .output_error_result import OutputErrorFit, assembled, profile_of
 from .separable_fit import KnownFactor, Structure, evaluate
 from .step_problem import StepData, step_scales, stop_at, window

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import FloatArray
+from .delay_choice import chains_of
 from .fit_window import Window, WindowFit, extended, fit_window
-from .likelihood_interval import chains_of, likelihood_fit
+from .likelihood_interval import likelihood_fit
 from .noise_level import correlation_time, quantisation_step, winsorised_sigma
 from .onset import correlation_onset
 from .output_error_result import OutputErrorFit
