@@ -35,6 +35,20 @@ def write_csv(path: str | os.PathLike[str], table: pd.DataFrame, *, index: bool)
     ------
     OSError
         The folder is missing or cannot be written; `path` is then as it was.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import pandas as pd
+    >>> from ctrl_realize.io.csv_files import write_csv
+    >>> table = pd.DataFrame({"record": ["valve", "=1+1"], "delay": [44.5, 45.0]})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_csv(Path(folder) / "records.csv", table, index=False)
+    ...     print((Path(folder) / "records.csv").read_text(encoding="utf-8"), end="")
+    record,delay
+    valve,44.5
+    '=1+1,45.0
     """
     whole = table.reset_index() if index else table
     safe = whole.rename(columns=as_text).apply(lambda column: column.map(as_text))
