@@ -11,7 +11,7 @@ import numpy as np
 
 from ..checks import positive
 from ..delayed import DelayedStateSpace, delayed_ss
-from ..errors import UnsuitableSystemError
+from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.inverse_hold import inverse_zero_order_hold, split_fraction
 from ..results import Result
@@ -239,7 +239,8 @@ def to_discrete(
     ----------
     core : control.StateSpace, control.TransferFunction or ContinuousModel
     dead_time : float, optional
-        In s; that of a `ContinuousModel` if there is one, else 0.
+        In s; that of a `ContinuousModel` if there is one, else 0. In place of a model's own it
+        is taken together with `dt` only.
     dt : float, optional
         Sample time in s; a `ContinuousModel` remembers its own.
     **names
@@ -257,6 +258,13 @@ def to_discrete(
     <DelayedStateSpace: u -> y, order 1, z^-3 (0.03 s), dt = 0.01 s>
     """
     if isinstance(core, ContinuousModel):
+        if dead_time is not None and dt is None:
+            # Else to_discrete(model, 0.05), meant as a sample time, would put 0.05 s of dead time
+            # in place of the model's own, and keep the sample time.
+            raise OptionError(
+                f"the model has a dead time of its own, {core.dead_time:.6g} s; say dt=... for "
+                "another sample time, or dead_time= and dt= to replace both"
+            )
         dead_time = core.dead_time if dead_time is None else dead_time
         dt = core.dt if dt is None else dt
         core = core.core
@@ -265,6 +273,7 @@ def to_discrete(
     if system.isdtime(strict=True):
         raise UnsuitableSystemError(
             f"{system.name!r} is discrete already (dt={system.dt!r}); put a delay before it with "
-            "delayed_ss(system, delay)"
+            "delayed_ss(system, delay), or sample it anew with to_discrete(to_continuous(system), "
+            "dt=...)"
         )
     return delayed_ss(system, dead_time=0.0 if dead_time is None else dead_time, dt=step, **names)

@@ -189,3 +189,13 @@ def test_systems_are_not_changed(valve):
     cr.design.to_continuous(plant)
     for a, b in zip(before, (plant.A, plant.B, plant.C, plant.D), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_a_sample_time_is_not_taken_for_the_dead_time_of_a_model(valve):
+    model = cr.design.to_continuous(valve(37))
+    with pytest.raises(OptionError, match="dead time of its own"):
+        cr.design.to_discrete(model, DT / 2)
+    finer = cr.design.to_discrete(model, dt=DT / 2)
+    assert finer.dead_time == pytest.approx(model.dead_time, abs=DT / 2)
+    replaced = cr.design.to_discrete(model, 10 * DT, DT)
+    assert replaced.dead_time == pytest.approx(10 * DT)
