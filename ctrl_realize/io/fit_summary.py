@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -13,7 +14,10 @@ from ..errors import FileFormatError
 from ..results import Flag, Result
 from .json_content import MAX_TEXT, field
 
-_KEPT = ("delay", "order", "dead_time", "std", "interval", "total_delay", "onset", "method")
+_KEPT = (
+    "delay", "order", "dead_time", "dead_time_interval", "std", "interval", "total_delay", "onset",
+    "method",
+)  # fmt: skip
 _MAX_ROWS = 200
 
 Plain = float | int | str | bool | None | tuple["Plain", ...]
@@ -56,6 +60,20 @@ class FitSummary(Result):
     def __getitem__(self, key: str) -> Plain:
         return dict(self.values)[key]
 
+    @property
+    def dead_time(self) -> float | None:
+        """Dead time in s, as the fit had it; None if it had none."""
+        value = dict(self.values).get("dead_time")
+        return float(value) if _is_time(value) else None
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float] | None:
+        """Interval of the dead time in s, for the functions of `design`; None if it is open."""
+        match dict(self.values).get("dead_time_interval"):
+            case (low, high) if _is_time(low) and _is_time(high) and low <= high:
+                return float(low), float(high)
+        return None
+
     def __repr__(self) -> str:
         return f"<FitSummary of a {self.kind}>"
 
@@ -64,6 +82,13 @@ class FitSummary(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         return list(self.rows)
+
+
+def _is_time(value: Plain) -> TypeGuard[float]:
+    """Tell a time from whatever else a file may hold in its place."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return 0 <= value <= sys.float_info.max  # a whole number in a file may be larger than that
 
 
 def summary_of(fit: Any) -> FitSummary | None:

@@ -322,3 +322,24 @@ def test_a_large_model_needs_a_large_limit(tmp_path, model):
     with pytest.raises(FileFormatError, match="102 states, delays included; max_states=50"):
         load_model(tmp_path / "a.json", max_states=50)
     assert load_model(tmp_path / "a.json", max_states=102).delay == 100
+
+
+def test_a_loaded_model_still_tells_the_interval_of_its_dead_time(tmp_path):
+    plant = cr.bench.valve(noise=1e-3)
+    system = cr.identify(plant.step_record(16, rng=5), order=3)
+    save_model(tmp_path / "a.json", system)
+    again = load_model(tmp_path / "a.json")
+    assert again.fit.dead_time == system.fit.dead_time
+    assert again.fit.dead_time_interval == system.fit.dead_time_interval
+    pi = cr.design.pid(system)
+    told = [cr.design.delay_robustness(each, pi).report() for each in (system, again)]
+    assert told[0] == told[1]
+
+
+@pytest.mark.parametrize(
+    "value", ["x", True, -1.0, (1.0,), (2.0, 1.0), ("inf", 1.0), None, 10**400], ids=range(8)
+)
+def test_what_is_no_interval_is_none(value):
+    summary = FitSummary("F", "f", (), (("dead_time_interval", value), ("dead_time", value)))
+    assert summary.dead_time is None
+    assert summary.dead_time_interval is None
