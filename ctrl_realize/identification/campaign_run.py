@@ -34,7 +34,7 @@ def identify_campaign(
         that cannot be read is a row with its error.
     n_jobs : int, optional
         Processes to use (joblib; -1 for all cores). The result does not depend on it. Inside
-        ``joblib.parallel_config(backend="dask")`` the work goes to a Dask cluster.
+        joblib's ``parallel_config(backend="dask")`` the work goes to a Dask cluster.
     method : {"output_error", "scan", "paper"}, optional
     progress : bool, optional
         Show a progress bar; default: where somebody can see it.

@@ -12,14 +12,16 @@ LONG = 12
 BEHIND = re.compile(r"(?<=[/_.:(,=])(?=[^/_.:(,=)])")
 LINE = 40
 """Letters from which code in a sentence may break."""
+UNITS = (re.compile(r"(?<=[\d)]) (?=(?:%|s|ms|Hz)(?!\w))"), "\u00a0")
 NUMBERS = (
     (re.compile(r"(?:-\+|\+-|\u2213) (?=[\d.])"), "\u00b1\u00a0"),
-    (re.compile(r"(?<=[\d)]) (?=(?:%|s|ms|Hz)(?!\w))"), "\u00a0"),
+    UNITS,
     (re.compile(r"(?<=\d)\u2013(?=\d)"), "\u2060\u2013\u2060"),
     (re.compile(r"(?<=\d) (?=\d{3}(?!\d))"), "\u00a0"),
     (re.compile(r"(?<=\d) (to|\u2026|\.\.\.) (?=-?\d)"), "\u00a0\\1\u00a0"),
 )
 """What stands between numbers and units -> what does not break there."""
+SENTENCES = (nodes.paragraph, nodes.strong, nodes.emphasis, nodes.reference)
 WORDS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)")
 
 
@@ -37,6 +39,10 @@ def let_code_break(app: Any, doctree: nodes.document, docname: str) -> None:
         for text in list(entry.findall(nodes.Text)):
             if not isinstance(text.parent, nodes.literal):
                 text.parent.replace(text, nodes.Text(_kept_together(text.astext())))
+    for paragraph in doctree.findall(nodes.paragraph):
+        for text in list(paragraph.findall(nodes.Text)):
+            if isinstance(text.parent, SENTENCES):
+                text.parent.replace(text, nodes.Text(UNITS[0].sub(UNITS[1], text.astext())))
     for code in list(doctree.findall(nodes.literal)):
         if len(code.astext()) > LINE:
             _break(code, BEHIND)
