@@ -130,8 +130,13 @@ class DelayTracker:
         Raises
         ------
         DataError
-            A value that is not finite, or beyond 1e70.
+            A value that is no number, not finite, or beyond 1e70.
         """
+        if np.ndim(u) or np.ndim(y):
+            raise DataError(
+                f"sample {self._count} is u={u!r}, y={y!r}; needed is one number each (run takes "
+                "a whole record)"
+            )
         if not (np.isfinite(u) and np.isfinite(y)):
             raise DataError(f"sample {self._count} is u={u}, y={y}; needed are finite numbers")
         if max(abs(u), abs(y)) > EXTREME:

@@ -237,6 +237,8 @@ def test_samples_that_are_no_numbers_and_records_that_do_not_fit_are_refused():
     bank = tracker()
     with pytest.raises(DataError, match="y=nan"):
         bank.update(1.0, np.nan)
+    with pytest.raises(DataError, match="one number each"):
+        bank.update([1.0], [2.0])
     slow = cr.Record(np.arange(10.0), np.ones(10), np.ones(10))
     with pytest.raises(DataError, match="sample time 1 s"):
         bank.run(slow)
