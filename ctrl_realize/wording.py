@@ -50,6 +50,8 @@ def poles_in_words(poles: Iterable[complex]) -> str:
     >>> from ctrl_realize.wording import poles_in_words
     >>> poles_in_words([-2.0, -20 + 99j, -20 - 99j, 0.0])
     'lag 0.5 s, pair at 16.1 Hz (damping 0.2), integrator'
+    >>> poles_in_words([-1300 + 10700j, -1300 - 10700j])
+    'pair at 1716 Hz (damping 0.12)'
     """
     upper = [p for p in map(complex, poles) if p.imag >= 0]
     return ", ".join(map(_pole_in_words, sorted(upper, key=lambda p: (p == 0, -p.real))))
@@ -60,7 +62,7 @@ def _pole_in_words(pole: complex) -> str:
         return "integrator"
     size = abs(pole)
     if pole.imag > 0:
-        return f"pair at {size / (2 * np.pi):.3g} Hz (damping {-pole.real / size:.2g})"
+        return f"pair at {_plainly(size / (2 * np.pi), 3)} Hz (damping {-pole.real / size:.2g})"
     return f"{'lag' if pole.real < 0 else 'growing in'} {in_time(1 / size)}"
 
 
