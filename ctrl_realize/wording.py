@@ -51,7 +51,7 @@ def poles_in_words(poles: Iterable[complex]) -> str:
     >>> poles_in_words([-2.0, -20 + 99j, -20 - 99j, 0.0])
     'lag 0.5 s, pair at 16.1 Hz (damping 0.2), integrator'
     >>> poles_in_words([-1300 + 10700j, -1300 - 10700j])
-    'pair at 1716 Hz (damping 0.12)'
+    'pair at 1715 Hz (damping 0.12)'
     """
     upper = [p for p in map(complex, poles) if p.imag >= 0]
     return ", ".join(map(_pole_in_words, sorted(upper, key=lambda p: (p == 0, -p.real))))
