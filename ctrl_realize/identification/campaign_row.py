@@ -68,7 +68,7 @@ class CampaignRow:
     >>> print(rows[0].name, rows[0].delay, "samples")
     valve_16mA 45.0 samples
     >>> print(rows[1].error)
-    NoStepError: no step in the input of record 'plug was out': it runs from 0 to 0 ...
+    NoStepError: no step in the input of record 'plug was out': it is 0 throughout. ...
     """
 
     name: str

@@ -175,7 +175,7 @@ def test_inputs_that_move_together_are_refused():
         cr.spectral_frf(two_by_two(5000, together=True))
     with pytest.raises(ValueError, match="'H1'"):
         cr.spectral_frf(two_by_two(5000), method="H2")
-    with pytest.raises(ValueError, match="one input"):
+    with pytest.raises(ValueError, match="period is for one of each"):
         cr.spectral_frf(two_by_two(5000), period=500)
 
 
