@@ -1,7 +1,8 @@
 """Print a table of speeds, each a ratio to a named baseline: ``python -m benchmarks.records``.
 
 Data are simulated; CPU time of the process, one call each. ``python -m benchmarks.records
-measured`` prints how well halves of measured records are predicted, beside subspace methods.
+measured`` prints how well halves of measured records are predicted, beside subspace methods, and
+``responses`` what measured frequency responses gave.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
-from .measured import table
+from . import measured, responses
 
 
 def cpu(work: Callable[[], object]) -> float:
@@ -79,4 +80,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    print(table()) if "measured" in sys.argv else main()
+    tables = {"measured": measured.table, "responses": responses.table}
+    asked = [tables[word] for word in sys.argv[1:] if word in tables]
+    for made in asked:
+        print(made())
+    if not asked:
+        main()
