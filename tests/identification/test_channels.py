@@ -41,8 +41,8 @@ def test_delays_of_inputs_and_outputs_come_back_with_one_core(inputs, outputs):
 
 
 def separate(delays):
-    """Entries of first and second order, each with a delay of its own, shape (2, 2)."""
-    entries = np.zeros((2, 2, 200))
+    """Entries of first and second order, each with a delay of its own."""
+    entries = np.zeros((*np.shape(delays), 200))
     for (i, j), d in np.ndenumerate(delays):
         pulse = np.concatenate([np.zeros(d + 1), (0.5 + 0.1 * i + 0.2 * j) ** np.arange(200.0)])
         entries[i, j] = pulse[:200]
@@ -86,6 +86,63 @@ def test_other_units_change_no_delay_and_no_pole():
     units = np.array([1e3, 1e-2])[:, None, None] * np.array([5.0, 0.1])[:, None]
     plain, other = (cr.realize_channels(d, 3, dt=DT) for d in (data, units * data))
     assert np.array_equal(plain.delay, other.delay)
+    for unit in (1e-9, 1e9):
+        assert np.array_equal(cr.channel_delays(unit * data, dt=DT), [[3, 4], [9, 10]])
+
+
+def test_what_is_rough_in_the_first_half_is_no_noise():
+    rough = np.concatenate([(-1.0) ** np.arange(100), np.zeros(100)])
+    assert cr.channel_delays(rough, dt=DT).tolist() == [[0]]
+
+
+def test_noise_of_other_channels_hides_no_response():
+    data = separate([[3], [5], [7]])
+    data[2] *= 0.01
+    # five standard deviations of their noise are 25 times the largest value of the third
+    data[:2] += 0.05 * np.random.default_rng(1).standard_normal(data[:2].shape)
+    assert cr.channel_delays(data, dt=DT)[2, 0] == 7
+
+
+def test_where_a_split_explains_the_delays_one_core_is_made():
+    data = separate([[3], [5]])  # of two poles: one state for each output would be nearer
+    sys = cr.realize_channels(data, 1, dt=DT)
+    assert sys.fit.structure == "common"
+    assert sys.fit.orders == (1,)
+    apart = cr.realize_channels(data, 1, dt=DT, structure="rows")
+    assert apart.fit.misfit.max() < 1e-9 < 0.01 < sys.fit.misfit.max()
+
+
+def test_the_longest_delay_leaves_three_samples():
+    pulse = np.concatenate([np.zeros(48), [1.0, 0.5]])
+    sys = cr.realize_channels(pulse, 1, delays=[[47]], dt=DT)
+    assert sys.delay == 47
+    # three numbers and three parameters, but for rounding
+    assert_allclose(sys.markov(50), pulse, rtol=0, atol=1e-14)
+    with pytest.raises(DelayRangeError, match="48"):
+        cr.realize_channels(pulse, 1, delays=[[48]], dt=DT)
+
+
+@pytest.mark.parametrize("structure", ["rows", "columns"])
+def test_lines_with_a_pure_gain_and_without_response_have_no_tap_too_many(structure):
+    delays = np.array([[0, 20], [5, 20], [20, -1]])
+    data = separate(delays)
+    data[2, 0] = np.eye(200)[20]  # nothing but a gain behind 20 samples
+    data[2, 1] = 0.0
+    if structure == "columns":
+        delays, data = delays.T, np.swapaxes(data, 0, 1)
+    sys = cr.realize_channels(data, 2, delays=delays, structure=structure, dt=DT)
+    assert_allclose(sys.markov(200), data, rtol=0, atol=1e-9)
+    fit = sys.fit
+    assert fit.orders == (2, 2, 0)
+    # one line of 0 to 20 samples, one of 20 that is not tapped before
+    assert (fit.input_delays, fit.output_delays)[structure == "columns"] == (0, 20)
+    assert fit.states == 4 + 20 + 20
+
+
+def test_a_filter_in_the_data_is_told():
+    markov = separate([[3], [5]])
+    lagging = cr.ImpulseResponse(markov, DT, filter=cr.FilterSpec(2, 1.0, False, DT))
+    assert [flag.code for flag in cr.realize_channels(lagging, 2).fit.flags] == ["filter_delay"]
 
 
 def test_an_entry_without_response_puts_no_limit():

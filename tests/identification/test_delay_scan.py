@@ -154,6 +154,7 @@ def test_result_reports_itself_and_pickles():
     assert not fit.iae.flags.writeable
     assert len(list(fit.candidates)) == 101
     assert [c.delay for c in fit.candidates[3:5]] == [3, 4]
+    assert repr(fit.candidates) == "<Candidates: d = 0...100>"
     with pytest.raises(IndexError):
         fit.candidates[101]
 
@@ -222,7 +223,11 @@ def test_curve_functions_read_a_curve_by_hand():
         "no_delay_resolved"
     }
     assert noise_flags(1.0, None, 3) == noise_flags(1.0, 0.0, 3) == noise_flags(3.1, 1.0, 3) == ()
-    assert noise_flags(2.9, 1.0, 3)[0].code == "order_near_noise"
+    assert curve_flags(np.array([1.0, 0.0, 1.0]), 1, 0.0) == ()  # nothing is left: no division
+    (near,) = noise_flags(2.9, 1.0, 3)
+    assert near.code == "order_near_noise"
+    assert near.message.startswith("singular value 3 is 2.90 times the noise level: expect errors")
+    assert noise_flags(1.3, 1.0, 3)[0].code == "order_near_noise"
     assert noise_flags(1.2, 1.0, 3)[0].code == "order_in_noise"
 
 
@@ -274,6 +279,22 @@ def test_the_data_of_the_caller_stay_as_they_are():
     before = pulse.copy()
     cr.estimate_delay(pulse, 3, max_delay=50, dt=TS)
     assert np.array_equal(pulse, before)
+
+
+def test_padded_candidates_are_the_padded_realizations():
+    pulse = valve_pulse("zero-phase", seed=1, noise=2e-3, n=161)
+    scan = cr.estimate_delay(pulse, 2, max_delay=5, samples=150, hankel="padded", dt=TS).fit
+    for d in (0, 5):
+        alone = cr.realize(pulse, 2, delay=d, samples=150, hankel="padded", dt=TS)
+        # the tolerance of the pairs of a scan (3e-10), times 300 for poles near the unit circle
+        assert_allclose(scan.candidates[d].markov(161), alone.markov(161), rtol=0,
+                        atol=1e-7 * np.abs(pulse).max())  # fmt: skip
+
+
+def test_the_card_tells_the_sample_time_to_six_digits():
+    pulse = np.concatenate([np.zeros(4), 0.8 ** np.arange(60)])
+    scan = cr.estimate_delay(pulse, 1, max_delay=10, dt=0.012345678).fit
+    assert dict(scan._rows())["tried"] == "0...10 samples of 12.3457 ms"
 
 
 def test_the_card_of_a_scan_names_what_was_found_and_tried():

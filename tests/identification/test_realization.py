@@ -124,6 +124,30 @@ def test_the_report_says_the_numbers_of_the_result(hankel):
     assert all(text in fit.report() for text in rows.values())
 
 
+def test_cards_tell_flags_a_missing_direct_term_and_six_digits_of_the_sample_time():
+    g = np.concatenate([np.zeros(4), 0.8 ** np.arange(100)])
+    fit = cr.realize(g, 1, delay=3, feedthrough=False, dt=0.012345678).fit
+    rows = dict(fit._rows())
+    assert rows["dead time"] == "37.037 ms (3 samples of 12.3457 ms)"
+    assert rows["direct term"] == "0"
+    assert repr(fit).endswith(f"IAE {fit.iae:.4g}>")
+    grown = cr.realize(1.1 ** np.arange(50), 1, dt=0.1)
+    assert codes(grown) == {"unstable"}
+    assert repr(grown.fit).endswith(", 1 flags>")
+
+
+def test_leading_singular_values_are_as_many_as_the_matrix_has():
+    assert cr.realize(0.8 ** np.arange(50), 1, dt=0.1).fit.leading_singular_values(1).shape == (1,)
+    for p, m in ((1, 1), (2, 2), (2, 3)):
+        markov = np.random.default_rng(0).standard_normal((p, m, 9))
+        for hankel, size in (("square", 4), ("padded", 8)):
+            fit = cr.realize(markov, 1, hankel=hankel, dt=0.1).fit
+            whole = dense.hankel(markov[:, :, 1:], size, size)
+            values = np.linalg.svd(whole, compute_uv=False)
+            assert values.size == size * min(p, m)
+            assert_allclose(fit.leading_singular_values(100), values, rtol=0, atol=1e-12)
+
+
 def test_result_is_frozen_and_survives_copies():
     sys = cr.realize(valve_pulse("zero-phase"), 3, delay=37, dt=TS)
     assert not sys.fit.singular_values.flags.writeable
