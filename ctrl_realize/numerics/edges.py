@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, rank_filter
 
 from .arrays import FloatArray
 
 REST_TOLERANCE = 0.02
 """The input has left its level when it is off by this part of the step (or 5 sigma of noise)."""
-
-PIECE = 200_000
-"""Samples of which the levels before and after are found at a time."""
 
 
 @dataclass(frozen=True)
@@ -120,10 +117,9 @@ def _significant_range(values: FloatArray, noise: float) -> float:
 def _side_medians(values: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:
     """Median of the `width` samples before each sample, and of those from it on."""
     padded = np.concatenate([np.full(width, values[0]), values, np.full(width, values[-1])])
-    windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    # in pieces: a median copies its windows, 4 GB for ten million samples
-    pieces = range(0, windows.shape[0], PIECE)
-    medians = np.concatenate([np.median(windows[k : k + PIECE], axis=1) for k in pieces])
+    # A window that begins at sample k is centred at k + width // 2.
+    low, high = (rank_filter(padded, rank, width) for rank in ((width - 1) // 2, width // 2))
+    medians = (0.5 * (low + high) if width % 2 == 0 else low)[width // 2 :]
     return medians[: values.size], medians[width : width + values.size]
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import FloatArray, IntArray
+from .moving_mean import moving_mean
 
 _SMOOTHINGS = (1, 8, 64)  # samples; a small step in much noise shows only in means
 
@@ -56,7 +57,7 @@ def first_motion(
     single, noise = moved, sigma
     for smoothing in _SMOOTHINGS:
         if smoothing > 1:
-            moved = np.convolve(single, np.ones(smoothing) / smoothing, "same")
+            moved = moving_mean(single, smoothing)
             sigma = noise / np.sqrt(smoothing)
         threshold = max(5 * sigma, 1.5 * quantum, 0.005 * span)
         crossing = _lasting_excursion(moved[edge:], threshold, smoothing)
@@ -64,12 +65,13 @@ def first_motion(
             break
     else:
         return None
-    stretch = moved[edge + crossing : edge + crossing + _lasting(crossing, smoothing)]
+    lasting = int(_lasting(np.array(crossing), smoothing))
+    stretch = moved[edge + crossing : edge + crossing + lasting]
     sign = float(np.sign(np.mean(stretch)))
     rise = moved * sign
     width = max(1, round(0.03 * crossing))
     if width > 1:
-        rise = np.convolve(rise, np.ones(width) / width, "same")
+        rise = moving_mean(rise, width)
     inside = max(sigma, 0.5 * quantum) / np.sqrt(width)
     still = np.flatnonzero(rise[edge : edge + crossing + 1] <= inside)
     last = float(still[-1]) if still.size else 0.0
@@ -78,18 +80,25 @@ def first_motion(
     )
 
 
-def _lasting(crossing: int, smoothing: int) -> int:
+def _lasting(crossing: IntArray, smoothing: int) -> IntArray:
     """How long an excursion must last: a quarter of the time that it took to come."""
-    return max(3 * smoothing, int(np.ceil(0.25 * crossing)))
+    return np.asarray(np.maximum(3 * smoothing, np.ceil(0.25 * crossing).astype(np.int64)))
 
 
 def _lasting_excursion(moved: FloatArray, threshold: float, smoothing: int) -> int | None:
-    for k in np.flatnonzero(np.abs(moved) > threshold):
-        stretch = moved[k : k + _lasting(int(k), smoothing)]
-        outside = np.mean(np.abs(stretch) > 0.6 * threshold) > 0.8
-        if outside and abs(np.mean(np.sign(stretch))) > 0.7:
-            return int(k)
-    return None
+    beyond = np.flatnonzero(np.abs(moved) > threshold)
+    if not beyond.size:
+        return None
+    # Sums up to every sample, so that many short excursions cost no more than a few.
+    outside = np.cumsum(np.abs(moved) > 0.6 * threshold)
+    upward = np.cumsum(np.sign(moved), dtype=np.int64)
+    last = np.minimum(beyond + _lasting(beyond, smoothing), moved.size) - 1
+    count = last + 1 - beyond
+    # The first of them is outside, and the sign is not zero there.
+    part = (outside[last] - outside[beyond] + 1) / count
+    balance = np.abs(upward[last] - upward[beyond] + np.sign(moved[beyond])) / count
+    lasting = beyond[(part > 0.8) & (balance > 0.7)]
+    return int(lasting[0]) if lasting.size else None
 
 
 def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:

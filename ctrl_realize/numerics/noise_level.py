@@ -9,6 +9,10 @@ from .arrays import FloatArray
 _DITHER = 0.6  # noise, rounding included, in quantisation steps, from which means are unbiased
 _MANY = 50  # samples at rest that are enough to tell the noise
 _TURNS = 3
+_MOST_OF_A_LINE = 45.0
+"""Bound of the energy of a line, in its power in a spectrum behind Hann's window over its samples:
+8 at a frequency of the spectrum, 11 between two of them, and leakage of what is beside it."""
+_BLOCK = 4096  # samples over which a phase is turned on at a time
 _FEW = 8  # samples at rest below which the whole record must tell the noise
 
 
@@ -153,6 +157,8 @@ def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
         around = np.delete(power[low:high], np.s_[max(peak - 2 - low, 0) : peak + 3 - low])
         if peak < 4 or around.size < 6 or power[peak] < 20 * np.median(around) / np.log(2):
             break
+        if _MOST_OF_A_LINE * power[peak] / n < float(left @ left) / 3:
+            break  # far too weak, wherever its frequency lies between those of the spectrum
         frequency = _refine(left, peak / n)
         if frequency * n < 3.5:
             break  # slower than it looked: too few periods to go on like this
@@ -173,11 +179,15 @@ def sine_pair(index: FloatArray, frequency: float) -> FloatArray:
 
 def _refine(values: FloatArray, frequency: float) -> float:
     """Improve the frequency of a line by golden steps on its least-squares power."""
-    index = np.arange(values.size, dtype=np.float64)
+    # Turned to the frequency within blocks, and then from block to block.
+    whole = values.size // _BLOCK * _BLOCK
+    blocks, rest = values[:whole].reshape(-1, _BLOCK), values[whole:]
 
     def power(f: float) -> float:
-        phase = np.exp(-2j * np.pi * f * index)
-        return float(np.abs(phase @ values))
+        turn = np.exp(-2j * np.pi * f * np.arange(_BLOCK))
+        sums = blocks @ turn.real + 1j * (blocks @ turn.imag)
+        starts = np.exp(-2j * np.pi * f * _BLOCK * np.arange(len(sums) + 1))
+        return float(np.abs(starts[:-1] @ sums + starts[-1] * (turn[: rest.size] @ rest)))
 
     width = 1.0 / values.size
     for _ in range(14):

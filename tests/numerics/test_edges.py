@@ -197,10 +197,11 @@ def test_overshoot_of_the_drive_is_part_of_its_edge():
     assert (found.index, found.amplitude, found.samples) == (60, 10.0, 1)
 
 
-def test_a_long_signal_is_looked_at_in_pieces_without_seams(monkeypatch):
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 7, 51])
+def test_levels_beside_a_sample_are_medians_of_the_window_before_and_from_it_on(width):
     values = levels((0, 40), (1, 30), (-2, 50)) + 0.01 * white(120)
-    whole = find_edges(values, 2, 0.1)
-    for piece in (1, 7, 119):
-        monkeypatch.setattr(edges, "PIECE", piece)
-        assert find_edges(values, 2, 0.1) == whole
-    assert len(whole) == 2
+    before, after = edges._side_medians(values, width)
+    padded = np.concatenate([np.full(width, values[0]), values, np.full(width, values[-1])])
+    for k in range(values.size):
+        assert before[k] == np.median(padded[k : k + width])
+        assert after[k] == np.median(padded[k + width : k + 2 * width])
