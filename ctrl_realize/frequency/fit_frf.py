@@ -12,8 +12,10 @@ import numpy as np
 from ..checks import one_of, positive, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
+from ..numerics.arrays import FloatArray
 from ..numerics.rational_fit import FRFData
 from ..numerics.rational_search import DEFAULT_ORDERS, dead_time_bound, fit_structures
+from ..numerics.rational_starts import longest_search
 from ..numerics.spectra import hold_response
 from .frf_selection import chosen_model
 from .points import frf_points
@@ -53,7 +55,8 @@ def fit_frf(
     dt : float, optional
         Sample time of the model in s; default a twentieth of the shortest period measured.
     max_dead_time : float, optional
-        Upper bound of the search in s; default from the slope of the measured phase.
+        Upper bound of the search in s; default from the slope of the measured phase. At most a
+        thousand periods of the eighth frequency.
     weighting : {"auto", "std", "relative", "uniform"}
         "std": the FRF's standard deviation. "relative": an error in proportion to the response,
         and to what the coherence says where there is one. "uniform": the same error everywhere.
@@ -140,7 +143,7 @@ def fit_frf(
     longest = (
         dead_time_bound(response, omega, sigma)
         if max_dead_time is None
-        else positive(max_dead_time, "max_dead_time", "time in s")
+        else _searchable(positive(max_dead_time, "max_dead_time", "time in s"), omega)
     )
     # Equal size of response and weights around 1: the optimiser's thresholds are relative.
     size = float(np.sqrt(np.mean(np.abs(response) ** 2)))
@@ -153,6 +156,17 @@ def fit_frf(
     fits = fit_structures(data, orders, degrees)
     used = replace(points, response=response, sigma=sigma)
     return chosen_model(frf, data, fits, used, unit, size, sample_time, name)
+
+
+def _searchable(max_dead_time: float, omega: FloatArray) -> float:
+    """Refuse a bound up to which dead times cannot be told apart, or counted."""
+    most = longest_search(omega)
+    if max_dead_time > most:
+        raise OptionError(
+            f"max_dead_time={max_dead_time:g} s is too long to search in at these frequencies; "
+            f"needed is at most {most:.3g} s"
+        )
+    return max_dead_time
 
 
 def _candidates(given: int | Sequence[int] | None, name: str, low: int) -> tuple[int, ...] | None:

@@ -25,8 +25,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular, toeplitz
+from scipy.linalg import solve_triangular
 from scipy.linalg.blas import dtrmm
+from scipy.linalg.lapack import dpotrf, dtrtrs
 from scipy.optimize import minimize
 
 from .arrays import FloatArray
@@ -196,18 +197,19 @@ def _factor(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> list[F
     """
     factors = []
     index = group * np.arange(lags)
+    apart = np.arange(lags)[:, None] - np.arange(lags)
     for row in x.reshape(m, -1):
         rate, scale = np.exp(row[0]), np.exp(row[-1] / 2)
         if kernel == "SS":
             slow, fast = np.exp(-rate / 2 * index), np.exp(-1.5 * rate * index)
-            K = toeplitz((3 * slow - fast) / 2)
+            K = ((3 * slow - fast) / 2)[np.abs(apart)]
             # Smooth kernels are singular to rounding when the decay is slow.
-            K[np.diag_indices(lags)] += 1e-11
-            L = cholesky(K, lower=True, check_finite=False)
+            K.flat[:: lags + 1] += 1e-11
+            L = _cholesky(K)
             decline = 1.5 * rate
         else:
             step = np.exp(row[1]) if kernel == "DC" else rate / 2
-            L = np.tril(toeplitz(np.exp(-step * index)))
+            L = np.where(apart < 0, 0.0, np.exp(-step * index)[np.abs(apart)])
             L[:, 1:] *= np.sqrt(-np.expm1(-2 * step * group))
             decline = rate / 2
         exponent = decline * (index + (group + 1) / 2)
@@ -232,11 +234,19 @@ def _likelihood(
             half = dtrmm(1.0, Lj, gram[rows, columns], side=1, lower=1)
             M[rows, columns] = dtrmm(1.0, Li, half, side=0, trans_a=1, lower=1, overwrite_b=1)
     M[np.diag_indices(M.shape[0])] += 1.0
-    C = cholesky(M, lower=True, check_finite=False, overwrite_a=True)
-    half = solve_triangular(C, right, lower=True, check_finite=False)
+    C = _cholesky(M)
+    half = dtrtrs(C, right, lower=1)[0]
     least = max(power - float(half @ half), FLOOR * power)
     value = freedom * np.log(least) + 2.0 * float(np.log(np.diag(C)).sum())
     return value, C, half, least
+
+
+def _cholesky(matrix: FloatArray) -> FloatArray:
+    """Factorize in place where that can be: LAPACK without SciPy's checks, a third of the time."""
+    lower, failed = dpotrf(matrix, lower=1, clean=1, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    return np.asarray(lower, dtype=np.float64)
 
 
 def _search(

@@ -24,6 +24,9 @@ from .vector_fitting import relocate_poles, trial_poles
 _RELOCATIONS = 8
 _MAX_STARTS = 4
 _MAX_DELAYS = 64
+_PER_TURN = 4
+_MAX_TRIED = 4000
+_POINTS_BELOW = 8
 _DAMPINGS = (0.01, 0.1, 0.6)
 _GRID = 16
 _PEAKS = 8
@@ -34,22 +37,55 @@ def delay_grid(data: FRFData, order: int) -> FloatArray:
     """Spread candidate dead times, close enough that no minimum is missed.
 
     The misfit has a minimum about every half turn of the phase at the highest frequency. Where
-    the band is wide, a slow lag allows a dead time of hundreds of turns; but a dead time that is
-    wrong by many turns leaves a phase that turns far more than poles and zeros can, and such
-    candidates are left out.
+    the band is wide, a slow lag allows a dead time of hundreds of turns, over six decades of
+    millions; but a dead time that is wrong by many turns leaves a phase that turns far more than
+    poles and zeros can, and such candidates are left out.
     """
     top = float(np.abs(data.s).max())
-    turns = data.max_dead_time * top / (2 * np.pi)
-    count = int(np.clip(np.ceil(4 * turns), 6, 4000))
-    delays = np.linspace(0.0, data.max_dead_time, count + 1)
-    if delays.size <= _MAX_DELAYS:
-        return delays
+    count = max(int(np.ceil(_PER_TURN * data.max_dead_time * top / (2 * np.pi))), 6)
+    if count < _MAX_DELAYS:
+        return np.linspace(0.0, data.max_dead_time, count + 1)
     clear = data.clear
     omega, values = np.abs(data.s[clear]), data.response[clear]
-    left = phase_roughness(np.angle(values[1:] / values[:-1]), np.diff(omega), delays)
-    possible = np.flatnonzero(left <= left.min() + np.pi * (2 * order + 2))
-    ranked = possible[np.argsort(left[possible], kind="stable")][:_MAX_DELAYS]
-    return np.asarray(delays[np.sort(ranked)])
+    steps, gaps = np.angle(values[1:] / values[:-1]), np.diff(omega)
+    allowed = np.pi * (2 * order + 2)
+    octaves = _octaves_below(omega, count)
+    # In the lower part of the band few candidates cover all dead times; those that it leaves are
+    # split in two for every octave more.
+    first = min(-(-count // 2**octaves), _MAX_TRIED)
+    delays, spacing = np.linspace(0.0, data.max_dead_time, first + 1), data.max_dead_time / first
+    for octave in range(octaves, 0, -1):
+        below = np.count_nonzero(omega <= top / 2**octave) - 1
+        left = phase_roughness(steps[:below], gaps[:below], delays)
+        kept = _smoothest(delays, left, allowed, _MAX_TRIED // 2)
+        spacing /= 2
+        places = np.round(kept / spacing)
+        places = np.unique(np.concatenate([places - 1, places, places + 1]))
+        delays = np.clip(spacing * places, 0.0, data.max_dead_time)
+    left = phase_roughness(steps, gaps, delays)
+    return np.sort(_smoothest(delays, left, allowed, _MAX_DELAYS))
+
+
+def longest_search(omega: FloatArray) -> float:
+    """Return the longest dead time, in s, that candidates can cover on rising frequencies."""
+    return 2 * np.pi * _MAX_TRIED / (_PER_TURN * _lowest_start(omega))
+
+
+def _octaves_below(omega: FloatArray, count: int) -> int:
+    """Return how far below the highest frequency the search among `count` dead times begins."""
+    wanted = int(np.ceil(np.log2(max(count / _MAX_TRIED, 1.0))))
+    return min(wanted, int(np.log2(omega[-1] / _lowest_start(omega))))
+
+
+def _lowest_start(omega: FloatArray) -> float:
+    """Return the frequency up to which there are enough points to tell dead times apart."""
+    return float(omega[min(_POINTS_BELOW, omega.size) - 1])
+
+
+def _smoothest(delays: FloatArray, left: FloatArray, allowed: float, most: int) -> FloatArray:
+    """Return the dead times that leave hardly more phase than the best one, the best first."""
+    possible = np.flatnonzero(left <= left.min() + allowed)
+    return np.asarray(delays[possible[np.argsort(left[possible], kind="stable")][:most]])
 
 
 def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[FloatArray]:

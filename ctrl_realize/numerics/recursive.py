@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import FloatArray
+from .time_axis import EXTREME
 
 FORGOTTEN = 1e-6
 """Part of its start that a settled system still shows."""
@@ -146,8 +147,10 @@ class DelayBank:
         gram -= sums[:, :, None] * sums[:, None, :] / self.weight
         cross = self._cross - sums * (self._total / self.weight)
         power = max(self._power - self._total**2 / self.weight, 0.0)
-        # An input that never moved leaves zeros; the floor is far below any information.
-        floor = 1e-13 * float(np.einsum("dii->di", gram).max(initial=0.0)) or 1.0
+        peak = float(np.einsum("dii->di", gram).max(initial=0.0))
+        # An input that never moved leaves zeros, one that moved by less than any measurement
+        # squares that underflow; the floor is far below any information.
+        floor = 1e-13 * peak if peak > EXTREME**-2 else 1.0
         precision = np.maximum(precision, floor)
         matrix = gram + np.diag(precision)
         inverse = np.linalg.inv(matrix)

@@ -385,3 +385,40 @@ def test_a_first_move_at_the_last_sample_behind_a_wild_one_is_fitted_or_refused(
     y[6], y[-1] = -8.58913364, -3.2
     with good_end(seconds=60):
         cr.identify(cr.Record(1e-6 * np.arange(n), u, y))
+
+
+@pytest.mark.parametrize("moved", [1e-155, 1e-158, 1e-100])
+def test_an_input_whose_squares_underflow_is_followed_or_refused_without_overflow(moved):
+    # the inverse of sums of squares around 1e-310 was infinite
+    tracker = cr.DelayTracker(PLANT, max_delay=10, memory=10.0)
+    with good_end() as models:
+        for k in range(60):
+            tracker.update(moved if k % 7 == 5 else 0.0, np.sin(k))
+        models.append(tracker.model)
+    assert np.isfinite(models[0].delay_free.C).all()
+
+
+@pytest.mark.parametrize("longest", [1.0, 10.0, 70.0])
+def test_a_dead_time_is_found_below_a_bound_of_thousands_of_periods(longest):
+    # candidates were spread too thinly below such a bound, and the model was wrong without a word
+    f = np.geomspace(10.0, 1e4, 100)
+    s = 2j * np.pi * f
+    frf = cr.MeasuredFRF(2 * np.exp(-0.002345 * s) / (0.002 * s + 1), f)
+    fit = cr.fit_frf(frf, 1, max_dead_time=longest, dt=1e-4).fit
+    assert fit.dead_time == pytest.approx(0.002345, rel=1e-6)
+
+
+def test_a_dead_time_far_below_a_slow_lag_is_found_over_six_decades():
+    # by its slope the slow lag allows 60 000 turns of the phase, which were not all searched
+    f = np.geomspace(1e-3, 1e3, 100)
+    s = 2j * np.pi * f
+    fit = cr.fit_frf(cr.MeasuredFRF(np.exp(-0.01 * s) / (100 * s + 1), f), 1, dt=1e-3).fit
+    assert fit.dead_time == pytest.approx(0.01, rel=1e-6)
+
+
+def test_a_bound_of_the_dead_time_that_cannot_be_searched_is_refused():
+    f = np.geomspace(0.01, 1.0, 30)
+    frf = cr.MeasuredFRF(1 / (1 + 3j * f), f)
+    for bound in (1e308, 1e6):
+        with pytest.raises(OptionError, match="too long to search in"):
+            cr.fit_frf(frf, 1, max_dead_time=bound)
