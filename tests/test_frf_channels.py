@@ -19,7 +19,9 @@ COHERENCE, STD = RNG.uniform(size=(2, 3, 3)), RNG.uniform(size=(2, 3, 3))
 
 @pytest.fixture
 def frf():
-    return cr.MeasuredFRF(RESPONSE, HZ, coherence=COHERENCE, std=STD, name="rig", **LABELS)
+    return cr.MeasuredFRF(
+        RESPONSE, HZ, coherence=COHERENCE, std=STD, repeats=7, name="rig", **LABELS
+    )
 
 
 @pytest.mark.parametrize(
@@ -38,6 +40,7 @@ def test_coherence_and_deviation_go_with_the_channels(frf, key, rows, columns):
     for name, values in (("frdata", RESPONSE), ("coherence", COHERENCE), ("std", STD)):
         assert_array_equal(getattr(part, name), values[np.ix_(rows, columns, rising)])
     assert_array_equal(part.frequency_hz, [1.0, 2.0, 3.0])
+    assert part.repeats == part.between_hz(1.0, 2.0).repeats == 7
 
 
 @pytest.mark.parametrize("key", [(0, 1), ("x", "b"), (slice(0, 1), 1)])
@@ -65,6 +68,7 @@ def test_without_coherence_and_deviation_there_is_none_to_take():
     part = cr.MeasuredFRF(RESPONSE, HZ)[1, 0]
     assert part.coherence is None
     assert part.std is None
+    assert part.repeats is None
 
 
 def test_no_channel_is_refused(frf):

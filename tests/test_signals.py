@@ -233,6 +233,28 @@ def test_frf_bands():
         cr.MeasuredFRF([1.0], [1.0]).trusted(0.9)
 
 
+@pytest.mark.parametrize("repeats", [3, 5.5, None])
+def test_circles_hold_the_truth_as_often_as_they_say(repeats):
+    rng = np.random.default_rng(4)
+    errors = rng.standard_normal((20_000, 2)) @ [1, 1j]
+    scatter = np.ones(errors.size)
+    if repeats is not None:  # the sum of 2 (n - 1) squares, as of n complex values
+        scatter = rng.chisquare(2 * (repeats - 1), errors.size) / (2 * (repeats - 1))
+    F = cr.MeasuredFRF(1 + errors, np.arange(20_000), std=np.sqrt(2 * scatter), repeats=repeats)
+    for level in (0.5, 0.95):
+        # binomial, 20 000 of them: a standard deviation of 0.35 % at most
+        assert np.mean(abs(F.complex - 1) <= F.circle(level)) == pytest.approx(level, abs=0.01)
+
+
+def test_circles_need_a_deviation_and_a_level():
+    with pytest.raises(DataError, match="no standard deviation"):
+        cr.MeasuredFRF([1.0], [1.0]).circle()
+    with pytest.raises(OptionError, match="below 1"):
+        frf().circle(95)
+    with pytest.raises(OptionError, match="more than one"):
+        cr.MeasuredFRF([1.0], [1.0], std=[0.1], repeats=1)
+
+
 @pytest.mark.parametrize(
     ("arguments", "match"),
     [

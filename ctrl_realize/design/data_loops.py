@@ -30,6 +30,7 @@ class DataLoop:
     omega: FloatArray
     values: ComplexArray
     std: FloatArray | None
+    repeats: float | None
     dead_time: float
     log_gain: Any
     phase: Any
@@ -114,6 +115,7 @@ def data_loop(
         omega,
         values,
         std,
+        points.repeats,
         wait,
         PchipInterpolator(x, np.log(np.abs(values))),
         PchipInterpolator(x, phase),

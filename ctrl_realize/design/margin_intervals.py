@@ -1,10 +1,10 @@
 """How well measured data know the margins of a loop.
 
-The errors of the points are taken to be independent, Gaussian, equal in all directions of the
-plane, and of known standard deviation. Around each measured value lies a disk for the true one,
-and what a margin may be is read off these disks. A derivative at the crossover that was measured
-would not do: noise lets a flat loop cross the unit circle many times, and the derivative at one
-crossing knows nothing of the others.
+The errors of the points are taken to be independent, Gaussian and equal in all directions of the
+plane; their standard deviation is known, or from the scatter of so many repeats. Around each
+measured value lies a disk for the true one, and what a margin may be is read off these disks. A
+derivative at the crossover that was measured would not do: noise lets a flat loop cross the unit
+circle many times, and the derivative at one crossing knows nothing of the others.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.statistics import circle_quantile, upper_quantile
 from .data_loops import DataLoop
 from .margin_result import Margins
 
@@ -25,27 +25,28 @@ Stretch = tuple[float, float, bool]
 TAIL = 0.025
 """Probability that is left beyond either end of an interval."""
 
-RADIUS = -float(ndtri(TAIL))
-"""Of the disks, in standard deviations of one direction. On a curve without noise a margin depends
-on one direction of the error only, and 1.96 is exact to first order; noise beside the crossover
-makes the interval wider, never narrower."""
-
 NEAR = np.geomspace(1e-8, 0.1, 280)
 """Relative distances from a crossover at which the curve is looked at, for the smallest noise."""
 
 
 @dataclass(frozen=True)
 class _Tube:
-    """The measured curve and the radius of its disks."""
+    """The measured curve and the radius of its disks.
+
+    On a curve without noise a margin depends on one direction of the error only, and 1.96 standard
+    deviations of it (Student's where repeats told them) are exact to first order; noise beside the
+    crossover makes the interval wider, never narrower.
+    """
 
     omega: FloatArray
     values: ComplexArray
     spread: FloatArray
+    alone: float
     together: float
 
     @property
     def radius(self) -> FloatArray:
-        return RADIUS * self.spread
+        return self.alone * self.spread
 
     def runs(self, distance: FloatArray, side: FloatArray) -> list[tuple[slice, bool]]:
         """Stretches of frequency in which the truth may cross a line, and whether it must.
@@ -97,21 +98,19 @@ def closest_approach(loop: DataLoop) -> Interval:
     The smallest lower bound holds as soon as that of the truly closest point does: z = 1.96. The
     smallest upper bound needs all of them to hold: z' is for 0.025 / K with K points. With
     ``a = -2 log 0.025 - z^2`` the bound is exact at distance 0 and far away, and conservative
-    between (r is Rice-distributed).
+    between (r is Rice-distributed). Where repeats told s, Student's quantiles and that of F take
+    the places.
     """
     spread = _spread(loop, loop.omega)
-    high = float(np.min(np.abs(1 + loop.values) + _quantile(loop.omega.size) * spread))
+    most = upper_quantile(TAIL / loop.omega.size, loop.repeats)
+    high = float(np.min(np.abs(1 + loop.values) + most * spread))
     # Between the points the curve itself counts, with the error of its neighbours.
     omega, values = loop.dense()
-    beside, z = _spread(loop, omega), _quantile(1)
-    bend = -2 * np.log(TAIL) - z**2
+    beside, z = _spread(loop, omega), upper_quantile(TAIL, loop.repeats)
+    # The circle counts in standard deviations of both directions together.
+    bend = 2 * circle_quantile(1 - TAIL, loop.repeats) ** 2 - z**2
     inner = np.sqrt(np.maximum(np.abs(1 + values) ** 2 - bend * beside**2, 0))
     return max(0.0, float(np.min(inner - z * beside))), high
-
-
-def _quantile(count: int) -> float:
-    """Standard deviations that an error exceeds upwards with `TAIL` / `count`."""
-    return -float(ndtri(TAIL / count))
 
 
 def _spread(loop: DataLoop, omega: FloatArray) -> FloatArray:
@@ -126,7 +125,13 @@ def _tube(loop: DataLoop, crossovers: FloatArray) -> _Tube:
     around = np.outer(crossovers, np.concatenate([1 - NEAR, [1.0], 1 + NEAR])).ravel()
     omega = np.unique(np.concatenate([grid, around]))
     omega = omega[(omega >= loop.omega[0]) & (omega <= loop.omega[-1])]
-    return _Tube(omega, loop(omega), _spread(loop, omega), _quantile(2 * loop.omega.size))
+    return _Tube(
+        omega,
+        loop(omega),
+        _spread(loop, omega),
+        upper_quantile(TAIL, loop.repeats),
+        upper_quantile(TAIL / (2 * loop.omega.size), loop.repeats),
+    )
 
 
 def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:

@@ -47,8 +47,9 @@ class Margins(Result):
     dt : float
         Sample time in s, 0 if continuous.
     intervals : dict of str to (float, float)
-        For measured responses with a standard deviation, which is taken as known: 95 % intervals
-        of the four margins. They hold at noise that makes the response cross and come back many
+        For measured responses with a standard deviation, which counts as known unless the
+        response says from how many `repeats` it was taken: 95 % intervals of the four margins.
+        They hold at noise that makes the response cross and come back many
         times, and are then not centred: the smallest of many noisy distances is too small by
         itself. Otherwise empty.
     flags : tuple of Flag

@@ -20,6 +20,8 @@ class MeasuredPoints:
     response: ComplexArray
     coherence: FloatArray | None
     std: FloatArray | None
+    repeats: float | None = None
+    """From whose scatter `std` was taken; None where it counts as known."""
 
     @property
     def omega(self) -> FloatArray:
@@ -33,6 +35,7 @@ class MeasuredPoints:
             self.response[kept],
             None if self.coherence is None else self.coherence[kept],
             None if self.std is None else self.std[kept],
+            self.repeats,
         )
 
 
@@ -53,6 +56,7 @@ def measured_points(frf: Any) -> MeasuredPoints:
         np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order],
         coherence,
         std,
+        getattr(frf, "repeats", None),
     )
 
 

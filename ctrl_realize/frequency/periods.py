@@ -29,7 +29,7 @@ def from_periods(stream: Stream, period: int, skip: int) -> tuple[Estimate, floa
     uu, yy = np.abs(U) ** 2 + share * var_u, np.abs(Y) ** 2 + share * var_y
     coherence = np.minimum(np.abs(Y * U.conj() + share * cov) ** 2 / (uu * yy), 1.0)
     frequency = np.asarray(np.fft.rfftfreq(period, dt)[excited], dtype=np.float64)
-    return Estimate(frequency, response, coherence, std), dt
+    return Estimate(frequency, response, coherence, std, count), dt
 
 
 def _statistics(stream: Stream, period: int, skip: int) -> tuple[PeriodStatistics, float]:

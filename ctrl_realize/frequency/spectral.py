@@ -64,7 +64,8 @@ def spectral_frf(
     Returns
     -------
     MeasuredFRF
-        With coherence and the standard deviation of the complex response. With several
+        With coherence and the standard deviation of the complex response, which the scatter of
+        `repeats` periods or independent segments tells (`MeasuredFRF.circle`). With several
         channels, shape (outputs, inputs, K); the coherence is then the multiple coherence of
         each output, the same for all its inputs.
 
@@ -79,9 +80,14 @@ def spectral_frf(
     Notes
     -----
     The coherence is :math:`\gamma^2 = |S_{yu}|^2 / (S_{uu} S_{yy})`. The variance of the complex
-    response is :math:`|H|^2 (1 - \gamma^2) / (\gamma^2 K)` with K independent segments: the
+    response is :math:`|H|^2 (1 - \gamma^2) / (\gamma^2 (K - 1))` with K independent segments: the
     number of segments, reduced for what overlapping ones share (Welch 1967). For periods it
     comes from their scatter [1]_.
+
+    That scatter is of what differs from period to period. What comes again in each of them it
+    does not tell: what a plant that is not linear adds to a multisine, and the rounding of a
+    converter without noise. Of a sensor with a quadratic term of a tenth the circles of 95 %
+    held the linear response at one point of five.
 
     A file that does not fit into memory is gone through piece by piece::
 
@@ -123,7 +129,14 @@ def spectral_frf(
         found, dt = from_segments(stream, method, segment, window, overlap)
     frequency = found.frequency_hz
     response = found.response * np.exp(-2j * np.pi * frequency * delay * dt)
-    return MeasuredFRF(response, frequency, coherence=found.coherence, std=found.std, name=name)
+    return MeasuredFRF(
+        response,
+        frequency,
+        coherence=found.coherence,
+        std=found.std,
+        repeats=found.repeats,
+        name=name,
+    )
 
 
 def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:

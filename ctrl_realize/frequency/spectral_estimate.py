@@ -16,10 +16,12 @@ Stream: TypeAlias = Iterator[tuple[FloatArray, FloatArray, float]]
 class Estimate:
     """A frequency response as estimated, at rising frequencies.
 
-    ``response``, ``coherence`` and ``std`` have the shape (K,), or (p, m, K) with several channels.
+    ``response``, ``coherence`` and ``std`` have the shape (K,), or (p, m, K) with several channels;
+    ``std`` comes from the scatter of ``repeats``.
     """
 
     frequency_hz: FloatArray
     response: ComplexArray
     coherence: FloatArray
     std: FloatArray
+    repeats: float

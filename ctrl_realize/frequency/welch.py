@@ -68,8 +68,8 @@ def _one_channel(
     h1, h2 = yu / uu, yy / yu.conj()
     response = {"H1": h1, "H2": h2, "Hv": yu / np.abs(yu) * np.sqrt(yy / uu)}[method]
     coherence = np.minimum(np.abs(yu) ** 2 / (uu * yy), 1.0)
-    std = np.abs(h1) * np.sqrt((1 - coherence) / (coherence * averages))
-    return Estimate(frequency[lines][excited], response, coherence, std)
+    std = np.abs(h1) * np.sqrt((1 - coherence) / (coherence * (averages - 1)))
+    return Estimate(frequency[lines][excited], response, coherence, std, averages)
 
 
 def _many_channels(
@@ -107,6 +107,7 @@ def _many_channels(
         np.moveaxis(response, 0, -1),
         np.moveaxis(np.broadcast_to(coherence[:, :, None], response.shape), 0, -1),
         np.moveaxis(std, 0, -1),
+        averages - m + 1,
     )
 
 

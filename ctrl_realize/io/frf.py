@@ -128,13 +128,16 @@ def read_frf(
     table = read_table(path, options, variable=variable, max_bytes=max_bytes)
     columns = _columns(table, asked)
     check_lengths(table, columns.values())
-    extras = {key: table.numbers(columns[key]) for key in ("coherence", "std") if key in columns}
+    coherence_values, std_values = (
+        table.numbers(columns[key]) if key in columns else None for key in ("coherence", "std")
+    )
     try:
         return MeasuredFRF(
             _response(table, columns, units),
             _frequency_hz(table, columns["frequency"], units.frequency),
+            coherence=coherence_values,
+            std=std_values,
             name=system_name(Path(path).stem) if name is None else name,
-            **extras,
         )
     except DataError as error:
         if str(error).startswith(str(table.path)):

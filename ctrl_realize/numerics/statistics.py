@@ -109,6 +109,50 @@ def trimmed_statistics(
     )
 
 
+def circle_quantile(level: float, repeats: float | None) -> float:
+    """Radius of the circle that holds a complex normal error, in its standard deviations.
+
+    Parameters
+    ----------
+    level : float
+        In 0...1, ends excluded.
+    repeats : float or None
+        Values, above 1, from whose scatter the standard deviation was taken: the square of the
+        error over it has the F distribution with 2 and ``2 (repeats - 1)`` degrees of freedom.
+        None where it is known.
+
+    Examples
+    --------
+    >>> for repeats in None, 1000, 5:
+    ...     print(f"{circle_quantile(0.95, repeats):.3f}")
+    1.731
+    1.732
+    2.112
+    """
+    beyond = -np.log1p(-level)
+    if repeats is None:
+        return float(np.sqrt(beyond))
+    with np.errstate(over="ignore"):
+        return float(np.sqrt((repeats - 1) * np.expm1(beyond / (repeats - 1))))
+
+
+def upper_quantile(tail: float, repeats: float | None) -> float:
+    """Standard deviations that the error in one direction of the plane exceeds with `tail`.
+
+    Student's with ``2 (repeats - 1)`` degrees of freedom; see `circle_quantile`.
+
+    Examples
+    --------
+    >>> for repeats in None, 5:
+    ...     print(f"{upper_quantile(0.025, repeats):.3f}")
+    1.960
+    2.306
+    """
+    if repeats is None:
+        return -float(special.ndtri(tail))
+    return -float(special.stdtrit(2 * (repeats - 1), tail))
+
+
 def mixture_quantile(
     level: float, centres: FloatArray, spreads: FloatArray, shares: FloatArray
 ) -> float:

@@ -8,8 +8,10 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import real
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.statistics import circle_quantile
 from .record_checks import check_size, numbers, unmasked
 
 
@@ -29,6 +31,9 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         Squared coherence, 0...1.
     std : array_like, same shape as `response`, optional
         Standard deviation of the complex response (root mean square of the error).
+    repeats : float, optional
+        Number of repeats, periods or independent segments from whose scatter `std` was taken,
+        above 1 and not necessarily whole. Without it `std` counts as known.
     name : str, optional
     inputs, outputs : str or sequence of str, optional
         Signal names, as python-control takes them.
@@ -39,6 +44,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     complex : ndarray
         The complex response (python-control's attribute), sorted by frequency.
     coherence, std : ndarray or None
+    repeats : float or None
 
     Raises
     ------
@@ -51,6 +57,10 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     ``frf[output, input]`` takes channels by number, name or slice, with their coherence and
     standard deviation.
 
+    A standard deviation from few repeats is itself uncertain: 1.96 of it, or circles of
+    ``sqrt(3) * std``, hold 95 % only where there are many. `circle` and the intervals of
+    `design.margins` reckon with `repeats`.
+
     Examples
     --------
     >>> import ctrl_realize as cr
@@ -61,6 +71,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
 
     coherence: FloatArray | None
     std: FloatArray | None
+    repeats: float | None
     frequency_hz: FloatArray
 
     def __init__(
@@ -70,6 +81,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         *,
         coherence: ArrayLike | None = None,
         std: ArrayLike | None = None,
+        repeats: float | None = None,
         name: str = "measured",
         inputs: Any = None,
         outputs: Any = None,
@@ -109,6 +121,9 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             )
         if self.std is not None and self.std.min() < 0:
             raise DataError(f"std goes down to {self.std.min():g}; needed is >= 0")
+        self.repeats = None if repeats is None else real(repeats, "repeats", "number above 1")
+        if self.repeats is not None and self.repeats <= 1:
+            raise OptionError(f"repeats={repeats!r}; a scatter needs more than one")
 
     def __repr__(self) -> str:
         return (
@@ -150,10 +165,44 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             self.frequency_hz,
             coherence=None if self.coherence is None else _channels(self.coherence, chosen),
             std=None if self.std is None else _channels(self.std, chosen),
+            repeats=self.repeats,
             name=taken.name,
             inputs=taken.input_labels,
             outputs=taken.output_labels,
         )
+
+    def circle(self, level: float = 0.95) -> FloatArray:
+        r"""Radii of the circles around the points that hold the true response, each with `level`.
+
+        For a complex normal error. With the standard deviation *s* from *n* repeats the radius is
+        :math:`s \sqrt{(n - 1) ((1 - level)^{-1 / (n - 1)} - 1)}`, which many repeats bring to
+        :math:`s \sqrt{-\log(1 - level)}`.
+
+        Returns
+        -------
+        ndarray, same shape as the response
+
+        Raises
+        ------
+        DataError
+            No standard deviation.
+        OptionError
+            A `level` that is not between 0 and 1.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> for repeats in None, 5:
+        ...     frf = cr.MeasuredFRF([1.0], [0.1], std=[0.1], repeats=repeats)
+        ...     print(frf.circle().round(3))
+        [0.173]
+        [0.211]
+        """
+        if self.std is None:
+            raise DataError("this FRF has no standard deviation, so nothing tells its error")
+        if not 0 < real(level, "level", "part between 0 and 1") < 1:
+            raise OptionError(f"level={level!r}; needed is above 0 and below 1")
+        return np.asarray(self.std * circle_quantile(level, self.repeats))
 
     def between_hz(self, low: float, high: float) -> MeasuredFRF:
         """Cut out the points with low <= frequency <= high, in Hz."""
@@ -184,6 +233,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             self.frequency_hz[keep],
             coherence=None if self.coherence is None else self.coherence[..., keep],
             std=None if self.std is None else self.std[..., keep],
+            repeats=self.repeats,
             name=self.name,
             inputs=self.input_labels,
             outputs=self.output_labels,

@@ -329,6 +329,26 @@ def test_intervals_of_measured_margins_cover_the_truth(valve, pi_controller, gai
         assert hits[name] >= 0.86 * asked[name], (name, hits)
 
 
+def test_intervals_from_three_repeats_are_those_of_student(valve, pi_controller):
+    omega = np.geomspace(1.0, 200.0, 400)
+    clean = valve(37)(np.exp(1j * omega * DT))
+
+    def measured(**more):
+        data = cr.MeasuredFRF(clean, omega / (2 * np.pi), std=1e-4 * np.abs(clean), **more)
+        return cr.design.margins(data, pi_controller(0.5, 0.2)).intervals
+
+    known, three, many = measured(), measured(repeats=3), measured(repeats=1e7)
+    for name, (low, high) in known.items():
+        assert many[name] == pytest.approx((low, high), rel=1e-6)
+        # Student with four degrees of freedom: 2.776 for 1.960. The disks are looked at at
+        # frequencies that lie 6 % further from each other; the upper end of the modulus margin
+        # asks all points at once, for which three repeats are few.
+        if name != "modulus_margin":
+            ratio = (three[name][1] - three[name][0]) / (high - low)
+            assert ratio == pytest.approx(2.776 / 1.960, rel=0.08), name
+        assert three[name][0] < low < high < three[name][1]
+
+
 def test_intervals_of_faint_noise_are_those_of_the_derivative(valve, pi_controller):
     plant, pi = valve(37), pi_controller(0.5, 0.2)
     omega = np.geomspace(1.0, 200.0, 400)

@@ -128,15 +128,19 @@ def test_transient_in_the_first_period_would_show():
 
 
 def test_deviation_of_periodic_estimates_is_that_of_their_scatter():
-    errors, stated = [], []
+    errors, stated, inside = [], [], []
     for seed in range(40):
         record, _ = multisine_record(periods=9, noise=1.0, seed=seed)
         frf = cr.spectral_frf(record, period=500)
         errors.append(frf.complex - exact(frf))
         stated.append(frf.std)
+        inside.append(np.abs(errors[-1]) <= frf.circle())
     # 40 x 59 lines; variances from 8 periods each: 2 %.
     ratio = np.sqrt(np.mean(np.abs(errors) ** 2) / np.mean(np.square(stated)))
     assert ratio == pytest.approx(1.0, abs=0.07)
+    assert frf.repeats == 8
+    # 0.45 % of scatter; with eight values taken for many it would be 91.7 %
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.014)
 
 
 def two_by_two(n, *, noise=0.0, seed=0, together=False):
@@ -145,6 +149,11 @@ def two_by_two(n, *, noise=0.0, seed=0, together=False):
     u[1] = u[0] if together else u[1] + 0.5 * u[0]
     y = np.stack([respond(u[0]) - 0.3 * u[1], 2 * u[0] + respond(u[1])])
     return cr.Record(DT * np.arange(n), u, y + noise * rng.standard_normal((2, n)))
+
+
+def record_of_one(n):
+    u = np.random.default_rng(0).standard_normal(n)
+    return cr.Record(DT * np.arange(n), u, respond(u))
 
 
 def exact_two_by_two(frf):
@@ -166,6 +175,8 @@ def test_deviations_of_several_channels_are_those_of_their_scatter():
         frf = cr.spectral_frf(two_by_two(20_000, noise=1.0, seed=seed), segment=512)
         frf = frf.between_hz(6, 40)
         score.append(np.abs(frf.frdata - exact_two_by_two(frf)) ** 2 / frf.std**2)
+    # independent segments, less what the second input takes
+    assert frf.repeats == cr.spectral_frf(record_of_one(20_000), segment=512).repeats - 1
     # 8 x 174 lines, neighbours correlated: 3 %; leakage adds a little.
     assert np.sqrt(np.mean(score, axis=(0, 3))) == pytest.approx(np.ones((2, 2)), abs=0.1)
 

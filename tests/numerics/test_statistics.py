@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from ctrl_realize.numerics.statistics import trimmed_statistics
+from ctrl_realize.numerics.statistics import (
+    circle_quantile,
+    trimmed_statistics,
+    upper_quantile,
+)
 
 samples = arrays(np.float64, st.integers(7, 40), elements=st.floats(-1e3, 1e3, width=32))
 
@@ -51,3 +55,18 @@ def test_95_percent_intervals_cover_the_centre_of_heavy_tails():
         hits += low <= 0 <= high
     # Binomial: 95 % of 400 has a standard deviation of 1.1 %; three of them.
     assert 0.917 <= hits / 400 <= 0.983
+
+
+@pytest.mark.parametrize("repeats", [1.3, 2, 5, 8, 40])
+def test_a_complex_error_over_its_scatter_is_distributed_as_f_and_student_say(repeats):
+    freedom = 2 * (repeats - 1)
+    for level in (0.5, 0.95, 0.999):
+        radius = circle_quantile(level, repeats)
+        assert radius**2 == pytest.approx(stats.f.ppf(level, 2, freedom), rel=1e-9)
+        assert upper_quantile(1 - level, repeats) == pytest.approx(stats.t.ppf(level, freedom))
+
+
+def test_a_known_scatter_is_that_of_very_many():
+    assert circle_quantile(0.95, None) == pytest.approx(circle_quantile(0.95, 1e9), rel=1e-8)
+    assert upper_quantile(0.025, None) == pytest.approx(upper_quantile(0.025, 1e9), rel=1e-8)
+    assert circle_quantile(0.95, None) == pytest.approx(np.sqrt(stats.chi2.ppf(0.95, 2) / 2))
