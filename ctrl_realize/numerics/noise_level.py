@@ -112,18 +112,36 @@ def correlation_time(residual: FloatArray) -> float:
     The sum ends where a pair of neighbouring terms turns negative (Geyer's initial positive
     sequence); what white noise scatters to, 1.5, counts as 1.
     """
+    time = 2 * float(_correlation(residual).sum(axis=1).sum()) - 1.0
+    return time if time > 1.5 else 1.0
+
+
+def kept_in_blocks(residual: FloatArray, length: int) -> float:
+    """Part of the variance of slow means that blocks of `length` samples keep.
+
+    Blocks that are drawn one by one know nothing of each other: the autocorrelation at lag k is
+    left in ``1 - k / length`` of the pairs. 1 for white noise.
+    """
+    time = correlation_time(residual)
+    if time == 1.0:
+        return 1.0
+    correlation = _correlation(residual).ravel()
+    pairs_inside = np.clip(1 - np.arange(correlation.size) / length, 0.0, None)
+    return float(np.clip((2 * pairs_inside @ correlation - 1.0) / time, 0.0, 1.0))
+
+
+def _correlation(residual: FloatArray) -> FloatArray:
+    """Autocorrelation from lag 0 to where a pair turns negative, in pairs: shape (K, 2)."""
     n = residual.size
     centred = residual - residual.mean()
     energy = float(centred @ centred)
     if n < 8 or energy == 0:
-        return 1.0
+        return np.zeros((0, 2))
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
     correlation = np.fft.irfft(spectrum)[: n // 2] / energy
-    pairs = correlation[: 2 * (correlation.size // 2)].reshape(-1, 2).sum(axis=1)
-    negative = np.flatnonzero(pairs <= 0)
-    last = int(negative[0]) if negative.size else pairs.size
-    time = 2 * float(pairs[:last].sum()) - 1.0
-    return time if time > 1.5 else 1.0
+    pairs = correlation[: 2 * (correlation.size // 2)].reshape(-1, 2)
+    negative = np.flatnonzero(pairs.sum(axis=1) <= 0)
+    return np.asarray(pairs[: negative[0]] if negative.size else pairs)
 
 
 def colouring(rest: FloatArray, sigma: float) -> float:

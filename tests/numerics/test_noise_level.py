@@ -11,6 +11,7 @@ from ctrl_realize.numerics.noise_level import (
     colouring,
     correlation_time,
     hum_frequencies,
+    kept_in_blocks,
     mad_sigma,
     quantisation_step,
     rest_noise,
@@ -158,6 +159,22 @@ def test_what_cannot_be_coloured_counts_sample_by_sample():
     assert correlation_time(np.repeat(white(3), 2)) == 1
     assert correlation_time(np.resize([1.0, -1.0], 100)) == 1
     assert correlation_time(lfilter([1], [1, -0.1], white(5000))) == 1  # 1.2: as white
+
+
+@pytest.mark.parametrize("over", [1, 3, 10])
+def test_blocks_keep_the_variance_of_slow_means_that_their_means_have(over):
+    noise = lfilter([1], [1, -0.8], white(200_000))
+    length = 9 * over
+    kept = kept_in_blocks(noise, length)
+    means = noise[: noise.size // length * length].reshape(-1, length).mean(axis=1)
+    # over all means; the autocorrelation is summed over some ten times 9 samples: known to 4 %
+    expected = length * means.var() / (noise.var() * correlation_time(noise))
+    assert kept == pytest.approx(expected, rel=0.06)
+
+
+def test_blocks_of_white_noise_lose_nothing():
+    assert kept_in_blocks(white(5000), 3) == 1
+    assert kept_in_blocks(np.zeros(10), 3) == 1
 
 
 def test_means_tell_colour_at_four_and_at_sixteen_samples():
