@@ -43,7 +43,8 @@ STUDIES: dict[str, Study] = {
     "pulses": Study(driven_intervals.pulses, 4, by_plant=False),
     "any input": Study(driven_intervals.any_input, by_plant=False),
     "joined": Study(driven_intervals.joined, by_plant=False),
-    "responses": Study(driven_intervals.responses, by_plant=False),
+    "responses": Study(driven_intervals.responses, 4, by_plant=False),
+    "response fits": Study(driven_intervals.response_fits, by_plant=False),
     "noise spectra": Study(driven_intervals.noise_spectra, 4, by_plant=False),
     "sines": Study(driven_intervals.sines, 4, by_plant=False),
 }
