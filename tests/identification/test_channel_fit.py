@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import control as ct
 import numpy as np
@@ -15,6 +16,7 @@ from ctrl_realize.errors import (
     OrderError,
     UnsuitableSystemError,
 )
+from ctrl_realize.wording import interval_in_time
 
 DT = 0.1
 CORE = ct.ss(
@@ -236,6 +238,38 @@ def test_refining_asks_for_a_system_that_fits_the_record():
         cr.refine(cr.delayed_ss(ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT), 900), one)
     with pytest.raises(UnsuitableSystemError):
         cr.refine(ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), record())
+
+
+def test_labels_name_and_steps_come_from_the_record_and_the_fit():
+    data = record(name="rig 1.2", input_labels=["valve", "pump"], output_labels=["p", "q"])
+    found = cr.refine(PLANT, data)
+    assert (found.name, found.input_labels, found.output_labels) == (
+        "rig 1_2",
+        ["valve", "pump"],
+        ["p", "q"],
+    )
+    assert 1 <= found.fit.steps < 50
+    assert (found.fit.choices, found.fit.bic) == ((), {})
+    assert found.fit.records == (data,)
+
+
+def test_records_that_all_have_gaps_are_not_said_to_leave_something():
+    first = record()
+    y = first.output.copy()
+    y[:, 50] = np.nan
+    found = cr.refine(PLANT, cr.Record(first.time, first.input, y, missing="keep"))
+    assert (found.fit.checks, found.fit.flags) == ((), ())
+
+
+def test_the_card_tells_a_dead_time_where_there_is_one(model):
+    assert "dead time" not in dict(model.fit._rows())
+    known = replace(model.fit, dead_time=0.23456, interval=(0.2, 0.3))
+    rows = dict(known._rows())
+    assert rows["dead time"] == "234.6 ms = 2 samples"
+    assert rows["not ruled out"] == interval_in_time(0.2, 0.3)
+    assert "instead of" not in rows
+    assert known.delay_interval == pytest.approx((2.0, 3.0))
+    assert known.dead_time_interval == (0.2, 0.3)
 
 
 def test_it_is_a_result_like_the_others(model):

@@ -115,8 +115,10 @@ def test_scaled_data_scale_the_curve_and_keep_the_delay(scale):
 
 def test_strictly_proper_candidates_have_no_direct_term():
     pulse = valve_pulse("zero-phase", n=360)
-    scan = cr.estimate_delay(pulse, 3, max_delay=40, samples=300, feedthrough=False, dt=TS).fit
+    sys = cr.estimate_delay(pulse, 3, max_delay=40, samples=300, feedthrough=False, dt=TS)
+    scan = sys.fit
     assert not scan.feedthrough
+    assert sys.delay_free.D == 0 != pulse[scan.delay]
     assert scan.candidates[30].delay_free.D == 0
     assert np.abs(pulse[:341] - scan.candidates[30].markov(341)).sum() == pytest.approx(
         scan.iae[30], rel=1e-12
