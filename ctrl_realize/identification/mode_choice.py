@@ -38,6 +38,7 @@ HOPELESS = 2.0
 _KEPT = ("records_differ", "gains_differ", "amplitude_trend", "same_records")
 _FAR_APART = 0.5  # width of an interval, in dead times, from which models disagree
 _NOTHING = 0.5  # samples
+_ROUNDING = 1e-12
 
 Residuals = list[FloatArray]
 
@@ -169,6 +170,8 @@ def _total_delay(system: DelayedStateSpace) -> float | None:
     states = np.linalg.solve(inside, core.B)
     total = float((core.D + core.C @ states)[0, 0])
     first = float((core.C @ np.linalg.solve(inside, states))[0, 0])
-    if total == 0 or not np.isfinite(first / total):
+    # what rounding leaves of a plant without gain
+    nothing = _ROUNDING * float((np.abs(core.D) + np.abs(core.C) @ np.abs(states))[0, 0])
+    if abs(total) <= nothing or not np.isfinite(first / total):
         return None
     return float((_delay(system) + first / total - 0.5) * system.dt)
