@@ -75,6 +75,7 @@ KEEPING = {
     "pickle": lambda S: (pickle.loads(pickle.dumps(S)), 1.0),
     "power one": lambda S: (S**1, 1.0),
     "replace": lambda S: (S.replace(name="other"), 1.0),
+    "index": lambda S: (S[0, 0], 1.0),
 }
 
 
@@ -117,7 +118,6 @@ PLAIN = {
     "S - 1": (lambda S: S - 1, lambda g, k: g - 1),
     "feedback": (lambda S: ct.feedback(S, CONTROLLER), lambda g, k: g / (1 + g * k)),
     "parallel": (lambda S: ct.parallel(S, CONTROLLER), lambda g, k: g + k),
-    "index": (lambda S: S[0, 0], lambda g, k: g),
     "ss": (lambda S: ct.ss(S), lambda g, k: g),
 }
 
@@ -182,6 +182,29 @@ def test_a_long_delay_costs_memory_only_where_matrices_are_asked_for():
     assert len(pickle.dumps(S)) < 1000
     assert S.A is S.A
     assert S.A.shape == (3001, 3001)
+
+
+def test_a_delay_too_long_for_matrices_has_all_that_needs_none():
+    S = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=1.0, dt=1e-6)
+    assert (S.delay, S.nstates) == (10**6, 10**6 + 1)
+    assert S.step(10**6 + 2)[10**6] == 0
+    # the exact step response one sample after the dead time; 1e-5 of it is left of 1 - exp
+    assert_allclose(S.step(10**6 + 2)[-1], -np.expm1(-1e-6 / 0.08), rtol=1e-9)
+    w = np.array([1.0, 30.0])
+    # the hold adds half a sample of phase, 5e-7 w
+    assert_allclose(S(np.exp(1j * w * 1e-6)), np.exp(-1j * w) / (1 + 0.08j * w), rtol=2e-5)
+    assert (S * S).delay == 2 * 10**6
+    assert pickle.loads(pickle.dumps(S)).delay == 10**6
+    slower = cr.design.to_discrete(*cr.design.to_continuous(S), 0.01)
+    assert slower.delay == 100
+    assert_allclose(slower.delay_free.poles(), np.exp(-0.01 / 0.08), rtol=1e-9)
+
+
+@pytest.mark.parametrize("look", [lambda S: S.A, ct.ss, lambda S: ct.feedback(S, 1)])
+def test_matrices_that_no_memory_holds_are_refused_with_what_goes_without(look):
+    S = cr.delayed_ss(CONTROLLER, 30_000)
+    with pytest.raises(DelayRangeError, match=r"7 GB.*to_discrete"):
+        look(S)
 
 
 def test_poles_of_the_delay_are_exactly_zero():
@@ -251,6 +274,44 @@ def test_several_channels_have_their_own_delays():
     assert_allclose(S.markov(40)[1, 1, :8], np.zeros(8), atol=0)
 
 
+@pytest.mark.parametrize(
+    ("key", "rows", "columns"),
+    [
+        ((2, 1), [2], [1]),
+        (("out", "b"), [2], [1]),
+        ((slice(None), 1), [0, 1, 2], [1]),
+        (([2, 0], [1, 0]), [2, 0], [1, 0]),
+        ((1, slice(None)), [1], [0, 1]),
+    ],
+)
+def test_channels_that_are_chosen_keep_their_delays(key, rows, columns):
+    S = cr.delayed_ss(
+        mimo_core(), [2, 5], output_delay=[0, 3, 1], inputs=["a", "b"], outputs=["p", "q", "out"]
+    )
+    part = S[key]
+    assert isinstance(part, cr.DelayedStateSpace)
+    assert_array_equal(part.delay, np.add.outer([0, 3, 1], [2, 5])[np.ix_(rows, columns)])
+    z = circle(9, dt=0.1)
+    assert_allclose(
+        np.reshape(part(z), (len(rows), len(columns), 9)),
+        S(z)[np.ix_(rows, columns)],
+        rtol=1e-12,
+    )
+    host = ct.ss(S)[key]
+    assert part.input_labels == host.input_labels
+    assert part.output_labels == host.output_labels
+    assert part.name == f"{S.name}$indexed"
+    # registers of channels that are left out go with them
+    assert part.nstates <= S.nstates
+
+
+@pytest.mark.parametrize("key", [(7, 0), (0, 7), (slice(0, 0), 0)])
+def test_a_choice_of_no_channel_is_refused(key):
+    # python-control makes a system without outputs of it
+    with pytest.raises(OptionError, match="3 outputs and 2 inputs"):
+        cr.delayed_ss(mimo_core(), [2, 5])[key]
+
+
 def test_products_of_channels_with_different_delays_stay_right():
     core = mimo_core()
     S = cr.delayed_ss(core, [2, 5])
@@ -312,7 +373,7 @@ def test_cards_show_core_and_shift():
         (lambda: cr.delayed_ss(CONTROLLER, 1, dt=0.1), OptionError, "sample time"),
         (lambda: cr.delayed_ss(1 + R3, dead_time=1.5 * TS, dt=TS), UnsuitableSystemError, "jumps"),
         (lambda: cr.DelayedStateSpace(ct.ss(R3), 3), UnsuitableSystemError, "sample time"),
-        (lambda: cr.delayed_ss(CONTROLLER, 10**6), DelayRangeError, "states"),
+        (lambda: cr.delayed_ss(CONTROLLER, 10**8), DelayRangeError, "at most 10000000"),
         (lambda: cr.delayed_ss(CONTROLLER, [1, 2]), DelayRangeError, "1 input"),
         (lambda: valve().simulate(np.ones((2, 5))), DataError, r"\(1, N\)"),
         (lambda: valve().markov(0), OptionError, ">= 1"),

@@ -7,8 +7,11 @@ from typing import Any, Self
 import control as ct
 import numpy as np
 
+from ..errors import OptionError
 from .chains import common
 from .parts import CoreAndDelays
+
+_ENDS = ("prefix", "suffix")
 
 
 class DelayedAlgebra(CoreAndDelays):
@@ -25,6 +28,31 @@ class DelayedAlgebra(CoreAndDelays):
 
     def _plain(self) -> ct.StateSpace:
         return ct.StateSpace(self)
+
+    def __getitem__(self, key: Any) -> Self:
+        """Choose channels, by number or name; each keeps its own delay."""
+        # The host names what it chose, and knows what is no key.
+        try:
+            chosen = self._core[key]
+            empty = not (chosen.noutputs and chosen.ninputs)
+        except ct.ControlDimension:
+            empty = True
+        if empty:
+            raise OptionError(
+                f"{key!r} chooses no output or no input; there are {self.noutputs} outputs and "
+                f"{self.ninputs} inputs, counted from 0"
+            )
+        inputs = [self.input_index[name] for name in chosen.input_labels]
+        outputs = [self.output_index[name] for name in chosen.output_labels]
+        prefix, suffix = (ct.config.defaults[f"iosys.indexed_system_name_{end}"] for end in _ENDS)
+        return self._around(
+            chosen,
+            delay=tuple(self.input_delays[j] for j in inputs),
+            output_delay=tuple(self.output_delays[i] for i in outputs),
+            inputs=chosen.input_labels,
+            outputs=chosen.output_labels,
+            name=f"{prefix}{self.name}{suffix}",
+        )
 
     def __neg__(self) -> Self:
         return self._around(-self._core)

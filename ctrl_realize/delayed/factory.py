@@ -13,7 +13,7 @@ from ..checks import positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.sampling import sample_with_dead_time, split_dead_time
 from .parts import check_core
-from .system import MAX_STATES, DelayedStateSpace
+from .system import MAX_DELAY, DelayedStateSpace
 
 
 def delayed_ss(
@@ -127,10 +127,10 @@ def delayed_ss(
 
 def _check_span(system: ct.StateSpace, wait: float, step: float) -> None:
     """Refuse sample times far too short for the dead time, or far too long for the core."""
-    if wait / step > MAX_STATES:
+    if wait / step > MAX_DELAY:
         raise DelayRangeError(
             f"dead_time={wait:g} s is {wait / step:.3g} samples of {step:g} s; at most "
-            f"{MAX_STATES} states are allowed: use a longer sample time"
+            f"{MAX_DELAY} are allowed: use a longer sample time"
         )
     largest = max(float(np.abs(M).max(initial=0.0)) for M in (system.A, system.B))
     if system.isctime() and not math.isfinite(largest * step):

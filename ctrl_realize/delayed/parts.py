@@ -8,26 +8,52 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..errors import OptionError, UnsuitableSystemError
+from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, IntArray
-from .chains import Matrices, augment
+from .chains import Matrices, augment, chain_labels
+
+MAX_STATES = 20_000
+"""The augmented A is dense, as python-control needs it: 20 000 states are 3 GB."""
 
 
 class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     """What a system with dead time is made of.
 
-    ``A, B, C, D`` follow from core and delays. They are dense, (n + d)^2 numbers, and most uses
-    never look at them: they are made at the first look.
+    ``A, B, C, D`` and the names of the states follow from core and delays. The matrices are dense,
+    (n + d)^2 numbers, and most uses never look at them: they are made at the first look.
     """
 
     _core: ct.StateSpace
     input_delays: tuple[int, ...]
     output_delays: tuple[int, ...]
     _augmented: Matrices | None
+    _state_names: dict[str, int] | None
+
+    @property
+    def state_index(self) -> dict[str, int]:
+        """Names of the states and where they stand: those of the core, then past inputs."""
+        if self._state_names is None:
+            delays = self.input_delays, self.output_delays
+            chain = chain_labels(self.input_labels, self.output_labels, *delays)
+            names = [*self._core.state_labels, *chain]
+            self._state_names = {name: i for i, name in enumerate(names)}
+        return self._state_names
+
+    @state_index.setter
+    def state_index(self, names: dict[str, int] | None) -> None:
+        self._state_names = names
 
     def _matrices(self) -> Matrices:
         if self._augmented is None:
             core = self._core
+            if self.nstates > MAX_STATES:
+                raise DelayRangeError(
+                    f"matrices of {self.nstates} states, {sum(self.input_delays)} of them for the "
+                    f"delay, have {8 * self.nstates**2 // 10**9} GB; they are made up to "
+                    f"{MAX_STATES} states. sys(z), sys.step, sys.simulate and sys.markov need no "
+                    "matrices; cr.design.to_discrete(*cr.design.to_continuous(sys), dt) gives a "
+                    "system with a longer sample time"
+                )
             made = augment((core.A, core.B, core.C, core.D), self.input_delays, self.output_delays)
             for M in made:
                 M.flags.writeable = False

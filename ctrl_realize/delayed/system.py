@@ -21,12 +21,12 @@ from ..numerics.arrays import read_only
 from .algebra import DelayedAlgebra
 from .analysis import DelayedAnalysis
 from .cards import DelayedCards
-from .chains import chain_labels, parse_delays
+from .chains import parse_delays
 from .parts import check_core, signal_names
 from .responses import DelayedResponses
 
-MAX_STATES = 20_000
-"""The augmented A is dense, as python-control needs it: 20 000 states are 3 GB."""
+MAX_DELAY = 10_000_000
+"""Samples in all delays together; more are a sample time given in another unit."""
 
 
 class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, DelayedCards):
@@ -34,7 +34,7 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
 
     It is a `control.StateSpace` with the states ``[core; u[k-1] ... u[k-d]]`` and goes into every
     function of python-control. The delay survives negation, products with numbers, matrices and
-    systems, powers, copies, pickling and renaming; sums, feedback, append and indexing give a
+    systems, powers, indexing, copies, pickling and renaming; sums, feedback and append give a
     plain `control.StateSpace`, still right. ``ct.ss(sys)`` strips to a plain one at any time.
 
     Matrices are read-only: core and chain must stay in step.
@@ -67,6 +67,11 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
     -----
     ``sys(z) == sys.delay_free(z) * z**-sys.delay`` to rounding, whatever the delay.
 
+    Up to 20 000 states the matrices A, B, C, D are made for who asks for them (A is dense: 3 GB).
+    Longer delays, of long records for instance, have everything that needs no matrices: ``sys(z)``
+    and the plots of frequency responses, `step`, `simulate`, `markov`, poles and products.
+    ``cr.design.to_discrete(*cr.design.to_continuous(sys), dt)`` samples such a system more slowly.
+
     ``tf * sys`` is the one product that python-control decides alone: it makes a transfer
     function of the augmented matrices, which is wrong from d = 50 or so on. Write ``sys * tf``
     or ``ct.ss(tf) * sys``.
@@ -76,7 +81,8 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
     UnsuitableSystemError
         A core that is not a discrete state-space system with a sample time.
     DelayRangeError
-        Delays that are negative, no whole numbers, or not one for each signal.
+        Delays that are negative, no whole numbers, not one for each signal, or more than ten
+        million samples; and where matrices of more than 20 000 states are asked for.
 
     Examples
     --------
@@ -110,16 +116,13 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             core = core.delay_free
         if core.issiso():
             before, behind = (before[0] + behind[0],), (0,)
-        size = core.nstates + sum(before) + sum(behind)
-        if size > MAX_STATES:
+        if sum(before) + sum(behind) > MAX_DELAY:
             raise DelayRangeError(
-                f"the delays {before + behind} make {size} states, and a dense matrix of "
-                f"{8 * size**2 // 10**9} GB; at most {MAX_STATES} states are allowed. "
-                "Use a longer sample time, or keep core and delay apart"
+                f"the delays are {before + behind} samples; at most {MAX_DELAY} are allowed. Use a "
+                "longer sample time, or keep core and delay apart"
             )
         input_names = signal_names(inputs, core.input_labels, "u")
         output_names = signal_names(outputs, core.output_labels, "y")
-        chain = chain_labels(input_names, output_names, before, behind)
         core_states = [f"x[{i}]" for i in range(core.nstates)]
         self._locked = False
         # Not StateSpace.__init__, which would need the augmented matrices now.
@@ -129,10 +132,13 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             self._output,
             inputs=input_names,
             outputs=output_names,
-            states=core_states + chain,
+            states=core_states,
             dt=core.dt,
             name=name,
         )
+        # The chain's states get their names when somebody asks for them.
+        self.nstates = core.nstates + sum(before) + sum(behind)
+        self._state_names = None
         self._core = ct.StateSpace(
             *(read_only(M) for M in (core.A, core.B, core.C, core.D)),
             core.dt,

@@ -243,11 +243,11 @@ def test_a_sample_time_of_another_world_than_the_response_is_refused(dt, degree)
         cr.fit_frf(cr.MeasuredFRF(RESPONSE, FREQUENCY), 1, relative_degree=degree, dt=dt)
 
 
-@pytest.mark.parametrize("delay", [10**6, 10**200])
+@pytest.mark.parametrize("delay", [10**8, 10**200])
 def test_a_delay_of_more_states_than_can_be_written_is_refused(delay):
-    with pytest.raises((DelayRangeError, OptionError), match=r"at most 20000 states|is beyond"):
+    with pytest.raises((DelayRangeError, OptionError), match=r"at most 10000000|is beyond"):
         cr.DelayedStateSpace(PLANT, delay)
-    with pytest.raises(DelayRangeError, match="at most 20000"):
+    with pytest.raises(DelayRangeError, match="at most 10000000"):
         cr.delayed_ss(PLANT, dead_time=delay * PLANT.dt)
 
 
