@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import warnings
 from dataclasses import dataclass
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
+from ctrl_realize.identification import campaign_row
 from tests.fuzz.draws import any_bytes, any_text, sometimes
 from tests.fuzz.lane import fuzz, good_end
 from tests.fuzz.test_binary_files import damaged
@@ -65,12 +68,54 @@ class Source:
         return cr.Record(t, u, y, name=self.name, missing="keep")
 
 
+class Remembering:
+    """`identify` of records that came before, with the same result, warnings and error.
+
+    What is tested here is what a campaign makes of them; to identify them is most of a case's
+    time, and there are few different ones.
+    """
+
+    MOST = 2000
+
+    def __init__(self, identify):
+        self.identify, self.known = identify, {}
+
+    def __call__(self, record, **choice):
+        arrays = (record.time, record.input, record.output)
+        key = (record.name, repr(choice), *(values.tobytes() for values in arrays))
+        if key not in self.known:
+            if len(self.known) >= self.MOST:
+                self.known.clear()
+            result = error = None
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                try:
+                    result = self.identify(record, **choice)
+                except Exception as raised:
+                    error = raised.with_traceback(None)
+            self.known[key] = result, error, [entry.message for entry in caught]
+        result, error, told = self.known[key]
+        for message in told:
+            warnings.warn(message, stacklevel=2)
+        if error is not None:
+            raise error.with_traceback(None)
+        return result
+
+
+REMEMBERED = patch.object(campaign_row, "identify", Remembering(campaign_row.identify))
+
+
+def identified(rng):
+    """Identify records that came before once more in one of twenty cases."""
+    return REMEMBERED if rng.randrange(20) else contextlib.nullcontext()
+
+
 KINDS = ["good"] * 6 + ["error of ours", "error of a reader", "no record", "other dt", "no step",
          "constant", "holes", "tiny", "two outputs"]  # fmt: skip
 
 
 def any_source(rng):
-    name = rng.choice(NAMES) if rng.randrange(2) else any_text(rng, 8)
+    name = any_text(rng, 8) if sometimes(rng, 8) else rng.choice(NAMES)
     source = Source(rng.choice(KINDS), rng.randrange(12), name)
     if source.kind == "good" and rng.randrange(2):
         return source()
@@ -110,13 +155,13 @@ class CutStore(cr.CampaignStore):
 def spoil(rng, folder) -> None:
     """Damage, empty, exchange, remove and add files of a store."""
     for path in sorted(folder.glob("row-*.json")):
-        kind = rng.randrange(8)
-        if kind == 0:
-            path.write_bytes(damaged(rng, path.read_bytes()))
+        kind, content = rng.randrange(8), path.read_bytes()
+        if kind == 0 and content:
+            path.write_bytes(damaged(rng, content))
         elif kind == 1:
             path.write_bytes(any_bytes(rng, 40))
         elif kind == 2:
-            path.write_bytes(path.read_bytes().replace(b'"delay": "', b'"delay": "9'))
+            path.write_bytes(content.replace(b'"delay": "', b'"delay": "9'))
         elif kind == 3:
             path.unlink()
         elif kind == 4:
@@ -165,8 +210,13 @@ SETTINGS = [{"method": "scan", "order": 1, "max_delay": 12}, {"method": "paper",
 
 @fuzz(25)
 def test_a_stopped_campaign_ends_as_one_that_was_not(rng, tmp_path_factory):
-    sources = [any_source(rng) for _ in range(rng.randint(1, 6))]
-    if sometimes(rng, 2):
+    with identified(rng):
+        stopped_campaign(rng, tmp_path_factory)
+
+
+def stopped_campaign(rng, tmp_path_factory):
+    sources = [any_source(rng) for _ in range(rng.randint(1, rng.choice([2, 3, 6])))]
+    if sometimes(rng, 3):
         sources.append(rng.choice(sources))
     settings = rng.choice(SETTINGS)
     folder = tmp_path_factory.mktemp("store")
@@ -174,7 +224,7 @@ def test_a_stopped_campaign_ends_as_one_that_was_not(rng, tmp_path_factory):
         campaigns.append(cr.identify_campaign(sources, **settings))
     (whole,) = campaigns
     look_at(whole)
-    for _ in range(rng.randint(1, 3)):
+    for _ in range(rng.choice([1, 1, 2, 3])):
         stopping = list(sources)
         if rng.randrange(2):
             place = rng.randrange(len(stopping))
@@ -205,10 +255,10 @@ def test_what_a_campaign_says_follows_from_its_rows(rng, method):
     kinds = ["good"] * 4 + ["error of ours", "other dt", "no step"]
     sources = [
         Source(rng.choice(kinds), rng.randrange(12), rng.choice(NAMES))
-        for _ in range(rng.randint(1, 4 if method == "output_error" else 8))
+        for _ in range(rng.randint(1, rng.choice([2, 3, 4 if method == "output_error" else 8])))
     ]
     options = {"order": 1} if method == "output_error" else SETTINGS[0]
-    with good_end(seconds=60) as campaigns:
+    with identified(rng), good_end(seconds=60) as campaigns:
         campaigns.append(cr.identify_campaign(sources, **{"method": method, **options}))
     (campaign,) = campaigns
     good = [source.kind in ("good", "other dt") for source in sources]
@@ -222,6 +272,9 @@ def test_what_a_campaign_says_follows_from_its_rows(rng, method):
     for summary in statistics:
         assert campaign.delays.min() <= summary.mean <= campaign.delays.max()
         assert campaign.best.misfit == min(row.misfit for row in campaign.good)
+    if method == "output_error" and rng.randrange(6):
+        # the model of all records is one more fit, ten times as long as the rest
+        return
     with good_end(seconds=60) as systems:
         systems.append(campaign.system)
     for system in systems:

@@ -99,7 +99,7 @@ def test_a_clean_stream_is_followed_to_its_delay(rng):
     core, delay = rng.choice(CORES[:3]), rng.randint(0, 9)
     # mostly from rest, where a few moves tell; seldom with what was before, which is forgotten
     # only in a memory or more
-    at_rest = rng.randrange(10)
+    at_rest = rng.randrange(40)
     moves, hold = rng.choice(
         [(9, 8), (12, 5), (7, 12)] if at_rest else [(15, 20), (30, 7), (30, 20)]
     )
