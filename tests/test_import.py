@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
+import types
+
+import pytest
 
 import ctrl_realize as cr
+
+SUBMODULES = {"bench", "design", "errors", "io", "paper", "plots", "report"}
 
 PROMISED = """
 Record ImpulseResponse MeasuredFRF StepResponse read_record read_frf detect_step
@@ -69,3 +75,25 @@ def test_every_public_name_is_there_and_documented():
     assert sorted(promised - set(public)) == []
     undocumented = [name for name in public if not getattr(cr, name).__doc__]
     assert undocumented == []
+
+
+@pytest.mark.parametrize(
+    "module", ["design", "plots", "io", "report", "frequency", "bench", "paper", None]
+)
+def test_completion_offers_what_is_public_and_no_module_of_ours(module):
+    place = cr if module is None else importlib.import_module(f"ctrl_realize.{module}")
+    offered = dir(place)
+    assert offered
+    inner = {name for name in offered if isinstance(getattr(place, name), types.ModuleType)}
+    assert inner == (SUBMODULES if module is None else set())
+    homes = {getattr(getattr(place, name), "__module__", "ctrl_realize") for name in offered}
+    assert all(home.split(".")[0] == "ctrl_realize" for home in homes)
+    # nothing that can be imported from there by name is left out
+    public = {
+        name
+        for name, value in vars(place).items()
+        if not name.startswith("_")
+        and getattr(value, "__module__", "").startswith("ctrl_realize.")
+        and not isinstance(value, types.ModuleType)
+    }
+    assert public <= set(offered)

@@ -7,3 +7,7 @@ from .set_up import valve as valve
 from .truth import ValveTruth as ValveTruth
 
 __all__ = ["Valve", "ValveTruth", "valve"]
+
+
+def __dir__() -> list[str]:
+    return __all__

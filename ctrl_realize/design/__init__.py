@@ -38,3 +38,44 @@ from .robustness import UncertaintyBound as UncertaintyBound
 from .robustness import robust_stability as robust_stability
 from .robustness import uncertainty_bound as uncertainty_bound
 from .smith import smith_predictor as smith_predictor
+
+__all__ = [
+    "BalancedReduction",
+    "ContinuousModel",
+    "DelayLineController",
+    "DelayRobustness",
+    "KalmanPredictor",
+    "Margins",
+    "PIDComparison",
+    "PIDController",
+    "Performance",
+    "PredictorLQR",
+    "ProcessModel",
+    "RobustnessCheck",
+    "UncertaintyBound",
+    "compare_pid",
+    "delay_robustness",
+    "hankel_singular_values",
+    "kalman_predictor",
+    "lqg",
+    "margins",
+    "pade_ss",
+    "performance",
+    "pid",
+    "predictor_lqr",
+    "reduce",
+    "reduce_fopdt",
+    "reduce_sopdt",
+    "robust_stability",
+    "smith_predictor",
+    "thiran",
+    "to_continuous",
+    "to_discrete",
+    "to_tf",
+    "uncertainty_bound",
+    "unwrapped_phase",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -9,3 +9,17 @@ from .frf_fit import FRFFit as FRFFit
 from .from_frf import impulse_from_frf as impulse_from_frf
 from .spectral import spectral_frf as spectral_frf
 from .stepped_sine import stepped_sine_frf as stepped_sine_frf
+
+__all__ = [
+    "FRFComparison",
+    "FRFFit",
+    "compare_frf",
+    "fit_frf",
+    "impulse_from_frf",
+    "spectral_frf",
+    "stepped_sine_frf",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

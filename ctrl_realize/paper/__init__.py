@@ -42,6 +42,11 @@ __all__ = [
     "trimmed_statistics",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 SETTINGS = Settings()
 """Section 3.2."""
 

@@ -39,6 +39,45 @@ from .scans import singular_value_plot as singular_value_plot
 from .tracks import track_plot as track_plot
 from .tuning_rules import pid_comparison_plot as pid_comparison_plot
 
+__all__ = [
+    "bootstrap_plot",
+    "campaign_plot",
+    "channel_fit_plot",
+    "channels_plot",
+    "closed_loop_plot",
+    "comparison_plot",
+    "dead_time_plot",
+    "delay_check_plot",
+    "delay_plot",
+    "delay_robustness_plot",
+    "draw",
+    "fit_plot",
+    "frf_fit_plot",
+    "frf_plot",
+    "hankel_plot",
+    "impulse_estimate_plot",
+    "impulse_plot",
+    "margins_plot",
+    "onset_plot",
+    "order_plot",
+    "pid_comparison_plot",
+    "prediction_plot",
+    "process_model_plot",
+    "record_plot",
+    "residual_plot",
+    "robustness_plot",
+    "singular_value_plot",
+    "step_plot",
+    "track_plot",
+    "truth_plot",
+    "uncertainty_plot",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 _DRAWN_BY: dict[str, Callable[..., ct.ControlPlot]] = {
     "BalancedReduction": hankel_plot,
     "Bootstrap": bootstrap_plot,

@@ -11,3 +11,21 @@ from .page import pairs as pairs
 from .page import write_page as write_page
 from .sketches import Sketch as Sketch
 from .verdict import verdict_of as verdict_of
+
+__all__ = [
+    "Column",
+    "Page",
+    "Row",
+    "Sketch",
+    "Table",
+    "pairs",
+    "verdict_of",
+    "write_campaign",
+    "write_comparison",
+    "write_identification",
+    "write_page",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
