@@ -6,16 +6,17 @@
     python tools/mutation.py numerics/kung            only these
     python tools/mutation.py --sample 40 --seed 2     another sample of large modules
 
-The changes are made by mutmut, in a copy of the project, each module against the tests that are
-named beside it. Changes of the words of messages are left out. Of a module with more changes than
-the sample, a seeded random sample is tried. Prints a line for each module, and writes what no test
-noticed into the file that --survivors names.
+The changes are made by mutmut, in a copy of the project; mutation_loop.py runs the tests that are
+named beside a module for each of them. Changes of the words of messages are left out. Of a module
+with more changes than the sample, a seeded random sample is tried. Prints a line for each module,
+and writes what no test noticed into the file that --survivors names.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import difflib
 import json
 import os
@@ -25,7 +26,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
+
+from mutmut.mutation.file_mutation import mutate_file_contents
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = "ctrl_realize"
@@ -72,11 +76,86 @@ MODULES = {
     "identification/known_dynamics": "tests/identification/test_known_dynamics.py",
     "identification/averaging": "tests/identification/test_averaging.py",
     "identification/fit_flags": "tests/identification/test_delay_fit.py",
+    "identification/channels": "tests/identification/test_channels.py",
+    "identification/channel_cores": "tests/identification/test_channels.py",
+    "identification/channel_fit": "tests/identification/test_channel_search.py "
+    "tests/identification/test_channel_fit.py",
+    "identification/channel_fit_result": "tests/identification/test_channel_fit.py",
+    "identification/channel_search": "tests/identification/test_channel_search.py "
+    "tests/identification/test_channel_fit.py",
+    "identification/mode_choice": "tests/identification/test_mode_choice_by_hand.py "
+    "tests/identification/test_mode_choice.py",
+    "identification/delay_scan_result": "tests/identification/test_delay_scan.py",
+    "identification/scan_curve": "tests/identification/test_delay_scan.py",
+    "identification/scan_surface": "tests/identification/test_orders.py "
+    "tests/identification/test_delay_scan.py",
+    "identification/realization_result": "tests/identification/test_realization.py",
+    "identification/order_choice": "tests/identification/test_order_choice.py "
+    "tests/identification/test_orders.py",
+    "identification/from_io": "tests/identification/test_from_io.py",
+    "identification/impulse_estimate": "tests/identification/test_from_io.py",
+    "identification/pulse_choice": "tests/identification/test_from_io.py",
+    "identification/pulse_regression": "tests/identification/test_from_io.py",
+    "identification/residuals": "tests/identification/test_residuals.py",
+    "identification/residual_check": "tests/identification/test_residuals.py",
+    "identification/record_simulation": "tests/identification/test_residuals.py",
+    "identification/prediction": "tests/identification/test_residuals.py",
+    "identification/cross_validation": "tests/identification/test_residuals.py",
+    "identification/bootstrap": "tests/identification/test_bootstrap.py",
+    "identification/campaign": "tests/identification/test_campaign.py",
+    "identification/campaign_row": "tests/identification/test_campaign.py",
+    "identification/campaign_run": "tests/identification/test_campaign.py",
+    "identification/cross_check": "tests/identification/test_cross_check.py",
+    "identification/delay_check": "tests/identification/test_cross_check.py",
+    "identification/identify": "tests/identification/test_identify.py",
+    "identification/from_step": "tests/identification/test_identify.py",
+    "identification/packed_model": "tests/identification/test_packed_model.py",
+    "identification/tracker": "tests/identification/test_tracker.py",
+    "identification/tracker_checks": "tests/identification/test_tracker.py",
+    "identification/tracker_solution": "tests/identification/test_tracker.py",
+    "identification/tracked": "tests/identification/test_tracker.py",
+    "identification/any_input_fit": "tests/identification/test_delay_fit_any_input.py",
+    "numerics/arx": "tests/numerics/test_arx.py",
+    "numerics/bands": "tests/numerics/test_spectra.py",
+    "numerics/block_svd": "tests/numerics/test_lanczos.py tests/numerics/test_kung.py",
+    "numerics/closed_loop": "tests/design/test_pid.py",
+    "numerics/coloured_noise": "tests/numerics/test_coloured_noise.py",
+    "numerics/correlation": "tests/numerics/test_correlation.py",
+    "numerics/crossovers": "tests/design/test_margins.py tests/design/test_phase.py",
+    "numerics/delay_models": "tests/numerics/test_kung.py",
+    "numerics/delay_split": "tests/numerics/test_delay_split.py",
+    "numerics/delayed_regulator": "tests/design/test_predictor.py",
+    "numerics/gramians": "tests/design/test_balanced.py",
+    "numerics/half_rule": "tests/design/test_reduction.py",
+    "numerics/inverse_hold": "tests/design/test_conversions.py",
+    "numerics/lagged": "tests/numerics/test_lagged.py tests/numerics/test_arx.py",
+    "numerics/lanczos": "tests/numerics/test_lanczos.py",
+    "numerics/modes": "tests/design/test_balanced.py tests/design/test_smith.py",
+    "numerics/pade": "tests/design/test_conversions.py",
+    "numerics/phase_slope": "tests/design/test_phase.py",
+    "numerics/pole_moves": "tests/numerics/test_recursive.py",
+    "numerics/rational": "tests/numerics/test_rational.py",
+    "numerics/rational_bounds": "tests/numerics/test_rational.py",
+    "numerics/rational_fit": "tests/numerics/test_rational.py",
+    "numerics/rational_search": "tests/numerics/test_rational.py",
+    "numerics/rational_starts": "tests/numerics/test_rational.py",
+    "numerics/recurrence": "tests/numerics/test_lanczos.py",
+    "numerics/recursive": "tests/numerics/test_recursive.py",
+    "numerics/rise": "tests/identification/test_identify.py",
+    "numerics/running_residual": "tests/numerics/test_running_residual.py",
+    "numerics/sampled_data": "tests/identification/test_delay_fit_any_input.py",
+    "numerics/sampled_fit": "tests/identification/test_delay_fit_any_input.py",
+    "numerics/sines": "tests/numerics/test_sines.py",
+    "numerics/spectra": "tests/numerics/test_spectra.py",
+    "numerics/state_space": "tests/numerics/test_state_space.py",
+    "numerics/statistics": "tests/numerics/test_statistics.py",
+    "numerics/thiran": "tests/design/test_conversions.py",
+    "numerics/time_axis": "tests/test_signals.py tests/identification/test_steps.py",
+    "numerics/vector_fitting": "tests/numerics/test_rational.py",
 }
 
-# exit codes by which mutmut tells how a mutant ended
-TIMED_OUT = {36, -24, 24, 152, 255}
-UNTESTED = {5, 33}
+# checks whose second argument is a name for the message
+NAMING = {"band", "one_of", "positive", "real", "whole"}
 HEAD = ("module", "changes", "tried", "noticed", "endless", "no test", "survived", "minutes")
 
 
@@ -85,6 +164,13 @@ class _WithoutWords(ast.NodeTransformer):
 
     def visit_Raise(self, node: ast.Raise) -> ast.AST:
         return ast.Raise(node.exc.func if isinstance(node.exc, ast.Call) else node.exc, node.cause)
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        self.generic_visit(node)
+        names = isinstance(node.func, ast.Name) and node.func.id in NAMING
+        if names and len(node.args) > 1 and isinstance(node.args[1], ast.Constant):
+            node.args[1] = ast.Constant("")
+        return node
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         if isinstance(node.value, str):
@@ -98,11 +184,11 @@ def body(function: ast.FunctionDef) -> ast.Module:
     )
 
 
-def changes(mutated: Path) -> dict[str, str]:
+def changes(mutated: str) -> dict[str, str]:
     """Read what mutmut has changed: for every mutant the lines, without those of words alone."""
     functions = {
         node.name: node
-        for node in ast.walk(ast.parse(mutated.read_text(encoding="utf-8")))
+        for node in ast.walk(ast.parse(mutated))
         if isinstance(node, ast.FunctionDef) and "__mutmut_" in node.name
     }
     found = {}
@@ -118,60 +204,56 @@ def changes(mutated: Path) -> dict[str, str]:
     return found
 
 
-def configure(copy: Path, module: str, tests: list[str]) -> None:
-    """Tell mutmut in the copy's pyproject.toml which file to change and which tests to run."""
-    settings = {
-        "source_paths": [PACKAGE],
-        "only_mutate": [f"{PACKAGE}/{module}.py"],
-        "also_copy": [PACKAGE],
-        "pytest_add_cli_args": ["-p", "no:cacheprovider"],
-        "pytest_add_cli_args_test_selection": tests,
-    }
-    lines = [f"{key} = {json.dumps(value)}" for key, value in settings.items()]
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    table = "\n".join(["", "[tool.mutmut]", *lines, "use_git_change_detection = false", ""])
-    (copy / "pyproject.toml").write_text(text + table, encoding="utf-8")
+def mutate(copy: Path, module: str) -> dict[str, str]:
+    """Put the changes of a module in its place; return their lines by name."""
+    path = copy / PACKAGE / f"{module}.py"
+    with contextlib.chdir(copy):  # where mutmut reads its settings
+        code = mutate_file_contents(str(path), path.read_text(encoding="utf-8")).code
+    path.write_text(code, encoding="utf-8")
+    prefix = f"{PACKAGE}.{module.replace('/', '.')}."
+    return {prefix + name: lines for name, lines in changes(code).items()}
 
 
-def mutmut(copy: Path, *names: str) -> str:
+def attempt(copy: Path, names: list[str], tests: list[str]) -> dict[str, str]:
+    """Run the tests for every change; return how each ended."""
+    asked, ends = copy / "names.json", copy / "ends.json"
+    asked.write_text(json.dumps(names), encoding="utf-8")
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    paths = {"MUTATION_NAMES": str(asked), "MUTATION_ENDS": str(ends), "MPLBACKEND": "Agg"}
+    search = os.pathsep.join([str(copy), str(ROOT / "tools"), os.environ.get("PYTHONPATH", "")])
+    options = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "mutation_loop"]
     done = subprocess.run(
-        [sys.executable, "-m", "mutmut", "run", "--max-children", "1", *names],
+        [sys.executable, "-m", "pytest", *options, *tests],
         cwd=copy,
-        env={**threads, **os.environ, "MPLBACKEND": "Agg"},
+        env={**threads, **os.environ, **paths, "PYTHONPATH": search},
         capture_output=True,
         text=True,
         check=False,
     )
-    return done.stdout + done.stderr
+    found = json.loads(ends.read_text(encoding="utf-8")) if ends.exists() else {}
+    if set(found) != set(names):
+        sys.exit(f"the tests did not come to an end:\n{(done.stdout + done.stderr)[-2000:]}")
+    return found
 
 
 def run(copy: Path, module: str, sample: int, seed: int) -> tuple[list[str], dict[str, str]]:
     """Mutate one module; return the row of the table and the survivors' changed lines."""
     started = time.monotonic()
-    configure(copy, module, [test for test in MODULES[module].split() if (ROOT / test).exists()])
-    mutated = copy / "mutants" / PACKAGE / f"{module}.py"
-    prefix = f"{PACKAGE}.{module.replace('/', '.')}."
-    # a name that is none makes mutmut write its mutants and stop
-    told = mutmut(copy, "none.of.these")
-    if not mutated.with_suffix(".py.meta").exists():
-        sys.exit(f"mutmut made no changes to {module}:\n{told[-2000:]}")
-    found = changes(mutated)
+    found = mutate(copy, module)
     names = sorted(found)
     if len(names) > sample:
         names = sorted(random.Random(seed).sample(names, sample))
-    told = mutmut(copy, *(prefix + name for name in names))
-    codes = json.loads(mutated.with_suffix(".py.meta").read_text())["exit_code_by_key"]
-    ends = {name: codes.get(prefix + name) for name in names}
-    if None in ends.values():
-        sys.exit(f"mutmut did not finish {module}:\n{told[-2000:]}")
-    survivors = {name: found[name] for name in names if ends[name] == 0}
-    endless = sum(code in TIMED_OUT for code in ends.values())
-    untested = {name: found[name] for name in names if ends[name] in UNTESTED}
-    noticed = len(names) - len(survivors) - len(untested) - endless
-    counts = (len(found), len(names), noticed, endless, len(untested), len(survivors))
+    tests = [test for test in MODULES[module].split() if (ROOT / test).exists()]
+    ends = attempt(copy, names, tests)
+    count = Counter(ends.values())
+    counts = (len(found), len(names), *(count[end] for end in HEAD[3:7]))
     minutes = (time.monotonic() - started) / 60
-    return [module, *map(str, counts), f"{minutes:.0f}"], {**survivors, **untested}
+    left = {
+        name.rpartition(".")[2]: found[name]
+        for name in names
+        if ends[name] in ("survived", "no test")
+    }
+    return [module, *map(str, counts), f"{minutes:.1f}"], left
 
 
 def main() -> None:
@@ -191,6 +273,9 @@ def main() -> None:
             for folder in (PACKAGE, "tests"):
                 skip = shutil.ignore_patterns("__pycache__")
                 shutil.copytree(ROOT / folder, copy / folder, ignore=skip)
+            settings = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+            settings += f'\n[tool.mutmut]\nsource_paths = ["{PACKAGE}"]\n'
+            (copy / "pyproject.toml").write_text(settings, encoding="utf-8")
             row, survivors = run(copy, module, asked.sample, asked.seed)
         print(f"| {' | '.join(row)} |", flush=True)
         survived = survived or bool(survivors)
