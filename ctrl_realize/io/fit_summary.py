@@ -28,7 +28,8 @@ class FitSummary(Result):
     """Report of a fit, without its curves, as a model file keeps it.
 
     ``summary[key]`` is what ``fit.key`` was, for the main numbers of a fit (`delay`, `order`,
-    `dead_time`, `std`, `interval`, ...) that are there; ``report()`` is the text that the fit had.
+    `dead_time`, `std`, `interval`, ...) that are there; the dead time and its interval are
+    attributes as well. ``report()`` is the text that the fit had.
 
     Attributes
     ----------
@@ -74,6 +75,14 @@ class FitSummary(Result):
                 return float(low), float(high)
         return None
 
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Interval as the fit had it: in s, of a scan in samples; None if it had none."""
+        match dict(self.values).get("interval"):
+            case (low, high) if _is_end(low) and _is_end(high) and float(low) <= float(high):
+                return float(low), float(high)
+        return None
+
     def __repr__(self) -> str:
         return f"<FitSummary of a {self.kind}>"
 
@@ -89,6 +98,11 @@ def _is_time(value: Plain) -> TypeGuard[float]:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return 0 <= value <= sys.float_info.max  # a whole number in a file may be larger than that
+
+
+def _is_end(value: Plain) -> TypeGuard[float | str]:
+    """Tell the end of an interval; one that is open stands in a file as text."""
+    return value in ("inf", "-inf") or _is_time(value)
 
 
 def summary_of(fit: Any) -> FitSummary | None:

@@ -111,6 +111,7 @@ def test_the_main_numbers_of_a_fit_its_report_and_its_flags_stay(tmp_path, model
     assert (summary["delay"], summary["std"], summary["method"]) == (37, 1e-4, "scan")
     # JSON has no infinity
     assert summary["interval"] == (0.0287, "inf")
+    assert summary.interval == (0.0287, np.inf)
     assert repr(summary) == "<FitSummary of a Fit>"
     assert pickle.loads(pickle.dumps(summary)).report() == fit.report()
     with pytest.raises(KeyError):
@@ -331,6 +332,7 @@ def test_a_loaded_model_still_tells_the_interval_of_its_dead_time(tmp_path):
     again = load_model(tmp_path / "a.json")
     assert again.fit.dead_time == system.fit.dead_time
     assert again.fit.dead_time_interval == system.fit.dead_time_interval
+    assert again.fit.interval == system.fit.interval
     pi = cr.design.pid(system)
     told = [cr.design.delay_robustness(each, pi).report() for each in (system, again)]
     assert told[0] == told[1]
@@ -340,6 +342,8 @@ def test_a_loaded_model_still_tells_the_interval_of_its_dead_time(tmp_path):
     "value", ["x", True, -1.0, (1.0,), (2.0, 1.0), ("inf", 1.0), None, 10**400], ids=range(8)
 )
 def test_what_is_no_interval_is_none(value):
-    summary = FitSummary("F", "f", (), (("dead_time_interval", value), ("dead_time", value)))
+    keys = "dead_time_interval", "dead_time", "interval"
+    summary = FitSummary("F", "f", (), tuple((key, value) for key in keys))
     assert summary.dead_time is None
+    assert summary.interval is None
     assert summary.dead_time_interval is None
