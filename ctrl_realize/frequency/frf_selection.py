@@ -220,12 +220,12 @@ def _cover(
     high = max(interval[1], mixture_quantile(0.975, centre, spread, share))
     flags = []
     low, high = max(low, 0.0), min(high, bound)
-    if best.dead_time >= (1 - 1e-9) * bound:
+    if high >= (1 - 1e-9) * bound:
         flags.append(
             Flag(
                 "delay_at_bound",
-                f"the dead time is at the upper bound of the search, {1e3 * bound:.4g} ms; "
-                "try a larger max_dead_time",
+                "the dead time may be larger than the upper bound of the search, "
+                f"{1e3 * bound:.4g} ms; try a larger max_dead_time",
             )
         )
     more = high - low - (interval[1] - interval[0])

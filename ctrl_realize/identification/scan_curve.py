@@ -47,10 +47,10 @@ def curve_flags(iae: FloatArray, delay: int, rounding: float) -> tuple[Flag, ...
     last = iae.size - 1
     least = float(iae[delay])
     contrast = float(iae[0]) / least if least > 0 else np.inf
-    if delay == last and last > 0:
-        flags.append(
-            Flag("delay_at_bound", f"the best delay is max_delay={last}; try a larger one")
-        )
+    low, high = flat_set(iae, delay, rounding)
+    if high == last and last > 0:
+        best = "the best delay is" if delay == last else "delays that fit as well reach up to"
+        flags.append(Flag("delay_at_bound", f"{best} max_delay={last}; try a larger one"))
     if contrast < CONTRAST:
         flags.append(
             Flag(
@@ -61,7 +61,6 @@ def curve_flags(iae: FloatArray, delay: int, rounding: float) -> tuple[Flag, ...
         )
     minima = local_minima(iae, delay, rounding)
     if minima > 1:
-        low, high = flat_set(iae, delay, rounding)
         flags.append(
             Flag(
                 "several_minima",

@@ -419,6 +419,17 @@ def test_result_pickles_and_tells_itself():
         model.fit.measured[0] = 0
 
 
+@pytest.mark.parametrize(("seed", "at_the_bound"), [(0, True), (1, False)])
+def test_a_dead_time_that_may_lie_beyond_the_bound_is_said(seed, at_the_bound):
+    # of 40 ms; one more lag takes what the bound leaves over
+    fit = cr.fit_frf(noisy(seed, level=0.02), 3, max_dead_time=0.036).fit
+    assert (fit.dead_time == pytest.approx(0.036, rel=1e-6)) == at_the_bound
+    assert fit.interval[1] == 0.036
+    assert "delay_at_bound" in {flag.code for flag in fit.flags}
+    free = cr.fit_frf(noisy(seed, level=0.02), 3).fit
+    assert "delay_at_bound" not in {flag.code for flag in free.flags}
+
+
 def test_shift_of_time_moves_the_dead_time_alone():
     frf = noisy(6)
     plain = cr.fit_frf(frf, 2, relative_degree=2, dt=1e-3).fit
