@@ -95,10 +95,11 @@ class ByHand(Search):
     def __init__(self, bic, samples=40, channels=(1, 1)):
         self._bic = bic
         self._markov = np.zeros((*channels, samples))
-        self.asked = []
+        self.asked, self.starts = [], []
 
     def fit(self, order, shares, *, direct, start=None):
         self.asked.append((order, *shares, direct))
+        self.starts.append(start)
         bic = self._bic(order, *shares, direct)
         if bic is None:
             raise OrderError("rank")
@@ -150,12 +151,12 @@ def test_a_search_of_delays_stays_in_the_first_half_of_the_response():
 def test_a_lower_order_of_one_channel_finds_its_own_delay():
     def traded(order, inputs, outputs, direct):
         best = {4: 3, 3: 5, 2: 8}
-        return None if order == 1 else (inputs[0] - best[order]) ** 2 + order
+        return None if order == 1 else (inputs[0] - best[order]) ** 2 + order - 0.5 * direct
 
     search = ByHand(traded)
     begun = search.fit(4, ((3,), (0,)), direct=False)
     found = search.lowered(begun, [1, 2, 3, 4], delays=True)
-    assert (found.order, found.inputs, found.bic) == (2, (8,), 2.0)
+    assert (found.order, found.inputs, found.direct, found.bic) == (2, (8,), False, 2.0)
     assert search.lowered(begun, [1, 2, 3, 4], delays=False) is begun
     two = ByHand(traded, channels=(2, 1))
     assert two.lowered(begun, [1, 2, 3, 4], delays=True) is begun
@@ -163,12 +164,14 @@ def test_a_lower_order_of_one_channel_finds_its_own_delay():
 
 def test_dead_times_that_the_data_do_not_rule_out_are_plausible():
     def valley(order, inputs, outputs, direct):
-        return 1000.0 if direct else 4.0 * (inputs[0] - 9) ** 2
+        return 1000.0 if direct else 100.0 + 4.0 * (inputs[0] - 9) ** 2
 
     search = ByHand(valley)
     best = search.fit(2, ((9,), (1,)), direct=False)
     # 4 and 16 at one and two samples, of which up to 10 is not ruled out
     assert search.plausible(best, 1.0) == (9, 12.0)
+    # each fit starts from the one before
+    assert [start.inputs[0] for start in search.starts[1:]] == [9, 8, 7, 9, 10, 11]
     assert {asked[:1] + asked[2:] for asked in search.asked} == {(2, (1,), False)}
     # two that are ruled out in a row end the search
     assert {asked[1][0] for asked in search.asked} == {6, 7, 8, 9, 10, 11, 12}
@@ -272,11 +275,51 @@ def test_a_search_starts_from_the_scaled_response_behind_the_delays():
     assert_allclose(response / scale[:, None, None], plant.markov(60), rtol=0, atol=1e-9)
     with pytest.raises(OrderError, match="order=3 is above the rank"):
         search._kung(3, ((3,), (0, 2)))
-    best = search.fit(2, ((3,), (0, 2)), direct=False)
-    # 598 values in two outputs, of which the first 3 and the last 2 of the second are lost
-    assert best.found.counts.tolist() == [297, 295]
-    used = 2 * best.found.loss * 300 / (592 / 2)
-    assert best.bic == pytest.approx(used + 2 * 3 * np.log(300), rel=1e-12)
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_the_criterion_counts_parameters_and_samples_the_last_fit_sees_all(direct):
+    core = ct.ss(np.diag([0.8, 0.5]), [[1.0], [1.0]], [[1.0, 1.0], [1.0, -1.0]], 0.0, 1.0)
+    plant = cr.DelayedStateSpace(core, (3,), output_delay=(0, 2))
+    rng = np.random.default_rng(3)
+    u = rng.standard_normal(300)
+    y = plant.simulate(u) + 0.1 * rng.standard_normal((2, 300))
+    search = Search([cr.Record(np.arange(300.0), u, y)], plant.markov(240), 4, enough=120)
+    shares = (3,), (0, 2)
+    found = search.fit(2, shares, direct=direct)
+    assert (found.order, found.inputs, found.outputs) == (2, *shares)
+    assert found.direct is direct
+    assert np.any(found.found.model.D) == direct
+    # the first 3 of 120 samples are lost, and the last 2 of the second output
+    assert found.found.counts.tolist() == [117, 115]
+    parameters = 2 * 3 + (2 if direct else 0)
+    expected = 2 * found.found.loss * 120 / (232 / 2) + parameters * np.log(120)
+    assert found.bic == pytest.approx(expected, rel=1e-12)
+    last = search.finish(found)
+    assert last.found.counts.tolist() == [297, 295]
+    assert (last.order, last.inputs, last.bic) == (2, (3,), found.bic)
+    assert np.any(last.found.model.D) == direct
+
+
+def test_sizes_of_signals_are_those_about_the_level_of_each_record():
+    u = np.random.default_rng(0).standard_normal(50)
+    k = np.arange(50.0)
+    group = [cr.Record(k, u + level, 2 * u - level) for level in (0.0, 100.0)]
+    search = Search(group, np.ones((1, 1, 30)), 4)
+    assert_allclose([search._size_in[0], search._size_out[0]], [u.std(), 2 * u.std()], rtol=1e-12)
+
+
+def test_six_samples_tell_no_order_and_a_short_response_few():
+    k = np.arange(6.0)
+    few = cr.Record(k, [1.0, -1.0, 1.0, 1.0, -1.0, 1.0], k)
+    with pytest.raises(DataError, match="6 samples are too few for a model of order 1"):
+        Search([few], np.ones((1, 1, 30)), 4).orders([1])
+    u = np.random.default_rng(0).standard_normal(100)
+    short = Search([cr.Record(np.arange(100.0), u, u)], 0.5 ** np.arange(6.0)[None, None], 20)
+    # five parameters behind the direct term
+    assert short._kung(5, ((0,), (0,))).matrices()[0].shape == (5, 5)
+    with pytest.raises(OrderError, match="order=6"):
+        short._kung(6, ((0,), (0,)))
 
 
 class Starts:
