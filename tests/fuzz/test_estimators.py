@@ -105,14 +105,14 @@ def test_an_exact_response_is_found_exactly(rng):
     np.testing.assert_allclose(model.markov(n), g, atol=1e-8 * np.abs(g).max())
 
 
-def any_experiment(rng):
+def any_experiment(rng, random_one_in=3):
     """A step record or a random one, short and noisy, of any scale, with bad samples."""
     n = rng.randint(3, rng.choice([40, 120, 260])) if rng.randrange(2) else rng.randint(100, 200)
     noise = generator(rng)
     dt = rng.choice([1.0, 0.01, 1e-6, 1e5])
     onset = rng.randrange(n if rng.randrange(2) else n // 3)
     u = (np.arange(n) >= onset).astype(float)
-    if sometimes(rng, 3):
+    if sometimes(rng, random_one_in):
         u = noise.choice([-1.0, 1.0], n)
     delay = rng.randint(0, 20)
     y = np.zeros(n)
