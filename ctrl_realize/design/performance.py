@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..checks import positive
 from ..delayed import DelayedStateSpace
+from ..errors import ModelWarning, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.closed_loop import damped_circle, step_on_circle
 from .loops import open_loop
+from .margins import margins
 
 LONGEST = 2**19
 """Most samples of a response."""
 SETTLED = 1e-4
 """Range of the last part of a response, relative, in which it counts as settled."""
+SETTLING_BAND = 0.02
+"""Part of the final value within which a response counts as arrived."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +42,7 @@ class Performance:
     >>> import ctrl_realize as cr
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
     >>> for rule in ("simc", "amigo"):
-    ...     found = cr.design.performance(plant, cr.design.pid(plant, rule), 0.5)
+    ...     found = cr.design.performance(plant, cr.design.pid(plant, rule))
     ...     print(rule, f"overshoot {found.overshoot:.1%}, load error {found.load_error:.4f} s")
     simc overshoot 4.1%, load error 0.0590 s
     amigo overshoot 0.2%, load error 0.1248 s
@@ -78,7 +84,9 @@ def step_responses(
     return setpoint, load
 
 
-def performance(plant: DelayedStateSpace, controller: Any, total_time: float) -> Performance:
+def performance(
+    plant: DelayedStateSpace, controller: Any, total_time: float | None = None
+) -> Performance:
     """Measure how a stable loop answers steps of its set-point and of a load at the plant's input.
 
     Parameters
@@ -86,21 +94,80 @@ def performance(plant: DelayedStateSpace, controller: Any, total_time: float) ->
     plant : DelayedStateSpace
     controller : system or float
         Of the plant's sample time, with negative feedback.
-    total_time : float
+    total_time : float, optional
         Dead time and lags together, in s: the first guess of how long the loop takes. The
-        responses are computed for longer until they have settled.
+        responses are computed for longer until they have settled. Default: dead time and twice
+        the slowest lag of the plant, or the time that the slowest crossover takes, 1 / omega, if
+        that is longer.
 
     Returns
     -------
     Performance
 
+    Raises
+    ------
+    UnsuitableSystemError
+        A loop that is not stable.
+
+    Warns
+    -----
+    ModelWarning
+        A loop that goes on for more than 260 000 samples; the numbers are those up to there.
+
     Examples
     --------
     >>> import ctrl_realize as cr
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
-    >>> found = cr.design.performance(plant, cr.design.pid(plant), 0.5)
+    >>> found = cr.design.performance(plant, cr.design.pid(plant))
     >>> print(f"load error {found.load_error:.4f} s, settled after {found.settling_time:.3f} s")
     load error 0.0590 s, settled after 0.179 s
+    """
+    guess = None if total_time is None else positive(total_time, "total_time", "time in s")
+    loop = loop_time(plant, controller)
+    setpoint, load, settled = settled_responses(plant, controller, guess or loop)
+    if not settled:
+        warnings.warn(
+            f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its errors "
+            "are those up to there. A longer sample time would show all of it",
+            ModelWarning,
+            stacklevel=2,
+        )
+    return measured(setpoint, load, float(plant.dt))
+
+
+def plant_time(plant: DelayedStateSpace) -> float:
+    """Guess how long a plant takes: dead time and twice its slowest lag, in s."""
+    poles = np.abs(plant.delay_free.poles())
+    slow = poles[poles < 1 - 1e-9]
+    slowest = -1 / np.log(slow.max()) if slow.size and slow.max() > 0 else 1.0
+    return float(plant.dt * (plant.delay + 2 * slowest + 4))
+
+
+def loop_time(plant: DelayedStateSpace, controller: Any, name: str = "") -> float:
+    """Guess how long a loop takes, in s: as its plant, or as its slowest crossover.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A loop that is not stable; `name` says which.
+    """
+    found = margins(plant, controller)
+    if not found.stable:
+        raise UnsuitableSystemError(
+            f"the loop{f' with {name!r}' if name else ''} is not stable: it has "
+            f"{found.unstable_poles} poles on or outside the unit circle, and no step response "
+            "that ends; see design.margins"
+        )
+    crossovers = found.gain_crossovers
+    return max(plant_time(plant), 1 / float(crossovers[0]) if crossovers.size else 0.0)
+
+
+def settled_responses(
+    plant: DelayedStateSpace, controller: Any, total_time: float
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Responses of a stable loop to steps of set-point and load, and whether they have settled.
+
+    `total_time` in s is the first guess of how long that takes.
     """
     dt = float(plant.dt)
     count = 2 ** int(np.ceil(np.log2(max(64.0, min(20 * total_time / dt, LONGEST)))))
@@ -113,15 +180,32 @@ def performance(plant: DelayedStateSpace, controller: Any, total_time: float) ->
             np.ptp(load[tail]) / max(np.abs(load).max(), 1e-300),
         )
         if left < SETTLED or count >= LONGEST:
-            break
+            return setpoint, load, bool(left < SETTLED)
         count *= 2
+
+
+def measured(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
+    """Put settled responses in numbers."""
     final = float(setpoint[-1])
     # 1e-5 is what the transform leaves; an error that stays is far larger.
     kept = (abs(1 - final) > 1e-3, abs(load[-1]) > 1e-3 * np.abs(load).max())
-    outside = np.flatnonzero(np.abs(setpoint - final) > 0.02 * abs(final))
     return Performance(
         setpoint_error=float("inf") if kept[0] else float(np.abs(1 - setpoint).sum() * dt),
         load_error=float("inf") if kept[1] else float(np.abs(load).sum() * dt),
         overshoot=max(0.0, float(setpoint.max()) / final - 1) if final else float("nan"),
-        settling_time=float((outside[-1] + 1) * dt) if outside.size else 0.0,
+        settling_time=settling(setpoint) * dt,
     )
+
+
+def lasting(setpoint: FloatArray, load: FloatArray) -> int:
+    """Samples until both responses stay within 2 % of where they end, that of load of its peak."""
+    away = np.abs(load - load[-1])
+    moving = np.flatnonzero(away > SETTLING_BAND * np.abs(load).max())
+    return max(settling(setpoint), int(moving[-1]) + 1 if moving.size else 0)
+
+
+def settling(response: FloatArray) -> int:
+    """First sample from which on a response stays within 2 % of its final value."""
+    away = np.abs(response - response[-1])
+    outside = np.flatnonzero(away > SETTLING_BAND * abs(response[-1]))
+    return int(outside[-1]) + 1 if outside.size else 0

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..checks import one_of
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..results import Result
 from .margin_result import Margins
 from .margins import margins
-from .performance import Performance, performance
+from .performance import Performance, measured, plant_time, settled_responses
 from .pid import KINDS, RULES, pid, reference_plant
 from .pid_controller import PIDController
 from .pid_rules import kinds_of
@@ -173,7 +171,7 @@ def compare_pid(
                 continue
             sampled = controller if controller.dt else controller.discretised(plant.dt)
             found = margins(plant, sampled)
-            reached = performance(plant, sampled, total) if found.stable else UNSTABLE
+            reached = _performance(plant, sampled, total) if found.stable else UNSTABLE
             made.append((controller, found, reached))
     if not made:
         reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
@@ -182,11 +180,13 @@ def compare_pid(
     return PIDComparison(controllers, found_margins, found_performance, tuple(refused))
 
 
+def _performance(plant: DelayedStateSpace, controller: Any, total: float) -> Performance:
+    setpoint, load, _ = settled_responses(plant, controller, total)
+    return measured(setpoint, load, float(plant.dt))
+
+
 def _span(system: Any, plant: DelayedStateSpace) -> float:
     """Guess how long the plant takes, in s."""
     if isinstance(system, ProcessModel):
         return system.total_time
-    poles = np.abs(plant.delay_free.poles())
-    slow = poles[poles < 1 - 1e-9]
-    slowest = -1 / np.log(slow.max()) if slow.size and slow.max() > 0 else 1.0
-    return float(plant.dt * (plant.delay + 2 * slowest + 4))
+    return plant_time(plant)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..checks import positive
 from ..delayed import DelayedStateSpace
-from ..design.performance import step_responses
+from ..design.performance import lasting, loop_time, settled_responses, step_responses
 from . import style
 from .names import plain
 from .scales import time_unit
@@ -20,7 +20,7 @@ def closed_loop_plot(
     plant: DelayedStateSpace,
     controllers: Mapping[str, Any],
     *,
-    span: float,
+    span: float | None = None,
     ax: style.AxesLike = None,
     title: str | None = None,
 ) -> ct.ControlPlot:
@@ -31,8 +31,9 @@ def closed_loop_plot(
     plant : DelayedStateSpace
     controllers : mapping of str to system
         Name -> controller of the plant's sample time; each must make a stable loop.
-    span : float
-        Time to show in s.
+    span : float, optional
+        Time to show in s. Default: a quarter more than all responses take to stay within 2 % of
+        where they end.
     ax : sequence of two Axes or Figure, optional
     title : str, optional
 
@@ -40,18 +41,24 @@ def closed_loop_plot(
     -------
     control.ControlPlot
 
+    Raises
+    ------
+    UnsuitableSystemError
+        Without `span`, a loop that is not stable.
+
     Examples
     --------
     >>> import ctrl_realize as cr
     >>> from ctrl_realize import plots
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
     >>> loops = {rule: cr.design.pid(plant, rule) for rule in ("simc", "amigo")}
-    >>> cplt = plots.closed_loop_plot(plant, loops, span=0.5)
+    >>> cplt = plots.closed_loop_plot(plant, loops)
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['output, set-point step', 'output, load step']
     """
-    positive(span, "span", "time in s")
-    count = int(np.ceil(span / plant.dt)) + 1
+    if span is None:
+        span = _span(plant, controllers)
+    count = int(np.ceil(positive(span, "span", "time in s") / plant.dt)) + 1
     # Twice the span is computed: what wraps around shows at the end.
     length = 2 ** int(np.ceil(np.log2(2 * count)))
     drawn: list[list[Any]] = [[], []]
@@ -73,3 +80,13 @@ def closed_loop_plot(
         axes[1].set(ylabel="output, load step", xlabel=f"time [{unit}]")
         # The set-point response ends at 1: the corner below it is free.
         return style.finished(axes, drawn, loc="lower right")
+
+
+def _span(plant: DelayedStateSpace, controllers: Mapping[str, Any]) -> float:
+    """Time in s until the slowest of the loops has settled, and a quarter more."""
+    samples = 8
+    for name, controller in controllers.items():
+        time = loop_time(plant, controller, name)
+        setpoint, load, _ = settled_responses(plant, controller, time)
+        samples = max(samples, lasting(setpoint, load))
+    return 1.25 * samples * float(plant.dt)
