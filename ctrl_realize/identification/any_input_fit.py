@@ -69,7 +69,8 @@ def _fit(
     for record in records:
         _check_moves(record)
     outputs, inputs = zip(*map(_signals, records), strict=True)
-    found = fit_sampled(outputs, inputs, dt, latest=latest, **settings)
+    ways = {name: value for name, value in settings.items() if name != "whiten"}
+    found = fit_sampled(outputs, inputs, dt, latest=latest, **ways)
     if found.explained < FOLLOWS:
         raise DataError(
             f"{_named(records)}: the output does not follow the input (the best of all models "

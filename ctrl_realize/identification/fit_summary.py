@@ -105,7 +105,12 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
         reasons.append(
             "interval widened by the first motion: a zero leaves open how the response begins"
         )
-    if fit.correlation > 1:
+    if fit.whitened:
+        reasons.append(
+            "the noise at rest is coloured: generalised least squares, by its autoregression, "
+            f"instead of counting {fit.correlation:.3g} samples as one"
+        )
+    elif fit.correlation > 1:
         reasons.append(f"the residual is correlated: {fit.correlation:.3g} samples count as one")
     return tuple(reasons)
 

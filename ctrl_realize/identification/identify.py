@@ -42,6 +42,7 @@ def identify(
     max_delay: int | None = None,
     known: ct.LTI | None = None,
     loss: Literal["huber", "least_squares"] = "huber",
+    noise: Literal["auto", "white"] = "auto",
     structures: Sequence[tuple[int, int]] | None = None,
     include_known: bool = False,
     cutoff_hz: float | Literal["auto"] | None = "auto",
@@ -66,7 +67,7 @@ def identify(
     max_delay : int, optional
         Largest delay in samples. Default: ``"scan"`` where the step response has risen by half,
         ``"paper"`` 100, ``"output_error"`` see `fit_delay`.
-    known, loss, structures, include_known : optional
+    known, loss, noise, structures, include_known : optional
         For ``"output_error"``, see `fit_delay`.
     cutoff_hz, samples, feedthrough : optional
         For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
@@ -115,7 +116,8 @@ def identify(
     scan_only = {"cutoff_hz": cutoff_hz != "auto", "samples": samples is not None}
     scan_only["feedthrough"] = feedthrough is not None
     fit_only = {"known": known is not None, "structures": structures is not None}
-    fit_only |= {"loss": loss != "huber", "include_known": include_known}
+    fit_only |= {"loss": loss != "huber", "noise": noise != "auto"}
+    fit_only["include_known"] = include_known
     strange = [
         name
         for name, given in (scan_only if method == "output_error" else fit_only).items()
@@ -141,6 +143,7 @@ def identify(
             max_delay=max_delay,
             known=known,
             loss=loss,
+            noise=noise,
             structures=structures,
             include_known=include_known,
         )

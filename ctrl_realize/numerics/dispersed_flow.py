@@ -196,10 +196,10 @@ class _FlowFit:
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Weighted residual (m,), gain and regressors eliminated."""
-        weight = self.problem.root_weight[:, None]
-        columns = np.column_stack([self._response(x), self.problem.regressors]) * weight
+        columns = np.column_stack([self._response(x), self.problem.regressors])
+        columns = self.problem.weighted(columns)
         q = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
-        data = self.problem.root_weight * self.problem.data
+        data = self.problem.weighted_data
         return np.asarray(data - q @ (q.T @ data))
 
     def cost(self, x: FloatArray) -> float:

@@ -83,7 +83,8 @@ class WindowFit:
 
     ``variance`` is that of independent noise which would scatter the estimates as much as the
     residual does: its own, with that of a coarse `rounding` once more, for neighbours are rounded
-    alike, times its `correlation`. `misfit` is the root mean square of the
+    alike, times its `correlation`; where the noise has been made white instead, times `colour`,
+    the mean square that is left there in units of it. `misfit` is the root mean square of the
     residual of the chosen structure, in means over bins, over the noise level given.
     """
 
@@ -96,16 +97,23 @@ class WindowFit:
     correlation: float
     misfit: float
     rounding: float = 0.0
+    colour: float | None = None
 
     @property
     def variance(self) -> float:
         """Variance per sample, colour included."""
-        return (self.sigma**2 + self.rounding**2) * self.correlation
+        colour = self.correlation if self.colour is None else self.colour
+        return (self.sigma**2 + self.rounding**2) * colour
+
+    @property
+    def independent(self) -> float:
+        """Samples after the step that count."""
+        return (self.window.output.size - self.window.start) / self.correlation
 
     @property
     def penalty(self) -> float:
         """What the criterion charges for a parameter: log of the independent samples."""
-        return parameter_charge((self.window.output.size - self.window.start) / self.correlation)
+        return parameter_charge(self.independent)
 
     @property
     def best(self) -> Candidate:
@@ -114,8 +122,7 @@ class WindowFit:
 
     def criteria(self, candidates: dict[Structure, Candidate]) -> dict[Structure, float]:
         """Information criterion of other candidates on the same data."""
-        samples = (self.window.output.size - self.window.start) / self.correlation
-        values = criteria(candidates, self.variance, samples)
+        values = criteria(candidates, self.variance, self.independent)
         return {s: value + self.problem.own_count(s.order) for s, value in values.items()}
 
     def at_delay(self, candidate: Candidate, delay: float) -> Candidate:

@@ -6,7 +6,8 @@ The rule:
    plant's own free response: the lowest information criterion decides.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
    is the model, and what its residual leaves is compared with the noise before the step, or, as
-   long as that is not much louder, with what it leaves long after the step.
+   long as that is not much louder, with what it leaves long after the step. Where it is noise that
+   was coloured before the step already, all structures are fitted again with that noise made white.
 2. Where the residual is noise, the delay is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
    four to eight nearly equal lags, modes of diffusion and flows that disperse among them. Where
@@ -28,6 +29,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .coloured_fit import in_coloured_noise
 from .delay_choice import chains_of, flows_of
 from .fit_window import WindowFit, fit_window
 from .likelihood_interval import likelihood_fit
@@ -60,6 +62,7 @@ def fit_output_error(
     latest: float | None = None,
     known: KnownFactor | None = None,
     huber: bool = True,
+    whiten: bool = True,
 ) -> OutputErrorFit:
     """Estimate the dead time of a step record.
 
@@ -76,6 +79,8 @@ def fit_output_error(
         Dynamics in cascade that do not belong to the plant.
     huber : bool, optional
         Huber's loss (k = 1.345) instead of least squares.
+    whiten : bool, optional
+        Make noise white that is coloured at rest.
     """
     factor = known or KnownFactor()
     tried = ALL_STRUCTURES if structures is None else tuple(structures)
@@ -87,6 +92,8 @@ def fit_output_error(
         )
     whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
     adequate = _is_noise(data, whole)
+    if adequate and whiten:
+        whole = in_coloured_noise(whole, data)
     if structures is not None:
         found = likelihood_fit(whole, adequate=adequate)
     elif adequate:

@@ -48,7 +48,8 @@ class OutputErrorFit:
     plant was moving before the step, and its free response was fitted along. `flows` that disperse
     are not ruled out; with `follows_flow` the delay is that of the best of them, and the lags
     behind it follow it. `beside` names what is not in the table of structures and not ruled out,
-    with its interval. `std` is that of the chosen structure.
+    with its interval. `std` is that of the chosen structure. `whitened`: coloured noise was made
+    white, by what it is at rest.
     """
 
     delay: float
@@ -75,6 +76,7 @@ class OutputErrorFit:
     flows: tuple[DispersedFlow, ...] = ()
     beside: tuple[tuple[str, float, float], ...] = ()
     follows_flow: bool = False
+    whitened: bool = False
 
 
 def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
@@ -127,4 +129,5 @@ def assembled(
         fitted=whole.window.predict(whole.problem, chosen),
         profile=profile,
         latest=whole.scales.latest,
+        whitened=whole.colour is not None,
     )

@@ -43,7 +43,8 @@ class KnownFactor:
 class Problem:
     """What is fitted: data (m,), root weights (m,), input, fixed regressors (m, q).
 
-    With `stretches` each of them has an initial state and regressors of its own besides.
+    With `stretches` each of them has an initial state and regressors of its own besides. Without
+    them, a `whitener` (m, m) may stand in for the weights: it makes coloured noise white.
     """
 
     data: FloatArray
@@ -52,6 +53,18 @@ class Problem:
     regressors: FloatArray
     known: KnownFactor
     stretches: Stretches | None = None
+    whitener: FloatArray | None = None
+
+    def weighted(self, columns: FloatArray) -> FloatArray:
+        """Columns (..., m, k) in units of the noise."""
+        if self.whitener is not None:
+            return np.asarray(self.whitener @ columns)
+        return columns * self.root_weight[:, None]
+
+    @cached_property
+    def weighted_data(self) -> FloatArray:
+        """Data (m,) in units of the noise."""
+        return self.weighted(self.data[:, None])[:, 0]
 
     @cached_property
     def _fixed(self) -> FixedTerms:
@@ -127,9 +140,8 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     size = np.abs(residues).sum(axis=1) + np.abs(gain)
     basis = (mode @ (residues / size[:, None])).real + static[:, :, None] * (gain / size)[:, None]
     fixed = np.broadcast_to(problem.regressors, (batch, *problem.regressors.shape))
-    weight = problem.root_weight
-    columns = np.concatenate([basis, fixed], axis=2) * weight[:, None]
-    data = np.tile(weight * problem.data, (batch, 1))
+    columns = problem.weighted(np.concatenate([basis, fixed], axis=2))
+    data = np.tile(problem.weighted_data, (batch, 1))
     own = None
     if problem.stretches is not None:
         own = problem.own_terms(free)
@@ -143,7 +155,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     linear = solve_upper(r, inside) / norm
     numerator = linear[:, :count] / size
 
-    derivative = np.empty((batch, weight.size, 1 + n))
+    derivative = np.empty((batch, problem.data.size, 1 + n))
     amplitudes = np.einsum("bjk,bk->bj", residues, numerator)
     derivative[:, :, 0] = -(mode @ (amplitudes * poles)[:, :, None]).real[:, :, 0]
     moved = _moved_amplitudes(poles, amplitudes, dresidues, numerator)[:, :, :n] @ dfree
@@ -153,7 +165,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     level *= (gain[:, 0] * numerator[:, 0])[:, None]
     derivative[:, :, 1:] = (mode @ moved + slope @ stretch).real
     derivative[:, :, 1:] += static[:, :, None] * level[:, None]
-    derivative *= weight[:, None]
+    derivative = problem.weighted(derivative)
     if own is not None:
         rest = whole - np.einsum("bmk,bk->bm", forced, linear)
         derivative[:, :, 1:] += own.moved(rest, dfree)

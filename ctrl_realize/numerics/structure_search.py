@@ -87,7 +87,7 @@ def search(
     """
     found = dict(beside or {})
     for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
-        starts = _neighbour_starts(structure, scales, found)
+        starts = neighbour_starts(structure, scales, found)
         if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
             starts += _pattern_starts(structure, scales)
         parameters, cost = fit_batch(
@@ -240,9 +240,10 @@ def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
     return found
 
 
-def _neighbour_starts(
+def neighbour_starts(
     structure: Structure, scales: Scales, found: dict[Structure, Candidate]
 ) -> list[FloatArray]:
+    """Optima of the structures next to one: a zero less, a pole less."""
     n, r = structure.order, structure.relative_degree
     starts = []
     if Structure(n, r + 1) in found:
