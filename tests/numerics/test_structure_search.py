@@ -16,13 +16,13 @@ from ctrl_realize.numerics.structure_search import (
     SLOWER_WITH_ZEROS,
     Candidate,
     Scales,
-    _neighbour_starts,
     _pattern_starts,
     _pole_patterns,
     _worth_a_search,
     choose,
     criteria,
     needless_charge,
+    neighbour_starts,
     parameter_bounds,
     plausible,
     refine,
@@ -92,12 +92,12 @@ def test_patterns_are_equal_lags_slow_ones_and_ringing_pairs_all_stable(order):
 
 def test_neighbours_are_one_zero_less_and_one_pole_less():
     known = {s: candidate(s.order, s.relative_degree) for s in (Structure(2, 1), Structure(2, 2))}
-    assert _neighbour_starts(Structure(1, 1), SCALES, known) == []
-    (only,) = _neighbour_starts(Structure(3, 3), SCALES, known)
+    assert neighbour_starts(Structure(1, 1), SCALES, known) == []
+    (only,) = neighbour_starts(Structure(3, 3), SCALES, known)
     added = parameters_from_poles(np.array([-1.0, -2.0, -20.0], dtype=np.complex128))
     assert_allclose(only, [1.5, *added], atol=1e-12)
-    assert len(_neighbour_starts(Structure(3, 2), SCALES, known)) == 2
-    (fewer_zeros,) = _neighbour_starts(Structure(2, 1), SCALES, {Structure(2, 2): candidate(2, 2)})
+    assert len(neighbour_starts(Structure(3, 2), SCALES, known)) == 2
+    (fewer_zeros,) = neighbour_starts(Structure(2, 1), SCALES, {Structure(2, 2): candidate(2, 2)})
     assert_array_equal(fewer_zeros, candidate(2, 2).parameters)
 
 
