@@ -239,7 +239,7 @@ def test_a_long_chain_may_be_a_flow_unless_that_is_out_of_the_question(monkeypat
     assert of(5)[0] is False
     assert of(6) == (True, pytest.approx(3.0 - 0.5 * 6 * 0.5))
     # a flow of more lags than the delay is long begins with the step
-    assert of(8, delay=1.0) == (True, 0.0)
+    assert of(7, delay=1.0) == (True, 0.0)
     doubted, ruled_out = flow(0.0, excess=2 * PLAUSIBLE), flow(0.0, excess=2 * PLAUSIBLE + 0.1)
     assert of(6, [ruled_out, doubted])[0] is True
     assert of(6, [ruled_out])[0] is False
