@@ -75,7 +75,7 @@ MODULES = {
     "identification/impulses": "tests/identification/test_impulses.py",
     "identification/known_dynamics": "tests/identification/test_known_dynamics.py",
     "identification/averaging": "tests/identification/test_averaging.py",
-    "identification/fit_flags": "tests/identification/test_delay_fit.py",
+    "identification/fit_flags": "tests/identification/test_fit_flags.py",
     "identification/channels": "tests/identification/test_channels.py",
     "identification/channel_cores": "tests/identification/test_channels.py",
     "identification/channel_fit": "tests/identification/test_channel_search.py "
@@ -122,6 +122,9 @@ MODULES = {
     "numerics/coloured_noise": "tests/numerics/test_coloured_noise.py",
     "numerics/correlation": "tests/numerics/test_correlation.py",
     "numerics/crossovers": "tests/design/test_margins.py tests/design/test_phase.py",
+    "numerics/delay_choice": "tests/numerics/test_delay_choice.py",
+    "numerics/likelihood_interval": "tests/numerics/test_likelihood_interval.py",
+    "numerics/flow_modes": "tests/numerics/test_dispersed_flow.py",
     "numerics/delay_models": "tests/numerics/test_kung.py",
     "numerics/delay_split": "tests/numerics/test_delay_split.py",
     "numerics/delayed_regulator": "tests/design/test_predictor.py",
