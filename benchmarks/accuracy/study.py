@@ -40,23 +40,29 @@ def with_known_sensor(noise: float, *, seed: int) -> Shown:
     return shown(Estimate(fit.delay, *fit.delay_interval), truth)
 
 
-def rig_table(seeds: int, noises: Iterable[float], methods: Iterable[str], jobs: int) -> list[str]:
-    """Tabulate bias, scatter, error over bound and coverage on the rigs."""
+def rig_table(
+    seeds: int, fit_seeds: int, noises: Iterable[float], methods: Iterable[str], jobs: int
+) -> list[str]:
+    """Tabulate bias, scatter, error over bound and coverage on the rigs.
+
+    `fit_seeds` is the number of records for the output-error fit.
+    """
     lines = [
-        "| plant | noise | method | bias | scatter | rms error | bound | error / bound "
+        "| plant | noise | method | records | bias | scatter | rms error | bound | error / bound "
         "| coverage | median width |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, plant in plants.RIGS.items():
         for noise in noises:
             best = plants.bound(plant, noise)
             for method in methods:
                 work = functools.partial(one, method, plant, noise)
-                lines.append(_row(name, noise, method, best, _repeat(work, seeds, jobs)))
+                count = fit_seeds if method.startswith("output error") else seeds
+                lines.append(_row(name, noise, method, best, repeated(work, count, jobs)))
             if name == "R4":
                 best = plants.bound(rigs.R3, noise, sensor_known=True)
                 work = functools.partial(with_known_sensor, noise)
-                rows = _repeat(work, seeds, jobs)
+                rows = repeated(work, fit_seeds, jobs)
                 lines.append(_row(name, noise, "output error, sensor known", best, rows))
     return lines
 
@@ -80,7 +86,7 @@ def factorial_table(seeds: int, jobs: int) -> list[str]:
     for cell in cells:
         method, name, noise, coarser = cell
         work = functools.partial(one, method, plants.FACTORIAL[name], noise, coarser)
-        found = _repeat(work, seeds, jobs)[:, 0] * coarser * rigs.TS * 1e3
+        found = repeated(work, seeds, jobs)[:, 0] * coarser * rigs.TS * 1e3
         # A method without an answer is charged 100 ms.
         found = np.where(np.isfinite(found), found, 100.0)
         errors[cell] = float(np.log10(max(np.sqrt(np.mean(found**2)), 1e-3)))
@@ -126,19 +132,24 @@ def measured_table(folder: Path) -> list[str]:
     return lines
 
 
-def _repeat(work: functools.partial, seeds: int, jobs: int) -> np.ndarray:
+def repeated(work: functools.partial, seeds: int, jobs: int) -> np.ndarray:
+    """Run seed after seed, in parallel; one row each."""
     return np.array(Parallel(n_jobs=jobs)(delayed(work)(seed=k) for k in range(seeds)), float)
 
 
 def _row(name: str, noise: float, method: str, best: float, rows: np.ndarray) -> str:
     error = rows[:, 0]
     if not np.isfinite(error).all():
-        return f"| {name} | {100 * noise:g} % | {method} | no answer | | | {best:.3g} | | | |"
+        return (
+            f"| {name} | {100 * noise:g} % | {method} | {len(rows)} | no answer | | | {best:.3g} "
+            "| | | |"
+        )
     rms = float(np.sqrt(np.mean(error**2)))
     has = np.isfinite(rows[:, 2]).all()
     covered = f"{100 * rows[:, 1].mean():.0f} %" if has else ""
     width = f"{np.median(rows[:, 2]):.3g}" if has else ""
     return (
-        f"| {name} | {100 * noise:g} % | {method} | {error.mean():+.3g} | {error.std(ddof=1):.3g} "
-        f"| {rms:.3g} | {best:.3g} | {rms / best:.3g} | {covered} | {width} |"
+        f"| {name} | {100 * noise:g} % | {method} | {len(rows)} | {error.mean():+.3g} "
+        f"| {error.std(ddof=1):.3g} | {rms:.3g} | {best:.3g} | {rms / best:.3g} | {covered} "
+        f"| {width} |"
     )
