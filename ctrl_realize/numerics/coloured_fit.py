@@ -16,6 +16,7 @@ from .whitening import noise_covariance, whitener
 
 _COLOURED = 2.0  # samples at rest that count as one, from which on the noise is coloured
 _FEWEST = 100  # samples at rest, and
+_ENOUGH = 100_000  # of a kind, where there are more
 _TIMES = 8  # correlation times, that tell its colour
 _LATE = 2.0  # times the rise to 95 % after which a response has settled
 _WILD = 5.0  # median absolute deviations at which samples are cut
@@ -83,4 +84,5 @@ def _delays_near(problem: Problem, old: Candidate, scales: Scales) -> list[Float
 def _quiet(error: FloatArray, data: StepData) -> FloatArray:
     """Residual at rest, and in the later half of what comes when the response has settled."""
     settled = data.edge + int(_LATE * (stop_at(data, 0.95) - data.edge))
-    return np.concatenate([error[: data.edge], error[(settled + error.size) // 2 :]])
+    late = error[(settled + error.size) // 2 :]
+    return np.concatenate([error[: data.edge][-_ENOUGH:], late[:_ENOUGH]])
