@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import control as ct
@@ -14,6 +15,7 @@ from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.spectra import hold_response, unwrapped_phase
 from ..results import Flag
 from .comparison import FRFComparison, decibels, hertz
+from .held import same_time, sampled_every
 from .measured_points import MeasuredPoints, check_single_channel, measured_points
 from .trusted_band import trusted_points
 
@@ -45,7 +47,9 @@ def compare_frf(
         Compare in this band in Hz instead.
     hold : {"auto", "zoh", None}
         "zoh": divide the zero-order hold out of a discrete model. None: do not. "auto": do so for
-        a discrete model, unless its ``.fit`` says that it is impulse-invariant.
+        a discrete model, unless its ``.fit`` says that it is impulse-invariant. An FRF that knows
+        its sample time has a hold in it as well: with the same sample time as the model both
+        stay, else that of the FRF is divided out too.
 
     Returns
     -------
@@ -67,7 +71,8 @@ def compare_frf(
     1.83 degrees at 13 Hz and 1280 Hz. An FRF that was measured on the plant with analog signals
     has no hold in it, and the hold is divided out of the model before they are compared. An
     *impulse-invariant* model (central difference) needs no such thing, nor does an FRF that was
-    itself estimated from the samples of a held input: pass ``hold=None``.
+    itself estimated from the samples of a held input, as one of `spectral_frf` is taken to be:
+    pass ``hold="zoh"`` where it was not, and ``hold=None`` where an FRF from elsewhere was.
 
     The trusted band is the widest stretch (in octaves) in which the coherence, smoothed by a
     running median of five points, stays up.
@@ -96,6 +101,11 @@ def compare_frf(
     points, flags = _comparable(measured_points(frf), dt)
     used_hold = _hold(system, dt, hold)
     omega = points.omega
+    held = sampled_every(frf) if hold == "auto" else None
+    if held is not None and used_hold is not None and dt is not None and same_time(held, dt):
+        used_hold = None
+    elif held is not None:
+        points = _without_hold(points, held)
     model = _evaluate(system, omega, dt)
     if used_hold is not None and dt is not None:
         model = model / hold_response(omega, dt)
@@ -128,6 +138,12 @@ def compare_frf(
         name=f"{_own_name(system, 'model')} and {_own_name(frf, 'measured')}",
         flags=flags,
     )
+
+
+def _without_hold(points: MeasuredPoints, dt: float) -> MeasuredPoints:
+    hold = hold_response(points.omega, dt)
+    std = None if points.std is None else points.std / np.abs(hold)
+    return replace(points, response=points.response / hold, std=std)
 
 
 def _own_name(system: Any, otherwise: str) -> str:

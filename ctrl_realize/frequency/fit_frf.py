@@ -9,7 +9,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of, positive, whole
+from ..checks import positive, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
@@ -18,6 +18,7 @@ from ..numerics.rational_search import DEFAULT_ORDERS, dead_time_bound, fit_stru
 from ..numerics.rational_starts import longest_search
 from ..numerics.spectra import hold_response
 from .frf_selection import chosen_model
+from .held import held_every, sampled_every
 from .points import frf_points
 
 _SAMPLES_PER_SHORTEST_PERIOD = 20
@@ -31,7 +32,7 @@ def fit_frf(
     dt: float | None = None,
     max_dead_time: float | None = None,
     weighting: Literal["auto", "std", "relative", "uniform"] = "auto",
-    hold: Literal["zoh"] | None = None,
+    hold: Literal["auto", "zoh"] | None = "auto",
     band_hz: tuple[float, float] | None = None,
     name: str | None = None,
 ) -> DelayedStateSpace:
@@ -53,7 +54,8 @@ def fit_frf(
         Poles minus zeros, or candidates; default 1 to the order. With 0 the dead time is rounded
         to whole samples of the model.
     dt : float, optional
-        Sample time of the model in s; default a twentieth of the shortest period measured.
+        Sample time of the model in s; default that of the records that the FRF was estimated
+        from, or a twentieth of the shortest period measured.
     max_dead_time : float, optional
         Upper bound of the search in s; default from the slope of the measured phase. At most a
         thousand periods of the eighth frequency.
@@ -61,10 +63,11 @@ def fit_frf(
         "std": the FRF's standard deviation. "relative": an error in proportion to the response,
         and to what the coherence says where there is one. "uniform": the same error everywhere.
         "auto": "std" where there is one, else "relative".
-    hold : {"zoh", None}
-        "zoh" for an FRF that was estimated from samples of a held input, such as one from
-        `spectral_frf`: the hold, for which `dt` must be that of the samples, is divided out, and
-        points near Nyquist, where samples fold, count for less.
+    hold : {"auto", "zoh", None}
+        "zoh" for an FRF that was estimated from samples of a held input: the hold, for which `dt`
+        must be that of the samples where the FRF does not know it, is divided out, and points
+        near Nyquist, where samples fold, count for less. "auto": do so where the FRF knows its
+        sample time, as one from `spectral_frf` does. None: the FRF has no hold in it.
     band_hz : tuple of float, optional
         Use points in this band alone.
     name : str, optional
@@ -118,26 +121,22 @@ def fit_frf(
     >>> print(f"{model.fit.dead_time:.6f}")
     0.028900
     """
-    if hold is not None:
-        one_of(hold, "hold", ("zoh",))
-        if dt is None:
-            raise OptionError("hold='zoh' needs dt, the sample time of the held input in s")
     step = None if dt is None else positive(dt, "dt", "sample time in s")
-    below_hz = 0.5 / step if hold is not None and step is not None else np.inf
+    held = held_every(frf, hold, step)
+    below_hz = np.inf if held is None else 0.5 / held
     points = frf_points(frf, weighting, band_hz, below_hz=below_hz)
     frequency, response, sigma = points.frequency_hz, points.response, points.sigma
-    if hold is not None and step is not None:
-        response = response / hold_response(2 * np.pi * frequency, step)
+    if held is not None:
+        response = response / hold_response(2 * np.pi * frequency, held)
         if points.noise_known:
             # Samples fold what lies beyond Nyquist back, which a continuous model cannot follow;
             # of a plant that falls with 1/omega it is about this large.
-            sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / step - frequency)) ** 2)
+            sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / held - frequency)) ** 2)
     orders = _candidates(order, "order", 1)
     degrees = _candidates(relative_degree, "relative_degree", 0)
     _check_structures(orders, degrees, frequency.size)
-    sample_time = (
-        1 / (_SAMPLES_PER_SHORTEST_PERIOD * float(frequency[-1])) if step is None else step
-    )
+    shortest = 1 / (_SAMPLES_PER_SHORTEST_PERIOD * float(frequency[-1]))
+    sample_time = step or sampled_every(frf) or shortest
     omega = 2 * np.pi * frequency
     unit = float(np.sqrt(omega[0] * omega[-1]))
     longest = (
@@ -155,7 +154,7 @@ def fit_frf(
     )
     fits = fit_structures(data, orders, degrees)
     used = replace(points, response=response, sigma=sigma)
-    return chosen_model(frf, data, fits, used, unit, size, sample_time, name)
+    return chosen_model(frf, data, fits, used, unit, size, sample_time, held, name)
 
 
 def _searchable(max_dead_time: float, omega: FloatArray) -> float:

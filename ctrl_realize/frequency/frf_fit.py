@@ -62,7 +62,7 @@ class FRFFit(Result):
         95 % interval of the dead time in s.
     frequency_hz : ndarray, shape (K,)
     measured : ndarray of complex, shape (K,)
-        What was fitted; a hold was divided out where asked.
+        What was fitted; the hold of an FRF from samples was divided out.
     sigma : ndarray, shape (K,)
         Standard deviation that weighted each point; where the FRF had none, a relative one.
     noise_known : bool
@@ -80,6 +80,8 @@ class FRFFit(Result):
         All that were tried, best first.
     name : str
         Name of the FRF.
+    hold_time : float or None
+        Sample time in s of the hold that was divided out of `measured`; None where none was.
     flags : tuple of Flag
 
     Examples
@@ -110,6 +112,7 @@ class FRFFit(Result):
     pole_std: FloatArray
     structures: tuple[FRFStructure, ...]
     name: str
+    hold_time: float | None = None
     flags: tuple[Flag, ...] = field(default=())
 
     @property
@@ -161,6 +164,9 @@ class FRFFit(Result):
             if p.imag >= 0
         ]
         digits = max(4, interval_digits(*self.interval))
+        hold = []
+        if self.hold_time is not None:
+            hold.append(("hold", f"that of samples every {in_time(self.hold_time)}, divided out"))
         return [
             ("dead time", f"{in_time(self.dead_time, digits)}, {self._std_in_words()}"),
             ("95 % interval", interval_in_time(*self.interval)),
@@ -179,6 +185,7 @@ class FRFFit(Result):
                 if self.noise_known
                 else f"{100 * self.misfit:.3g} % of {unit}",
             ),
+            *hold,
         ]
 
     def _std_in_words(self) -> str:

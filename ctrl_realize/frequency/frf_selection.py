@@ -53,6 +53,7 @@ def chosen_model(
     unit: float,
     size: float,
     dt: float,
+    held: float | None,
     name: str | None,
 ) -> DelayedStateSpace:
     """Choose the structure, state the uncertainty and build the model.
@@ -70,6 +71,8 @@ def chosen_model(
     unit, size : float
     dt : float
         Sample time of the model in s.
+    held : float or None
+        Sample time in s of the hold that was divided out.
     name : str or None
     """
     frequency, noise_known = points.frequency_hz, points.noise_known
@@ -112,6 +115,7 @@ def chosen_model(
         pole_std=read_only(pole_std * unit),
         structures=tuple(rows),
         name=str(frf.name or "measured"),
+        hold_time=held,
         flags=tuple(flags),
     )
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)

@@ -15,6 +15,7 @@ from ..numerics.fir_kernels import cautious_std, fit_kernel
 from ..numerics.lagged import NormalEquations
 from ..numerics.spectra import hold_response
 from ..results import Flag
+from .held import held_every, same_time
 from .points import FRFPoints, frf_points
 
 _BLOCK = 256
@@ -37,7 +38,7 @@ def impulse_from_frf(
     *,
     kernel: Literal["TC", "DC", "SS"] = "SS",
     weighting: Literal["auto", "std", "relative", "uniform"] = "auto",
-    hold: Literal["zoh"] | None = None,
+    hold: Literal["auto", "zoh"] | None = "auto",
     band_hz: tuple[float, float] | None = None,
 ) -> ImpulseEstimate:
     r"""Estimate the unit-pulse response that explains a frequency response.
@@ -59,9 +60,10 @@ def impulse_from_frf(
         Prior; "SS" is smooth, "TC" allows a jump at lag 0 (see `impulse_from_io`).
     weighting : {"auto", "std", "relative", "uniform"}
         As for `fit_frf`, but "auto" is "std" where there is one, else "uniform".
-    hold : {"zoh", None}
+    hold : {"auto", "zoh", None}
         None: the FRF is that of the plant itself, and the hold of a step-invariant model is put
-        in. "zoh": it was estimated from samples of a held input and has the hold in it.
+        in. "zoh": it was estimated from samples of a held input and has the hold in it. "auto":
+        the latter where the FRF knows its sample time, as one from `spectral_frf` does.
     band_hz : tuple of float, optional
         Use points in this band alone.
 
@@ -107,11 +109,12 @@ def impulse_from_frf(
     points = frf_points(frf, weighting, band_hz, below_hz=0.5 / step)
     if weighting == "auto" and not points.noise_known:
         points = frf_points(frf, "uniform", band_hz, below_hz=0.5 / step)
-    if hold is not None:
-        one_of(hold, "hold", ("zoh",))
+    held = held_every(frf, hold, step)
     omega = 2 * np.pi * points.frequency_hz
     response, sigma = points.response, points.sigma
-    if hold is None:
+    if held is not None and not same_time(held, step):
+        response = response / hold_response(omega, held) * hold_response(omega, step)
+    elif held is None:
         response = response * hold_response(omega, step)
         if points.noise_known:
             # What the plant still answers beyond Nyquist comes back as an alias that no hold

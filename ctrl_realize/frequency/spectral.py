@@ -97,7 +97,9 @@ def spectral_frf(
         frf = cr.spectral_frf(pieces, segment=8192)
 
     An input that is held between the samples makes this the response of the *sampled* plant,
-    which has the hold in it: ``compare_frf(..., hold=None)``.
+    which has the hold in it. The result knows its `sample_time`, and `fit_frf`, `compare_frf` and
+    `impulse_from_frf` take it that the input was held. Where it was not (a record of analog
+    signals behind filters, with nothing beyond the Nyquist frequency), give them ``hold=None``.
 
     References
     ----------
@@ -135,6 +137,7 @@ def spectral_frf(
         coherence=found.coherence,
         std=found.std,
         repeats=found.repeats,
+        sample_time=dt,
         name=name,
     )
 

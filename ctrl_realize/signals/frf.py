@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import real
+from ..checks import positive, real
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.statistics import circle_quantile
@@ -34,6 +34,10 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     repeats : float, optional
         Number of repeats, periods or independent segments from whose scatter `std` was taken,
         above 1 and not necessarily whole. Without it `std` counts as known.
+    sample_time : float, optional
+        Sample time in s of the records that the response was estimated from. An input that is
+        held between the samples leaves its hold in the response, half a sample of delay;
+        `fit_frf`, `compare_frf` and `impulse_from_frf` then reckon with it.
     name : str, optional
     inputs, outputs : str or sequence of str, optional
         Signal names, as python-control takes them.
@@ -44,7 +48,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     complex : ndarray
         The complex response (python-control's attribute), sorted by frequency.
     coherence, std : ndarray or None
-    repeats : float or None
+    repeats, sample_time : float or None
 
     Raises
     ------
@@ -72,6 +76,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     coherence: FloatArray | None
     std: FloatArray | None
     repeats: float | None
+    sample_time: float | None
     frequency_hz: FloatArray
 
     def __init__(
@@ -82,6 +87,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         coherence: ArrayLike | None = None,
         std: ArrayLike | None = None,
         repeats: float | None = None,
+        sample_time: float | None = None,
         name: str = "measured",
         inputs: Any = None,
         outputs: Any = None,
@@ -124,6 +130,9 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         self.repeats = None if repeats is None else real(repeats, "repeats", "number above 1")
         if self.repeats is not None and self.repeats <= 1:
             raise OptionError(f"repeats={repeats!r}; a scatter needs more than one")
+        self.sample_time = (
+            None if sample_time is None else positive(sample_time, "sample_time", "time in s")
+        )
 
     def __repr__(self) -> str:
         return (
@@ -166,6 +175,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             coherence=None if self.coherence is None else _channels(self.coherence, chosen),
             std=None if self.std is None else _channels(self.std, chosen),
             repeats=self.repeats,
+            sample_time=self.sample_time,
             name=taken.name,
             inputs=taken.input_labels,
             outputs=taken.output_labels,
@@ -234,6 +244,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
             coherence=None if self.coherence is None else self.coherence[..., keep],
             std=None if self.std is None else self.std[..., keep],
             repeats=self.repeats,
+            sample_time=self.sample_time,
             name=self.name,
             inputs=self.input_labels,
             outputs=self.output_labels,

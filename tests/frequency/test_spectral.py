@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import control as ct
 import numpy as np
 import pytest
@@ -205,12 +207,13 @@ def test_random_record_of_the_simulated_valve_agrees_with_its_sampled_truth():
     bits = np.random.default_rng(0).integers(0, 2, 1600)
     record = valve.record(8 + 8 * np.repeat(bits, 40), rng=1)
     frf = cr.spectral_frf(record, segment=2048, delay=37).between_hz(0.6, 8)
-    # Held samples in, so the hold is in the estimate: none is divided out of the model.
-    held = cr.compare_frf(valve.truth.sampled, frf, hold=None)
+    # Held samples in, so the hold is in the estimate, which knows: it stays in the model too.
+    held = cr.compare_frf(valve.truth.sampled, frf)
+    assert held.hold is None
     assert held.band_hz[1] > 6
     # Leakage of the valve's own memory, 0.1 s in segments of 1.6 s, is most of it.
     assert held.rms_relative_error < 0.05
-    divided = cr.compare_frf(valve.truth.sampled, frf)
+    divided = cr.compare_frf(valve.truth.sampled, frf, hold="zoh")
     assert np.mean(divided.phase_error_deg) > np.mean(held.phase_error_deg) + 0.3
 
 
@@ -269,3 +272,44 @@ def test_records_without_excitation_or_of_two_rates_are_refused():
         cr.spectral_frf([record, cr.Record(2 * record.time, record.input, record.output)])
     with pytest.raises(ValueError, match="no records"):
         cr.spectral_frf([])
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.1])
+def test_an_estimate_from_samples_knows_its_hold_and_every_function_reckons_with_it(dt):
+    core = ct.tf([2.0], [0.8, 1])
+    plant = cr.delayed_ss(core, dead_time=0.37, dt=dt)
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal(40_000)
+    y = plant.simulate(u) + 0.02 * rng.standard_normal(u.size)
+    record = cr.Record(dt * np.arange(u.size), u, y)
+    frf = cr.spectral_frf(record, segment=1024, delay=plant.delay)
+    assert frf.sample_time == dt
+    band = frf.between_hz(0.02, 0.2 / dt)
+    assert band.sample_time == dt
+    assert pickle.loads(pickle.dumps(band)).sample_time == dt
+
+    free = cr.fit_frf(band, 1)
+    asked = cr.fit_frf(band, 1, dt=dt, hold="zoh")
+    assert free.dt == dt
+    assert free.fit.hold_time == dt
+    assert free.fit.dead_time == asked.fit.dead_time
+    assert "hold" in free.fit.report()
+    # a tenth of a sample is what noise and leakage leave; the hold is half of one
+    assert abs(free.fit.dead_time - 0.37) < 0.1 * dt
+    without = cr.fit_frf(band, 1, hold=None)
+    assert without.fit.hold_time is None
+    assert without.dt == dt
+    assert without.fit.dead_time - 0.37 == pytest.approx(0.5 * dt, abs=0.15 * dt)
+    # a model of another sample time is of the same plant
+    assert cr.fit_frf(band, 1, dt=0.5 * dt).fit.dead_time == free.fit.dead_time
+
+    pulses = cr.impulse_from_frf(band, dt, 200).markov
+    np.testing.assert_array_equal(pulses, cr.impulse_from_frf(band, dt, 200, hold="zoh").markov)
+
+    errors = [
+        cr.compare_frf(system, band, band_hz=(0.02, 0.2 / dt)).phase_error_deg.mean()
+        for system in (plant, cr.delayed_ss(core, dead_time=0.37, dt=0.01))
+    ]
+    # the same plant at two sample times, and half a sample is 9 degrees in the middle of the band
+    assert abs(errors[0]) < 1.0
+    assert abs(errors[1]) < 1.0
