@@ -117,7 +117,7 @@ MODULES = {
     "identification/any_input_fit": "tests/identification/test_delay_fit_any_input.py",
     "numerics/arx": "tests/numerics/test_arx.py",
     "numerics/bands": "tests/numerics/test_bands.py tests/numerics/test_spectra.py",
-    "numerics/block_svd": "tests/numerics/test_lanczos.py tests/numerics/test_kung.py",
+    "numerics/block_svd": "tests/numerics/test_block_svd.py tests/numerics/test_lanczos.py",
     "numerics/closed_loop": "tests/design/test_pid.py",
     "numerics/coloured_noise": "tests/numerics/test_coloured_noise.py",
     "numerics/correlation": "tests/numerics/test_correlation.py",

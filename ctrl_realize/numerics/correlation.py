@@ -79,7 +79,7 @@ def autoregression(signal: FloatArray, most: int) -> FloatArray:
     for order in range(1, most + 1):
         ahead, behind = forward[1:], backward[:-1]
         energy = float(ahead @ ahead + behind @ behind)
-        if energy <= 1e-28 * power or power == 0:
+        if energy <= 1e-28 * power:
             break
         reflection = -2.0 * float(ahead @ behind) / energy
         forward, backward = ahead + reflection * behind, behind + reflection * ahead

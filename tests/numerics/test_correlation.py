@@ -25,7 +25,7 @@ def test_correlation_by_fft_is_the_sum_over_pairs():
 
 
 def test_a_constant_is_correlated_with_nothing():
-    assert not correlation(np.full(20, 3.0), np.arange(20.0), 5).any()
+    assert correlation(np.full(20, 3.0), np.arange(20.0), 5).tolist() == [0.0] * 6
 
 
 def test_white_noise_fails_the_test_as_often_as_asked_for():
@@ -98,3 +98,25 @@ def test_a_ringing_autoregression_does_not_start_with_a_burst():
     c = -np.poly(0.99 * np.exp(1j * np.array([0.1, -0.1, 0.2, -0.2, 0.3, -0.3])))[1:].real
     e = lfilter([1], np.r_[1, -c], np.random.default_rng(0).normal(size=400))[200:]
     assert np.abs(predict_ahead(e, c, 1)).max() < 1.1 * np.abs(e).max()
+
+
+def test_the_highest_order_that_is_allowed_is_tried():
+    e = lfilter([1], [1, -1.5, 0.8], np.random.default_rng(0).normal(size=4000))
+    assert autoregression(e, 2).size == 2
+    assert autoregression(e, 1).size == 1
+    assert autoregression(e, 0).size == 0
+
+
+def test_what_is_predicted_exactly_needs_no_higher_order():
+    assert_allclose(autoregression((-1.0) ** np.arange(50), 8), [-1.0], rtol=0, atol=1e-14)
+    assert autoregression(np.full(50, 3.0), 8).size == 0
+
+
+def test_what_has_no_complete_past_is_predicted_as_zero():
+    signal = np.arange(1.0, 9.0)
+    for steps in (1, 2):
+        found = predict_ahead(signal, np.array([1.0, 0.5, 0.25]), steps)
+        # order + steps - 1 samples
+        assert np.flatnonzero(found)[0] == 2 + steps
+    # 3 + 2 / 2 + 1 / 4 one step ahead
+    assert predict_ahead(signal, np.array([1.0, 0.5, 0.25]), 1)[3] == 4.25
