@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
@@ -106,7 +107,9 @@ def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
     return np.asarray((np.arange(n_samples) >= start[:, None]) * 1.0)
 
 
-def misfit_beside_line(records: Sequence[Record], fit: SineFit) -> FloatArray:
+def misfit_beside_line(
+    records: Sequence[Record], fit: SineFit
+) -> tuple[FloatArray, NDArray[np.int_]]:
     """Return how much stronger the misfit is beside the line than on average; at least 1.
 
     The covariance of the fit takes the misfit for white, which a sine in slow noise feels most.
@@ -114,8 +117,10 @@ def misfit_beside_line(records: Sequence[Record], fit: SineFit) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (B, 2)
+    stronger : ndarray, shape (B, 2)
         For input and output of each record.
+    count : ndarray, shape (B,)
+        Bins that tell it.
     """
     time, signals = _time_and_signals(records)
     late = _left(time, signals, fit)[..., time.size // 2 :]
@@ -123,7 +128,7 @@ def misfit_beside_line(records: Sequence[Record], fit: SineFit) -> FloatArray:
     bins = np.arange(power.shape[2])
     away = np.abs(bins - fit.omega[:, None] * records[0].dt * late.shape[2] / (2 * np.pi))
     beside = (away > _BESIDE[0]) & (away < _BESIDE[1]) & (bins > 0)
-    count = np.maximum(beside.sum(axis=1), 1)[:, None]
-    near = (power * beside[:, None]).sum(axis=2) / count
+    count = np.maximum(beside.sum(axis=1), 1)
+    near = (power * beside[:, None]).sum(axis=2) / count[:, None]
     average = np.maximum(power[..., 1:].mean(axis=2), np.finfo(float).tiny)
-    return np.asarray(np.maximum(near / average, 1.0), dtype=np.float64)
+    return np.asarray(np.maximum(near / average, 1.0), dtype=np.float64), count

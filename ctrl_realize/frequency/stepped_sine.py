@@ -61,9 +61,10 @@ def stepped_sine_frf(
         At the frequencies as measured (mean over the repeats), sorted. `std` is that of the
         averaged complex response: from the scatter of the repeats where there are at least
         three, from the misfit of the sines otherwise, as strong as it is beside their frequency.
-        `repeats` is the smallest number of repeats whose scatter was taken: with five of them
-        1.96 `std` hold less than 95 %, `MeasuredFRF.circle` holds them. The rounding of a
-        converter without noise comes again in every repeat, and is in no scatter.
+        `repeats` is the smallest number of values that told it at a point, repeats or bins of the
+        misfit's spectrum: where they are few 1.96 `std` hold less than 95 %,
+        `MeasuredFRF.circle` holds them. The rounding of a converter without noise comes again in
+        every repeat, and is in no scatter.
 
     Raises
     ------
@@ -103,6 +104,7 @@ def stepped_sine_frf(
     phasors = np.empty((len(flat), 2), dtype=np.complex128)
     power = np.empty((len(flat), 2))
     relative_variance = np.empty(len(flat))
+    bins = np.empty(len(flat))
     for batch in batches(flat):
         members = [flat[i] for i in batch]
         fit = fit_batch(members, starts[batch], settle, free_frequency, drift)
@@ -110,9 +112,10 @@ def stepped_sine_frf(
         power[batch] = 0.5 * np.abs(fit.phasor) ** 2 + fit.noise_variance
         # Total variance of a phasor is the trace; that of a ratio adds the relative ones.
         variance = np.trace(fit.phasor_covariance, axis1=2, axis2=3)
-        variance = variance * misfit_beside_line(members, fit)
+        stronger, bins[batch] = misfit_beside_line(members, fit)
+        variance = variance * stronger
         relative_variance[batch] = (variance / np.abs(fit.phasor) ** 2).sum(axis=1)
-    return _averaged(points, omega, phasors, power, relative_variance, name)
+    return _averaged(points, omega, phasors, power, relative_variance, bins, name)
 
 
 def _as_points(records: Sweep) -> list[list[Record]]:
@@ -175,12 +178,13 @@ def _averaged(
     phasors: ComplexArray,
     power: FloatArray,
     relative_variance: FloatArray,
+    bins: FloatArray,
     name: str,
 ) -> MeasuredFRF:
     """Average the repeats of each point."""
     response = np.empty(len(points), dtype=np.complex128)
     frequency, coherence, std = (np.empty(len(points)) for _ in range(3))
-    scattered = [len(point) for point in points if len(point) >= _ENOUGH]
+    told = np.empty(len(points))
     start = 0
     for k, point in enumerate(points):
         these = slice(start, start + len(point))
@@ -196,10 +200,12 @@ def _averaged(
         coherence[k] = min(abs(y @ u.conj()) ** 2 / total, 1.0) if total > 0 else 0.0
         if len(point) >= _ENOUGH:
             variance = np.var(values, ddof=1) / len(point)
+            told[k] = len(point)
         else:
             variance = np.mean(np.abs(values) ** 2 * relative_variance[these]) / len(point)
+            # No mean is taken off: as many values as bins are worth one repeat more.
+            told[k] = 1 + bins[these].sum()
         std[k] = np.sqrt(variance)
-    repeats = min(scattered) if scattered else None
     return MeasuredFRF(
-        response, frequency, coherence=coherence, std=std, repeats=repeats, name=name
+        response, frequency, coherence=coherence, std=std, repeats=float(told.min()), name=name
     )
