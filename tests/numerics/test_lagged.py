@@ -21,7 +21,7 @@ def by_rows(z, y, lags, offset):
     return phi, target
 
 
-@pytest.mark.parametrize("missing", [0, 4, 30])
+@pytest.mark.parametrize("missing", [0, 4, 30, 60])  # the last: more rows are lost than kept
 @pytest.mark.parametrize("offset", [True, False])
 @pytest.mark.parametrize(("signals", "targets", "lags"), [(1, 1, 1), (2, 2, 5), (3, 1, 12)])
 def test_sums_by_fft_equal_those_of_the_regression_matrix(
@@ -35,7 +35,7 @@ def test_sums_by_fft_equal_those_of_the_regression_matrix(
         z[0, 40] = np.nan
     equations = normal_equations(z, y, lags, offset=offset)
     phi, target = by_rows(z, y, lags, offset)
-    assert equations.rows == len(phi)
+    assert equations.rows == len(phi) > 0
     # sums of 80 products of numbers of size one
     assert_allclose(equations.gram, phi.T @ phi, rtol=0, atol=1e-11)
     assert_allclose(equations.cross, phi.T @ target, rtol=0, atol=1e-11)
