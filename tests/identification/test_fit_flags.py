@@ -141,6 +141,7 @@ def test_a_zero_on_the_right_is_an_inverse_response_where_it_is_slow_enough():
     # b(s) = b0 + b1 s from the lowest power on: a zero at -b0 / b1
     assert set(of_model(numerator=np.array([6.0, -1.0]))) == {"inverse_response"}
     assert "zero at 6 rad/s" in of_model(numerator=np.array([6.0, -1.0]))["inverse_response"]
+    assert "zero at 0.5 rad/s" in of_model(numerator=np.array([0.5, -1.0]))["inverse_response"]
     assert of_model(numerator=np.array([6.01, -1.0])) == {}  # over three times the fastest pole
     assert of_model(numerator=np.array([1.0, 1.0])) == {}
     assert of_model(numerator=np.array([6.0, -1.0]), follows_flow=True, flows=()) == {}
@@ -237,7 +238,7 @@ def test_a_value_for_none_is_named(code):
     told = of_step(data(output=output), fitted=output)["outliers"]
     assert told.startswith(f"2 sample(s), the first at index 400, are {code:g}, 20 times")
     # several values are no code, and 20 times the range is far
-    output[700] *= 1.01
+    output[700] *= 1.0005  # half a unit
     assert of_step(data(output=output), fitted=output) == {}
     range_ = float(np.diff(np.percentile(np.linspace(0.0, 1.0, 1000), [1, 99]))[0])
     for times, flagged in ((19.9, False), (20.2, True)):
@@ -271,6 +272,7 @@ def test_records_that_differ_are_flagged():
     assert "chi-square 31.4, p = 0.0099" in differing["records_differ"]
     assert repeats(p_value=0.01) == {}
     assert "(-3.1 +- 1 s per unit)" in repeats(trend=-3.1)["amplitude_trend"]
+    assert set(repeats(trend=1.6, trend_error=0.5)) == {"amplitude_trend"}
     assert repeats(trend=3.0) == repeats(trend=1.0, trend_error=0.0) == {}
 
 
@@ -284,5 +286,7 @@ def test_records_that_are_others_over_again_are_named():
     assert "the 2.)" in flag.message
     (many,) = same_record_flags((a,) * 6)
     assert "(the 2. is the 1., the 3. is the 1., the 4. is the 1. and 2 more)" in many.message
+    (four,) = same_record_flags((a,) * 5)
+    assert "the 4. is the 1. and 1 more)" in four.message
     (three,) = same_record_flags((a,) * 4)
     assert "more" not in three.message

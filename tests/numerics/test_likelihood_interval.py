@@ -203,6 +203,12 @@ def test_parameters_are_charged_at_least_as_bic_would_of_many_samples(monkeypatc
     assert set(likelihood(monkeypatch, of_two(), whole).profiles) == {ONE, TWO}
     whole.criterion[ONE] += 0.1
     assert set(likelihood(monkeypatch, of_two(), whole).profiles) == {TWO}
+    # two lags and a zero have one more
+    whole.candidates[ZERO] = Model(ZERO, 3.0, 99.0)
+    whole.criterion[ZERO] = PLAUSIBLE - more
+    assert set(likelihood(monkeypatch, of_two(), whole).profiles) == {TWO, ZERO}
+    whole.criterion[ZERO] += 0.1
+    assert set(likelihood(monkeypatch, of_two(), whole).profiles) == {TWO}
     # a larger charge than the least one is as it is
     costly = window(penalty=LEAST_CHARGE + 3.0)
     costly.criterion[ONE] = PLAUSIBLE
