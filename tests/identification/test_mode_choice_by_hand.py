@@ -23,6 +23,7 @@ from ctrl_realize.identification.mode_choice import (
 from ctrl_realize.numerics.coloured_noise import noise_lags
 from ctrl_realize.numerics.noise_level import correlation_time
 from ctrl_realize.results import Flag
+from ctrl_realize.wording import interval_in_time
 
 DT = 0.1
 RECORDS = ("first", "second")
@@ -72,7 +73,14 @@ def by_hand(monkeypatch):
 
     monkeypatch.setattr(mode_choice, "_left", left)
     monkeypatch.setattr(mode_choice, "from_starts", starts)
-    monkeypatch.setattr(mode_choice, "_gain", lambda fit, left, found: set_up.gain)
+
+    def gain(fit, left, found):
+        assert isinstance(fit, Lags)
+        assert (left is None) == isinstance(set_up.left, Exception)
+        assert found is set_up.found
+        return set_up.gain
+
+    monkeypatch.setattr(mode_choice, "_gain", gain)
     monkeypatch.setattr(mode_choice, "_chosen", lambda *args: args)
     return set_up
 
@@ -168,6 +176,10 @@ def test_the_total_delay_is_the_first_moment_of_the_pulse_less_half_a_hold(direc
     pulse = system.markov(400)  # 0.8^400 is nothing
     moment = pulse @ np.arange(400) / pulse.sum()
     assert _total_delay(system) == pytest.approx((moment - 0.5) * DT, rel=1e-12)
+    # in other units
+    small = ct.ss(core.A, 1e-12 * core.B, core.C, 1e-12 * core.D, DT)
+    found = _total_delay(cr.DelayedStateSpace(small, 2, output_delay=1))
+    assert found == pytest.approx((moment - 0.5) * DT, rel=1e-12)
 
 
 def test_without_a_gain_there_is_no_total_delay():
@@ -238,7 +250,12 @@ def test_flags_of_modes_tell_of_no_delay_and_of_lags_that_disagree(modes):
     assert codes(taken(modes, own=(0.6, 1.5), interval=(0.1, 0.2))) == []
     # up to half of the dead time, 0.2 s, or twice the interval of the modes is no contradiction
     assert codes(taken(modes, interval=(0.26, 0.45))) == []
-    assert codes(taken(modes, interval=(0.24, 0.45))) == ["structures_disagree"]
+    apart = taken(modes, interval=(0.24, 0.45))
+    assert codes(apart) == ["structures_disagree"]
+    assert apart.flags[0].message == (
+        f"modes put the dead time in {interval_in_time(0.35, 0.45)}, lags behind a dead time in "
+        f"{interval_in_time(0.24, 0.45)}"
+    )
     assert codes(taken(modes, own=(3.0, 4.5), interval=(0.17, 0.45))) == []
     assert codes(taken(modes, own=(3.0, 4.5), interval=(0.14, 0.45))) == ["structures_disagree"]
 
