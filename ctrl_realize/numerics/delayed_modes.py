@@ -16,7 +16,8 @@ and pole sets at once; `SampledInput` does it for a long measured signal, by rec
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, TypeAlias
 
@@ -29,8 +30,15 @@ Modes: TypeAlias = tuple[FloatArray, ComplexArray, ComplexArray]
 """H (B, m), E (B, m, J) and T (B, m, J)."""
 
 
+_PIECE = 2**16  # samples of a response that are found at a time, which bounds the memory
+
+
 class HeldInput(Protocol):
     """An input that is constant between its moves."""
+
+    def pieces(self) -> Sequence[HeldInput]:
+        """Inputs whose responses, one after the other, are the response to this one."""
+        ...
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for delays (B,) and poles (B, J)."""
@@ -64,6 +72,12 @@ class MoveTrain:
     dt: float
     moves: FloatArray
     sizes: FloatArray
+
+    def pieces(self) -> list[MoveTrain]:
+        """Cut the bins, of which every one stands for itself, into short pieces."""
+        stops = range(_PIECE, self.first.size, _PIECE)
+        parts = zip(np.split(self.first, stops), np.split(self.width, stops), strict=True)
+        return [replace(self, first=first, width=width) for first, width in parts]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for every bin; see `HeldInput`."""
@@ -142,6 +156,10 @@ class SampledInput:
     signal: FloatArray
     dt: float
 
+    def pieces(self) -> list[SampledInput]:
+        """All of it: a recursion runs through."""
+        return [self]
+
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T at every sample; see `HeldInput`."""
         n = self.signal.size
@@ -180,6 +198,10 @@ class SeveralInputs:
 
     parts: tuple[SampledInput, ...]
     starts: tuple[int, ...]
+
+    def pieces(self) -> list[SeveralInputs]:
+        """All of it: a recursion runs through."""
+        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T at every sample wanted; see `HeldInput`."""

@@ -35,18 +35,23 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
         return None
     # Single wild samples are no curve, the first of a record least of all.
     before = median_filter(output[:edge], size=5, mode="mirror")
-    time = np.arange(output.size) / edge
-    line = np.stack([np.ones(edge), time[:edge]], axis=1)
+    time = np.arange(edge) / edge
+    line = np.stack([np.ones(edge), time], axis=1)
     straight = before - line @ np.linalg.lstsq(line, before, rcond=None)[0]
-    best, curve = np.inf, straight
-    for rate in _RATES:
-        columns = np.stack([np.ones(output.size), np.exp(-rate * time)], axis=1)
-        weights = np.linalg.lstsq(columns[:edge], before, rcond=None)[0]
-        left = float(np.sum((before - columns[:edge] @ weights) ** 2))
+    best, rate, residual = np.inf, 0.0, straight
+    weights: FloatArray = np.zeros(2)
+    for tried in _RATES:
+        columns = _level_and_decay(tried, time)
+        found = np.asarray(np.linalg.lstsq(columns, before, rcond=None)[0], dtype=np.float64)
+        error = before - columns @ found
+        left = float(np.sum(error**2))
         if left < best:
-            best, curve = left, columns @ weights
-    residual = before - curve[:edge]
+            best, rate, weights, residual = left, float(tried), found, error
     variance = best / (edge - 3) * correlation_time(residual)
     if float(straight @ straight) - best <= _SIGNIFICANT * variance:
         return None
-    return np.asarray(curve)
+    return np.asarray(_level_and_decay(rate, np.arange(output.size) / edge) @ weights)
+
+
+def _level_and_decay(rate: float, time: FloatArray) -> FloatArray:
+    return np.stack([np.ones(time.size), np.exp(-rate * time)], axis=1)

@@ -182,11 +182,13 @@ def respond(
     """Response (m,) of one model, numerator (n - r + 1,), parameters (1 + n,)."""
     free = poles_from_parameters(parameters[None, 1:])[0]
     poles = np.concatenate([free, known.poles[None]], axis=1)
-    static, mode, _ = drive.modes(parameters[:1], poles)
     residues, gain, _ = partial_fractions(poles, known.numerator, numerator.size)
-    return np.asarray(
-        (mode[0] @ (residues[0] @ numerator)).real + static[0] * (gain[0] @ numerator)
-    )
+    amplitudes, level = residues[0] @ numerator, gain[0] @ numerator
+    response = []
+    for piece in drive.pieces():
+        static, mode, _ = piece.modes(parameters[:1], poles)
+        response.append((mode[0] @ amplitudes).real + static[0] * level)
+    return np.concatenate(response)
 
 
 def fit_batch(
