@@ -126,7 +126,7 @@ MODULES = {
     "numerics/likelihood_interval": "tests/numerics/test_likelihood_interval.py",
     "numerics/flow_modes": "tests/numerics/test_dispersed_flow.py",
     "numerics/whitening": "tests/numerics/test_whitening.py",
-    "numerics/coloured_fit": "tests/numerics/test_whitening.py",
+    "numerics/coloured_fit": "tests/numerics/test_coloured_fit.py",
     "numerics/moving_mean": "tests/numerics/test_moving_mean.py",
     "numerics/delay_models": "tests/numerics/test_kung.py",
     "numerics/delay_split": "tests/numerics/test_delay_split.py",
