@@ -132,11 +132,15 @@ class DelayTracker:
         DataError
             A value that is no number, not finite, or beyond 1e70.
         """
-        if np.ndim(u) or np.ndim(y):
+        try:
+            if np.ndim(u) or np.ndim(y):
+                raise TypeError
+            u, y = float(u), float(y)
+        except (TypeError, ValueError):
             raise DataError(
                 f"sample {self._count} is u={u!r}, y={y!r}; needed is one number each (run takes "
                 "a whole record)"
-            )
+            ) from None
         if not (np.isfinite(u) and np.isfinite(y)):
             raise DataError(f"sample {self._count} is u={u}, y={y}; needed are finite numbers")
         if max(abs(u), abs(y)) > EXTREME:
@@ -146,9 +150,9 @@ class DelayTracker:
             )
         if self._count == 0:
             # What was before is rest; large offsets would cost digits.
-            self._first = (float(u), float(y))
+            self._first = (u, y)
         self._count += 1
-        moved, seen = float(u) - self._first[0], float(y) - self._first[1]
+        moved, seen = u - self._first[0], y - self._first[1]
         self._now.bank.update(moved, seen)
         if self._next is not None:
             self._next.bank.update(moved, seen)

@@ -14,7 +14,7 @@ from ..identification.campaign import Campaign
 from ..identification.delay_scan_result import DelayScan
 from ..plots.dead_times import estimate_of, interval_of
 from ..results import Flag
-from ..wording import in_time, interval_in_time
+from ..wording import in_time, interval_in_time, poles_in_words
 
 SEVERE = frozenset(
     {
@@ -37,6 +37,9 @@ CLOSE, FAR = 0.05, 0.2
 """Relative errors (rms, in the trusted band) under which a model is close, over which it is off."""
 
 INTEGRATING = "none: it integrates"
+
+_REAL, _AT_ONE = 1e-12, 1e-9
+"""Imaginary part of a pole of z that is rounding, and distance to 1 of an integrator."""
 
 Level = Literal["good", "caution", "poor"]
 
@@ -180,24 +183,16 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
 
 
 def poles_of(system: DelayedStateSpace) -> str:
-    """Write the core's poles as corner frequencies, as a plant behind a hold would have them."""
-    poles = np.asarray(system.delay_free.poles())
-    shown = []
-    for pole in sorted(poles, key=lambda z: -abs(z)):
-        if pole.imag < -1e-12:
-            continue
-        if pole.imag > 1e-12:
-            s = np.log(pole) / system.dt
-            damping = -s.real / abs(s)
-            shown.append(f"{abs(s) / (2 * np.pi):.3g} Hz (damping {damping:.2g})")
-        elif pole.real <= 0:
-            shown.append(f"z = {pole.real:.3g}")
-        elif abs(pole.real - 1) < 1e-9:
-            shown.append("integrator")
-        else:
-            rate = -np.log(pole.real) / system.dt
-            shown.append(f"{rate / (2 * np.pi):.3g} Hz")
-    return ", ".join(shown) or "none"
+    """Write the core's poles as those of a plant behind a hold, what no plant has as z."""
+    poles = np.asarray(system.delay_free.poles(), dtype=np.complex128)
+    alternating = (np.abs(poles.imag) <= _REAL) & (poles.real <= 0)
+    plant = np.log(poles[~alternating]) / system.dt
+    plant[np.abs(poles[~alternating] - 1) < _AT_ONE] = 0.0
+    real = np.abs(poles[~alternating].imag) <= _REAL
+    plant[real] = plant[real].real
+    words = [poles_in_words(plant)] if plant.size else []
+    words += [f"z = {pole.real:.3g}" for pole in sorted(poles[alternating], key=lambda z: -abs(z))]
+    return ", ".join(words) or "none"
 
 
 def _gain(system: DelayedStateSpace) -> str:

@@ -239,6 +239,9 @@ def test_samples_that_are_no_numbers_and_records_that_do_not_fit_are_refused():
         bank.update(1.0, np.nan)
     with pytest.raises(DataError, match="one number each"):
         bank.update([1.0], [2.0])
+    for wrong in ("a", None, 1j):
+        with pytest.raises(DataError, match="one number each"):
+            bank.update(wrong, 1.0)
     slow = cr.Record(np.arange(10.0), np.ones(10), np.ones(10))
     with pytest.raises(DataError, match="sample time 1 s"):
         bank.run(slow)

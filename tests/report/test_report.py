@@ -259,14 +259,21 @@ def test_a_scan_is_never_trusted_without_a_remark(record):
     assert verdict.reasons[0].startswith("The dead time is where the misfit of a scan is least")
 
 
-def test_poles_are_told_as_corner_frequencies():
+def test_poles_are_told_in_the_words_of_the_cards():
     import control as ct
 
     slow, fast = 2 * np.pi * 2.2, 2 * np.pi * 8
     plant = ct.tf([1], [1 / slow, 1]) * ct.tf([1], [1 / fast**2, 1.4 / fast, 1])
     system = cr.delayed_ss(plant, 3, dt=1e-3)
-    assert poles_of(system) == "2.2 Hz, 8 Hz (damping 0.7)"
+    assert poles_of(system) == "lag 72.3 ms, pair at 8 Hz (damping 0.7)"
     assert poles_of(cr.delayed_ss(ct.tf([1], [1, 0]), 3, dt=1e-3)) == "integrator"
+    for core, words in (
+        (ct.tf([1], [1, -2.0]), "growing in 0.5 s"),
+        (ct.tf([1], [1, 0.4], 0.1), "z = -0.4"),
+        (ct.tf([1], np.poly([0.9, -0.2, -0.6]), 0.1), "lag 949 ms, z = -0.6, z = -0.2"),
+        (ct.tf([2.0], [1.0], 0.1), "none"),
+    ):
+        assert poles_of(cr.delayed_ss(core, 3, dt=0.1)) == words
 
 
 def test_the_checksum_of_a_record_is_that_of_its_samples(record):
