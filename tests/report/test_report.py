@@ -270,7 +270,7 @@ def test_poles_are_told_in_the_words_of_the_cards():
     for core, words in (
         (ct.tf([1], [1, -2.0]), "growing in 0.5 s"),
         (ct.tf([1], [1, 0.4], 0.1), "z = -0.4"),
-        (ct.tf([1], np.poly([0.9, -0.2, -0.6]), 0.1), "lag 949 ms, z = -0.6, z = -0.2"),
+        (ct.tf([1], np.poly([0.9, -0.2, -0.6]), 0.1), "lag 0.949 s, z = -0.6, z = -0.2"),
         (ct.tf([2.0], [1.0], 0.1), "none"),
     ):
         assert poles_of(cr.delayed_ss(core, 3, dt=0.1)) == words
