@@ -103,6 +103,7 @@ MODULES = {
     "identification/cross_validation": "tests/identification/test_residuals.py",
     "identification/bootstrap": "tests/identification/test_bootstrap.py",
     "identification/campaign": "tests/identification/test_campaign.py",
+    "identification/campaign_flags": "tests/identification/test_campaign.py",
     "identification/campaign_row": "tests/identification/test_campaign.py",
     "identification/campaign_run": "tests/identification/test_campaign.py",
     "identification/cross_check": "tests/identification/test_cross_check.py",

@@ -7,7 +7,6 @@ together, since averaging estimates keeps their common bias.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ..results import Flag, Result
 from ..wording import in_time
+from .campaign_flags import campaign_flags
 from .campaign_row import CampaignRow, RecordSource, read_source
 from .identify import Method, fit_records, identify
 from .realization import realize
@@ -229,19 +229,7 @@ class Campaign(Result):
     @property
     def flags(self) -> tuple[Flag, ...]:
         """What one should know: records that failed or came twice, a delay that is not constant."""
-        flags = []
-        if self.failed:
-            names = ", ".join(row.name for row in self.failed[:5])
-            more = "" if len(self.failed) <= 5 else f" and {len(self.failed) - 5} more"
-            flags.append(
-                Flag(
-                    "failed_records",
-                    f"{len(self.failed)} of {len(self.rows)} records failed: {names}{more}; the "
-                    "table tells why",
-                )
-            )
-        found = (_same_records(self.good), _amplitude_trend(self.good, self.method))
-        return (*flags, *(flag for flag in found if flag is not None))
+        return campaign_flags(self.rows, self.good, self.failed, self.method)
 
     def _title(self) -> str:
         return f"Campaign of {len(self.rows)} records ({self.method})"
@@ -273,59 +261,3 @@ class Campaign(Result):
     def __repr__(self) -> str:
         failed = f", {len(self.failed)} failed" if self.failed else ""
         return f"<Campaign: {len(self.rows)} records{failed}, method {self.method!r}>"
-
-
-def _same_records(rows: tuple[CampaignRow, ...]) -> Flag | None:
-    """Find records whose results agree in every digit, which noise never lets happen."""
-    alike: dict[tuple[float, ...], list[str]] = {}
-    for row in rows:
-        results = (row.delay, row.misfit, row.gain, row.amplitude, *row.interval)
-        alike.setdefault(results, []).append(row.name)
-    twice = [names for names in alike.values() if len(names) > 1]
-    if not twice:
-        return None
-    extra = sum(len(names) - 1 for names in twice)
-    names = ", ".join(twice[0][:4]) + (", ..." if len(twice[0]) > 4 else "")
-    more = "" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)"
-    return Flag(
-        "same_records",
-        f"{extra} of {len(rows)} records are others over again: {names} have the same results to "
-        f"the last digit{more}; the scatter and its interval are too small",
-    )
-
-
-def _amplitude_trend(rows: tuple[CampaignRow, ...], method: str) -> Flag | None:
-    """Test whether the delay depends on the height of the step, by the rank correlation."""
-    from scipy.stats import pearsonr, spearmanr  # scipy.stats takes a while to import
-
-    if rows and method != "output_error":
-        # A realization of one order more takes a lag out of the delay: compared is what is alike.
-        orders = Counter(row.order for row in rows)
-        rows = tuple(row for row in rows if row.order == orders.most_common(1)[0][0])
-    heights = np.array([abs(row.amplitude) for row in rows])
-    delays = np.array([row.delay for row in rows])
-    known = np.isfinite(heights) & np.isfinite(delays)
-    heights, delays = heights[known], delays[known]
-    if np.unique(np.round(heights, 6)).size < 2 or heights.size < 8 or np.ptp(delays) == 0:
-        return None
-    correlation, chance = spearmanr(heights, delays)
-    if heights.size < 10:
-        # So few ranks stand in order by chance (1 in 35 campaigns of four and four records, where
-        # Student's distribution says 1 in 350): the delays themselves have to agree.
-        chance = max(chance, pearsonr(heights, delays).pvalue)
-    # 1 %: one false alarm in a hundred campaigns of a linear plant.
-    if not chance < 0.01:
-        return None
-    way = "longer" if correlation > 0 else "shorter"
-    # Noise is larger beside a smaller step: a scan's bias grows with it, a fit misses fast lags.
-    doubt = ""
-    if method != "output_error":
-        doubt = "; or the bias of the scan, which grows with the noise: method='output_error' tells"
-    elif len({row.order for row in rows if np.isfinite(row.delay)}) > 1:
-        doubt = "; or a lag that only large steps show above the noise, as the orders differ"
-    return Flag(
-        "amplitude_trend",
-        f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, chance "
-        f"{chance:.1g}): friction, a slew limit or another nonlinearity, for which one linear "
-        f"model cannot hold at all amplitudes{doubt}",
-    )

@@ -8,7 +8,7 @@ from pathlib import Path
 RAISED_BY = {
     "any_input_fit": "fit_delay",
     "bootstrap": "bootstrap",
-    "campaign": "identify_campaign",
+    "campaign_flags": "identify_campaign",
     "channel_fit": "fit_channels",
     "channel_fit_result": "fit_channels",
     "compare": "compare_frf",

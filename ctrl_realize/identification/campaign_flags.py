@@ -1,0 +1,85 @@
+"""Say what one should know before trusting the table of a campaign."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from ..results import Flag
+from .campaign_row import CampaignRow
+
+Rows = tuple[CampaignRow, ...]
+
+
+def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[Flag, ...]:
+    """List the flags of a campaign: of all its rows, of those identified, and of those not."""
+    found = (_failed(rows, failed), _same_records(good), _amplitude_trend(good, method))
+    return tuple(flag for flag in found if flag is not None)
+
+
+def _failed(rows: Rows, failed: Rows) -> Flag | None:
+    if not failed:
+        return None
+    names = ", ".join(row.name for row in failed[:5])
+    more = "" if len(failed) <= 5 else f" and {len(failed) - 5} more"
+    return Flag(
+        "failed_records",
+        f"{len(failed)} of {len(rows)} records failed: {names}{more}; the table tells why",
+    )
+
+
+def _same_records(rows: Rows) -> Flag | None:
+    """Find records whose results agree in every digit, which noise never lets happen."""
+    alike: dict[tuple[float, ...], list[str]] = {}
+    for row in rows:
+        results = (row.delay, row.misfit, row.gain, row.amplitude, *row.interval)
+        alike.setdefault(results, []).append(row.name)
+    twice = [names for names in alike.values() if len(names) > 1]
+    if not twice:
+        return None
+    extra = sum(len(names) - 1 for names in twice)
+    names = ", ".join(twice[0][:4]) + (", ..." if len(twice[0]) > 4 else "")
+    more = "" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)"
+    return Flag(
+        "same_records",
+        f"{extra} of {len(rows)} records are others over again: {names} have the same results to "
+        f"the last digit{more}; the scatter and its interval are too small",
+    )
+
+
+def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
+    """Test whether the delay depends on the height of the step, by the rank correlation."""
+    from scipy.stats import pearsonr, spearmanr  # scipy.stats takes a while to import
+
+    if rows and method != "output_error":
+        # A realization of one order more takes a lag out of the delay: compared is what is alike.
+        orders = Counter(row.order for row in rows)
+        rows = tuple(row for row in rows if row.order == orders.most_common(1)[0][0])
+    heights = np.array([abs(row.amplitude) for row in rows])
+    delays = np.array([row.delay for row in rows])
+    known = np.isfinite(heights) & np.isfinite(delays)
+    heights, delays = heights[known], delays[known]
+    if np.unique(np.round(heights, 6)).size < 2 or heights.size < 8 or np.ptp(delays) == 0:
+        return None
+    correlation, chance = spearmanr(heights, delays)
+    if heights.size < 10:
+        # So few ranks stand in order by chance (1 in 35 campaigns of four and four records, where
+        # Student's distribution says 1 in 350): the delays themselves have to agree.
+        chance = max(chance, pearsonr(heights, delays).pvalue)
+    # 1 %: one false alarm in a hundred campaigns of a linear plant.
+    if not chance < 0.01:
+        return None
+    way = "longer" if correlation > 0 else "shorter"
+    # Noise is larger beside a smaller step: a scan's bias grows with it, a fit misses fast lags.
+    doubt = ""
+    if method != "output_error":
+        doubt = "; or the bias of the scan, which grows with the noise: method='output_error' tells"
+    elif len({row.order for row in rows if np.isfinite(row.delay)}) > 1:
+        doubt = "; or a lag that only large steps show above the noise, as the orders differ"
+    return Flag(
+        "amplitude_trend",
+        f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, chance "
+        f"{chance:.1g}): friction, a slew limit or another nonlinearity, for which one linear "
+        f"model cannot hold at all amplitudes{doubt}",
+    )
