@@ -58,7 +58,8 @@ def selector(text: str | None) -> str | int | None:
         return None
     if text.startswith("="):
         return text[1:]
-    return int(text) if text.isdigit() else text
+    # "²" is a digit, and no number
+    return int(text) if text.isdecimal() and text.isascii() else text
 
 
 def check_files(paths: Sequence[Path]) -> None:

@@ -55,8 +55,11 @@ def _parse(path: Path, layout: TextLayout) -> Any:
     import pandas as pd
 
     separator = r"\s+" if layout.delimiter == " " else layout.delimiter
-    keywords: dict[str, Any] = {}
-    if tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1):
+    keywords: dict[str, Any] = {"low_memory": False}
+    if not (layout.delimiter + (layout.comment or "")).isascii():
+        # the faster parser knows signs of one byte alone
+        keywords = {"engine": "python"}
+    elif tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1):
         # the default of later versions; before, the last digit could be wrong
         keywords["float_precision"] = "round_trip"
     try:
@@ -74,7 +77,6 @@ def _parse(path: Path, layout: TextLayout) -> Any:
             skipinitialspace=True,
             # an empty cell or a "NaN" makes its column text, and is complained about there
             na_filter=False,
-            low_memory=False,
             **keywords,
         )
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeError, OverflowError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import hashlib
 import os
 from collections.abc import Sequence
@@ -10,7 +11,7 @@ from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
-from jinja2 import DictLoader, Environment, StrictUndefined
+from jinja2 import DictLoader, Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from ..io.atomic import write_text
@@ -185,6 +186,16 @@ def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) ->
 
 def render(page: Page) -> str:
     """Write a page as HTML; all text of it is escaped, and what steers a terminal is left out."""
+    template, css, js = _template()
+    # The page allows this script and no other, whatever came with the data.
+    digest = base64.b64encode(hashlib.sha256(js.encode("utf-8")).digest()).decode("ascii")
+    text = template.render(page=page, css=Markup(css), js=Markup(js), js_digest=digest)
+    return text.translate(_UNSEEN) + "\n"
+
+
+@functools.cache
+def _template() -> tuple[Template, str, str]:
+    """Return the page's template, compiled once for all reports of a run, its style and script."""
     folder = resources.files("ctrl_realize.report") / "templates"
     html, css, js = (
         (folder / name).read_text(encoding="utf-8")
@@ -193,11 +204,7 @@ def render(page: Page) -> str:
     environment = Environment(
         loader=DictLoader({"report": html}), autoescape=True, undefined=StrictUndefined
     )
-    # The page allows this script and no other, whatever came with the data.
-    digest = base64.b64encode(hashlib.sha256(js.encode("utf-8")).digest()).decode("ascii")
-    template = environment.get_template("report")
-    text = template.render(page=page, css=Markup(css), js=Markup(js), js_digest=digest)
-    return text.translate(_UNSEEN) + "\n"
+    return environment.get_template("report"), css, js
 
 
 def write_page(path: str | os.PathLike[str], page: Page) -> Path:

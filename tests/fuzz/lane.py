@@ -11,6 +11,8 @@ FUZZ_SEED     other seeds, other cases (default 0)
 FUZZ_SECONDS  end a target after that time, however many cases it has had
 FUZZ_CASE     run the case of this number alone
 FUZZ_LOG      file to which each target adds a line: cases, ends, failures, time
+
+Ctrl-C ends a target with its line in the log.
 """
 
 from __future__ import annotations
@@ -92,11 +94,15 @@ def _long(name: str, case: Target) -> None:
     ends.clear()
     numbers = [int(CASE)] if CASE else range(FIRST, CASES)
     start, failures, done, early = time.monotonic(), [], 0, 0.0
+    stopped: KeyboardInterrupt | None = None
     for number in numbers:
         if time.monotonic() - start > SECONDS:
             break
         try:
             case(rng=random.Random(f"{SEED}:{name}:{number}"))
+        except KeyboardInterrupt as interrupt:
+            stopped = interrupt
+            break
         except Exception as error:
             if CASE:
                 raise
@@ -116,6 +122,8 @@ def _long(name: str, case: Target) -> None:
         }  # fmt: skip
         with Path(LOG).open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
+    if stopped:
+        raise stopped
     assert not failures, "\n".join([f"{ends['FAILED']} of {done} cases:", *failures])
     assert grown < LEAK_MB, f"nine tenths of the cases took {grown:.0f} MB that stay"
 

@@ -51,11 +51,11 @@ OPTIONS = [
 ]
 
 
-def run(arguments: list[str], *, rendered: bool = True) -> tuple[int, str]:
+def run(arguments: list[str], *, figures: str = "drawn") -> tuple[int, str]:
     """Run the command line as a user would; return exit code and what it complained.
 
-    Not `rendered`: figures are laid out by our code, but Matplotlib puts no ink on them, which
-    would be nine tenths of a case.
+    Figures are ``"drawn"``, ``"laid out"`` by our code without Matplotlib's ink, which would be
+    nine tenths of a case, or ``"empty"``, as their axes alone are two thirds of what is left.
     """
     complaints = io.StringIO()
     with contextlib.ExitStack() as stack:
@@ -63,8 +63,9 @@ def run(arguments: list[str], *, rendered: bool = True) -> tuple[int, str]:
         stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
         # looking for libraries of threads takes 3 ms: most of what `main` does with odd words
         stack.enter_context(patch.object(cli, "threadpool_limits", _one_thread))
-        if not rendered:
-            stack.enter_context(patch.object(sketches, "laid_out", _without_ink))
+        if figures != "drawn":
+            instead = _without_ink if figures == "laid out" else _empty
+            stack.enter_context(patch.object(sketches, "laid_out", instead))
         code = main(arguments)
     return code, complaints.getvalue()
 
@@ -75,6 +76,10 @@ def _one_thread(limits: int) -> contextlib.AbstractContextManager[None]:
 
 def _without_ink(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure:
     draw(Figure(figsize=size))
+    return Figure(figsize=(1, 1), dpi=10)
+
+
+def _empty(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure:
     return Figure(figsize=(1, 1), dpi=10)
 
 
@@ -117,13 +122,13 @@ def step_table(rng) -> bytes:
 def test_identify_ends_in_an_exit_code_and_one_complaint(rng, folder):
     content = rng.choice([any_table, mutated, lambda r: any_bytes(r, 60), step_table])(rng)
     (folder / "record.csv").write_bytes(content)
-    output, rendered = folder / "out", sometimes(rng, 30)
+    output, figures = folder / "out", rng.choice(["drawn"] + ["laid out"] * 10 + ["empty"] * 100)
     shutil.rmtree(output, ignore_errors=True)
     arguments = [word for option in some(rng, rng.choice(OPTIONS), 3) for word in option]
     with contextlib.chdir(folder), good_end(seconds=60) as codes:
         method = [] if "--method" in arguments else ["--method", "scan"]
         codes.append(
-            run(["identify", "record.csv", "-o", "out", *method, *arguments], rendered=rendered)
+            run(["identify", "record.csv", "-o", "out", *method, *arguments], figures=figures)
         )
     assert codes, "an error was not caught"
     check(*codes[0], output)

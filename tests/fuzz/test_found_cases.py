@@ -422,3 +422,22 @@ def test_a_bound_of_the_dead_time_that_cannot_be_searched_is_refused():
     for bound in (1e308, 1e6):
         with pytest.raises(OptionError, match="too long to search in"):
             cr.fit_frf(frf, 1, max_dead_time=bound)
+
+
+@pytest.mark.parametrize("options", [{"delimiter": "·"}, {"delimiter": "·", "comment": "§"}])
+def test_signs_beyond_ascii_part_cells_and_begin_comments(tmp_path, options):
+    # pandas' fast parser refused the first with a ValueError, and half understood the second
+    lines = [f"{k}·{float(k > 5)}·{k / 8}" for k in range(20)]
+    lines = [f"{line} § {k}" for k, line in enumerate(lines)] if "comment" in options else lines
+    (tmp_path / "a.csv").write_text("\n".join(["t·u·y", *lines]), encoding="utf-8")
+    with good_end() as records:
+        records.append(cr.read_record(tmp_path / "a.csv", **options))
+    np.testing.assert_array_equal(records[0].output, np.arange(20) / 8)
+
+
+@pytest.mark.parametrize("column", ["²", "6²", "٣"])
+def test_digits_that_are_no_numbers_name_columns_at_the_command_line(tmp_path, column, capsys):
+    (tmp_path / "a.csv").write_text("t,u,y\n0,0,0\n1,1,1\n2,1,2\n")
+    asked = ["identify", str(tmp_path / "a.csv"), "-o", str(tmp_path / "out"), "--time", column]
+    assert main(asked) == 2
+    assert f"'{column}'" in capsys.readouterr().err

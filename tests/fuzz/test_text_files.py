@@ -44,7 +44,7 @@ def any_cell(rng):
 
 def any_table(rng) -> bytes:
     """A table whose rows are regular, with single cells and lines put out of order."""
-    delimiter = rng.choice([",", ";", "\t", " ", "|", ", ", "  "])
+    delimiter = rng.choice([",", ";", "\t", " ", "|", ", ", "  ", "·"])
     regular = rng.randrange(2)
     width = 3 if regular else rng.randint(1, 5)
     kind = rng.choice(KINDS) if regular else any_number
@@ -97,10 +97,10 @@ OPTIONS = {
     "dt": of(1.0, 1e-9, 0, -1, float("nan"), 1e300, 5e-324),
     "time_unit": of("auto", "ms", "h", "fortnight"),
     "time_format": of("%d.%m.%Y", "%", ""),
-    "delimiter": of(",", ";", " ", ".", "1", "ab"),
+    "delimiter": of(",", ";", " ", ".", "1", "ab", "·", "\U0001f600"),
     "decimal": of(".", ","),
     "encoding": of("utf-8", "utf-16", "ascii", "idna", "rot13", "zlib"),
-    "comment": of("#", None, "1", ","),
+    "comment": of("#", None, "1", ",", "§"),
     "header": of(True, False),
     "skip_rows": lambda rng: rng.randint(0, 20),
     "missing": of("refuse", "keep"),
@@ -117,7 +117,7 @@ def numbers_in(content: bytes) -> set[float]:
     found = {0.0, 1.0}
     for encoding in ("utf-8", "utf-16-le", "utf-16-be", "latin-1"):
         text = content.decode(encoding, errors="replace")
-        for delimiters in (r"[\s;|,\"]+", r"[\s;|\"]+"):
+        for delimiters in (r"[\s;|,\"·§]+", r"[\s;|\"·§]+"):
             for token in re.split(delimiters, text):
                 try:
                     found.add(float(token.replace(",", ".").strip("\0")))
