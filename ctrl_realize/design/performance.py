@@ -13,6 +13,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import ModelWarning, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.closed_loop import damped_circle, step_on_circle
+from ..wording import in_time
 from .loops import open_loop
 from .margins import margins
 
@@ -24,7 +25,7 @@ SETTLING_BAND = 0.02
 """Part of the final value within which a response counts as arrived."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Performance:
     """Responses of a stable loop to unit steps, in numbers.
 
@@ -52,6 +53,20 @@ class Performance:
     load_error: float
     overshoot: float
     settling_time: float
+
+    def __repr__(self) -> str:
+        errors = (
+            f"{name} {'stays' if error == float('inf') else in_time(error)}"
+            for name, error in (
+                ("set-point error", self.setpoint_error),
+                ("load error", self.load_error),
+            )
+        )
+        over = "unknown" if np.isnan(self.overshoot) else f"{100 * self.overshoot:.3g} %"
+        settled = "never settled"
+        if np.isfinite(self.settling_time):
+            settled = f"settled after {in_time(self.settling_time)}"
+        return f"<Performance: {', '.join(errors)}, overshoot {over}, {settled}>"
 
 
 def step_responses(
@@ -118,9 +133,10 @@ def performance(
     --------
     >>> import ctrl_realize as cr
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
-    >>> found = cr.design.performance(plant, cr.design.pid(plant))
-    >>> print(f"load error {found.load_error:.4f} s, settled after {found.settling_time:.3f} s")
-    load error 0.0590 s, settled after 0.179 s
+    >>> cr.design.performance(plant, cr.design.pid(plant))
+    <Performance: set-point error 64 ms, load error 59 ms, overshoot 4.05 %, settled after 179 ms>
+    >>> cr.design.performance(plant, 0.5).setpoint_error
+    inf
     """
     guess = None if total_time is None else positive(total_time, "total_time", "time in s")
     loop = loop_time(plant, controller)

@@ -71,7 +71,7 @@ def axis_fault(time: FloatArray) -> str | None:
     if bad.size:
         row = int(bad[0])
         return (
-            f"time is not uniform: row {row} is {drift[row]:.2f} samples off the uniform grid "
+            f"time is not uniform: row {row} is {drift[row]:.2g} samples off the uniform grid "
             f"of {dt:.6g} s (worst: {drift.max():.2f}; allowed: {UNIFORM_WITHIN})"
         )
     return None

@@ -9,6 +9,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.design import performance
+from ctrl_realize.design.pid_table import UNSTABLE
 from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
 
 DT = 0.01
@@ -75,3 +76,13 @@ def test_a_plot_ends_when_the_slowest_of_its_loops_has_settled(scale):
     response = np.ravel(drawn.lines)[0][1].get_ydata()
     assert abs(response[-1] - 1) < 0.02
     plt.close(drawn.figure)
+
+
+def test_performance_is_told_in_words():
+    assert repr(performance(plant(), pi(0.4, 0.8))) == (
+        "<Performance: set-point error 1 s, load error 2 s, overshoot 0 %, settled after 2.81 s>"
+    )
+    assert "set-point error stays" in repr(performance(plant(), 0.5))
+    assert repr(UNSTABLE) == (
+        "<Performance: set-point error stays, load error stays, overshoot unknown, never settled>"
+    )
