@@ -309,7 +309,8 @@ def test_a_pole_that_is_moved_to_where_it_cannot_move_from_gives_no_core():
     # StopIteration, and the logarithm of a pole at 0
     directions = pole_directions(CORE.poles(), 0.1)
     core = (CORE.A, CORE.B[:, 0], CORE.C[0], 0.1)
-    for moves in ([8.0, 0.0], [8.0, 0.5], [-40.0, 5.0]):
+    # a move of 2169, of a tracker that had seen two samples from another world, overflowed
+    for moves in ([8.0, 0.0], [8.0, 0.5], [-40.0, 5.0], [2169.0, 0.0], [-2169.0, 0.0]):
         with good_end():
             moved_core(core, CORE.zeros(), directions, np.array(moves), 0.1)
 
