@@ -60,7 +60,7 @@ def broken(kind: str) -> np.ndarray:
         ("repeat", "repeats at row 40"),
         ("back", "jumps back at row 40"),
         ("reversed", "backwards: row 1"),
-        ("jitter", "row 40 is 0.30 samples off"),
+        ("jitter", "row 40 is 0.3 samples off"),
     ],
 )
 def test_broken_time_is_named_with_its_first_bad_row(kind, match):
