@@ -140,8 +140,9 @@ def moved_core(
 
 
 def _moved_pole(pole: complex, what: str, move: float, dt: float) -> complex:
-    if pole == 0:
-        return 0j
+    if pole in (0, 1):
+        # where no speed and no damping moves it from
+        return pole
     s = np.log(complex(pole)) / dt
     if what == "speed":
         # e^100 times as fast is as good as at once
