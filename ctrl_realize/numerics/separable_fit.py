@@ -58,7 +58,10 @@ class Problem:
     def weighted(self, columns: FloatArray) -> FloatArray:
         """Columns (..., m, k) in units of the noise."""
         if self.whitener is not None:
-            return np.asarray(self.whitener @ columns)
+            # One product of a wide matrix is several times as fast as many of thin ones.
+            wide = np.moveaxis(columns, -2, 0)
+            white = self.whitener @ wide.reshape(wide.shape[0], -1)
+            return np.asarray(np.moveaxis(white.reshape(wide.shape), 0, -2))
         return columns * self.root_weight[:, None]
 
     @cached_property
