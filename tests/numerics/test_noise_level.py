@@ -46,6 +46,9 @@ def test_a_step_far_below_the_usual_difference_is_rounding():
 
 
 def test_four_differences_are_needed():
+    assert quantisation_step(1e-12 * np.array([0.0, 1, 2, 3, 4])) == pytest.approx(
+        1e-12
+    )  # any unit
     assert quantisation_step(np.array([0.0, 1, 2, 3])) == 0
     assert quantisation_step(np.array([0.0, 1, 2, 3, 4])) == 1
 
