@@ -129,7 +129,7 @@ MODULES = {
     "numerics/whitening": "tests/numerics/test_whitening.py",
     "numerics/coloured_fit": "tests/numerics/test_coloured_fit.py",
     "numerics/moving_mean": "tests/numerics/test_moving_mean.py",
-    "numerics/delay_models": "tests/numerics/test_kung.py",
+    "numerics/delay_models": "tests/numerics/test_kung.py tests/identification/test_delay_scan.py",
     "numerics/delay_split": "tests/numerics/test_delay_split.py",
     "numerics/delayed_regulator": "tests/design/test_predictor.py",
     "numerics/gramians": "tests/design/test_balanced.py",
