@@ -26,7 +26,8 @@ def white(n, seed=0):
 
 @pytest.mark.parametrize("step", [1e-12, 1e-3, 1e9])
 def test_the_step_is_found_however_small_the_unit(step):
-    assert quantisation_step(step * np.round(5 * white(400))) == pytest.approx(step)
+    found = quantisation_step(step * np.round(5 * white(400)))
+    assert found == pytest.approx(step, abs=0)  # the default would take 0 for 1e-12
 
 
 def test_most_differences_have_to_be_multiples():
@@ -46,9 +47,6 @@ def test_a_step_far_below_the_usual_difference_is_rounding():
 
 
 def test_four_differences_are_needed():
-    assert quantisation_step(1e-12 * np.array([0.0, 1, 2, 3, 4])) == pytest.approx(
-        1e-12
-    )  # any unit
     assert quantisation_step(np.array([0.0, 1, 2, 3])) == 0
     assert quantisation_step(np.array([0.0, 1, 2, 3, 4])) == 1
 
