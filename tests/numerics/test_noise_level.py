@@ -27,7 +27,8 @@ def white(n, seed=0):
 @pytest.mark.parametrize("step", [1e-12, 1e-3, 1e9])
 def test_the_step_is_found_however_small_the_unit(step):
     found = quantisation_step(step * np.round(5 * white(400)))
-    assert found == pytest.approx(step, abs=0)  # the default would take 0 for 1e-12
+    # but for rounding; the default absolute tolerance would take 0 for 1e-12
+    assert found == pytest.approx(step, rel=1e-9, abs=0)
 
 
 def test_most_differences_have_to_be_multiples():
