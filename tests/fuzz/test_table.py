@@ -18,3 +18,14 @@ def test_seeds_add_up_and_runs_of_one_seed_do_not():
     other = {**line, "seed": "2", "cases": 2000}
     rows = table([line, failing, again, other])
     assert rows[2:] == ["| any table is read | 2 110 | 2 |"]
+
+
+def test_cases_of_a_renamed_target_count_under_its_new_name_beside_those_of_the_same_number():
+    line = {"target": "test_an_exact_delay_is_found_exactly", "seed": "1", "cases": 60}
+    rows = table(
+        [
+            {**line, "failures": ["case 5: KeyError: 0"]},
+            {**line, "target": "test_an_exact_response_is_found_exactly", "failures": []},
+        ]
+    )
+    assert rows[2:] == ["| an exact response is found exactly | 120 | 1 |"]
