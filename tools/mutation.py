@@ -133,7 +133,7 @@ MODULES = {
     "numerics/delay_split": "tests/numerics/test_delay_split.py",
     "numerics/delayed_regulator": "tests/design/test_predictor.py",
     "numerics/gramians": "tests/design/test_balanced.py",
-    "numerics/half_rule": "tests/design/test_reduction.py",
+    "numerics/half_rule": "tests/numerics/test_half_rule.py tests/design/test_reduction.py",
     "numerics/inverse_hold": "tests/design/test_conversions.py",
     "numerics/lagged": "tests/numerics/test_lagged.py tests/numerics/test_arx.py",
     "numerics/lanczos": "tests/numerics/test_lanczos.py",
@@ -157,7 +157,7 @@ MODULES = {
     "numerics/state_space": "tests/numerics/test_state_space.py",
     "numerics/statistics": "tests/numerics/test_statistics.py",
     "numerics/thiran": "tests/design/test_conversions.py",
-    "numerics/time_axis": "tests/test_signals.py tests/identification/test_steps.py",
+    "numerics/time_axis": "tests/numerics/test_time_axis.py tests/test_signals.py",
     "numerics/vector_fitting": "tests/numerics/test_rational.py",
 }
 

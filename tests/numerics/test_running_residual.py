@@ -32,3 +32,16 @@ def test_samples_held_for_ten_count_as_a_tenth():
 
 def test_before_anything_is_left_samples_count_as_they_are():
     assert inflation([]) == inflation(np.zeros(50)) == 1.0
+
+
+def test_inflation_is_the_ratio_of_sums_that_are_forgotten():
+    residual = RunningResidual(0.5)
+    residual.add(1.0)
+    residual.add(2.0)
+    residual.close_sum()
+    # (1 + 2)^2 over 1 / 2 + 4
+    assert residual.inflation == 2.0
+    residual.add(-1.0)
+    residual.close_sum()
+    # 9 / 2 + 1 over 4.5 / 2 + 1
+    assert residual.inflation == pytest.approx(5.5 / 3.25)
