@@ -19,7 +19,7 @@ _FEWEST = 100  # samples at rest, and
 _ENOUGH = 100_000  # of a kind, where there are more
 _TIMES = 8  # correlation times, that tell its colour
 _LATE = 2.0  # times the rise to 95 % after which a response has settled
-_WILD = 5.0  # median absolute deviations at which samples are cut
+_WILD = 5.0  # standard deviations at which samples are cut
 _NEAR = np.arange(-6, 6.5, 0.5)  # samples from the delay of before, where it starts again
 _UNLIKE = 3.0
 """Root mean square of the whitened residual, in that of the noise, from which on the response holds
@@ -42,9 +42,11 @@ def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
     if samples < max(_COLOURED, 0.5 * whole.correlation) or rest.size < _TIMES * samples:
         return whole
     # Not the pseudo-values of Huber's loss: they bend what is smooth in the noise.
-    limit = _WILD * mad_sigma(error)
+    limit = _WILD * max(mad_sigma(error), whole.sigma)
     plain = whole.window.with_output(whole.window.output - error + np.clip(error, -limit, limit))
     covariance = noise_covariance(_quiet(error, data), error.size)
+    if covariance.size == 1:
+        return whole
     problem = replace(plain, whitener=whitener(bins, covariance))
     candidates = _fitted_again(whole, problem)
     refit = replace(whole, problem=problem, candidates=candidates, colour=1.0)

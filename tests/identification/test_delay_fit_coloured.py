@@ -144,3 +144,15 @@ def test_noise_louder_than_its_short_rest_is_told_by_what_goes_on_long_after():
         fit = cr.fit_delay(cr.Record(0.1 * k, 1.0 * (k >= 40), y)).fit
         at_noise_level.append(fit.at_noise_level)
     assert all(at_noise_level)
+
+
+def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
+    rng = np.random.default_rng(1)
+    k = np.arange(1400)
+    y = np.where(k > 543, -np.expm1(-(k - 543) / 60), 0)
+    for burst in rng.integers(0, 1390, 25):
+        y[burst : burst + 6] += 0.05 * rng.standard_normal()
+    fit = cr.fit_delay(cr.Record(0.1 * k, 1.0 * (k >= 500), y)).fit
+    assert "generalised" not in fit.report()
+    low, high = fit.delay_interval
+    assert low <= 43 <= high
