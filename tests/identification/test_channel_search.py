@@ -301,6 +301,15 @@ def test_the_criterion_counts_parameters_and_samples_the_last_fit_sees_all(direc
     assert np.any(last.found.model.D) == direct
 
 
+def test_a_direct_term_has_a_parameter_for_every_channel():
+    search = ByHand(None, channels=(2, 3))
+    search._samples, search._enough = 100, 80
+    found = SimpleNamespace(counts=np.array([80, 80]), loss=5.0)
+    plain, direct = (search._judged(found, 4, ((0,) * 3, (0,) * 2), way) for way in (False, True))
+    assert plain.bic == pytest.approx(10.0 + 4 * 5 * np.log(80))
+    assert direct.bic - plain.bic == pytest.approx(6 * np.log(80))
+
+
 def test_sizes_of_signals_are_those_about_the_level_of_each_record():
     u = np.random.default_rng(0).standard_normal(50)
     k = np.arange(50.0)

@@ -77,11 +77,11 @@ def window(output=None, **changed):
 @pytest.fixture
 def by_hand(monkeypatch):
     """Covariances and fits are recorded; one lag leaves `cost`, two lags more."""
-    seen = SimpleNamespace(cost=1990.0)
+    seen = SimpleNamespace(cost=1990.0, covariance=np.array([1.0, 0.7]))
 
     def noise_covariance(quiet, longest):
         seen.quiet, seen.longest = quiet, longest
-        return "covariance"
+        return seen.covariance
 
     def fitted_again(whole, problem):
         seen.problem = problem
@@ -103,7 +103,7 @@ def test_noise_that_is_coloured_at_rest_is_made_white(by_hand):
     whole = window()
     found = in_coloured_noise(whole, data())
     assert found is not whole
-    assert by_hand.problem.whitener == ("bins", "covariance")
+    assert by_hand.problem.whitener == ("bins", by_hand.covariance)
     assert by_hand.longest == SIZE
     assert np.array_equal(by_hand.quiet, whole.window.output[:EDGE])
     assert found.problem is by_hand.problem
@@ -140,6 +140,16 @@ def test_samples_that_are_wild_are_cut_at_five_deviations(by_hand):
     assert np.sign(used[[900, 1500]]).tolist() == [1.0, -1.0]
     tame = np.abs(output) < 0.99 * limit
     assert np.array_equal(used[tame], output[tame])
+    # where most samples agree, those of the noise of the fit
+    louder = Whole(**vars(window(output)) | {"sigma": 3.0})
+    in_coloured_noise(louder, data())
+    assert np.abs(by_hand.problem.data).max() == 15.0
+
+
+def test_noise_without_a_coefficient_is_left_as_it_is(by_hand):
+    by_hand.covariance = np.ones(1)
+    whole = window()
+    assert in_coloured_noise(whole, data()) is whole
 
 
 def test_other_records_stay_as_they_are(by_hand):
