@@ -158,12 +158,17 @@ def fit_frf(
 
 
 def _searchable(max_dead_time: float, omega: FloatArray) -> float:
-    """Refuse a bound up to which dead times cannot be told apart, or counted."""
-    most = longest_search(omega)
+    """Refuse a bound up to which dead times cannot be told apart, counted, or told from none."""
+    most, least = longest_search(omega), 1e-15 / float(omega[-1])
     if max_dead_time > most:
         raise OptionError(
             f"max_dead_time={max_dead_time:g} s is too long to search in at these frequencies; "
             f"needed is at most {most:.3g} s"
+        )
+    if max_dead_time < least:
+        raise OptionError(
+            f"max_dead_time={max_dead_time:g} s is too short to search in at these frequencies; "
+            f"needed is at least {least:.3g} s, which is as good as none"
         )
     return max_dead_time
 

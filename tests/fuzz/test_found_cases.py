@@ -420,9 +420,11 @@ def test_a_dead_time_far_below_a_slow_lag_is_found_over_six_decades():
 def test_a_bound_of_the_dead_time_that_cannot_be_searched_is_refused():
     f = np.geomspace(0.01, 1.0, 30)
     frf = cr.MeasuredFRF(1 / (1 + 3j * f), f)
-    for bound in (1e308, 1e6):
-        with pytest.raises(OptionError, match="too long to search in"):
+    # 1e308 overflowed, and the interval within 1e-320 had no width to search in
+    for bound, fault in ((1e308, "long"), (1e6, "long"), (1e-320, "short"), (1e-200, "short")):
+        with pytest.raises(OptionError, match=f"too {fault} to search in"):
             cr.fit_frf(frf, 1, max_dead_time=bound)
+    assert cr.fit_frf(frf, 1, max_dead_time=1e-12).fit.dead_time <= 1e-12
 
 
 @pytest.mark.parametrize("options", [{"delimiter": "·"}, {"delimiter": "·", "comment": "§"}])
