@@ -171,7 +171,7 @@ def arx_markov_std(fit: ArxFit, count: int) -> FloatArray:
     H = arx_markov(fit, count).transpose(2, 0, 1)
     inverse = _divide(fit.a, np.concatenate([np.eye(p)[None], np.zeros((count - 1, p, p))]))
     # Targets are correlated through their noise: L mixes the rows of A and B.
-    L = np.linalg.cholesky(fit.noise)
+    L = _root(fit.noise)
     mixed = inverse @ L
     variance = np.zeros((p, m, count))
     W = fit.solution.inverse_root
@@ -192,6 +192,14 @@ def arx_markov_std(fit: ArxFit, count: int) -> FloatArray:
                 spread = np.fft.irfft(response[:, None] * transform, n=points, axis=0)[:count]
                 variance[a, j] += (spread**2).sum(axis=1)
     return np.asarray(np.sqrt(variance))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """Return L with ``L L^T = covariance``, which is singular where outputs say the same."""
+    scale = np.sqrt(np.diag(covariance))
+    size = np.where(scale > 0, scale, 1.0)
+    values, vectors = eigh(covariance / np.outer(size, size))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _divide(a: FloatArray, series: FloatArray) -> FloatArray:

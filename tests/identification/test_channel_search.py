@@ -389,16 +389,16 @@ def test_records_that_begin_at_rest_start_from_rest(monkeypatch):
 
 
 def test_the_highest_order_and_the_samples_are_handed_on_to_the_search(monkeypatch):
-    class Reached(Exception):
+    class ReachedError(Exception):
         pass
 
     def search(group, markov, top, enough):
-        raise Reached(markov.shape[:2], top, enough)
+        raise ReachedError(markov.shape[:2], top, enough)
 
     monkeypatch.setattr(channel_fit, "Search", search)
     u = np.random.default_rng(0).standard_normal((2, 300))
     record = cr.Record(np.arange(300.0), u, np.stack([u[0], u[1], u[0] - u[1]]))
     for asked, top in (((2, 3), 3), (None, 20)):
-        with pytest.raises(Reached) as reached:
+        with pytest.raises(ReachedError) as reached:
             channel_fit._from_start((record,), ("unknown", "auto"), asked, None, None, 123)
         assert reached.value.args == ((3, 2), top, 123)

@@ -6,6 +6,7 @@ import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, DataWarning, OptionError
@@ -344,3 +345,18 @@ def test_a_response_that_begins_behind_the_first_window_is_found(delay):
     # the largest value is 0.1 behind the delay, its noise 0.05 / sqrt(700)
     assert abs(int(np.argmax(g.markov)) - delay - 1) <= 1
     assert np.abs(g.markov[: delay - 5]).max() < 0.02
+
+
+def test_an_output_that_is_recorded_twice_has_the_deviations_of_one():
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal((1, 600))
+    y = lfilter([0.0, 1.0], [1.0, -0.8], u) + 0.1 * rng.standard_normal((1, 600))
+
+    def of(outputs):
+        return cr.impulse_from_io(cr.Record(np.arange(600.0), u, outputs), 40, method="okid")
+
+    # 3 y + 1 says nothing that y does not: the covariance of both is singular
+    both = of(np.concatenate([y, 3 * y + 1]))
+    assert np.all(np.isfinite(both.std))
+    assert_allclose(both.markov[1], 3 * both.markov[0], rtol=0, atol=1e-6)
+    assert_allclose(both.std[1], 3 * both.std[0], rtol=1e-6)
