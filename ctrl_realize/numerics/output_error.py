@@ -29,14 +29,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arrays import FloatArray
 from .coloured_fit import in_coloured_noise
 from .delay_choice import chains_of, flows_of
 from .fit_window import WindowFit, fit_window
 from .likelihood_interval import likelihood_fit
-from .noise_level import mad_sigma
 from .output_error_result import OutputErrorFit, assembled, profile_of
-from .separable_fit import KnownFactor, Structure
+from .separable_fit import KnownFactor, Structure, evaluate
 from .step_problem import StepData, step_scales, stop_at, window
 from .structure_search import (
     ALL_STRUCTURES,
@@ -54,8 +52,7 @@ _WILD = 3.0  # standard deviations at which residuals are cut where explanations
 _LOUDER = 4.0
 """How much louder noise may be after the step than before it: slow noise shows little of itself in
 a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less)."""
-_LATE, _FEWEST_LATE = 2.0, 8  # times the rise to 95 %; means in the later half from there on
-_CUT = 5.0  # median absolute deviations at which samples are cut for that
+_LATE, _FEWEST_LATE = 2.0, 8  # times the rise to 95 %; bins in the later half from there on
 
 
 def fit_output_error(
@@ -135,29 +132,17 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
         return True
     if whole.misfit > ADEQUATE * data.colour * _LOUDER:
         return False
-    bins = whole.window.bins
-    assert bins is not None
-    error = whole.window.output - whole.window.predict(whole.problem, whole.best)
-    limit = _CUT * mad_sigma(error[data.edge :])
-    error = np.clip(error, -limit, limit)
-    settled = data.edge + int(_LATE * (stop_at(data, 0.95) - data.edge))
-    # What a wrong model leaves dies away: it is in the first half.
-    late = error[(settled + error.size) // 2 :]
-    told = (bins.first >= data.edge) & (bins.first < settled)
-    told &= bins.width * _FEWEST_LATE <= late.size
-    if not told.any():
+    state = evaluate(whole.problem, whole.best.structure, whole.best.parameters[None])
+    assert whole.window.bins is not None
+    first = whole.window.bins.first
+    settled = data.edge + _LATE * (stop_at(data, 0.95) - data.edge)
+    late = np.asarray(state.residual[0][first >= settled])
+    moving = state.residual[0][(first >= data.edge) & (first < settled)]
+    if late.size < 2 * _FEWEST_LATE:
         return False
-    moving = (bins.width * bins.average(error) ** 2)[told]
-    # Means over as many samples as in the bins: coloured noise is louder in wide ones.
-    widths, count = np.unique(bins.width[told], return_counts=True)
-    noise = [_power_of_means(late, int(width)) for width in widths]
-    return bool(np.mean(moving) <= ADEQUATE**2 * np.average(noise, weights=count))
-
-
-def _power_of_means(values: FloatArray, width: int) -> float:
-    """Mean square of means over `width` samples, times the width."""
-    means = values[: values.size // width * width].reshape(-1, width).mean(axis=1)
-    return float(width * np.mean(means**2))
+    # What a wrong model leaves dies away: it is in the first half.
+    late = late[late.size // 2 :]
+    return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
 
 
 def _robust_fit(

@@ -133,19 +133,6 @@ def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow(shared_data):
     assert last - first > 2 * (high - low)
 
 
-def test_noise_louder_than_its_short_rest_is_told_by_what_goes_on_long_after():
-    # Wide bins hold coloured noise that sounds louder in them: it is compared in equal means.
-    k = np.arange(1300)
-    at_noise_level = []
-    for seed in range(4):
-        rng = np.random.default_rng([seed, 21])
-        noise = lfilter([0.6], [1, -0.8], rng.standard_normal(k.size + 100))[100:]
-        y = np.where(k > 83, -np.expm1(-(k - 83) / 150), 0) + 0.014 * noise
-        fit = cr.fit_delay(cr.Record(0.1 * k, 1.0 * (k >= 40), y)).fit
-        at_noise_level.append(fit.at_noise_level)
-    assert all(at_noise_level)
-
-
 def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
     rng = np.random.default_rng(1)
     k = np.arange(1400)
