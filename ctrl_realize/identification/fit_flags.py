@@ -242,7 +242,7 @@ def _inverse(fit: OutputErrorFit) -> Flag | None:
     if fit.follows_flow:
         # Zeros on the right make the beginning late, as that of a flow is.
         return None
-    zeros = np.roots(fit.numerator[::-1]) if fit.numerator.size > 1 else np.empty(0)
+    zeros = np.roots(fit.numerator[::-1])
     right = zeros[zeros.real > 0]
     if not right.size or np.abs(right).min() > 3 * np.abs(fit.poles).max():
         return None
