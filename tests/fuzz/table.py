@@ -62,10 +62,10 @@ def main() -> None:
     parser.add_argument("--date", default=date.today().isoformat(), help="of the runs")
     asked = parser.parse_args()
     lines = [json.loads(row) for log in asked.logs for row in log.read_text().splitlines()]
-    seeds = ", ".join(sorted({line["seed"] for line in lines}))
+    seeds = ", ".join(sorted({line["seed"] for line in lines}, key=lambda seed: (len(seed), seed)))
     installed = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
     caption = (
-        f"*Runs of {asked.date} with the seed {seeds}: Python {platform.python_version()}, "
+        f"*Runs of {asked.date} with the seeds {seeds}: Python {platform.python_version()}, "
         f"{installed}. A case counts once, in however many runs it was.*"
     )
     text = "\n".join([*table(lines), "", caption, ""])
