@@ -55,8 +55,8 @@ MODULES = {
     "numerics/structure_search": "tests/numerics/test_structure_search.py "
     "tests/numerics/test_separable_fit.py",
     "numerics/delay_bound": "tests/numerics/test_delay_bound.py",
-    "numerics/profile_interval": "tests/numerics/test_step_numerics.py "
-    "tests/numerics/test_delay_bound.py",
+    "numerics/profile_interval": "tests/numerics/test_profile_interval.py "
+    "tests/numerics/test_step_numerics.py tests/numerics/test_delay_bound.py",
     "numerics/step_problem": "tests/numerics/test_step_problem.py",
     "numerics/relaxation": "tests/numerics/test_relaxation.py",
     "numerics/sections": "tests/numerics/test_sections.py",
