@@ -26,6 +26,8 @@ _JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singul
 def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
     """Autocovariance of noise over its variance, from lag 0 until it has died away.
 
+    That of white noise has lag 0 alone.
+
     Parameters
     ----------
     quiet : ndarray
@@ -37,6 +39,8 @@ def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
     limit = _WILD * mad_sigma(quiet)
     tamed = np.clip(quiet - np.median(quiet), -limit, limit)
     coefficients = autoregression(tamed, noise_lags(tamed.size))
+    if not coefficients.size:
+        return np.ones(1)
     denominator = np.concatenate([[1.0], -coefficients])
     slowest = float(np.abs(np.roots(denominator)).max(initial=0.0))
     alive = np.log(_NOTHING) / np.log(min(max(slowest, 1e-3), 1 - 1e-9))
