@@ -10,7 +10,7 @@ from .arrays import FloatArray
 from .fit_window import WindowFit
 from .noise_level import correlation_time, mad_sigma
 from .separable_fit import Problem, Structure, evaluate, fit_batch
-from .step_problem import StepData, stop_at
+from .step_problem import StepData, settled_at
 from .structure_search import Candidate, Scales, choose, neighbour_starts, parameter_bounds
 from .whitening import noise_covariance, whitener
 
@@ -18,7 +18,6 @@ _COLOURED = 2.0  # samples at rest that count as one, from which on the noise is
 _FEWEST = 100  # samples at rest, and
 _ENOUGH = 100_000  # of a kind, where there are more
 _TIMES = 8  # correlation times, that tell its colour
-_LATE = 2.0  # times the rise to 95 % after which a response has settled
 _WILD = 5.0  # standard deviations at which samples are cut
 _NEAR = np.arange(-6, 6.5, 0.5)  # samples from the delay of before, where it starts again
 _UNLIKE = 3.0
@@ -85,6 +84,5 @@ def _delays_near(problem: Problem, old: Candidate, scales: Scales) -> list[Float
 
 def _quiet(error: FloatArray, data: StepData) -> FloatArray:
     """Residual at rest, and in the later half of what comes when the response has settled."""
-    settled = data.edge + int(_LATE * (stop_at(data, 0.95) - data.edge))
-    late = error[(settled + error.size) // 2 :]
+    late = error[(settled_at(data) + error.size) // 2 :]
     return np.concatenate([error[: data.edge][-_ENOUGH:], late[:_ENOUGH]])

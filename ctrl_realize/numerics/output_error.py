@@ -35,7 +35,7 @@ from .fit_window import WindowFit, fit_window
 from .likelihood_interval import likelihood_fit
 from .output_error_result import OutputErrorFit, assembled, profile_of
 from .separable_fit import KnownFactor, Structure, evaluate
-from .step_problem import StepData, step_scales, stop_at, window
+from .step_problem import StepData, settled_at, step_scales, stop_at, window
 from .structure_search import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
@@ -52,7 +52,7 @@ _WILD = 3.0  # standard deviations at which residuals are cut where explanations
 _LOUDER = 4.0
 """How much louder noise may be after the step than before it: slow noise shows little of itself in
 a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less)."""
-_LATE, _FEWEST_LATE = 2.0, 8  # times the rise to 95 %; bins in the later half from there on
+_FEWEST_LATE = 8  # bins in the later half of what comes when the response has settled
 
 
 def fit_output_error(
@@ -135,7 +135,7 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
     state = evaluate(whole.problem, whole.best.structure, whole.best.parameters[None])
     assert whole.window.bins is not None
     first = whole.window.bins.first
-    settled = data.edge + _LATE * (stop_at(data, 0.95) - data.edge)
+    settled = settled_at(data)
     late = np.asarray(state.residual[0][first >= settled])
     moving = state.residual[0][(first >= data.edge) & (first < settled)]
     if late.size < 2 * _FEWEST_LATE:

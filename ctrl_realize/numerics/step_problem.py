@@ -156,6 +156,11 @@ def stop_at(data: StepData, part: float) -> int:
     return min(n, edge + max(first, int(motion.onset) + 10, motion.crossing + 3))
 
 
+def settled_at(data: StepData) -> int:
+    """Sample from which on a response counts as settled: twice the rise to 95 % after the step."""
+    return data.edge + 2 * (stop_at(data, 0.95) - data.edge)
+
+
 def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     """Set up the fit of the samples up to `stop`."""
     crossing = data.motion.crossing if data.motion else 0

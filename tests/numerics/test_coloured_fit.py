@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics import coloured_fit
+from ctrl_realize.numerics import coloured_fit, step_problem
 from ctrl_realize.numerics.coloured_fit import (
     _delays_near,
     _fitted_again,
@@ -185,7 +185,7 @@ def test_quiet_is_the_rest_and_the_later_half_of_what_has_settled(monkeypatch):
         parts.append(part)
         return 150
 
-    monkeypatch.setattr(coloured_fit, "stop_at", stop_at)
+    monkeypatch.setattr(step_problem, "stop_at", stop_at)
     error = np.arange(400.0)
     # settled twice the rise of 50 samples after the edge, at 200
     found = _quiet(error, SimpleNamespace(edge=100))
