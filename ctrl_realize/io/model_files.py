@@ -25,7 +25,6 @@ from .json_content import boolean_free, field, matrix, texts, whole_numbers
 FORMAT = "ctrl_realize model"
 SCHEMA = 1
 MAX_MODEL_BYTES = 64 * 2**20
-MAX_LOADED_STATES = 5000
 _PACKAGES = ("ctrl-realize", "control", "numpy", "scipy")
 
 
@@ -82,7 +81,7 @@ def save_model(
 
 
 def load_model(
-    path: str | os.PathLike[str], *, max_states: int = MAX_LOADED_STATES
+    path: str | os.PathLike[str], *, max_states: int | None = None
 ) -> DelayedStateSpace:
     """Read a model that `save_model` wrote.
 
@@ -93,8 +92,9 @@ def load_model(
     ----------
     path : path-like
     max_states : int, optional
-        Largest number of states, delays included, that is accepted: the matrix that
-        python-control needs has their square.
+        Largest number of states, delays included, that is accepted; by default what a
+        `DelayedStateSpace` takes. A long delay costs nothing until a function of python-control
+        asks for the matrices, which hold the square of the number of states.
 
     Returns
     -------
@@ -122,7 +122,8 @@ def load_model(
     >>> valve.delay, valve.name
     (37, 'valve')
     """
-    whole(max_states, "max_states", 0)
+    if max_states is not None:
+        whole(max_states, "max_states", 0)
     file = usable_file(path, MAX_MODEL_BYTES)
     try:
         text = file.read_bytes().decode("utf-8")
@@ -161,13 +162,13 @@ def model_to_text(
         content["sha256"] = _checksum(content)
         text = json.dumps(content, indent=1, allow_nan=False)
         # nothing is written that could not be read again
-        _model_from(json.loads(text), max_states=model.nstates)
+        _model_from(json.loads(text))
     except (TypeError, ValueError, RecursionError) as error:
         raise OptionError(f"the model cannot be stored as JSON: {error}") from error
     return text + "\n"
 
 
-def model_from_text(text: str, *, max_states: int = MAX_LOADED_STATES) -> DelayedStateSpace:
+def model_from_text(text: str, *, max_states: int | None = None) -> DelayedStateSpace:
     """Build a model from the text that `save_model` wrote; see `load_model`."""
     try:
         content = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
@@ -197,7 +198,7 @@ def _model_content(model: DelayedStateSpace) -> dict[str, Any]:
     }
 
 
-def _model_from(content: Mapping[str, Any], max_states: int) -> DelayedStateSpace:
+def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> DelayedStateSpace:
     model = field(content, "model", dict)
     inputs, outputs = texts(model, "inputs"), texts(model, "outputs")
     order = boolean_free(model, "order", int)
@@ -214,7 +215,7 @@ def _model_from(content: Mapping[str, Any], max_states: int) -> DelayedStateSpac
     before = whole_numbers(model, "input_delays", len(inputs))
     behind = whole_numbers(model, "output_delays", len(outputs))
     n_states = order + sum(before) + sum(behind)
-    if n_states > max_states:
+    if max_states is not None and n_states > max_states:
         raise FileFormatError(
             f"the model has {n_states} states, delays included; max_states={max_states} allows "
             f"fewer (the matrix takes {8e-6 * n_states**2:.0f} MB)"
