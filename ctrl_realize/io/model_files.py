@@ -80,9 +80,7 @@ def save_model(
     write_text(path, model_to_text(system, created=created, settings=settings, note=note))
 
 
-def load_model(
-    path: str | os.PathLike[str], *, max_states: int | None = None
-) -> DelayedStateSpace:
+def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -> DelayedStateSpace:
     """Read a model that `save_model` wrote.
 
     Reading runs no code from the file. What is truncated, edited, of a later version or not a
