@@ -48,7 +48,7 @@ class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
             core = self._core
             if self.nstates > MAX_STATES:
                 raise DelayRangeError(
-                    f"matrices of {self.nstates} states, {sum(self.input_delays)} of them for the "
+                    f"matrices of {self.nstates} states, all but {core.nstates} of them for the "
                     f"delay, have {8 * self.nstates**2 // 10**9} GB; they are made up to "
                     f"{MAX_STATES} states. sys(z), sys.step, sys.simulate and sys.markov need no "
                     "matrices; cr.design.to_discrete(*cr.design.to_continuous(sys), dt) gives a "
