@@ -66,6 +66,8 @@ MODULES = {
     "numerics/lag_chains": "tests/numerics/test_lag_chains.py",
     "numerics/dispersed_flow": "tests/numerics/test_dispersed_flow.py",
     "numerics/fir_kernels": "tests/numerics/test_fir_kernels.py",
+    "numerics/kernel_priors": "tests/numerics/test_fir_kernels.py",
+    "numerics/kernel_search": "tests/numerics/test_fir_kernels.py",
     "io/csv_files": "tests/io/test_csv_files.py",
     "numerics/output_error": "tests/identification/test_delay_fit.py",
     "identification/steps": "tests/identification/test_steps.py",
