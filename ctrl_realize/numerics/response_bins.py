@@ -52,12 +52,9 @@ def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BIN
     k = edges[0]
     while k < stop:
         distance = float(np.abs(onsets - k).min())
-        nearest = onsets - k
-        ahead = nearest[nearest > 0]
-        room = min(_GROWTH * distance, float(ahead.min())) if ahead.size else _GROWTH * distance
-        width = int(_WIDTHS[np.searchsorted(_WIDTHS, max(room, 1.0), side="right") - 1])
+        width = int(_WIDTHS[np.searchsorted(_WIDTHS, max(_GROWTH * distance, 1.0), "right") - 1])
         following = min(s for s in starts if s > k)
         k = min(k + width, following, stop)
         bounds.append(k)
-    limits = np.array(sorted(set(bounds)))
+    limits = np.array(bounds)
     return Bins(limits[:-1], np.diff(limits))

@@ -1,0 +1,77 @@
+"""The time from 10 % to 90 % of a step response."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ctrl_realize.numerics.rise import rise_time
+
+
+def ramp(start, length, size):
+    return np.clip((np.arange(size) - start) / length, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("height", [1.0, -3.0, 1e-200])
+def test_a_ramp_rises_for_four_fifths_of_its_length(height):
+    # the mean over a window inside the ramp is the ramp: exact, between samples as well
+    assert rise_time(height * ramp(10, 100, 1000), 0.5) == pytest.approx(40.0, rel=1e-12)
+    assert rise_time(height * ramp(10.3, 33, 400), 1.0) == pytest.approx(26.4, rel=1e-12)
+    # of a record that is short, single samples are taken
+    assert rise_time(height * ramp(2, 7, 39), 1.0) == pytest.approx(5.6, rel=1e-12)
+
+
+def test_a_lag_rises_for_the_logarithm_of_nine_times_itself():
+    step = -np.expm1(-np.arange(4000) / 200.0)
+    # means over 50 samples bend an exponential by (50 / 200)^2 / 24
+    assert rise_time(step, 0.1) == pytest.approx(0.1 * 200 * np.log(9), rel=0.005)
+
+
+def test_a_jump_takes_four_fifths_of_a_sample():
+    for size in (5, 39, 1000):
+        step = 1.0 * (np.arange(size) >= 2)
+        assert rise_time(step, 0.25) == pytest.approx(0.2, rel=1e-12)
+        # at rest in no sample at all
+        assert rise_time(np.ones(size), 0.25) == pytest.approx(0.2, rel=1e-12)
+
+
+def test_noise_neither_starts_nor_ends_the_rise():
+    noise = 0.1 * np.random.default_rng(0).standard_normal(2000)
+    slow = ramp(200, 1000, 2000) + noise
+    # of single samples the first beyond 90 % comes 100 samples early, the last below 10 % late;
+    # means over 100 of them err by 0.01, that is by ten samples at either end
+    assert rise_time(slow, 1.0) == pytest.approx(800, abs=40)
+
+
+def test_the_final_level_is_that_of_the_last_tenth():
+    # an overshoot is no level; nor are single wild samples at the end
+    step = ramp(10, 100, 1000)
+    step[300:500] = 1.4
+    assert rise_time(step, 1.0) == pytest.approx(80.0, rel=1e-12)
+    step[-40:] = 7.0
+    assert rise_time(step, 1.0) == pytest.approx(80.0, rel=1e-12)
+    # a tenth is three samples at least
+    assert rise_time(np.array([0, 0, 5, 10, 10, 10, 5.0]), 1.0) == pytest.approx(1.6)
+
+
+def test_the_rise_ends_at_the_first_crossing_and_begins_at_the_last_before_it():
+    # 39 samples are taken one by one; a dip to below 10 % before, and one to below 90 % after
+    step = np.ones(39)
+    step[:14] = [0, 0.5, 0.5, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0]
+    # from 3.5 (10 %) to 7.5 (90 %)
+    assert rise_time(step, 1.0) == pytest.approx(4.0, rel=1e-12)
+
+
+def test_of_a_pulse_that_ends_at_rest_the_largest_value_is_the_level():
+    pulse = np.zeros(39)
+    pulse[3:15] = np.concatenate([np.arange(1, 9), [6, 4, 2, 1]])
+    # 0.8 at 2.8, 7.2 at 9.2, in samples
+    assert rise_time(pulse, 1.0) == pytest.approx(6.4, rel=1e-12)
+    assert rise_time(-pulse, 1.0) == pytest.approx(6.4, rel=1e-12)
+    assert rise_time(np.zeros(39), 1.0) > 0
+
+
+def test_a_spike_that_no_mean_shows_is_looked_at_sample_by_sample():
+    spike = np.zeros(1000)
+    spike[500] = 2.0
+    assert rise_time(spike, 1.0) == pytest.approx(0.8, rel=1e-12)
