@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import warnings
 from dataclasses import replace
+from importlib import metadata
 from types import SimpleNamespace
 
 import control as ct
@@ -243,14 +244,16 @@ def test_the_key_depends_on_the_version_of_the_package(monkeypatch):
 
 
 def test_a_package_that_is_not_installed_has_an_unknown_version(monkeypatch):
-    from importlib import metadata
+    known = {"ctrl-realize": "1.2.3"}
 
-    assert campaign_row._version.__wrapped__() == metadata.version("ctrl-realize")
-
-    def missing(name):
+    def version(name):
+        if name in known:
+            return known[name]
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr(metadata, "version", missing)
+    monkeypatch.setattr(metadata, "version", version)
+    assert campaign_row._version.__wrapped__() == "1.2.3"
+    known.clear()
     assert campaign_row._version.__wrapped__() == "unknown"
 
 
