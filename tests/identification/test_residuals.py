@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
+from scipy.stats import norm
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.identification.residuals import _flags, _outside
 from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
 MIMO = cr.DelayedStateSpace(TWO_INPUTS.delay_free, (2, 4), output_delay=(0, 3, 1))
@@ -110,6 +112,81 @@ def test_a_controller_of_the_same_sample_is_feedback_and_no_wrong_delay(integral
     direct = ct.ss([[0.8]], [[1.0]], [[0.16]], [[0.2]], DT)
     at_once = cr.check_residuals(direct, cr.Record(DT * np.arange(n), u, y))
     assert not at_once.independent
+
+
+@pytest.mark.parametrize(
+    ("direct", "shift", "told"),
+    [
+        (0.0, -1, "feedback"),
+        (0.0, 0, "feedback"),  # the model cannot answer at once, so a controller has
+        (0.0, 1, "input_in_residual"),
+        (2.0, -1, "feedback"),
+        (2.0, 0, "input_in_residual"),
+        (2.0, 1, "input_in_residual"),
+    ],
+)
+def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal(1002)
+    plant = ct.ss([[0.5]], [[1.0]], [[0.5]], [[direct]], DT)
+    y = cr.DelayedStateSpace(plant).simulate(u) + 0.1 * rng.standard_normal(1002)
+    # what is left follows the input of `shift` samples before: 0.1 of it, sigma is 0.03
+    y = (y + 0.03 * np.roll(u, shift))[1:-1]
+    for system in (plant, cr.DelayedStateSpace(plant)):
+        check = cr.check_residuals(system, cr.Record(DT * np.arange(1000), u[1:-1], y))
+        assert [flag.code for flag in check.flags] == [told]
+        assert check.independent == (told == "feedback")
+        assert np.abs(check.cross[0, 0]).argmax() == 25 + shift
+
+
+def test_the_flag_of_a_wrong_model_names_the_lag_at_which_it_is_most_wrong():
+    cross = np.zeros((2, 1, 4))
+    cross[1, 0] = [0.1, 0.2, -0.4, 0.9]
+    later = np.abs(cross) > 0.15
+    later[1, 0, 3] = False
+    (flag,) = _flags(later, np.zeros_like(later), cross)
+    assert "most at lag 2:" in flag.message
+    assert _flags(np.zeros_like(later), np.zeros_like(later), cross) == ()
+
+
+@pytest.mark.parametrize("level", [0.9, 0.99])
+def test_all_lags_together_alarm_as_rarely_as_one(level):
+    # 51 lags: each may leave the bound in one case of 51 of those that all may
+    bound = norm.isf((1 - level) / 2)
+    limit = norm.isf((1 - level) / 2 / 51)
+    cross = np.full((1, 2, 51), 0.0)
+    cross[0, 0, 3], cross[0, 1, 4] = 1.0001 * limit, -0.9999 * limit
+    outside = _outside(cross, np.full((1, 2), bound), level)
+    assert np.argwhere(outside).tolist() == [[0, 0, 3]]
+
+
+def test_the_bound_of_the_autocorrelation_is_that_of_white_noise():
+    check = cr.check_residuals(TWO_STATES, record(n=400), confidence=0.95)
+    assert_allclose(check.bound, 1.959964 / 20, rtol=1e-6)
+    assert check.confidence == 0.95
+
+
+def test_three_samples_for_each_lag_are_enough():
+    assert cr.check_residuals(TWO_STATES, record(n=75), lags=25).lags.size == 51
+    with pytest.raises(DataError, match="needs 75 samples, the record has 74"):
+        cr.check_residuals(TWO_STATES, record(n=74), lags=25)
+
+
+def test_what_rounding_leaves_says_nothing_about_the_model():
+    one = record(noise=0.0)
+    for size, whether in ((1e-9, True), (1e-7, False)):
+        y = one.output + size * np.ptp(one.output) * np.sin(np.arange(1000))
+        check = cr.check_residuals(TWO_STATES, cr.Record(one.time, one.input, y))
+        assert check.white == whether
+        assert np.all(check.residual == 0) == whether
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1e-13, 1 - 1e-13, np.nan, "high"])
+def test_a_confidence_is_a_probability(confidence):
+    with pytest.raises(OptionError, match="confidence"):
+        cr.check_residuals(TWO_STATES, record(), confidence=confidence)
+    for border in (1e-12, 1 - 1e-12):
+        assert cr.check_residuals(TWO_STATES, record(), confidence=border).confidence == border
 
 
 def test_predictions_fall_from_the_noise_model_to_the_simulation():

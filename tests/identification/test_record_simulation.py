@@ -1,0 +1,148 @@
+"""Simulation from an unknown start, piece by piece."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.identification.record_simulation import (
+    PIECES,
+    _later,
+    _pieces,
+    as_delayed,
+    simulate_record,
+)
+
+DT = 0.1
+
+
+def core(pole=0.8, D=0.0, dt=DT):
+    return ct.ss([[pole]], [[1.0]], [[1 - pole]], [[D]], dt)
+
+
+def record(u, y, dt=DT):
+    return cr.Record(dt * np.arange(np.shape(u)[-1]), u, y)
+
+
+def test_pieces_lie_side_by_side_and_there_are_no_more_than_sixteen():
+    assert _pieces(0) == []
+    assert _pieces(3) == [(0, 1), (1, 2), (2, 3)]
+    assert _pieces(PIECES) == [(k, k + 1) for k in range(PIECES)]
+    long = _pieces(40)
+    assert len(long) == PIECES
+    assert (long[0][0], long[-1][1]) == (0, 40)
+    assert all(a[1] == b[0] for a, b in pairwise(long))
+    assert {b - a for a, b in long} == {2, 3}
+
+
+def test_later_responses_leave_the_record_at_its_end():
+    one = np.array([[1.0, 2.0, 3.0]])
+    assert_allclose(_later(one, 0), one)
+    assert_allclose(_later(one, 2), [[0.0, 0.0, 1.0]])
+    assert_allclose(_later(one, 3), 0.0)
+    assert_allclose(_later(one, 7), 0.0)
+
+
+@pytest.mark.parametrize("where", ["input", "output"])
+@pytest.mark.parametrize("delay", [1, 5, 40])
+def test_what_was_inside_a_dead_time_is_found(where, delay):
+    # before the record: an input in as many levels as there are pieces
+    rng = np.random.default_rng(0)
+    u = np.concatenate([np.zeros(delay), rng.standard_normal(60)])
+    for (a, b), level in zip(_pieces(delay), rng.standard_normal(PIECES), strict=False):
+        u[a:b] = level
+    # behind an output delay is what the core has answered, which is as free as the state
+    system = cr.DelayedStateSpace(
+        ct.ss([], [], [], [[2.0]], DT) if where == "output" else core(D=0.3),
+        delay if where == "input" else 0,
+        output_delay=delay if where == "output" else 0,
+    )
+    y = 4.0 + system.simulate(u)
+    one = record(u[delay:], y[delay:])
+    # exact to the rounding of a least-squares problem whose small values end at 1e-10
+    assert_allclose(simulate_record(system, one, "estimate")[0], one.output, rtol=0, atol=1e-9)
+    assert np.abs(simulate_record(system, one, "rest")[0] - one.output).max() > 0.1
+
+
+def test_a_dead_time_longer_than_the_record_leaves_what_the_record_shows():
+    system = cr.DelayedStateSpace(core(), 50, output_delay=0)
+    rng = np.random.default_rng(0)
+    u = np.r_[np.repeat(rng.standard_normal(5), 10), rng.standard_normal(10)]
+    y = system.simulate(np.r_[u, np.zeros(10)])[50:60]
+    # ten samples of which each may have its own level inside the dead time
+    assert_allclose(simulate_record(system, record(np.ones(10), y), "estimate")[0], y, atol=1e-9)
+    assert simulate_record(system, record(np.ones(10), y), "rest").std() == 0.0
+
+
+def test_each_output_has_its_own_offset_and_delay():
+    system = cr.DelayedStateSpace(
+        ct.ss([[0.8]], [[1.0]], [[1.0], [2.0]], np.zeros((2, 1)), DT), 0, output_delay=(0, 4)
+    )
+    u = np.random.default_rng(0).standard_normal(80)
+    y = system.simulate(u) + np.array([[3.0], [-5.0]])
+    one = record(u[20:], y[:, 20:])
+    assert_allclose(simulate_record(system, one, "estimate"), one.output, rtol=0, atol=1e-9)
+
+
+def test_at_rest_means_at_the_first_sample_of_the_input():
+    u = np.r_[2.0, 5.0, np.zeros(8)]
+    found = simulate_record(core(D=1.0), record(u, np.zeros(10)), "rest")[0]
+    answer = cr.DelayedStateSpace(core(D=1.0)).simulate(u - 2.0)
+    # the offset that fits best an output of zero
+    assert_allclose(found, answer - answer.mean(), rtol=0, atol=1e-12)
+
+
+def test_a_plain_gain_has_no_state_to_start_from():
+    gain = ct.ss([], [], [], [[2.0]], DT)
+    u = np.random.default_rng(0).standard_normal(10)
+    assert_allclose(simulate_record(gain, record(u, 3 + 2 * u), "estimate")[0], 3 + 2 * u)
+
+
+def test_a_transfer_function_is_simulated_as_its_states():
+    u = np.r_[0.0, np.random.default_rng(0).standard_normal(30)]
+    plain = ct.tf([0.2], [1.0, -0.8], DT)
+    y = cr.DelayedStateSpace(core()).simulate(u)
+    assert_allclose(simulate_record(plain, record(u, y), "rest")[0], y, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("system", "error", "match"),
+    [
+        ("plant", UnsuitableSystemError, "a str; needed is a discrete"),
+        (core(dt=None), UnsuitableSystemError, "not discrete"),
+        (core(dt=0), UnsuitableSystemError, "not discrete"),
+        (core(dt=True), UnsuitableSystemError, "not discrete with a sample time"),
+        (core(dt=1.0011 * DT), DataError, r"0\.1 s, the system 0\.10011 s"),
+        (ct.ss([[0.5]], [[1.0, 1.0]], [[1.0]], np.zeros((1, 2)), DT), DataError, "the system 2"),
+        (ct.ss([[0.5]], [[1.0]], np.ones((2, 1)), np.zeros((2, 1)), DT), DataError, "1 and 2"),
+        (core(1 + 1.1e-6), UnsuitableSystemError, "unstable"),
+    ],
+)
+def test_systems_that_do_not_fit_the_record_are_refused(system, error, match):
+    with pytest.raises(error, match=match):
+        as_delayed(system, record(np.ones(9), np.ones(9)))
+
+
+def test_systems_that_just_fit_are_taken():
+    one = record(np.ones(9), np.ones(9))
+    assert as_delayed(core(dt=1.0009 * DT), one).delay == 0
+    for border in (core(1.0), core(1 + 0.9e-6)):
+        assert as_delayed(border, one).delay == 0
+    assert as_delayed(core(1.5), one, stable=False).delay == 0
+    late = cr.DelayedStateSpace(core(), 3)
+    assert as_delayed(late, one) is late
+
+
+def test_a_start_has_one_of_two_names_and_a_record_no_holes():
+    one = record(np.ones(9), np.arange(9.0))
+    with pytest.raises(OptionError, match="'estimate', 'rest'"):
+        simulate_record(core(), one, "zero")
+    holes = cr.Record(one.time, one.input, np.r_[np.nan, np.ones(8)], missing="keep")
+    with pytest.raises(DataError, match="a simulation needs every sample"):
+        simulate_record(core(), holes, "rest")
