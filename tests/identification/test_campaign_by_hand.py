@@ -58,6 +58,7 @@ def test_rows_are_those_that_have_a_model_and_those_that_failed():
     assert some.failed == (FAILED,)
     assert some.delays.tolist() == [3.0, 4.0]
     assert repr(some) == "<Campaign: 3 records, 1 failed, method 'scan'>"
+    assert repr(of_delays(3)) == "<Campaign: 1 records, method 'scan'>"
     assert [flag.code for flag in some.flags] == ["failed_records"]
 
 
@@ -226,10 +227,10 @@ def test_the_card_tells_mean_scatter_and_best_record():
 
 
 def test_one_record_has_no_scatter():
-    shown = dict(of_delays(3)._rows())
+    shown = dict(of_delays(3.12345)._rows())
     assert shown["scatter"] == "unknown: one record has none"
     assert "variance" not in shown
-    assert shown["delay, trimmed mean"] == f"3.00 samples = {in_time(0.3)} (0 of 1 left out)"
+    assert shown["delay, trimmed mean"] == "3.12 samples = 312.3 ms (0 of 1 left out)"
 
 
 @pytest.fixture
