@@ -122,7 +122,7 @@ MODULES = {
     "identification/tracker_checks": "tests/identification/test_tracker_checks.py",
     "identification/tracker_solution": "tests/identification/test_tracker_solution.py",
     "identification/tracked": "tests/identification/test_tracked.py",
-    "identification/any_input_fit": "tests/identification/test_delay_fit_any_input.py",
+    "identification/any_input_fit": "tests/identification/test_any_input_fit.py",
     "numerics/arx": "tests/numerics/test_arx.py",
     "numerics/bands": "tests/numerics/test_bands.py tests/numerics/test_spectra.py",
     "numerics/block_svd": "tests/numerics/test_block_svd.py tests/numerics/test_lanczos.py",

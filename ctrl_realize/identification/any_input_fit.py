@@ -37,7 +37,8 @@ def fit_any_input(
 ) -> tuple[DelayFit, OutputErrorFit]:
     """Fit one model to all records, each with its own level, drift and initial state.
 
-    A record whose delay lies apart from the others' is left out, as among step records.
+    A record whose delay or gain lies apart from the others' is left out, as among step records,
+    until none of the rest does.
     """
     dt = common_sample_time(records)
     latest = None if limit is None else limit * dt
@@ -45,7 +46,7 @@ def fit_any_input(
     if len(records) == 1:
         found = _fit(records, dt, latest, settings)
         return _summary(found, found.fit, records, used, limit, ()), found.fit
-    for _ in range(2):
+    while True:
         found = _fit(tuple(records[i] for i in used), dt, latest, settings)
         own = [found.own_delay(*_signals(record)) for record in records]
         repeats = _repeatability(own, records, used, found.fit.delay)
