@@ -166,6 +166,9 @@ MODULES = {
     "numerics/thiran": "tests/design/test_conversions.py",
     "numerics/time_axis": "tests/numerics/test_time_axis.py tests/test_signals.py",
     "numerics/response_bins": "tests/numerics/test_response_bins.py",
+    "numerics/delayed_modes": "tests/numerics/test_delayed_modes.py "
+    "tests/numerics/test_long_responses.py",
+    "numerics/fit_window": "tests/numerics/test_fit_window.py",
     "numerics/vector_fitting": "tests/numerics/test_rational.py",
 }
 

@@ -26,7 +26,6 @@ def rise_time(step: FloatArray, dt: float) -> float:
     if abs(final) <= 1e-100 * abs(largest):
         final = largest or 1.0
     shape = step / final
-    best = float(step.size)
     window = max(step.size // 20, 1)
     while True:
         smooth = _moving_mean(shape, window)

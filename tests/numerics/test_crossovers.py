@@ -141,6 +141,8 @@ def test_gain_crossovers_are_where_the_magnitude_is_one():
         return 2 / (1j * omega)
 
     assert unit_crossings(integrator, *grid_for(integrator, 0.1, 50)) == pytest.approx([2.0])
+    two = np.array([1.0, 3.0])
+    assert unit_crossings(integrator, two, integrator(two)) == pytest.approx([2.0])
 
     def resonant(omega):
         # |1 / (1 - omega^2)| / 2 is one at omega^2 of 1/2 and 3/2
@@ -170,6 +172,14 @@ def test_phase_crossovers_are_on_the_negative_axis():
         lambda omega: delay(omega).conj(), *grid_for(lambda omega: delay(omega).conj(), 0.5, 8)
     )
     assert found == pytest.approx([np.pi], rel=1e-12)
+
+
+def test_a_phase_that_comes_back_crosses_once_more():
+    def curve(omega):
+        return 2 * np.exp(1j * (np.pi + 0.4 * np.sin(omega)))
+
+    found = negative_axis_crossings(curve, *grid_for(curve, 0.5, 10))
+    assert found == pytest.approx(np.pi * np.array([1, 2, 3]), rel=1e-12)
 
 
 def test_phase_crossovers_do_not_depend_on_how_large_the_curve_is_at_either_end():

@@ -51,7 +51,7 @@ def test_the_final_level_is_that_of_the_last_tenth():
     step[-40:] = 7.0
     assert rise_time(step, 1.0) == pytest.approx(80.0, rel=1e-12)
     # a tenth is three samples at least
-    assert rise_time(np.array([0, 0, 5, 10, 10, 10, 5.0]), 1.0) == pytest.approx(1.6)
+    assert rise_time(np.array([0, 0, 10, 10, 10, 20, 20.0]), 1.0) == pytest.approx(4.8 - 1.2)
 
 
 def test_the_rise_ends_at_the_first_crossing_and_begins_at_the_last_before_it():
@@ -75,3 +75,18 @@ def test_a_spike_that_no_mean_shows_is_looked_at_sample_by_sample():
     spike = np.zeros(1000)
     spike[500] = 2.0
     assert rise_time(spike, 1.0) == pytest.approx(0.8, rel=1e-12)
+
+
+def test_levels_may_be_met_exactly_and_at_once():
+    assert rise_time(np.array([0, 0.1, 0.5, 0.9, 1, 1, 1]), 1.0) == pytest.approx(2.0, rel=1e-12)
+    # at the first of two samples at 90 %
+    assert rise_time(np.array([0, 0.9, 0.9, 1, 1, 1, 1]), 1.0) == pytest.approx(8 / 9, rel=1e-12)
+    # between the first two samples
+    assert rise_time(np.array([0, 0.5, 1, 1, 1, 1, 1]), 1.0) == pytest.approx(1.6, rel=1e-12)
+
+
+def test_what_never_stays_at_its_level_rises_to_the_end():
+    # the median is one, means over 51 samples are 0.6
+    step = np.tile([1.0, 1.0, 0.0, 1.0, 0.0], 200)
+    step[:300] = 0.6 * ramp(100, 200, 300)
+    assert rise_time(step, 1.0) == pytest.approx(999 - (100 + 200 / 6), rel=1e-12)
