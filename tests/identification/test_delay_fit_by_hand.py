@@ -112,6 +112,7 @@ def test_an_input_holds_where_nine_samples_of_ten_do():
     assert not _holds_between(strays(11, -5.0, 60), one)
     assert _holds_between(strays(11, 0.1999), one)
     assert not _holds_between(strays(11, 0.2001), one)
+    assert _holds_between(strays(11, 1.0), [edge(50, amplitude=5.0)])  # just a fifth
 
 
 def test_an_input_may_stray_by_a_fifth_of_its_largest_edge():
