@@ -215,9 +215,8 @@ def _scaled_misfit(fit: DelayFit | DelayScan, amplitude: float) -> float:
 
 
 def _gain(system: DelayedStateSpace) -> float:
-    # An integrating plant has no gain: infinite, and no warning of it.
-    gain = complex(system(1.0, warn_infinite=False))
-    return gain.real if np.isfinite(gain) else float("inf")
+    # An integrating plant has no gain: it is infinite, and no warning of it.
+    return complex(system(1.0, warn_infinite=False)).real
 
 
 def _source_name(source: RecordSource, position: int) -> str:

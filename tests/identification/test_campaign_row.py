@@ -121,6 +121,8 @@ def test_a_row_is_called_by_its_record_by_what_its_function_reads_or_by_its_plac
     assert of(record, 8).name == "record 8"
     assert of(functools.partial(record), 9).name == "record 9"
     assert of(functools.partial(record, "the record's own", 1.0)).name == "the record's own"
+    reads = functools.partial(lambda path: record("what it holds"), "file.csv")
+    assert of(reads).name == "what it holds"
     nameless = functools.partial(lambda path, place: record(), "a\udcff.csv", 3)
     assert of(nameless).name == "a\\udcff.csv"
 
