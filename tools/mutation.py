@@ -69,7 +69,7 @@ MODULES = {
     "numerics/kernel_priors": "tests/numerics/test_fir_kernels.py",
     "numerics/kernel_search": "tests/numerics/test_fir_kernels.py",
     "io/csv_files": "tests/io/test_csv_files.py",
-    "numerics/output_error": "tests/identification/test_delay_fit.py",
+    "numerics/output_error": "tests/numerics/test_output_error.py",
     "identification/steps": "tests/identification/test_steps.py",
     "identification/realization": "tests/identification/test_realization.py",
     "identification/delay_scan": "tests/identification/test_delay_scan.py",
@@ -98,9 +98,9 @@ MODULES = {
     "identification/order_choice": "tests/identification/test_order_choice.py "
     "tests/identification/test_orders.py",
     "identification/from_io": "tests/identification/test_from_io.py",
-    "identification/impulse_estimate": "tests/identification/test_from_io.py",
-    "identification/pulse_choice": "tests/identification/test_from_io.py",
-    "identification/pulse_regression": "tests/identification/test_from_io.py",
+    "identification/impulse_estimate": "tests/identification/test_impulse_estimate.py",
+    "identification/pulse_choice": "tests/identification/test_pulse_choice.py",
+    "identification/pulse_regression": "tests/identification/test_pulse_regression.py",
     "identification/residuals": "tests/identification/test_residuals.py",
     "identification/residual_check": "tests/identification/test_residual_check.py",
     "identification/record_simulation": "tests/identification/test_record_simulation.py "
@@ -169,6 +169,7 @@ MODULES = {
     "numerics/delayed_modes": "tests/numerics/test_delayed_modes.py "
     "tests/numerics/test_long_responses.py",
     "numerics/fit_window": "tests/numerics/test_fit_window.py",
+    "numerics/output_error_result": "tests/numerics/test_output_error_result.py",
     "numerics/vector_fitting": "tests/numerics/test_rational.py",
 }
 
