@@ -166,7 +166,8 @@ def test_a_first_order_fit_comes_first_and_tells_the_ringing(searched):
     wave = np.sin(2 * np.pi * np.arange(1000) / 25)
     window = ByHand(np.concatenate([9 * noise(200), wave]), start=200)
     found = fitted(window)
-    (_, first, scales, _), (_, second, informed, _) = searched.searches
+    (rough, first, scales, _), (problem, second, informed, _) = searched.searches
+    assert rough is problem is window.problem
     assert (first, second) == ([ONE], [ONE, TWO])
     assert scales.ringing == 0.0
     assert informed == replace(SCALES, ringing=pytest.approx(2 * np.pi / 25 / DT))
