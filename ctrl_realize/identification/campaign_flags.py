@@ -11,6 +11,8 @@ from .campaign_row import CampaignRow
 
 Rows = tuple[CampaignRow, ...]
 
+_SAME_HEIGHT = 1e-6  # part of the step by which heights may differ and be one
+
 
 def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[Flag, ...]:
     """List the flags of a campaign: of all its rows, of those identified, and of those not."""
@@ -60,7 +62,7 @@ def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
     delays = np.array([row.delay for row in rows])
     known = np.isfinite(heights) & np.isfinite(delays)
     heights, delays = heights[known], delays[known]
-    if np.unique(np.round(heights, 6)).size < 2 or heights.size < 8 or np.ptp(delays) == 0:
+    if heights.size < 8 or np.ptp(heights) <= _SAME_HEIGHT * heights.max() or np.ptp(delays) == 0:
         return None
     correlation, chance = spearmanr(heights, delays)
     if heights.size < 10:

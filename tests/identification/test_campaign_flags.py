@@ -115,9 +115,11 @@ def test_eight_records_of_two_heights_are_needed():
     delays = [3.0, 3.1, 3.2, 3.3, 6.0, 6.1, 6.2, 6.3]
     assert set(told(rows(heights, delays))) == {"amplitude_trend"}
     assert told(rows(heights[:7], delays[:7])) == {}
-    # heights that differ by measurement alone are one
-    near = [16.0] * 4 + [16.0 + 4e-7] * 4
-    assert told(rows(near, delays)) == {}
+    # heights that differ by a part in a million are one, in any unit
+    for unit in (1.0, 1e-9):
+        near, apart = ([unit] * 4 + [unit * (1 + by)] * 4 for by in (0.9e-6, 1.1e-6))
+        assert told(rows(near, delays)) == {}
+        assert set(told(rows(apart, delays))) == {"amplitude_trend"}
     # without a height or a delay a row does not count
     assert told(rows([np.nan, *heights[1:]], delays)) == {}
     assert told(rows(heights, [*delays[:7], np.nan])) == {}
