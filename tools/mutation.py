@@ -97,7 +97,8 @@ MODULES = {
     "identification/realization_result": "tests/identification/test_realization.py",
     "identification/order_choice": "tests/identification/test_order_choice.py "
     "tests/identification/test_orders.py",
-    "identification/from_io": "tests/identification/test_from_io.py",
+    "identification/from_io": "tests/identification/test_from_io_by_hand.py "
+    "tests/identification/test_from_io.py",
     "identification/impulse_estimate": "tests/identification/test_impulse_estimate.py",
     "identification/pulse_choice": "tests/identification/test_pulse_choice.py",
     "identification/pulse_regression": "tests/identification/test_pulse_regression.py",

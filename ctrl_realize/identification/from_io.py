@@ -202,14 +202,15 @@ def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
     size = np.sqrt(np.mean(found.markov[..., tail] ** 2, axis=-1))
     noise = np.sqrt(np.mean(found.std[..., tail] ** 2, axis=-1))
     share = size / np.maximum(np.abs(found.markov).max(axis=-1), 1e-300)
-    if not np.any((share > TAIL) & (size > 3 * noise)):
+    alive = (share > TAIL) & (size > 3 * noise)
+    if not np.any(alive):
         return ()
     return (
         Flag(
             "not_died_away",
-            f"at the end of {count} samples the response is still {100 * share.max():.0f} % of its "
-            "largest; what comes later is missing, and disturbs what is here. Choose a larger "
-            "length, or method='okid'",
+            f"at the end of {count} samples the response is still {100 * share[alive].max():.0f} % "
+            "of its largest; what comes later is missing, and disturbs what is here. Choose a "
+            "larger length, or method='okid'",
         ),
     )
 
