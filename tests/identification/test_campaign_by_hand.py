@@ -234,7 +234,20 @@ def test_one_record_has_no_scatter():
 
 
 @pytest.fixture
-def rows_asked(monkeypatch):
+def processes(monkeypatch):
+    """In the place of joblib a row after the other in this process; what was asked of it."""
+    asked = []
+
+    def parallel(**how):
+        asked.append(how)
+        return lambda tasks: (call(*args) for call, args, _ in tasks)
+
+    monkeypatch.setattr("joblib.Parallel", parallel)
+    return asked
+
+
+@pytest.fixture
+def rows_asked(monkeypatch, processes):
     """In the place of an identification a row that is called by its place."""
     asked = []
 
@@ -246,7 +259,7 @@ def rows_asked(monkeypatch):
     return asked
 
 
-def test_every_source_is_identified_at_its_place(rows_asked):
+def test_every_source_is_identified_at_its_place(rows_asked, processes):
     def read():
         raise AssertionError("it is read where it is identified")
 
@@ -260,6 +273,7 @@ def test_every_source_is_identified_at_its_place(rows_asked):
     assert found.delays.tolist() == [0.0, 1.0]
     assert (found.sources, found.method, found.options) == ((RECORD, read), "scan", options)
     assert cr.identify_campaign([RECORD]).method == "output_error"
+    assert [how["n_jobs"] for how in processes] == [1, 1]
     assert rows_asked[-1] == (RECORD, 0, "output_error", {}, None)
 
 
@@ -279,22 +293,16 @@ def test_a_bar_is_shown_where_somebody_sees_it_or_as_asked(
 
 
 @pytest.mark.parametrize("n_jobs", [True, 1.5, "2", 0, 10_001, -10_001])
-def test_a_number_of_processes_is_a_whole_one_within_reason(rows_asked, n_jobs):
+def test_a_number_of_processes_is_a_whole_one_within_reason(rows_asked, processes, n_jobs):
     with pytest.raises(OptionError, match="n_jobs="):
         cr.identify_campaign([RECORD], n_jobs=n_jobs)
+    assert processes == []
 
 
 @pytest.mark.parametrize("n_jobs", [10_000, -10_000, -1, 1])
-def test_ten_thousand_processes_are_within_reason(rows_asked, monkeypatch, n_jobs):
-    asked = []
-
-    def parallel(**how):
-        asked.append(how)
-        return lambda tasks: [call(*args) for call, args, _ in tasks]
-
-    monkeypatch.setattr("joblib.Parallel", parallel)
+def test_ten_thousand_processes_are_within_reason(rows_asked, processes, n_jobs):
     cr.identify_campaign([RECORD], n_jobs=n_jobs)
-    assert asked == [{"n_jobs": n_jobs, "return_as": "generator"}]
+    assert processes == [{"n_jobs": n_jobs, "return_as": "generator"}]
 
 
 @pytest.mark.parametrize(
