@@ -119,7 +119,8 @@ MODULES = {
     "identification/identify": "tests/identification/test_identify.py",
     "identification/from_step": "tests/identification/test_steps.py",
     "identification/packed_model": "tests/identification/test_packed_model.py",
-    "identification/tracker": "tests/identification/test_tracker.py",
+    "identification/tracker": "tests/identification/test_tracker_by_hand.py "
+    "tests/identification/test_tracker.py",
     "identification/tracker_checks": "tests/identification/test_tracker_checks.py",
     "identification/tracker_solution": "tests/identification/test_tracker_solution.py",
     "identification/tracked": "tests/identification/test_tracked.py",

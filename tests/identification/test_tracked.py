@@ -68,15 +68,16 @@ def test_a_track_has_an_entry_for_every_moment():
 
 def test_a_track_is_reported_by_its_first_and_last_told_moment():
     second = replace(NOW, time=14.0, dead_time=0.0385, gain_ratio=0.78)
-    track = track_of([LATER, NOW, second, LATER], 0.001)
+    between = replace(NOW, time=13.0, dead_time=0.01, gain_ratio=0.5)
+    track = track_of([LATER, NOW, between, second, LATER], 0.001)
     assert track.report().splitlines() == [
         "Tracked delay",
-        "  told   2 of 4 moments",
+        "  told   3 of 5 moments",
         "  first  37.20 samples at 12.25 s",
         "  last   38.50 samples at 14 s",
         "  gain   0.81 to 0.78",
     ]
-    assert repr(track) == "<DelayTrack: 4 moments, told at 2>"
+    assert repr(track) == "<DelayTrack: 5 moments, told at 3>"
 
 
 def test_a_track_without_a_told_moment_has_no_first_one():
