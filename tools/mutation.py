@@ -108,7 +108,7 @@ MODULES = {
     "tests/identification/test_residuals.py",
     "identification/prediction": "tests/identification/test_prediction.py "
     "tests/identification/test_residuals.py",
-    "identification/cross_validation": "tests/identification/test_residuals.py",
+    "identification/cross_validation": "tests/identification/test_cross_validation.py",
     "identification/bootstrap": "tests/identification/test_bootstrap.py",
     "identification/campaign": "tests/identification/test_campaign_by_hand.py",
     "identification/campaign_flags": "tests/identification/test_campaign_flags.py",
@@ -116,7 +116,7 @@ MODULES = {
     "identification/campaign_run": "tests/identification/test_campaign_by_hand.py",
     "identification/cross_check": "tests/identification/test_cross_check_by_hand.py",
     "identification/delay_check": "tests/identification/test_delay_check.py",
-    "identification/identify": "tests/identification/test_identify.py",
+    "identification/identify": "tests/identification/test_identify_by_hand.py",
     "identification/from_step": "tests/identification/test_steps.py",
     "identification/packed_model": "tests/identification/test_packed_model.py",
     "identification/tracker": "tests/identification/test_tracker_by_hand.py "
