@@ -157,7 +157,7 @@ def track_of(course: Sequence[TrackedDelay], dt: float) -> DelayTrack:
     """Put single moments into the arrays of a track."""
 
     def along(values: Iterable[float]) -> FloatArray:
-        return read_only(np.array(list(values), dtype=np.float64))
+        return read_only(np.array(list(values)))
 
     return DelayTrack(
         time=along(moment.time for moment in course),
