@@ -159,7 +159,7 @@ MODULES = {
     "numerics/recursive": "tests/numerics/test_recursive.py",
     "numerics/rise": "tests/numerics/test_rise.py",
     "numerics/running_residual": "tests/numerics/test_running_residual.py",
-    "numerics/sampled_data": "tests/identification/test_delay_fit_any_input.py",
+    "numerics/sampled_data": "tests/numerics/test_sampled_data.py",
     "numerics/sampled_fit": "tests/identification/test_delay_fit_any_input.py",
     "numerics/sines": "tests/numerics/test_sines.py",
     "numerics/spectra": "tests/numerics/test_spectra.py",

@@ -15,6 +15,7 @@ which are real and independent in every case.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -33,7 +34,8 @@ class Stretches:
     clock : ndarray, shape (m,)
         Time since the first sample of the own stretch, in s.
     regressors : ndarray, shape (m, q)
-        Known shapes, which enter every stretch with coefficients of its own.
+        Known shapes, which enter every stretch with coefficients of its own. A stretch with
+        fewer of them has zeros in its last columns.
     """
 
     edges: IntArray
@@ -45,6 +47,11 @@ class Stretches:
         """Rows of every stretch."""
         edges = [int(edge) for edge in self.edges]
         return [slice(a, b) for a, b in pairwise(edges)]
+
+    @cached_property
+    def shapes(self) -> int:
+        """Number of known shapes of all stretches together."""
+        return sum(int(self.regressors[rows].any(axis=0).sum()) for rows in self.rows)
 
 
 class FixedTerms:
@@ -187,6 +194,8 @@ def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArra
     """Basis (m, k) of columns of norm 1, triangle (k, k), and their norms before (k,)."""
     single, norm = _normalised(columns[None])
     q, r = np.linalg.qr(single[0])
+    # A column of zeros spans nothing; a direction that QR makes up for it would.
+    q[:, ~single[0].any(axis=0)[: q.shape[1]]] = 0.0
     return q, r, norm[0]
 
 

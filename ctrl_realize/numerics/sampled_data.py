@@ -73,6 +73,9 @@ class SampledData:
                 for y, start, scale in zip(self.outputs, self.starts, self.scales, strict=True)
             ]
         )
+        most = max(shape.shape[1] for shape in shapes)
+        # A shorter record has fewer cosines.
+        shapes = [np.pad(shape, ((0, 0), (0, most - shape.shape[1]))) for shape in shapes]
         stretches = Stretches(self.edges, np.concatenate(clocks), np.concatenate(shapes))
         return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, stretches)
 
@@ -94,12 +97,12 @@ def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) 
 
 
 def _own_shapes(clock: FloatArray, known: KnownFactor, period: float) -> FloatArray:
-    """Level, drift, slow cosines, and the free responses of what is known, shape (m, q)."""
+    """Level, drift, the free responses of what is known, and slow cosines, shape (m, q)."""
     length = max(float(clock[-1]), 1e-300)
     shapes = [np.ones_like(clock), clock / length]
-    # Cosines of half periods: with a line they make up anything slow, whatever its ends.
-    shapes += [np.cos(np.pi * k * clock / length) for k in range(1, int(2 * length / period) + 1)]
     for pole in known.poles[known.poles.imag >= 0]:
         wave = np.exp(pole * clock)
         shapes += [wave.real] if pole.imag == 0 else [wave.real, wave.imag]
+    # Cosines of half periods: with a line they make up anything slow, whatever its ends.
+    shapes += [np.cos(np.pi * k * clock / length) for k in range(1, int(2 * length / period) + 1)]
     return np.stack(shapes, axis=1)

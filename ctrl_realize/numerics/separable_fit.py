@@ -82,8 +82,7 @@ class Problem:
         """Linear terms that all stretches have for themselves, of a model of an order."""
         if self.stretches is None:
             return 0
-        per_stretch = int(self.stretches.regressors.shape[1]) + order
-        return per_stretch * (int(self.stretches.edges.size) - 1)
+        return self.stretches.shapes + order * (int(self.stretches.edges.size) - 1)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,157 @@
+"""Records of any input as one problem."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ctrl_realize.numerics import sampled_data as module
+from ctrl_realize.numerics.own_terms import FixedTerms
+from ctrl_realize.numerics.pole_factors import poles_from_parameters
+from ctrl_realize.numerics.sampled_data import SampledData, cut
+from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, evaluate, respond
+
+NOTHING = KnownFactor()
+
+
+def records(*lengths):
+    rng = np.random.default_rng(0)
+    outputs = [rng.standard_normal(n) for n in lengths]
+    return outputs, [rng.standard_normal(n) + 5.0 for n in lengths]
+
+
+@pytest.fixture
+def short(monkeypatch):
+    monkeypatch.setattr(module, "MOST_SAMPLES", 100)
+    monkeypatch.setattr(module, "MOST_IN_ALL", 300)
+
+
+def test_records_are_used_from_their_first_sample_on(short):
+    outputs, inputs = records(150, 40)
+    data = cut(outputs, inputs, 0.5)
+    assert [y.tolist() for y in data.outputs] == [outputs[0][:100].tolist(), outputs[1].tolist()]
+    # the mean is that of what is used
+    for used, given in zip(data.inputs, inputs, strict=True):
+        kept = given[: used.size]
+        assert used == pytest.approx(kept - kept.mean(), abs=1e-14)
+    assert [u.size for u in data.inputs] == data.counts == [100, 40]
+    assert (data.starts, data.scales, data.dt, data.period) == ((0, 0), (1.0, 1.0), 0.5, np.inf)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "kept"),
+    [
+        ((150, 150, 150), [100, 100, 100]),
+        # five of them are cut to a fifth each, in steps of a tenth of the longest allowed
+        ((90, 90, 90, 90, 90), [60, 60, 60, 60, 60]),
+        # 10 + 4 x 72 is less than 300 in all, 10 + 4 x 81 is not
+        ((10, 90, 90, 90, 90), [10, 72, 72, 72, 72]),
+        ((60, 60, 60, 60, 60), [60, 60, 60, 60, 60]),
+        ((7, 300), [7, 100]),
+    ],
+)
+def test_the_shortest_records_keep_all_they_have(short, lengths, kept):
+    assert cut(*records(*lengths), 0.5).counts == kept
+
+
+def test_no_record_is_cut_below_its_share(short):
+    assert cut(*records(*[90] * 7), 0.5).counts == [42] * 7
+
+
+def two(**changed):
+    outputs, inputs = records(9, 6)
+    given = {"starts": (2, 1), "scales": (1.0, 4.0), "dt": 0.5} | changed
+    return SampledData(tuple(inputs), tuple(outputs), **given)
+
+
+def test_what_counts_stands_one_after_the_other():
+    data = two()
+    assert data.counts == [7, 5]
+    assert data.edges.tolist() == [0, 7, 12]
+    assert data.edges.dtype == np.int64
+    problem = data.problem(NOTHING)
+    assert problem.data[:7].tolist() == data.outputs[0][2:].tolist()
+    assert problem.data[7:].tolist() == (data.outputs[1][1:] / 4).tolist()
+    assert problem.root_weight.tolist() == [1.0] * 12
+    assert problem.regressors.shape == (12, 0)
+    assert problem.known is NOTHING
+    assert problem.whitener is None
+    # the drive is that of the whole record, divided by the same scale
+    assert problem.drive.starts == (2, 1)
+    for part, signal, scale in zip(problem.drive.parts, data.inputs, (1.0, 4.0), strict=True):
+        assert part.dt == 0.5
+        assert part.signal.tolist() == (signal / scale).tolist()
+
+
+def test_every_record_has_its_own_clock_level_and_drift():
+    stretches = two().problem(NOTHING).stretches
+    assert stretches.edges.tolist() == [0, 7, 12]
+    assert stretches.clock.tolist() == [0, 0.5, 1, 1.5, 2, 2.5, 3, 0, 0.5, 1, 1.5, 2]
+    level, drift = stretches.regressors.T
+    assert level.tolist() == [1.0] * 12
+    # from nothing to one
+    assert drift == pytest.approx(np.concatenate([np.linspace(0, 1, 7), np.linspace(0, 1, 5)]))
+
+
+def test_slow_cosines_go_down_to_the_shortest_period():
+    # a record of 3 s: half periods of 3, 1.5 and 1 s are periods of 2 s and longer
+    stretches = two(period=2.0).problem(NOTHING).stretches
+    time = np.linspace(0, 1, 7)
+    expected = [np.ones(7), time, *(np.cos(np.pi * k * time) for k in (1, 2, 3))]
+    assert stretches.regressors[:7] == pytest.approx(np.stack(expected, axis=1))
+    # a record of 2 s has one less
+    time = np.linspace(0, 1, 5)
+    expected = [np.ones(5), time, *(np.cos(np.pi * k * time) for k in (1, 2)), np.zeros(5)]
+    assert stretches.regressors[7:] == pytest.approx(np.stack(expected, axis=1))
+    assert stretches.shapes == 5 + 4
+    # shorter periods are left out, whatever comes close
+    assert two(period=2.01).problem(NOTHING).stretches.shapes == 4 + 3
+    assert two(period=7.0).problem(NOTHING).stretches.shapes == 2 + 2
+
+
+def test_a_record_with_fewer_cosines_keeps_what_they_would_take():
+    problem = two(period=2.0).problem(NOTHING)
+    time = np.linspace(0, 1, 5)
+    own = np.stack([np.ones(5), time, np.cos(np.pi * time), np.cos(2 * np.pi * time)], axis=1)
+    fast = np.cos(4 * np.pi * time)
+    basis = FixedTerms(problem.stretches, problem.root_weight).parts[1][0]
+    assert np.abs(own - basis @ (basis.T @ own)).max() < 1e-12
+    # of what none of the four is, as much is left as by least squares
+    left = fast - own @ np.linalg.lstsq(own, fast, rcond=None)[0]
+    assert np.abs(left).max() > 0.1
+    assert fast - basis @ (basis.T @ fast) == pytest.approx(left, abs=1e-12)
+    # level, drift, cosines and a state of one pole
+    assert problem.own_count(1) == (5 + 1) + (4 + 1)
+
+
+def test_what_is_known_has_a_free_response_in_every_record():
+    known = KnownFactor(np.array([-0.7 + 0j, -0.2 + 3j, -0.2 - 3j]), np.ones(1))
+    shapes = two().problem(known).stretches.regressors
+    assert shapes.shape[1] == 2 + 3
+    clock = np.concatenate([0.5 * np.arange(7), 0.5 * np.arange(5)])
+    wave = np.exp((-0.2 + 3j) * clock)
+    expected = np.stack([np.exp(-0.7 * clock), wave.real, wave.imag], axis=1)
+    assert shapes[:, 2:] == pytest.approx(expected)
+
+
+def test_records_of_one_sample_have_a_clock_that_stands():
+    outputs, inputs = records(1)
+    data = SampledData(tuple(inputs), tuple(outputs), (0,), (1.0,), 0.5)
+    assert data.problem(NOTHING).stretches.regressors.tolist() == [[1.0, 0.0]]
+
+
+def test_two_records_of_one_plant_leave_nothing_of_either():
+    # a lag behind a delay; the first has a level and a drift, the second starts in motion
+    parameters = np.array([1.2, np.log(0.8)])
+    (pole,), _ = poles_from_parameters(parameters[None, 1:])
+    _, inputs = records(40, 30)
+    zero = [np.zeros(u.size) for u in inputs]
+    at_rest = cut(zero, inputs, 0.5)
+    model = respond(at_rest.problem(NOTHING).drive, NOTHING, np.array([2.0]), parameters)
+    first = model[:40] + 3.0 - 0.1 * np.arange(40)
+    second = model[40:] + 5.0 * np.exp(pole.real * 0.5 * np.arange(30))
+    state = evaluate(
+        cut([first, second], inputs, 0.5).problem(NOTHING), Structure(1, 1), parameters[None]
+    )
+    assert np.abs(state.residual).max() < 1e-12
+    assert state.numerator[0] == pytest.approx([2.0])
