@@ -109,7 +109,7 @@ MODULES = {
     "identification/prediction": "tests/identification/test_prediction.py "
     "tests/identification/test_residuals.py",
     "identification/cross_validation": "tests/identification/test_cross_validation.py",
-    "identification/bootstrap": "tests/identification/test_bootstrap.py",
+    "identification/bootstrap": "tests/identification/test_bootstrap_by_hand.py",
     "identification/campaign": "tests/identification/test_campaign_by_hand.py",
     "identification/campaign_flags": "tests/identification/test_campaign_flags.py",
     "identification/campaign_row": "tests/identification/test_campaign_row.py",
@@ -160,7 +160,7 @@ MODULES = {
     "numerics/rise": "tests/numerics/test_rise.py",
     "numerics/running_residual": "tests/numerics/test_running_residual.py",
     "numerics/sampled_data": "tests/numerics/test_sampled_data.py",
-    "numerics/sampled_fit": "tests/identification/test_delay_fit_any_input.py",
+    "numerics/sampled_fit": "tests/numerics/test_sampled_fit.py",
     "numerics/sines": "tests/numerics/test_sines.py",
     "numerics/spectra": "tests/numerics/test_spectra.py",
     "numerics/state_space": "tests/numerics/test_state_space.py",

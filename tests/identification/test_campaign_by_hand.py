@@ -179,6 +179,7 @@ def test_the_table_has_all_rows_in_their_order():
     assert (broken["flags"], broken["error"]) == ("", "DataError: it is")
     assert broken.drop(["flags", "error"]).isna().all()
     assert list(table.index) == ["a", "broken"]
+    assert campaign([FAILED]).table()["order"].dtype == float
 
 
 def test_rows_are_grouped_by_two_digits_of_their_height():

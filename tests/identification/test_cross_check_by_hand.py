@@ -41,9 +41,11 @@ def ways(monkeypatch):
         return of
 
     def fit_delay(given):
+        assert given.n_samples == set_up.n
         return SimpleNamespace(fit=answer(set_up.fit))
 
     def impulse_from_io(given, length):
+        assert given.n_samples == set_up.n
         set_up.asked.append(("any input", length))
         return set_up.impulse
 
@@ -64,7 +66,7 @@ def ways(monkeypatch):
 
     set_up.n = 400
     monkeypatch.setattr(cross_check, "fit_delay", fit_delay)
-    monkeypatch.setattr(cross_check, "unit_step", lambda given: "the unit step")
+    monkeypatch.setattr(cross_check, "unit_step", lambda given: f"step of {given.n_samples}")
     monkeypatch.setattr(cross_check, "impulse_from_io", impulse_from_io)
     monkeypatch.setattr(cross_check, "impulse_from_step", impulse_from_step)
     monkeypatch.setattr(cross_check, "estimate_delay", estimate_delay)
@@ -86,7 +88,7 @@ def test_a_step_is_seen_by_fit_first_motion_and_scan(ways):
     motion = ("first motion", "record", "upper bound", 0.7, 0.0, 0.7 + DT, "")
     assert seen(check) == [FIT, motion, SCAN]
     # 1.2 s are ten samples, and ten more
-    assert ways.asked == [("step", "the unit step"), ("scan", 2, 20)]
+    assert ways.asked == [("step", "step of 400"), ("scan", 2, 20)]
     assert (check.agree, check.common, check.conflicts) == (True, (0.4, 0.6), ())
     assert (check.dt, check.flags) == (DT, ())
 

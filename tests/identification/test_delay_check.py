@@ -50,6 +50,10 @@ def test_only_pairs_that_rule_each_other_out_are_in_conflict():
     common, pairs = common_dead_time([A, B, late, bound("p", 2.0), bound("q", 4.5)])
     assert common is None
     assert pairs == (("a", "late"), ("b", "late"), ("b", "p"), ("late", "p"))
+    # those that touch do not
+    touching = [A, view("b", 3.0, 3.5), view("c", 3.5, 4.0)]
+    for order in (touching, touching[::-1]):
+        assert [set(pair) for pair in common_dead_time(order)[1]] == [{"a", "c"}]
     # the interval of an upper bound begins where nothing is said: only its end counts
     assert common_dead_time([A, view("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
 
