@@ -84,7 +84,7 @@ def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) 
     """Cut long records; the shortest keep all they have."""
     lengths = np.minimum([y.size for y in outputs], MOST_SAMPLES)
     share = MOST_SAMPLES
-    while np.minimum(lengths, share).sum() > MOST_IN_ALL and share > MOST_IN_ALL // len(lengths):
+    while np.minimum(lengths, share).sum() > MOST_IN_ALL:
         share = max(int(0.9 * share), MOST_IN_ALL // len(lengths))
     lengths = np.minimum(lengths, share)
     return SampledData(
