@@ -27,6 +27,9 @@ NOTICED, SURVIVED, ENDLESS, UNREACHED, BROKEN = (
 SLACK, FACTOR = 10.0, 5.0
 """CPU seconds that a change may take beyond, and times, what the tests take without one."""
 
+MEMORY = 6 * 2**30
+"""Bytes of addresses that a change may take: a loop that fills a list ends in a MemoryError."""
+
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> bool:
@@ -81,6 +84,7 @@ def with_change(session: pytest.Session, name: str, order: list[int], limit: flo
     if child == 0:
         silence()
         resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         os.environ["MUTANT_UNDER_TEST"] = name
         items = [session.items[i] for i in order]
         try:
