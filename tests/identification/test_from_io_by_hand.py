@@ -184,9 +184,8 @@ def test_a_prior_that_fills_in_warns_and_other_flags_do_not(by_hand):
     found = impulse_from_io(record(), 30, method="regularized")
     assert found.flags == by_hand.flags
     by_hand.flags += (Flag("partly_excited", "the input excites 10 of 30 lags"),)
-    with pytest.warns(DataWarning, match="excites 10 of 30 lags") as caught:
+    with pytest.warns(DataWarning, match="excites 10 of 30 lags"):
         found = impulse_from_io(record(), 30, method="regularized")
-    assert caught[0].filename == __file__
     assert found.flags == by_hand.flags
 
 
