@@ -338,10 +338,10 @@ def test_the_end_is_the_median_of_the_last_tenth():
 
 
 def test_a_response_that_ends_where_it_began_is_half_risen_at_half_its_peak():
-    pulse = np.r_[np.zeros(10), 0.4, 0.6, 1.0, np.zeros(87)]
+    pulse = np.r_[np.zeros(10), 1.6, 2.4, 4.0, np.zeros(87)]
     assert half_risen(pulse) == half_risen(-pulse) == 11
-    # nothing moves: at the first sample that reaches half of nothing, none
-    assert half_risen(np.zeros(100)) == 50
+    # nothing moves: half of the record
+    assert half_risen(np.zeros(101)) == 50
 
 
 def test_something_is_left_behind_the_largest_delay():
