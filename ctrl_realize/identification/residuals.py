@@ -148,8 +148,7 @@ def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> tuple[Fla
 def _first_response(system: ct.StateSpace) -> FloatArray:
     """Return the Markov parameter at lag 0, shape (p, m), without forming chains of delays."""
     if isinstance(system, DelayedStateSpace):
-        first = np.asarray(system.markov(1), dtype=np.float64)
-        return first.reshape(system.noutputs, system.ninputs)
+        return system.markov(1).reshape(system.noutputs, system.ninputs)
     return np.asarray(system.D, dtype=np.float64)
 
 

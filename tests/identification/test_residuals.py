@@ -166,6 +166,17 @@ def test_the_bound_of_the_autocorrelation_is_that_of_white_noise():
     assert check.confidence == 0.95
 
 
+def test_the_bound_of_the_cross_correlation_grows_where_both_are_coloured():
+    one = record(n=20_000, colour=0.9, drive=0.9)
+    check = cr.check_residuals(TWO_STATES, one, confidence=0.95)
+    # sum of 0.9^|i| 0.9^|i| is 1.81 / 0.19; both correlations are known to some per cent
+    assert check.cross_bound.shape == (1, 1)
+    white = 1.959964 / np.sqrt(20_000)
+    assert_allclose(check.cross_bound[0, 0], white * np.sqrt(1.81 / 0.19), rtol=0.1)
+    plain = cr.check_residuals(TWO_STATES, record(n=20_000), confidence=0.95)
+    assert_allclose(plain.cross_bound[0, 0], white, rtol=0.05)
+
+
 def test_three_samples_for_each_lag_are_enough():
     assert cr.check_residuals(TWO_STATES, record(n=75), lags=25).lags.size == 51
     with pytest.raises(DataError, match="needs 75 samples, the record has 74"):
