@@ -161,10 +161,10 @@ def _no_choice(delay: int, interval: tuple[int, int], candidates: tuple[int, int
 
 def _too_far(speeds: FloatArray) -> str:
     """Say that the poles have left the range in which their moves count to first order."""
-    moved = float(np.abs(speeds).max(initial=0.0))
-    if moved <= SPEED_STD:
+    moved = float(max(speeds, key=abs, default=0.0))
+    if abs(moved) <= SPEED_STD:
         return ""
     return (
-        f"a pole has moved by {100 * np.expm1(moved):.0f} %, too far for the model that "
+        f"a pole has moved by {100 * np.expm1(moved):+.0f} %, too far for the model that "
         "changes are counted from; it is being renewed"
     )

@@ -187,4 +187,5 @@ def test_one_delay_stands_out_unless_it_is_at_an_end_or_half_of_all_fit():
 def test_poles_may_move_by_a_third_to_either_side():
     assert _too_far(np.array([])) == ""
     assert _too_far(np.array([0.3, -0.3])) == ""
-    assert "moved by 49 %" in _too_far(np.array([0.1, -0.4]))  # e^0.4 - 1
+    assert "moved by +49 %" in _too_far(np.array([0.1, 0.4]))  # e^0.4 - 1
+    assert "moved by -33 %" in _too_far(np.array([-0.4, 0.1]))  # e^-0.4 - 1
