@@ -156,7 +156,8 @@ def test_an_interval_holds_95_of_100_parts_of_the_chances():
 @pytest.mark.parametrize("vertex", [-0.4, 0.0, 0.3])
 def test_the_fraction_is_where_a_parabola_is_lowest(vertex):
     misfit = np.array([9.0, *(3 + 2 * (np.array([-1.0, 0.0, 1.0]) - vertex) ** 2), 9.0])
-    assert _fraction(misfit, 2) == pytest.approx(vertex, abs=1e-12)
+    for unit in (1.0, 1e-20):
+        assert _fraction(unit * misfit, 2) == pytest.approx(vertex, abs=1e-12)
 
 
 def test_there_is_no_fraction_at_the_ends_and_on_a_plain():
