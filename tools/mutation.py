@@ -83,8 +83,8 @@ MODULES = {
     "identification/fit_flags": "tests/identification/test_fit_flags.py",
     "identification/channels": "tests/identification/test_channels.py",
     "identification/channel_cores": "tests/identification/test_channels.py",
-    "identification/channel_fit": "tests/identification/test_channel_search.py "
-    "tests/identification/test_channel_fit.py",
+    "identification/channel_fit": "tests/identification/test_channel_fit_by_hand.py "
+    "tests/identification/test_channel_search.py",
     "identification/channel_fit_result": "tests/identification/test_channel_fit.py",
     "identification/channel_search": "tests/identification/test_channel_search.py "
     "tests/identification/test_channel_fit.py",
