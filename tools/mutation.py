@@ -77,7 +77,8 @@ MODULES = {
     "identification/impulses": "tests/identification/test_impulses.py",
     "identification/known_dynamics": "tests/identification/test_known_dynamics.py",
     "identification/averaging": "tests/identification/test_averaging.py",
-    "identification/delay_fit": "tests/identification/test_delay_fit_by_hand.py",
+    "identification/delay_fit": "tests/identification/test_delay_fit_steps.py "
+    "tests/identification/test_delay_fit_by_hand.py",
     "identification/delay_fit_result": "tests/identification/test_delay_fit_result.py",
     "identification/fit_summary": "tests/identification/test_fit_summary.py",
     "identification/fit_flags": "tests/identification/test_fit_flags.py",
