@@ -118,7 +118,8 @@ MODULES = {
     "identification/cross_check": "tests/identification/test_cross_check_by_hand.py",
     "identification/delay_check": "tests/identification/test_delay_check.py",
     "identification/identify": "tests/identification/test_identify_by_hand.py",
-    "identification/from_step": "tests/identification/test_steps.py",
+    "identification/from_step": "tests/identification/test_from_step.py "
+    "tests/identification/test_steps.py",
     "identification/packed_model": "tests/identification/test_packed_model.py",
     "identification/tracker": "tests/identification/test_tracker_by_hand.py "
     "tests/identification/test_tracker.py",
