@@ -51,7 +51,9 @@ MODULES = {
     "numerics/onset": "tests/numerics/test_onset.py",
     "numerics/process_step": "tests/numerics/test_process_step.py",
     "numerics/pole_factors": "tests/numerics/test_pole_factors.py",
-    "numerics/separable_fit": "tests/numerics/test_separable_fit.py",
+    "numerics/separable_fit": "tests/numerics/test_separable_batch.py "
+    "tests/numerics/test_own_terms.py "
+    "tests/numerics/test_separable_fit.py",
     "numerics/structure_search": "tests/numerics/test_structure_search.py "
     "tests/numerics/test_separable_fit.py",
     "numerics/delay_bound": "tests/numerics/test_delay_bound.py",
