@@ -102,17 +102,23 @@ def test_phases_fall_with_the_delay_and_are_not_wrapped():
     np.testing.assert_allclose(low, lag - 9 * omega * DT, atol=1e-9)
 
 
-def test_models_on_both_sides_of_half_a_turn_are_close():
-    # two samples of delay turn by half where one turns by a quarter; a pole tilts that by itself
-    poles = np.array([0.01, -0.02, 0.03, -0.04])
-    systems = tuple(
-        cr.DelayedStateSpace(ct.ss([[p]], [[1.0]], [[1.0]], [[0.0]], DT), 1) for p in poles
-    )
-    result = Bootstrap(systems[0], systems, np.ones(4), "residuals", 7, 0)
-    low, high = result.phase_band(np.array([0.5, 0.51]) * np.pi / DT, level=0.6)
-    # of four the first and the last, on the side of the first model
-    ends = np.pi - np.arctan([0.03, -0.04])
-    np.testing.assert_allclose([low[0], high[0]], ends, atol=1e-12)
+def test_phases_are_taken_within_half_a_turn_of_the_first_model():
+    phases = np.array([2.2, -2.2, 3.1, -3.1, 2.0])
+    systems = tuple(lambda z, phase=phase: np.exp([1j * phase]) for phase in phases)
+    result = Bootstrap(model(), systems, np.ones(5), "residuals", 7, 0)
+    # of five in a row 1 / 6 and 5 / 6: 2, 2.2, 3.1, 2 pi - 3.1 and 2 pi - 2.2
+    low, high = result.phase_band([1.0], level=2 / 3)
+    np.testing.assert_allclose([low[0], high[0]], [2.0, 2 * np.pi - 2.2], rtol=1e-12)
+
+
+def test_bands_are_of_95_percent_unless_asked():
+    result = drawn(np.arange(79.0))
+    for ask, what in (
+        (result.step_band, 3),
+        (result.magnitude_band, [1.0]),
+        (result.phase_band, [1.0]),
+    ):
+        np.testing.assert_array_equal(ask(what), ask(what, level=0.95))
 
 
 def test_failed_draws_and_coarse_rounding_are_flagged():
@@ -160,6 +166,11 @@ def test_offset_and_slope_are_not_in_the_residual():
     response, residual = _model_and_residual(model(), given)
     np.testing.assert_allclose(residual, 0.0, atol=1e-10)
     np.testing.assert_allclose(response, given.output, atol=1e-10)
+    # the rest is where the input is at first
+    early = cr.Record(
+        TIME, np.where(k < 1, 5.0, 6.0), 7 + 2 * (1 - 0.5 ** np.clip(k - 2.0, 0, None))
+    )
+    np.testing.assert_allclose(_model_and_residual(model(), early)[1], 0.0, atol=1e-10)
     noise = np.where(k % 2, 1.0, -1.0)
     response, residual = _model_and_residual(model(), record(step + noise))
     np.testing.assert_allclose(response + residual, step + noise, atol=1e-12)
@@ -286,8 +297,8 @@ def asked():
 
 
 def test_one_record_stays_one_and_four_stay_four(asked):
-    result = cr.bootstrap(NOISY[0], asked, repeats=3, block=8)
-    assert (result.kind, result.block, result.failed) == ("residuals", 8, 0)
+    result = cr.bootstrap(NOISY[0], asked, repeats=3, block=17)
+    assert (result.kind, result.block, result.failed) == ("residuals", 17, 0)
     assert asked.given[0] is NOISY[0]
     assert [type(draw) for draw in asked.given[1:]] == [cr.Record] * 3
     asked.given.clear()
