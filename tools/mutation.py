@@ -66,7 +66,8 @@ MODULES = {
     "numerics/own_terms": "tests/numerics/test_own_terms.py",
     "numerics/svd": "tests/numerics/test_svd.py",
     "numerics/lag_chains": "tests/numerics/test_lag_chains.py",
-    "numerics/dispersed_flow": "tests/numerics/test_dispersed_flow.py",
+    "numerics/dispersed_flow": "tests/numerics/test_flow_fit.py "
+    "tests/numerics/test_dispersed_flow.py",
     "numerics/fir_kernels": "tests/numerics/test_fir_kernels.py",
     "numerics/kernel_priors": "tests/numerics/test_fir_kernels.py",
     "numerics/kernel_search": "tests/numerics/test_fir_kernels.py",
