@@ -248,6 +248,9 @@ def test_records_of_one_plant_have_one_sample_time_and_the_same_channels():
     assert as_group(one) == (one,)
     with pytest.raises(DataError, match=r"record 2 has the sample time 0\.10011 s, the first"):
         as_group([one, near, far])
+    # of nanoseconds as well
+    with pytest.raises(DataError, match="sample time 2e-09 s, the first one 1e-09 s"):
+        as_group([record(dt=1e-9), record(dt=2e-9)])
     with pytest.raises(DataError, match="record 1 has 2 inputs and 1 outputs, the first one 1 and"):
         as_group([one, record(m=2)])
     with pytest.raises(DataError, match="record 1 has 1 inputs and 2 outputs"):

@@ -216,6 +216,20 @@ def test_an_arx_model_is_least_squares_and_its_first_markov_parameters_are_its_o
     assert found.arx.a.shape == (3, p, p)
 
 
+def test_records_join_to_one_arx_model_with_a_level_each():
+    one, other = record(seed=1), record(seed=2, level=-30.0)
+    # one of three samples has no past of three
+    found = through_arx((one, record(n=3, seed=3), other), 5, "unknown", 3)
+    (X, y), (Z, z) = (tall(each, 3, 4, of_output=3) for each in (one, other))
+    split = np.zeros((154, 9))
+    split[:77, [0, *range(2, 9)]], split[77:, 1:] = X, Z
+    theta, std, _ = plain(split, np.concatenate([y, z], axis=1))
+    assert found.rows == 154
+    assert_allclose(found.arx.a[:, 0, 0], -theta[2:5, 0], rtol=0, atol=1e-10)
+    assert_allclose(found.arx.b[:, 0, 0], theta[5:, 0], rtol=0, atol=1e-10)
+    assert_allclose(found.arx.b_std[:, 0, 0], std[5:, 0], rtol=1e-8)
+
+
 def test_an_arx_model_of_other_units_is_the_same_in_other_units():
     one = record()
     small = cr.Record(one.time, 1e3 * one.input, 1e-9 * one.output)

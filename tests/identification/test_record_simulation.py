@@ -129,6 +129,13 @@ def test_systems_that_do_not_fit_the_record_are_refused(system, error, match):
         as_delayed(system, record(np.ones(9), np.ones(9)))
 
 
+def test_sample_times_of_nanoseconds_differ_as_well():
+    one = record(np.ones(9), np.ones(9), dt=1e-9)
+    assert as_delayed(core(dt=1e-9), one).dt == 1e-9
+    with pytest.raises(DataError, match="1e-09 s, the system 2e-09 s"):
+        as_delayed(core(dt=2e-9), one)
+
+
 def test_systems_that_just_fit_are_taken():
     one = record(np.ones(9), np.ones(9))
     assert as_delayed(core(dt=1.0009 * DT), one).delay == 0

@@ -302,6 +302,9 @@ def test_a_record_of_one_channel_and_the_model_s_sample_time_is_taken(by_hand):
     assert_array_equal(tracker().run(rows).dead_time, track.dead_time)
     with pytest.raises(DataError, match=r"the record has the sample time 0\.010011 s, the model"):
         tracker().run(cr.Record(DT * (1 + 1.1e-3) * np.arange(50), U[:50], U[:50]))
+    fast = cr.DelayTracker(ct.ss(CORE.A, CORE.B, CORE.C, CORE.D, 1e-9), max_delay=9, memory=1e-6)
+    with pytest.raises(DataError, match="sample time 2e-09 s, the model 1e-09 s"):
+        fast.run(cr.Record(2e-9 * np.arange(50), U[:50], U[:50]))
     with pytest.raises(DataError, match="several channels"):
         tracker().run(cr.Record(one.time, np.stack([U[:50], U[:50]]), U[:50]))
     with pytest.raises(DataError, match="5 samples, fewer than the 6 between"):
