@@ -38,7 +38,7 @@ def ways(monkeypatch):
         return take
 
     monkeypatch.setattr(module, "fit_records", way("fit_records", lambda: set_up.fitted))
-    monkeypatch.setattr(module, "unit_step", lambda record: "the step")
+    monkeypatch.setattr(module, "unit_step", lambda record: {RECORD: "the step"}[record])
     for name in ("fit_channels", "with_modes_judged", "_paper", "_scan"):
         monkeypatch.setattr(module, name, way(name))
     return set_up
@@ -145,11 +145,12 @@ def test_an_order_stands_for_all_its_relative_degrees(monkeypatch):
     fit_records(RECORD, order=3, loss="huber")
     fit_records(RECORD, structures=[(2, 1)])
     fit_records(RECORD, order=8)
+    fit_records(RECORD, order=1)
     assert asked[:2] == [
         ((RECORD,), {"structures": [(3, 1), (3, 2), (3, 3)], "loss": "huber"}),
         ((RECORD,), {"structures": [(2, 1)]}),
     ]
-    assert len(asked[2][1]["structures"]) == 8
+    assert [len(how["structures"]) for _, how in asked[2:]] == [8, 1]
     for order in (0, 9, 1.0):
         with pytest.raises(OptionError, match="order="):
             fit_records(RECORD, order=order)
@@ -190,6 +191,7 @@ def steps(monkeypatch):
     )
 
     def impulse_from_step(step, **how):
+        assert isinstance(step, Step)
         set_up.asked.append(("impulse", how))
         return set_up.impulse
 
@@ -306,6 +308,7 @@ def test_a_scan_is_called_by_its_record(steps):
     record = cr.Record(TIME, TIME, TIME, name="a.b", input_labels=["i"], output_labels=["x"])
     system = scanned(Step(RISING, record), 1)
     assert (system.name, system.input_labels, system.output_labels) == ("a_b", ["i"], ["x"])
+    assert len(system.fit.choices) == 3
     nameless = scanned(Step(RISING, RECORD), 1)
     assert (nameless.name, nameless.input_labels) == ("own", list(RECORD.input_labels))
     assert scanned(Step(RISING), 1).name == "own"
@@ -326,12 +329,15 @@ def test_a_step_response_is_half_risen_where_it_first_reaches_half_its_end():
     assert half_risen(-ramp, -np.ones(100)) == 25
     assert half_risen(-ramp, np.zeros(9), np.ones(100)) == 60  # an inverse response does not count
     assert half_risen(ramp, 2 * np.ones(100)) == 50
+    assert half_risen(3 * ramp, 2 * np.ones(100)) == 17  # of 2, not of the peak: 1 / 0.06
 
 
 def test_the_end_is_the_median_of_the_last_tenth():
     end = np.full(10, 4.0)
     end[:4] = -50.0
     assert half_risen(np.zeros(20), np.full(30, 1.9), np.full(40, 2.0), end) == 50
+    tenth = np.r_[np.full(6, 4.0), np.full(5, -50.0)]  # eleven of 110
+    assert half_risen(np.zeros(20), np.full(39, 1.9), np.full(40, 2.0), tenth) == 59
     # of few samples the last three
     few = [0.0, 0.0, 2.1, 2.1, 0.0]
     assert half_risen(np.zeros(4), np.ones(6), np.full(14, 2.1), few) == 10
@@ -347,6 +353,7 @@ def test_a_response_that_ends_where_it_began_is_half_risen_at_half_its_peak():
 def test_something_is_left_behind_the_largest_delay():
     late = np.r_[np.zeros(90), np.ones(10)]
     assert half_risen(late) == 75  # a quarter
+    assert half_risen(np.zeros(2), late) == 77  # of 102 samples 25
     assert half_risen(np.zeros(20), np.ones(5)) == 13  # twelve samples
     assert half_risen(np.ones(30)) == 1
     assert half_risen(np.ones(5)) == 1
