@@ -104,6 +104,8 @@ def test_orders_are_tried_once_in_their_order(surface):
         ("pulses", (2, 4), 5, 20, True, "padded", DT),
         ("pulses", (1, 2), 5, None, None, "square", None),
     ]
+    scanned(1)
+    assert surface.asked[-1][1] == (1,)
     cr.scan_orders("pulses", max_delay=5)
     assert surface.asked[-1][1] == (1, 2, 3, 4, 5, 6, 7, 8)
     for orders, match in (([], "empty"), (0, "orders=0"), ([0], "orders=0"), ("3", "orders='3'")):
