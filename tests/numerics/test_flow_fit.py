@@ -218,6 +218,24 @@ def test_a_profile_goes_from_the_optimum_to_three_errors_and_its_bounds():
     assert delay.size == 1 + 5 + 2
 
 
+def test_a_profile_of_a_flow_with_a_lag_keeps_the_lag():
+    fit = flow_fit(lagging=True)
+    x = np.append(TRUTH, np.log(0.7 / 4))
+    data = 5 + 2 * fit._response(x) + 0.01 * np.random.default_rng(0).standard_normal(SIZE)
+    fit = replace(fit, problem=replace(fit.problem, data=data))
+    x = fit.improved(x)
+    flow = DispersedFlow(*fit.times(x), fit.cost(x), 0.0, 0.0)
+    assert 0.2 < flow.lag < 1.0
+    delay, excess = flow_profile(fit.problem, flow, SCALES, 0.01**2)
+    best = int(np.argmin(excess))
+    for i in (best - 1, best + 1):
+        other = fit.improved(np.append(delay[i] / 4, x[1:]), fixed_delay=True)
+        assert excess[i] == pytest.approx((fit.cost(other) - flow.cost) / 0.01**2, rel=1e-6)
+    # without one it would be another
+    plain = flow_profile(fit.problem, replace(flow, lag=0.0), SCALES, 0.01**2)[1]
+    assert abs(plain[best - 1] - excess[best - 1]) > 0.01
+
+
 # --- which are followed
 
 
