@@ -18,7 +18,7 @@ FLAG = Flag("no_response", "output 0 shows no response")
 def estimate(markov=(0.0, 1.0, 0.5), std=(0.01, 0.0234, 0.02), noise=(0.125,), **beside):
     settings = {"method": "TC kernel, 3 free parameters", "rows": 560, **beside}
     return ImpulseEstimate(
-        np.array(markov), 0.05, std=np.array(std), noise_std=np.array(noise), **settings
+        np.array(markov), 0.012345678, std=np.array(std), noise_std=np.array(noise), **settings
     )
 
 
@@ -27,7 +27,7 @@ def test_a_report_has_the_gain_the_largest_error_and_the_noise():
     assert told.splitlines() == [
         "Impulse response 'hairdryer'",
         "  method       TC kernel, 3 free parameters",
-        "  length       3 samples of 50 ms, 560 equations",
+        "  length       3 samples of 12.3457 ms, 560 equations",
         "  sum (gain)   1.5",
         "  largest std  0.0234",
         "  noise left   0.125",
@@ -49,7 +49,7 @@ def test_an_estimate_keeps_what_it_is_given_and_cannot_be_changed():
     made = estimate(name="rig", flags=(FLAG,), choices=("a",))
     again = pickle.loads(pickle.dumps(made))
     for one in (made, again):
-        assert (one.dt, one.name, one.rows) == (0.05, "rig", 560)
+        assert (one.dt, one.name, one.rows) == (0.012345678, "rig", 560)
         assert (one.flags, one.choices) == ((FLAG,), ("a",))
         assert_array_equal(one.std, [0.01, 0.0234, 0.02])
         assert_array_equal(one.noise_std, [0.125])
@@ -59,4 +59,4 @@ def test_an_estimate_keeps_what_it_is_given_and_cannot_be_changed():
             array[0] = 1.0
     with pytest.raises(FrozenInstanceError):
         made.rows = 1
-    assert repr(made) == "<ImpulseEstimate 'rig': 3 samples of 0.05 s>"
+    assert repr(made) == "<ImpulseEstimate 'rig': 3 samples of 0.0123457 s>"

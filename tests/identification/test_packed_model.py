@@ -48,6 +48,16 @@ def test_unpacking_gives_the_model_bit_by_bit(system):
         assert twin.state_labels == system.state_labels
 
 
+@pytest.mark.parametrize("removed", [False, True])
+def test_states_that_nothing_reaches_are_kept(monkeypatch, removed):
+    # whatever python-control is told to do with them when a system is made
+    core = ct.ss(np.diag([0.5, 0.0]), [[1.0], [0.0]], [[1.0, 0.0]], [[0.0]], 0.1)
+    system = cr.DelayedStateSpace(core, 3)
+    assert system.delay_free.nstates == 2
+    monkeypatch.setitem(ct.config.defaults, "statesp.remove_useless_states", removed)
+    assert_array_equal(PackedModel.of(system).unpack().delay_free.A, system.delay_free.A)
+
+
 def test_the_fit_is_the_same_object():
     fit = object()
     packed = PackedModel.of(cr.DelayedStateSpace(SISO, 3, fit=fit))
