@@ -102,6 +102,14 @@ def test_orders_above_the_rank_are_refused_with_it():
             cr.realize(LAG, **{"order": 1, "dt": DT, **wrong})
 
 
+def test_a_padded_matrix_holds_twice_as_many_orders():
+    noise = np.random.default_rng(0).standard_normal(9)
+    assert cr.realize(noise, 8, hankel="padded", dt=DT).fit.order == 8
+    for hankel, most in (("padded", 8), ("square", 4)):
+        with pytest.raises(OrderError, match=f"1 <= order <= {most}$"):
+            cr.realize(noise, most + 1, hankel=hankel, dt=DT)
+
+
 def test_flags_of_filter_poles_and_gap_stand_together():
     causal = cr.FilterSpec(5, 1.0, zero_phase=False, dt=DT)
     noise = np.random.default_rng(0).standard_normal(60)
@@ -164,9 +172,9 @@ def test_a_model_that_grows_beyond_all_numbers_is_off_without_bound():
 def test_poles_are_judged_by_what_they_keep():
     assert codes(_pole_flags(np.diag([0.3, 1.0]), 9)) == ["unstable"]
     assert codes(_pole_flags(np.diag([0.3, 1 - 1e-9]), 9)) == ["not_died_away"]
-    (kept,) = _pole_flags(np.diag([0.5, 0.1]), 2)
+    (kept,) = _pole_flags(np.diag([0.9, 0.1]), 2)
     assert kept.code == "not_died_away"
-    assert "magnitude 0.50000 and keeps 25 % of its response at the end of the 2 " in kept.message
+    assert "magnitude 0.90000 and keeps 81 % of its response at the end of the 2 " in kept.message
     assert _pole_flags(np.diag([0.5, 0.1]), 3) == ()  # an eighth
     turn = 0.5 * np.array([[0.6, -0.8], [0.8, 0.6]])  # a pair of magnitude 0.5
     assert codes(_pole_flags(turn, 2)) == ["not_died_away"]
