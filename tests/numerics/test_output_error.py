@@ -240,9 +240,13 @@ def test_the_fit_of_least_noise_sets_the_unit():
 def test_wild_samples_count_as_three_deviations(wildest):
     wild = way(90)
     wild[1].error[0] = wildest
-    # one sample of 3 instead of 0.95: 8.1 more
+    # one sample of 3 instead of 0.95: 8.1 more; of 6 where the closer one leaves twice as much
     assert chosen(wild, way(90 + 8.0)) == 1
     assert chosen(wild, way(90 + 8.2)) == 0
+    louder = way(90, sigma=2.0)
+    louder[1].error[0] = wildest
+    assert chosen(louder, way(90 + 35.0, sigma=2.1)) == 1
+    assert chosen(louder, way(90 + 35.2, sigma=2.1)) == 0
 
 
 # --- whether it is noise
@@ -261,7 +265,7 @@ def residual(monkeypatch):
         return SimpleNamespace(residual=seen.values[None])
 
     monkeypatch.setattr(module, "evaluate", evaluate)
-    monkeypatch.setattr(module, "settled_at", lambda data: seen.settled)
+    monkeypatch.setattr(module, "settled_at", lambda data: data.edge - 10 + seen.settled)
     return seen
 
 
@@ -294,6 +298,10 @@ def test_a_louder_one_is_noise_if_it_goes_on_when_the_response_has_settled(resid
     assert is_noise(5.0)
     residual.values[10:30] *= 1.31 / 1.29
     assert not is_noise(5.0)
+    # the sample at which the input moves is in motion
+    residual.values[10:30] = np.where(np.arange(20) == 0, 9.0, 1.0)
+    assert not is_noise(5.0)
+    residual.values[10:30] = 1.31
     # of both, the mean squares count
     residual.values[45:60] *= 1.1
     assert is_noise(5.0)
@@ -311,7 +319,7 @@ def test_of_fewer_than_sixteen_bins_nothing_is_concluded(residual):
 
 
 def test_the_delay_is_the_median_of_five_views_and_the_interval_leaves_the_lowest_out(monkeypatch):
-    monkeypatch.setattr(module, "profile_of", lambda whole, candidate: ("profile", candidate))
+    monkeypatch.setattr(module, "profile_of", lambda *of: ("profile", *of))
     monkeypatch.setattr(module, "assembled", lambda *given: given)
     views = tuple((str(at), at) for at in (3.0, 9.0, 1.0, 4.0, 7.0, 2.0))
     best = Candidate(TWO, np.zeros(2), 0.0)
@@ -321,8 +329,8 @@ def test_the_delay_is_the_median_of_five_views_and_the_interval_leaves_the_lowes
     assert model == (best, 4.0)
     assert adequate is False
     assert kept == views
-    assert profiles == {TWO: ("profile", best)}
-    assert profile == ("profile", best)
+    assert profiles == {TWO: ("profile", whole, best)}
+    assert profile == ("profile", whole, best)
     assert interval == (2.0, 9.0, pytest.approx(7 / 3.92))
 
 
@@ -337,8 +345,8 @@ def test_views_are_of_the_beginning_the_rise_and_all_of_it(monkeypatch):
         )
 
     monkeypatch.setattr(module, "_fit_until", fit_until)
-    monkeypatch.setattr(module, "stop_at", lambda data, part: 100 * part)
     data, best = record(), Candidate(TWO, np.array([8.0]), 0.0)
+    monkeypatch.setattr(module, "stop_at", lambda of, part: 100 * part if of is data else None)
     found = _views(data, best, None, KNOWN, True)
     assert found == (
         ("first motion", 4.5),
