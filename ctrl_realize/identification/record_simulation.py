@@ -69,7 +69,7 @@ def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
 
 
 def _pieces(samples: int) -> list[tuple[int, int]]:
-    edges = np.unique(np.linspace(0, samples, min(samples, PIECES) + 1).round().astype(int))
+    edges = np.unique(np.linspace(0, samples, min(samples, PIECES) + 1).round())
     return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 

@@ -135,7 +135,7 @@ def _fraction(misfit: FloatArray, best: int) -> float:
         return 0.0
     before, here, after = misfit[best - 1 : best + 2]
     bend = before - 2 * here + after
-    return float(np.clip((before - after) / (2 * bend), -0.5, 0.5)) if bend > 0 else 0.0
+    return float((before - after) / (2 * bend)) if bend > 0 else 0.0
 
 
 def _no_reply(explained: float, gain: float, gain_std: float) -> str:
