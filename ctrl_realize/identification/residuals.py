@@ -149,7 +149,7 @@ def _first_response(system: ct.StateSpace) -> FloatArray:
     """Return the Markov parameter at lag 0, shape (p, m), without forming chains of delays."""
     if isinstance(system, DelayedStateSpace):
         return system.markov(1).reshape(system.noutputs, system.ninputs)
-    return np.asarray(system.D, dtype=np.float64)
+    return np.asarray(system.D)
 
 
 def _two_sided(residual: FloatArray, drive: FloatArray, lags: int) -> FloatArray:

@@ -192,6 +192,27 @@ def test_what_rounding_leaves_says_nothing_about_the_model():
         assert np.all(check.residual == 0) == whether
 
 
+def test_what_rounding_leaves_is_small_beside_its_own_output():
+    one = record(MIMO)
+    y = one.output * np.array([[1e9], [1.0], [1.0]])
+    core = MIMO.delay_free
+    C, D = (np.diag([1e9, 1.0, 1.0]) @ M for M in (core.C, core.D))
+    system = cr.DelayedStateSpace(
+        ct.ss(core.A, core.B, C, D, DT), MIMO.input_delays, output_delay=MIMO.output_delays
+    )
+    check = cr.check_residuals(system, cr.Record(one.time, one.input, y))
+    assert_allclose(check.residual.std(axis=1), [0.05e9, 0.05, 0.05], rtol=0.1)
+
+
+def test_results_have_the_shape_of_the_output():
+    one = record(n=90)
+    for each in (one, cr.Record(one.time, one.input, one.output[None]), record(MIMO, n=90)):
+        system = MIMO if each.n_outputs == 3 else TWO_STATES
+        check = cr.check_residuals(system, each, lags=1)
+        assert check.simulated.shape == check.residual.shape == each.output.shape
+        assert check.cross.shape == (each.n_outputs, each.n_inputs, 3)
+
+
 @pytest.mark.parametrize("confidence", [0.0, 1e-13, 1 - 1e-13, np.nan, "high"])
 def test_a_confidence_is_a_probability(confidence):
     with pytest.raises(OptionError, match="confidence"):
