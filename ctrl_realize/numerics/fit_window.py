@@ -69,7 +69,7 @@ class Window:
             return np.asarray(problem.data - state.residual[0])
         setting = problem.known, state.numerator[0], candidate.parameters
         model = respond(self.drive, *setting) + self.columns @ state.regression[0]
-        if problem.stretches is not None and self.own is not None:
+        if self.own is not None:
             weight = problem.root_weight
             terms = problem.own_terms(candidate.poles[None])
             rest = weight * (problem.data - respond(problem.drive, *setting))
@@ -214,5 +214,5 @@ def _ringing(error: FloatArray, dt: float) -> float:
     """Angular frequency that stands out of what a first-order fit leaves over."""
     if error.size < 16:
         return 0.0
-    power = np.abs(np.fft.rfft(error - error.mean())) ** 2
-    return float(2 * np.pi * (int(np.argmax(power[2:])) + 2) / (error.size * dt))
+    lines = np.abs(np.fft.rfft(error - error.mean()))
+    return float(2 * np.pi * (int(np.argmax(lines[2:])) + 2) / (error.size * dt))

@@ -112,16 +112,20 @@ def test_a_free_response_is_predicted_at_every_sample():
 
 
 class ByHand:
-    """A window whose model is zero for one lag, and `better` of the output for others."""
+    """A window whose model is `rough` for one lag, and `better` of the output for others."""
 
-    def __init__(self, output, start=0, columns=1, better=0.0):
-        self.output, self.start, self.better = output, start, better
+    def __init__(self, output, start=0, columns=1, better=0.0, rough=0.0):
+        self.output, self.start, self.better, self.rough = output, start, better, rough
         self.columns = np.ones((output.size, columns))
         self.problem = HandProblem(output)
 
     def predict(self, problem, candidate):
         assert isinstance(problem, HandProblem)
-        return self.better * self.output if candidate.structure != ONE else 0 * self.output
+        return (
+            self.better * self.output
+            if candidate.structure != ONE
+            else 0 * self.output + self.rough
+        )
 
     def with_output(self, values):
         return HandProblem(values)
@@ -164,7 +168,9 @@ def fitted(window, noise=(1.0, 0.0), huber=False, structures=(ONE, TWO)):
 
 def test_a_first_order_fit_comes_first_and_tells_the_ringing(searched):
     wave = np.sin(2 * np.pi * np.arange(1000) / 25)
-    window = ByHand(np.concatenate([9 * noise(200), wave]), start=200)
+    slow = np.sin(2 * np.pi * np.arange(1200) / 300)
+    output = np.concatenate([9 * noise(200), wave]) + 5 * slow
+    window = ByHand(output, start=200, rough=5 * slow)
     found = fitted(window)
     (rough, first, scales, _), (problem, second, informed, _) = searched.searches
     assert rough is problem is window.problem
@@ -209,6 +215,7 @@ def test_own_terms_are_counted(searched):
         ONE: pytest.approx(500 / variance + 3 * charge + 7),
         TWO: pytest.approx(100 / variance + 4 * charge + 14),
     }
+    assert found.criteria(found.candidates) == pytest.approx(found.criterion)
 
 
 def test_where_hardly_a_sample_is_free_one_is_counted(searched):
@@ -383,6 +390,8 @@ def test_residuals_are_wild_where_two_in_a_thousand_are_beyond_four_deviations()
     mild = noise(2000)
     mild[:10] = 3.5
     assert not _wild(mild)
+    mild[:10] = 4.5
+    assert _wild(mild)
 
 
 def test_the_ringing_is_the_highest_line_above_two_periods():
