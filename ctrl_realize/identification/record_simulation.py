@@ -25,8 +25,9 @@ PIECES = 16
 def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatArray:
     """Simulate the outputs of a record, shape (p, N), with the start that fits it best.
 
-    An offset of every output is always free. With ``start="estimate"`` so are the state of the
-    core, and what was on its way through the dead times when the record began.
+    Misses count as parts of the range of each output. An offset of every output is always free.
+    With ``start="estimate"`` so are the state of the core, and what was on its way through the
+    dead times when the record began.
     """
     one_of(start, "start", ("estimate", "rest"))
     check_complete(record, "a simulation")
@@ -39,10 +40,20 @@ def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatA
     if start == "estimate":
         columns += _unknown_starts(model, N)
     regressors = np.hstack(columns)
-    scale = np.linalg.norm(regressors, axis=0)
+    # Every output in its own unit, lest the large ones alone say where the simulation starts.
+    unit = np.repeat(_units(y), N)
+    alike = regressors / unit[:, None]
+    scale = np.linalg.norm(alike, axis=0)
     scale[scale == 0] = 1.0
-    weights = np.linalg.lstsq(regressors / scale, (y - forced).ravel(), rcond=1e-10)[0]
+    weights = np.linalg.lstsq(alike / scale, (y - forced).ravel() / unit, rcond=1e-10)[0]
     return np.asarray(forced + (regressors @ (weights / scale)).reshape(p, N))
+
+
+def _units(outputs: FloatArray) -> FloatArray:
+    """Range of every output over the largest one; 1 where an output stands still."""
+    ranges = np.ptp(outputs, axis=1)
+    largest = ranges.max() or 1.0
+    return np.asarray(np.where(ranges > 0, ranges, largest) / largest)
 
 
 def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:

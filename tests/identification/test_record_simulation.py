@@ -90,6 +90,31 @@ def test_each_output_has_its_own_offset_and_delay():
     assert_allclose(simulate_record(system, one, "estimate"), one.output, rtol=0, atol=1e-9)
 
 
+def test_units_of_the_outputs_do_not_matter():
+    units = np.array([[1e9], [1.0]])
+    plant = ct.ss([[0.8]], [[1.0]], [[1.0], [2.0]], np.zeros((2, 1)), DT)
+    other = ct.ss(plant.A, plant.B, units * plant.C, plant.D, DT)
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal(60)
+    y = cr.DelayedStateSpace(plant, 3).simulate(u) + 0.1 * rng.standard_normal((2, 60))
+    found, scaled = (
+        simulate_record(cr.DelayedStateSpace(core, 3), record(u[10:], of[:, 10:]), "estimate")
+        for core, of in ((plant, y), (other, units * y))
+    )
+    # 1e9 in 16 digits
+    assert_allclose(scaled / units, found, rtol=0, atol=1e-6)
+
+
+def test_an_output_that_stands_still_has_a_start_as_well():
+    still = ct.ss([[0.8]], [[1.0]], [[1.0], [0.0]], np.zeros((2, 1)), DT)
+    u = np.random.default_rng(0).standard_normal(60)
+    y = cr.DelayedStateSpace(still, 3).simulate(u) + np.array([[2.0], [5.0]])
+    found = simulate_record(cr.DelayedStateSpace(still, 3), record(u[10:], y[:, 10:]), "estimate")
+    assert_allclose(found, y[:, 10:], rtol=0, atol=1e-9)
+    calm = record(np.ones(9), np.full((2, 9), 4.0))
+    assert_allclose(simulate_record(still, calm, "rest"), 4.0, rtol=0, atol=1e-12)
+
+
 def test_at_rest_means_at_the_first_sample_of_the_input():
     u = np.r_[2.0, 5.0, np.zeros(8)]
     found = simulate_record(core(D=1.0), record(u, np.zeros(10)), "rest")[0]
