@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -58,6 +60,20 @@ def test_a_filter_settles_within_ten_times_the_samples():
     assert cr.impulse_from_step(one, cutoff_hz=lowest * 1.0001).filter is not None
     with pytest.raises(OptionError, match=r"30 s to settle, the step response is 2\.4 s long"):
         cr.impulse_from_step(one, cutoff_hz=lowest / 1.0001)
+
+
+@pytest.mark.parametrize("zero_phase", [True, False])
+def test_zeros_are_before_a_rest_that_is_shorter_than_the_filter_settles(zero_phase):
+    def expected(one, zeros):
+        joint = np.concatenate([np.zeros(zeros), one.pre, one.output])
+        pulses = low_pass(np.diff(joint, prepend=joint[0]), 5, 10.0, DT, zero_phase=zero_phase)
+        return pulses[zeros + one.pre.size :]
+
+    # five periods of 10 Hz are 50 samples
+    for before, zeros in ((20, 200), (54, 0)):
+        one = replace(step(before), pre=step(before).pre + 0.3)
+        found = cr.impulse_from_step(one, cutoff_hz=10.0, zero_phase=zero_phase).markov
+        assert_allclose(found, expected(one, zeros), rtol=0, atol=1e-14)
 
 
 def test_what_is_no_step_response_is_named():
