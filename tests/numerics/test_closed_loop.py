@@ -72,6 +72,9 @@ def test_what_never_comes_near_bears_any_gain():
     # to the right, at rest, or past -1 at more than half: |sin| of its angle is 0.89
     aside = np.array([1.0, 0.0, 2j, -1 + 2j, 3 - 4j])
     assert gain_gaps(aside, 0.5) == [(0.0, math.inf)]
+    # or so small that its square vanishes
+    assert gain_gaps(np.array([-1e-200 + 0j]), 0.5) == [(0.0, math.inf)]
+    assert largest_gain(np.array([-1e-200 + 0j]), 0.5) == (math.inf, 0)
     assert largest_gain(aside, 0.5) == (math.inf, 0)
 
 

@@ -197,7 +197,12 @@ def test_the_closest_point_of_a_curve_is_found():
 
     distance, at = smallest_distance(curve, np.geomspace(0.1, 50, 40))
     assert distance == pytest.approx(0.1, rel=1e-9)
-    assert at == pytest.approx(3.0, rel=1e-6)
+    # of the half between two points of the grid, eleven times a quarter
+    assert at == pytest.approx(3.0, abs=1e-7)
+    # the same far from the origin
+    distance, at = smallest_distance(lambda omega: curve(omega) + 2j, np.geomspace(0.1, 50, 40))
+    assert distance == pytest.approx(2.1, rel=1e-9)
+    assert at == pytest.approx(3.0, abs=1e-7)
 
 
 def test_the_lower_of_several_closest_points_is_found():

@@ -71,6 +71,15 @@ def test_means_over_bins_are_those_of_their_samples(poles):
             np.testing.assert_allclose(one[row], means, rtol=1e-8, atol=1e-12)
 
 
+def test_a_move_that_arrives_with_the_last_sample_of_a_bin_counts_in_it():
+    pole = np.array([[-0.5 + 0j]])
+    static, mode, slope = train([0, 4], [4, 2], [2.5], [2.0], dt=1.0).modes(np.zeros(1), pole)
+    assert static[0].tolist() == [0.5, 2.0]
+    late = np.exp(-0.5 * np.array([0.5, 1.5, 2.5]))
+    close(mode[0, :, 0], [2 * late[0] / 4, late[1] + late[2]])
+    close(slope[0, :, 0], [late[0] / 4, 1.5 * late[1] + 2.5 * late[2]])
+
+
 @pytest.mark.parametrize("count", [5, 100])
 @pytest.mark.parametrize("rate", [0.99e-4, 1.01e-4, 1e-6, 0.3])
 def test_the_mean_of_a_slow_mode_is_as_right_as_that_of_a_fast_one(rate, count):

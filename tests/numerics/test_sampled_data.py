@@ -83,10 +83,12 @@ def test_what_counts_stands_one_after_the_other():
         assert part.signal.tolist() == (signal / scale).tolist()
 
 
-def test_every_record_has_its_own_clock_level_and_drift():
-    stretches = two().problem(NOTHING).stretches
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_every_record_has_its_own_clock_level_and_drift(unit):
+    stretches = two(dt=0.5 * unit).problem(NOTHING).stretches
     assert stretches.edges.tolist() == [0, 7, 12]
-    assert stretches.clock.tolist() == [0, 0.5, 1, 1.5, 2, 2.5, 3, 0, 0.5, 1, 1.5, 2]
+    clock = np.array([0, 0.5, 1, 1.5, 2, 2.5, 3, 0, 0.5, 1, 1.5, 2])
+    assert stretches.clock == pytest.approx(unit * clock)
     level, drift = stretches.regressors.T
     assert level.tolist() == [1.0] * 12
     # from nothing to one
