@@ -54,7 +54,7 @@ def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BIN
         distance = float(np.abs(onsets - k).min())
         width = int(_WIDTHS[np.searchsorted(_WIDTHS, max(_GROWTH * distance, 1.0), "right") - 1])
         following = min(s for s in starts if s > k)
-        k = min(k + width, following, stop)
+        k = min(k + width, following)
         bounds.append(k)
     limits = np.array(bounds)
     return Bins(limits[:-1], np.diff(limits))

@@ -175,6 +175,7 @@ def test_records_of_different_noise_are_weighted(steps):
     mean = np.sqrt(1.31)
     assert found.data.scales == pytest.approx((1 / mean, 1.31 / mean))
     assert steps.fits[-1][0] is found.data
+    assert steps.fits[-1][1:] == steps.fits[-2][1:]
     assert found.fit.of.data is found.data
     # records come back in their own unit
     first, second = found.fitted
@@ -455,6 +456,27 @@ def test_standard_errors_are_those_of_many_records():
     # the same of a model of twice the gain, which has the same delay
     twice = _own_delay(cut([2 * outputs[0]], inputs, DT), common(), NOTHING)
     assert twice.gain == pytest.approx(2.0)
+
+
+def test_standard_errors_are_those_of_a_regression():
+    outputs, inputs, parameters = exact(lengths=(60,))
+    y = outputs[0] + 0.02 * np.random.default_rng(3).standard_normal(60)
+    found = _own_delay(cut([y], inputs, DT), common(), NOTHING)
+    drive = cut([y], inputs, DT).problem(NOTHING).drive
+
+    def at(delay):
+        x = np.array([delay, parameters[1]])
+        return respond(drive, NOTHING, np.array([0.4]), x)
+
+    end, h, clock = 2.3 + found.shift, 0.05, DT * np.arange(60)
+    slope = (at(end + h) - at(end - h)) / (2 * h)
+    columns = np.stack([at(end), slope, clock**0, clock, np.exp(-0.2 * clock)], axis=1)
+    weights, (squares,), _, _ = np.linalg.lstsq(columns, y, rcond=None)
+    spread = squares / (60 - 5) * np.linalg.inv(columns.T @ columns)
+    # the last step is less than a thousandth of a sample; slopes are central differences
+    assert found.gain == pytest.approx(weights[0], rel=1e-3)
+    assert found.gain_error == pytest.approx(np.sqrt(spread[0, 0]), rel=3e-3)
+    assert found.error == pytest.approx(np.sqrt(spread[1, 1]) / weights[0], rel=3e-3)
 
 
 def test_colour_of_the_noise_is_in_the_standard_errors(monkeypatch):
