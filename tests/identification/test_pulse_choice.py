@@ -101,7 +101,7 @@ def test_where_two_thirds_are_too_short_the_prior_stays(by_hand):
 
 def test_missing_samples_cannot_be_simulated(by_hand):
     y = record().output.copy()
-    y[250] = np.nan
+    y[[50, 250]] = np.nan  # in what is fitted and in what is judged
     holes = cr.Record(record().time, record().input, y, missing="keep")
     chosen = choose_estimate((record(), holes), 40, "unknown")
     assert (chosen.method, chosen.kernels, chosen.reason) == ("regularized", ("SS",), "")
@@ -147,6 +147,14 @@ def test_every_output_counts_in_its_own_unit():
     # all of the small output is missed, nothing of the large one
     found = pulses([[0.0, 0.0, 0.0]], [[0.0, 0.0, 2e6]])
     assert_allclose(_error((one,), [200], found, 3), np.sqrt(0.5), rtol=1e-9)
+
+
+def test_a_large_output_that_is_missed_hides_nothing_of_a_small_one():
+    u = np.random.default_rng(0).standard_normal(300)
+    outputs = np.stack([filtered(u, 0.0, 1.0), 1e9 * filtered(u, 0.0, 0.0, 2.0)])
+    one = cr.Record(DT * np.arange(300), u, outputs)
+    nothing = pulses([[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]])
+    assert_allclose(_error((one,), [200], nothing, 3), 1.0, rtol=1e-12)
 
 
 def test_every_record_counts_by_its_samples():
