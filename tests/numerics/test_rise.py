@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.rise import rise_time
+from ctrl_realize.numerics.rise import _moving_mean, rise_time
 
 
 def ramp(start, length, size):
@@ -48,7 +48,7 @@ def test_the_final_level_is_that_of_the_last_tenth():
     step = ramp(10, 100, 1000)
     step[300:500] = 1.4
     assert rise_time(step, 1.0) == pytest.approx(80.0, rel=1e-12)
-    step[-40:] = 7.0
+    step[-49:] = 7.0
     assert rise_time(step, 1.0) == pytest.approx(80.0, rel=1e-12)
     # a tenth is three samples at least
     assert rise_time(np.array([0, 0, 10, 10, 10, 20, 20.0]), 1.0) == pytest.approx(4.8 - 1.2)
@@ -60,6 +60,38 @@ def test_the_rise_ends_at_the_first_crossing_and_begins_at_the_last_before_it():
     step[:14] = [0, 0.5, 0.5, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0]
     # from 3.5 (10 %) to 7.5 (90 %)
     assert rise_time(step, 1.0) == pytest.approx(4.0, rel=1e-12)
+
+
+def test_a_dip_behind_the_rise_is_no_beginning():
+    step = np.array([0, 0, 0.3, 0.6, 0.95, 0.0, 1, 1, 1, 1, 1, 1])
+    # 10 % is a third behind sample 1, 90 % six sevenths behind sample 3
+    assert rise_time(step, 1.0) == pytest.approx(3 + 6 / 7 - 4 / 3, rel=1e-12)
+
+
+def test_what_begins_above_10_percent_is_counted_from_its_second_sample():
+    step = np.clip(0.5 + 0.025 * np.arange(39), None, 1.0)
+    assert rise_time(step, 1.0) == pytest.approx(15.0, rel=1e-12)
+
+
+def test_a_spike_does_not_end_a_rise():
+    step = ramp(5, 40, 59)
+    step[25] = 1.0
+    assert rise_time(step, 1.0) == pytest.approx(32.0, rel=1e-12)
+
+
+def test_of_less_than_forty_samples_every_one_counts():
+    step = ramp(5, 28, 39)
+    step[19] = 1.0
+    # from 2.8 samples after 5 to where the last move, from 13/28 to one, passes 90 %
+    assert rise_time(step, 1.0) == pytest.approx(18 + (0.9 - 13 / 28) / (15 / 28) - 7.8, rel=1e-12)
+
+
+def test_means_begin_at_rest_and_end_at_the_last_value():
+    values = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    assert _moving_mean(values, 1) is values
+    assert _moving_mean(values, 2) == pytest.approx(np.array([3, 7, 14, 28, 40]) / 3)
+    assert _moving_mean(values, 3) == pytest.approx(np.array([3, 7, 14, 28, 40]) / 3)
+    assert _moving_mean(values, 4) == pytest.approx(np.array([7, 15, 31, 46, 60]) / 5)
 
 
 def test_of_a_pulse_that_ends_at_rest_the_largest_value_is_the_level():
@@ -81,6 +113,8 @@ def test_levels_may_be_met_exactly_and_at_once():
     assert rise_time(np.array([0, 0.1, 0.5, 0.9, 1, 1, 1]), 1.0) == pytest.approx(2.0, rel=1e-12)
     # at the first of two samples at 90 %
     assert rise_time(np.array([0, 0.9, 0.9, 1, 1, 1, 1]), 1.0) == pytest.approx(8 / 9, rel=1e-12)
+    # at the last of several samples at 10 %
+    assert rise_time(np.array([0, 0.1, 0.1, 0.1, 1, 1, 1]), 1.0) == pytest.approx(8 / 9, rel=1e-12)
     # between the first two samples
     assert rise_time(np.array([0, 0.5, 1, 1, 1, 1, 1]), 1.0) == pytest.approx(1.6, rel=1e-12)
 
