@@ -92,10 +92,12 @@ def test_the_largest_and_smallest_tenth_go_from_five_records_on(count, left):
 
 
 def test_two_of_twenty_go_at_each_end():
-    shapes = [SHAPE + 1e-3 * i for i in range(20)]
-    shapes[19] = SHAPE + 0.03
+    # squares, since of equally spaced values the mean is the same with one at each end
+    shapes = [SHAPE + 1e-4 * i**2 for i in range(20)]
     mean = mean_step(steps(shapes), skip=())
-    assert_allclose(mean.output[mean.edge :] - SHAPE, 1e-3 * np.arange(2, 18).mean(), atol=1e-12)
+    assert mean.left_out == ()
+    left = 1e-4 * np.mean(np.arange(2, 18) ** 2)
+    assert_allclose(mean.output[mean.edge :] - SHAPE, left, atol=1e-12)
 
 
 def test_a_record_apart_from_four_others_is_left_out():
@@ -168,6 +170,26 @@ def test_errors_and_chi_square_are_those_of_the_noise():
     assert found.chi_square == pytest.approx(statistic, rel=1e-6)
     assert found.p_value == pytest.approx(chdtrc(kept.size - 1, statistic), rel=1e-6)
     assert found.p_value > 0.001
+
+
+def test_the_error_of_a_delay_does_not_hang_on_how_far_it_lies_from_the_model():
+    made = simulated([37.0], [16.0], noise=0.01)
+    mean = mean_step(made)
+    errors = [
+        repeatability(made, mean, model_of(mean, delay), delay * TS, LEVEL).errors[0]
+        for delay in (37.0, 97.0)
+    ]
+    # the same record seen from two models; its slope is interpolated
+    assert errors[1] == pytest.approx(errors[0], rel=0.01)
+
+
+def test_a_drift_before_the_step_stays_in_the_record():
+    # the mean has the drift of all, which is fitted with it
+    (drifting,) = records([SHAPE], before=100)
+    line = 0.5 * drifting.time
+    (kept,) = aligned_steps((cr.Record(drifting.time, drifting.input, drifting.output + line),))
+    assert kept.drift == 0.0
+    assert_allclose(np.diff(kept.pre), 0.5 * 0.01 / 2.0, rtol=1e-9)
 
 
 def test_what_a_record_has_for_itself_moves_its_delay_no_more_than_noise_does():

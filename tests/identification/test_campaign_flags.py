@@ -120,6 +120,7 @@ def test_eight_records_of_two_heights_are_needed():
         near, apart = ([unit] * 4 + [unit * (1 + by)] * 4 for by in (0.9e-6, 1.1e-6))
         assert told(rows(near, delays)) == {}
         assert set(told(rows(apart, delays))) == {"amplitude_trend"}
+    assert told(rows([0.0] * 8, delays)) == {}
     # without a height or a delay a row does not count
     assert told(rows([np.nan, *heights[1:]], delays)) == {}
     assert told(rows(heights, [*delays[:7], np.nan])) == {}

@@ -49,6 +49,13 @@ def test_without_a_direct_term_its_sample_is_what_is_missing():
     assert not without.fit.feedthrough
 
 
+def test_a_direct_term_is_looked_for_at_the_delay():
+    rest = 1e-3 * np.random.default_rng(0).standard_normal(50)
+    noisy = cr.ImpulseResponse(LAG + 1e-12, DT, noise=rest)
+    assert not cr.realize(noisy, 1, delay=3).fit.feedthrough
+    assert cr.realize(noisy, 1, delay=4).fit.feedthrough
+
+
 def test_samples_beyond_those_asked_for_are_not_seen():
     wild = LAG.copy()
     wild[14] = 9.0

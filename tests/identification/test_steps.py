@@ -289,7 +289,17 @@ def test_an_edge_knows_its_time_and_a_response_its_name():
     edge = cr.detect_step(record)
     assert edge.time == pytest.approx(5.0 + 0.01 * 100)
     assert cr.unit_step(record).name == "valve"
+    assert cr.unit_step(record).record is record
     assert cr.impulse_from_step(cr.unit_step(record), cutoff_hz=None).name == "valve"
+
+
+def test_missing_samples_are_refused_by_what_needs_them():
+    y = np.zeros(400)
+    y[7] = np.nan
+    holes = cr.Record(0.01 * np.arange(400), step_input(), y, missing="keep")
+    for ask in (cr.detect_step, cr.unit_step):
+        with pytest.raises(DataError, match=r"^a step response needs every sample"):
+            ask(holes)
 
 
 def test_a_record_of_one_row_is_one_channel():
@@ -324,8 +334,11 @@ def test_twenty_samples_at_rest_are_kept_as_noise(before, known):
 def test_spikes_may_have_no_length_and_the_share_ends_below_one():
     u = step_input()
     assert cr.detect_step(record_of(u), spike_samples=0).index == 100
-    with pytest.raises(OptionError, match="spike_samples"):
-        cr.detect_step(record_of(u), spike_samples=-1)
+    third = u.size // 3
+    assert cr.detect_step(record_of(u), spike_samples=third).index == 100
+    for spikes in (-1, third + 1):
+        with pytest.raises(OptionError, match="spike_samples"):
+            cr.detect_step(record_of(u), spike_samples=spikes)
     for share in (0.0, 1.0):
         with pytest.raises(OptionError, match="min_share"):
             cr.detect_step(record_of(u), min_share=share)
