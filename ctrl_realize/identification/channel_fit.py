@@ -158,7 +158,8 @@ def from_starts(
         if clear and all(check.independent for check in best.system.fit.checks):
             break
     if best is None:
-        raise refused or DataError("nothing could be fitted")
+        assert refused is not None
+        raise refused
     return best
 
 

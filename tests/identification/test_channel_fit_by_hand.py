@@ -14,11 +14,13 @@ from ctrl_realize.errors import DataError, DataWarning, OptionError, OrderError
 from ctrl_realize.identification import channel_fit as module
 from ctrl_realize.identification.channel_fit import (
     LEVEL,
+    Outcome,
     _check_signals,
     _from_start,
     _orders,
     _silence,
     _split,
+    from_starts,
 )
 from ctrl_realize.identification.channel_search import ORDERS, Candidate
 
@@ -43,6 +45,7 @@ def searched(monkeypatch):
     seen = SimpleNamespace(
         calls=[],
         flags=(),
+        warning=None,
         fits=[candidate(2, 30.0), candidate(3, 10.0)],
         moved=candidate(3, 5.0, (2, 1)),
         lowered=candidate(3, 5.0, (2, 1)),
@@ -50,6 +53,8 @@ def searched(monkeypatch):
     markov = np.ones((2, 2, 40))
 
     class Search:
+        highest = 3
+
         def __init__(self, group, markov, top, enough):
             seen.calls.append(("search", group, markov.shape, top, enough))
 
@@ -76,12 +81,14 @@ def searched(monkeypatch):
     def impulse_from_io(group, *, method, start):
         seen.calls.append(("impulse", group, method, start))
         warnings.warn("filled in by the prior", DataWarning, stacklevel=2)
-        return SimpleNamespace(markov=markov, flags=seen.flags)
+        if seen.warning:
+            warnings.warn("of another kind", seen.warning, stacklevel=2)
+        one = group[0].n_inputs == 1
+        return SimpleNamespace(markov=markov[0, 0] if one else markov, flags=seen.flags)
 
     def channel_delays(impulse, *, level):
-        assert impulse.markov is markov
         seen.calls.append(("delays", level))
-        return np.array([[1, 0], [3, -1]])
+        return np.array([[1]]) if impulse.markov.ndim == 1 else np.array([[1, 0], [3, -1]])
 
     monkeypatch.setattr(module, "Search", Search)
     monkeypatch.setattr(module, "impulse_from_io", impulse_from_io)
@@ -111,6 +118,7 @@ def test_a_start_goes_from_the_impulse_response_to_delays_orders_and_the_last_fi
     assert called(searched, "lowered") == [(searched.moved, (1, 2, 3), True)]
     assert called(searched, "finish") == [(searched.lowered,)]
     assert (found.bic, found.seen, found.best) == (5.0, True, searched.lowered)
+    assert found.search.highest == 3
     finished, group, bic, choices, flags = found.system
     assert finished == ("finished", searched.lowered)
     assert group == (RECORD,)
@@ -166,6 +174,58 @@ def test_an_output_that_is_not_explained_is_flagged_by_the_fit(searched):
     flags = begun().system[4]
     assert [str(flag)[:8] for flag in flags] == ["output 1"]
     assert flags == _silence(searched.lowered)
+
+
+def test_flags_of_the_order_and_of_outputs_stand_beside_each_other(searched):
+    searched.lowered.found.spread[1] = 1.001
+    assert [flag.code for flag in begun((2, 3)).system[4]] == ["no_response", "highest_order"]
+
+
+@pytest.mark.parametrize("unit", [1e-3, 50.0])
+def test_whether_an_output_is_explained_does_not_depend_on_its_unit(unit):
+    best = candidate(3, 0.0)
+    best.found.spread[1] = 1.001
+    flags = [str(flag) for flag in _silence(best)]
+    best.found.spread *= unit
+    best.found.variance *= unit
+    assert [str(flag) for flag in _silence(best)] == flags
+    assert len(flags) == 1
+
+
+def test_one_channel_is_a_matrix_of_one(searched):
+    one = cr.Record(K, U[0], U[1])
+    searched.lowered = searched.moved = candidate(3, 5.0, (1,), (0,))
+    _from_start((one,), ("rest", "okid"), None, None, None, 77)
+    assert called(searched, "search")[0][1] == (1, 1, 40)
+    assert called(searched, "by order")[0][1] in (((1,), (0,)), ((0,), (1,)))
+
+
+def test_warnings_of_another_kind_are_given(searched):
+    searched.warning = RuntimeWarning
+    with pytest.warns(RuntimeWarning, match="of another kind"):
+        begun()
+
+
+# --- which starts
+
+
+def test_starts_are_given_what_was_asked_for(monkeypatch):
+    calls = []
+
+    def from_start(*given):
+        calls.append(given)
+        checks = [SimpleNamespace(independent=True)]
+        return Outcome(1.0, SimpleNamespace(fit=SimpleNamespace(checks=checks)), True, None, None)
+
+    monkeypatch.setattr(module, "_from_start", from_start)
+    from_starts((RECORD,), (2, 3), "delays", "feedthrough", enough=77)
+    assert calls == [((RECORD,), ("unknown", "auto"), (2, 3), "delays", "feedthrough", 77)]
+    # inputs that stand still, each at its level, are at rest
+    still = U.copy()
+    still[:, :10] = [[0.0], [3.0]]
+    from_starts((cr.Record(K, still, RECORD.output),))
+    assert calls[1][1] == ("rest", "auto")
+    assert calls[1][2:] == (None, None, None, module.ENOUGH_SAMPLES)
 
 
 # --- refine
@@ -243,6 +303,13 @@ def test_the_fit_is_that_of_the_best_start(monkeypatch):
     assert calls == [((RECORD,), None, None, None)]
     cr.fit_channels([RECORD, RECORD], [3, 2], delays=[[1]], feedthrough=False)
     assert calls[1] == ((RECORD, RECORD), (2, 3), [[1]], False)
+    with pytest.raises(OptionError, match="feedthrough='yes'"):
+        cr.fit_channels(RECORD, feedthrough="yes")
+
+
+def test_refining_asks_for_a_direct_term_or_none(refined):
+    with pytest.raises(OptionError, match="feedthrough='yes'"):
+        cr.refine(plant(), RECORD, feedthrough="yes")
 
 
 def test_orders_are_rising_and_each_is_tried_once():
@@ -294,6 +361,12 @@ def test_delays_are_split_into_those_of_inputs_and_outputs():
     assert _split(np.array([[2, 5], [9, 12]])) == ((2, 5), (0, 7))
     # a channel without response has no say
     assert _split(np.array([[1, 0], [3, -1]])) == ((1, 0), (0, 2))
+    # one with a response at once allows none to its input and its output
+    inputs, outputs = _split(np.array([[0, 3], [4, 5]]))
+    assert (inputs[0], outputs[0]) == (0, 0)
+    assert inputs[1] <= 3
+    assert outputs[1] <= 4
+    assert inputs[1] + outputs[1] == 5
     inputs, outputs = _split(np.array([[4]]))
     assert inputs[0] + outputs[0] == 4
     assert {type(d) for d in inputs + outputs} == {int}
