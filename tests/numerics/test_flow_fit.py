@@ -67,7 +67,7 @@ def test_a_lag_behind_the_flow_is_that_of_known_dynamics():
 
 
 def test_wide_bins_are_means_by_simpson_s_rule():
-    width = np.array([1] * 60 + [3] * 20 + [12] * 10)
+    width = np.array([1] * 40 + [2] * 10 + [3] * 20 + [12] * 10)
     first = np.concatenate([[0], np.cumsum(width)[:-1]])
     drive = MoveTrain(DT * first, width, DT, MOVES, SIZES)
     fit = replace(flow_fit(), drive=drive)
@@ -183,6 +183,24 @@ def test_a_start_may_be_on_its_bounds():
         assert np.all((fit.bounds[0] <= corner) & (corner <= fit.bounds[1]))
 
 
+def test_what_is_improved_stays_within_its_bounds():
+    for bounds in ({"latest": 1.5}, {"earliest": 2.0}):
+        fit = flow_fit(scales=replace(SCALES, **bounds))
+        x = fit.improved(TRUTH)
+        assert fit.bounds[0][0] <= x[0] <= fit.bounds[1][0]
+        # trust-region steps keep off a bound by some part of the range
+        assert x[0] * 4 == pytest.approx(next(iter(bounds.values())), abs=0.02)
+
+
+@pytest.mark.parametrize("side", [-20.0, 20.0])
+def test_starts_beyond_the_bounds_are_taken_to_them(side):
+    x = flow_fit().improved(np.array([side, *TRUTH[1:]]))
+    assert x[0] * 4 == pytest.approx(1.73, abs=0.05)
+    corner = flow_fit().improved(np.full(3, side))
+    low, high = flow_fit().bounds
+    assert np.all((low <= corner) & (corner <= high))
+
+
 def test_the_error_of_the_delay_is_that_of_least_squares():
     fit = flow_fit()
     x = fit.improved(TRUTH)
@@ -215,6 +233,10 @@ def test_a_profile_goes_from_the_optimum_to_three_errors_and_its_bounds():
     near = replace(SCALES, latest=flow.delay + 0.9 * error)
     delay, _ = flow_profile(fit.problem, flow, near, 0.01**2)
     assert delay[-1] == pytest.approx(near.latest)
+    assert delay.size == 1 + 5 + 2
+    near = replace(SCALES, earliest=flow.delay - 0.9 * error)
+    delay, _ = flow_profile(fit.problem, flow, near, 0.01**2)
+    assert delay[0] == pytest.approx(near.earliest)
     assert delay.size == 1 + 5 + 2
 
 
