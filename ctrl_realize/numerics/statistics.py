@@ -91,7 +91,8 @@ def trimmed_statistics(
     ordered = np.sort(np.ravel(values).astype(np.float64))
     n = ordered.size
     kept = ordered[trim : n - trim]
-    mean = float(kept.mean())
+    # Rounding puts the mean of equal values beside them.
+    mean = float(np.clip(kept.mean(), kept[0], kept[-1]))
     winsorized = np.clip(ordered, kept[0], kept[-1])
     std_error = float("nan")
     half_width = float("nan")

@@ -83,3 +83,9 @@ def test_so_much_of_a_mixture_lies_below_its_quantile(level):
     for centre in (-1e3, 1e3):
         one = mixture_quantile(level, np.array([centre]), np.array([2.0]), np.ones(1))
         assert one == pytest.approx(stats.norm.ppf(level, centre, 2.0), abs=1e-9)
+
+
+def test_the_mean_of_equal_values_is_that_value():
+    value = 3.0000216123935806  # the sum of three of them is rounded down
+    assert np.full(3, value).mean() < value
+    assert trimmed_statistics(np.full(3, value), 0).mean == value
