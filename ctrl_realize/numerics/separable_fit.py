@@ -299,7 +299,7 @@ def partial_fractions(
     value = np.polyval(known, poles)
     power = poles[:, :, None] ** (i - 1)
     residues = power * (value / slope)[:, :, None]
-    turn = np.polyval(np.polyder(known), poles) if known.size > 1 else np.zeros_like(poles)
+    turn = np.polyval(np.polyder(known), poles)
     dresidues = (i - 1) * residues / poles[:, :, None] + power * (turn / slope)[:, :, None]
     gain = np.zeros((batch, count))
     gain[:, 0] = known[-1] / np.prod(-poles, axis=1).real

@@ -134,7 +134,7 @@ def test_a_first_order_model_comes_first_without_a_twentieth_of_each_record(step
 
 
 def test_samples_are_left_out_for_one_and_a_half_of_its_delays(steps):
-    outputs, inputs = records(200, 30)
+    outputs, inputs = records(200, 31)
     found = fit_sampled(outputs, inputs, DT)
     # 9 s are 18 samples; half of the short record
     assert found.data.starts == (18, 15)
@@ -161,14 +161,15 @@ def test_its_delay_and_lag_are_the_scales_of_the_search(steps):
     assert (scales.onset, scales.rise) == (0.25, 1.0)
     fit_sampled(outputs, inputs, DT, structures=[TWO])
     assert steps.fits[-1][2] == (TWO,)
+    assert steps.fits[-1][4] is True
 
 
 def test_records_of_different_noise_are_weighted(steps):
     outputs, inputs = records(200, 119)
-    steps.noise = [1.0, 1.3]
+    steps.noise = [2.0, 2.6]
     assert fit_sampled(outputs, inputs, DT).data.scales == (1.0, 1.0)
     assert len(steps.fits) == 1
-    steps.noise = [1.0, 1.31]
+    steps.noise = [2.0, 2.62]
     found = fit_sampled(outputs, inputs, DT)
     assert len(steps.fits) == 3
     # over the mean one, in logarithms
@@ -189,19 +190,19 @@ def slow(correlation=3.1, variance=1.0, order=2):
 
 def test_slow_disturbances_are_fitted_along_where_they_take_half_of_the_variance(steps):
     outputs, inputs = records(200, 119)
-    steps.wholes = [slow(), slow(2.0, 0.49)]
+    steps.wholes = [slow(3.1, 2.0), slow(2.0, 0.98)]
     found = fit_sampled(outputs, inputs, DT)
     # ten times 14 s
     assert found.data.period == pytest.approx(140.0)
-    assert found.fit.of.variance == 0.49
+    assert found.fit.of.variance == 0.98
     assert found.data is steps.fits[1][0]
     assert steps.fits[0][1:] == steps.fits[1][1:]
     # else they are let be
     steps.fits.clear()
-    steps.wholes = [slow(), slow(2.0, 0.5)]
+    steps.wholes = [slow(3.1, 2.0), slow(2.0, 1.0)]
     found = fit_sampled(outputs, inputs, DT)
     assert found.data.period == np.inf
-    assert found.fit.of.variance == 1.0
+    assert found.fit.of.variance == 2.0
     # white residuals have none
     steps.fits.clear()
     steps.wholes = [slow(3.0), slow(2.0, 0.1)]
@@ -298,7 +299,7 @@ def test_a_fit_of_samples_has_no_bins_and_a_least_noise(monkeypatch):
     still[0] = 7.0
     spiked = replace(cut([still, np.zeros(40)], inputs, DT), starts=(3, 2))
     noise = _fit(spiked, NOTHING, (ONE,), "scales", True)[3]
-    assert noise[0] == pytest.approx(7e-13)
+    assert noise[0] == pytest.approx(7e-13, rel=1e-9, abs=0)
 
 
 def test_the_coarsest_of_all_quantisers_counts(monkeypatch):
@@ -309,26 +310,29 @@ def test_the_coarsest_of_all_quantisers_counts(monkeypatch):
     assert _fit(cut(rounded, inputs, DT), NOTHING, (ONE,), "scales", True)[3][1] == 0.5
 
 
-def test_noise_is_what_the_best_model_leaves_of_each_record():
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_noise_is_what_the_best_model_leaves_of_each_record(unit):
     outputs, inputs = records(4000, 3000, 1000)
     data = replace(cut(outputs, inputs, DT), starts=(500, 0, 0))
     scaled = np.concatenate([y[s:] for y, s in zip(data.outputs, data.starts, strict=True)])
     scaled[3500:6500] *= 3.0
     scaled[6500:] = 0.0
     scaled[:3500:100] = 40.0  # spikes hardly count
+    scaled *= unit
     seen = []
+    model = np.linspace(0.0, 9.0, 7500)
 
     def predict(problem, best):
         seen.append((problem, best))
-        return np.full(7500, 7.0)
+        return model
 
-    window = SimpleNamespace(output=scaled + 7.0, predict=predict)
+    window = SimpleNamespace(output=scaled + model, predict=predict)
     found = _noise_levels(data, SimpleNamespace(window=window, problem="p", best="b"))
     assert seen == [("p", "b")]
     # known to a standard error of one per cent, and what spikes and clipping add
-    assert found[:2] == pytest.approx([1.0, 3.0], rel=0.05)
+    assert found[:2] == pytest.approx([unit, 3.0 * unit], rel=0.05)
     # a ten-thousandth of all that moves at least
-    assert found[2] == pytest.approx(1e-4 * np.ptp(scaled))
+    assert found[2] == pytest.approx(1e-4 * np.ptp(scaled + model))
 
 
 def exact(delay=2.3, gain=0.4, lengths=(90, 70), seed=1, lag=5.0):
@@ -380,8 +384,12 @@ def test_where_nothing_is_seen_nothing_is_guessed():
     assert _seen(cut(outputs, [u], DT), 50.0) == []
     # an input that stands still, a limit of a single sample
     assert _seen(cut(outputs, [np.ones(300)], DT), 50.0) == []
-    late, u = delayed(20)
+    late, u = delayed(1, share=0.0)
     assert _seen(cut([late], [u], DT), 0.9) == []
+    assert _seen(cut([late], [u], DT), 1.0) == [1.0]
+    assert _seen(cut([late], [1e-3 * u], DT), 50.0) == [1.0]
+    # what follows at once has no lag
+    assert _seen(cut([u], [u], DT), 50.0) == []
     # no further than a third of a short record
     for size, seen in ((57, []), (63, [20.0])):
         late, u = delayed(20, size, share=0.0)
@@ -490,6 +498,30 @@ def test_colour_of_the_noise_is_in_the_standard_errors(monkeypatch):
     assert slow.gain_error == pytest.approx(2 * white.gain_error)
 
 
+@pytest.mark.parametrize("unit", [1e3, 1e-6])
+def test_an_own_delay_does_not_depend_on_the_unit_of_time(unit):
+    outputs, inputs, _ = exact(2.51, 0.6, (200,))
+    y = outputs[0] + 0.01 * records(200)[0][0]
+    same = _own_delay(cut([y], inputs, DT), common(), NOTHING)
+    model = common(2.3 * unit, 0.4 / unit, 5.0 * unit)
+    found = _own_delay(cut([y], inputs, DT * unit), model, NOTHING)
+    assert found.shift == pytest.approx(same.shift * unit, rel=1e-6)
+    assert found.error == pytest.approx(same.error * unit, rel=1e-6)
+    assert (found.gain, found.gain_error) == pytest.approx((same.gain, same.gain_error), rel=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_step_of_an_own_delay_is_twenty_samples_at_most(monkeypatch, side):
+    monkeypatch.setattr(module, "_TURNS", 1)
+    # a lag of 400 samples under one step is nearly a line: 36 samples are told at once
+    u = 1.0 * (np.arange(800) >= 60)
+    parameters = np.array([40.0 + 18.0 * side, -np.log(200.0)])
+    drive = cut([u], [u], DT).problem(NOTHING).drive
+    y = respond(drive, NOTHING, np.array([0.4]), parameters)
+    found = _own_delay(cut([y], [u], DT), common(40.0, lag=200.0), NOTHING)
+    assert found.shift == pytest.approx(10.0 * side, rel=1e-9)
+
+
 def test_a_delay_is_never_negative():
     outputs, inputs, _ = exact(0.0, lengths=(200,))
     found = _own_delay(cut(outputs, inputs, DT), common(0.2), NOTHING)
@@ -510,7 +542,7 @@ def test_a_record_is_held_against_the_model_like_those_that_were_fitted(monkeypa
     assert data.dt == DT
     assert data.outputs[0].tolist() == output.tolist()
     assert data.inputs[0] == pytest.approx(signal - signal.mean())
-    whole.own_delay(output[:16], signal[:16])
+    whole.own_delay(output[:17], signal[:17])
     assert seen[1][0].starts == (8,)
 
 
