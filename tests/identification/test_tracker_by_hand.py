@@ -287,7 +287,7 @@ def test_samples_up_to_the_largest_measurement_are_taken():
     for u, y in ((np.inf, 0.0), (0.0, np.nan)):
         with pytest.raises(DataError, match=r"sample 2 is .*finite numbers"):
             one.update(u, y)
-    single = np.array([1.0])  # which float() would take, with a warning
+    single = np.array([1.0])  # which float() takes with NumPy before 2.4
     for u, y in ((single, 0.0), (0.0, single), ([1.0], 0.0), ("one", 0.0), (0.0, None)):
         with pytest.raises(DataError, match=r"sample 2 is .*one number each"):
             one.update(u, y)
