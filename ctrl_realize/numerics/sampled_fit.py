@@ -229,13 +229,14 @@ def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> Ow
         columns = own.without(np.stack([response(at), slope], axis=1)[None])[0]
         solution = np.linalg.lstsq(columns, target, rcond=None)[0]
         left = target - columns @ solution
-        gain = float(solution[0]) or 1.0
-        move = float(solution[1]) / gain
+        gain = float(solution[0])
+        size = gain or 1.0
+        move = float(solution[1]) / size
         freedom = max(left.size - 2 - problem.own_count(poles.shape[1]), 1)
         variance = float(left @ left) / freedom * correlation_time(left)
         spread = np.linalg.pinv(columns.T @ columns)
         gain_error = float(np.sqrt(variance * spread[0, 0]))
-        error = float(np.sqrt(variance * spread[1, 1])) / abs(gain)
+        error = float(np.sqrt(variance * spread[1, 1])) / abs(size)
         shift = at - fit.delay + float(np.clip(move, -20 * data.dt, 20 * data.dt))
         if abs(move) < 1e-3 * data.dt:
             break

@@ -446,6 +446,12 @@ def test_a_delay_that_is_its_own_optimum_has_errors_of_rounding():
     assert 1e-12 <= found.gain_error < 1e-9
 
 
+def test_a_record_that_stands_still_has_no_gain():
+    _, inputs, _ = exact(lengths=(200,))
+    found = _own_delay(cut([np.zeros(200)], inputs, DT), common(), NOTHING)
+    assert (found.gain, found.shift) == (0.0, 0.0)
+
+
 def test_standard_errors_are_those_of_many_records():
     outputs, inputs, _ = exact(lengths=(300,))
     sigma = 0.05 * np.std(outputs[0])
