@@ -23,6 +23,7 @@ def test_a_response_found_in_pieces_has_no_seams(monkeypatch, piece):
     monkeypatch.setattr(delayed_modes, "_PIECE", piece)
     parts = drive.pieces()
     assert max(part.first.size for part in parts) <= piece
+    assert len(parts) == -(-width.size // piece)
     assert sum(part.first.size for part in parts) == width.size
     # one sum of two products at every bin, in whatever order a library takes it
     assert_allclose(respond(drive, *model), whole, rtol=1e-13, atol=1e-15)
