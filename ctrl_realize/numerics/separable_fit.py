@@ -29,6 +29,7 @@ _LONGEST_STEP = 1.5  # of a logarithmic parameter, in one iteration
 _MOST_FAILURES = 4  # in a row, before a start is given up
 _TURNS_FOR_ALL = 8  # iterations after which starts that are far behind are given up
 _HOPELESS = 1.5
+_STEEPEST = 1e145  # slope of a residual: the sum of its squares is a number still
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +269,8 @@ def _damped_step(
     # The delay counts in parts of its range: any unit of time gives the same steps.
     unit = np.ones(x.shape[1])
     unit[0] = max(float(bounds.high[0] - bounds.low[0]), 1e-300)
-    jacobian = jacobian * unit
+    # A response that shows in rounding alone has a gain, and slopes, whose squares overflow.
+    jacobian = np.clip(jacobian * unit, -_STEEPEST, _STEEPEST)
     downhill = np.einsum("bmp,bm->bp", jacobian, residual)
     free = ~((x <= bounds.low) & (downhill < 0) | (x >= bounds.high) & (downhill > 0))
     if delay_fixed:

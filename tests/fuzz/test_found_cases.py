@@ -444,3 +444,13 @@ def test_digits_that_are_no_numbers_name_columns_at_the_command_line(tmp_path, c
     asked = ["identify", str(tmp_path / "a.csv"), "-o", str(tmp_path / "out"), "--time", column]
     assert main(asked) == 2
     assert f"'{column}'" in capsys.readouterr().err
+
+
+def test_an_output_that_moves_at_its_last_sample_alone_is_fitted():
+    # responses that come after the record showed in rounding, with slopes of 1e168
+    u, y = np.repeat([0.0, 1e30], [19, 4]), np.zeros(23)
+    u[0], y[-1] = 8.75366413e-130, 2e20
+    with good_end() as models:
+        models.append(cr.identify(cr.Record(1e-6 * np.arange(23), u, y)))
+    low, high = models[0].fit.interval
+    assert 1.9e-6 < low < high <= 4e-6
