@@ -191,6 +191,16 @@ def test_phase_crossovers_do_not_depend_on_how_large_the_curve_is_at_either_end(
     assert negative_axis_crossings(curve, grid, curve(grid)) == pytest.approx([1.1], rel=1e-12)
 
 
+def test_a_large_curve_at_one_end_does_not_hide_the_crossing():
+    # from 80 degrees to 250 degrees, while it falls to a tenth: at 180 it is across
+    def curve(omega):
+        return np.exp(1j * np.radians(80 + 170 * omega)) * 10.0**-omega
+
+    grid = np.array([0.0, 1.0])
+    found = negative_axis_crossings(curve, grid, curve(grid))
+    assert found == pytest.approx([100 / 170], rel=1e-12)
+
+
 def test_the_closest_point_of_a_curve_is_found():
     def curve(omega):
         return (omega - 3) + 0.1j
@@ -217,6 +227,16 @@ def test_the_lower_of_several_closest_points_is_found():
     # the same, the other way round
     distance, at = smallest_distance(lambda omega: curve(9.03 - omega), np.linspace(0.5, 8, 200))
     assert at == pytest.approx(2.0, rel=1e-6)
+
+
+def test_the_closest_point_need_not_be_next_to_the_closest_of_the_grid():
+    # 0.1 on a point of the grid, 0.09 in the middle between two of them
+    def curve(omega):
+        return np.minimum(0.1 + np.abs(omega - 2), 0.09 + np.abs(omega - 7.025)) + 0j
+
+    distance, at = smallest_distance(curve, np.linspace(1, 10, 181))
+    assert distance == pytest.approx(0.09, rel=1e-6)
+    assert at == pytest.approx(7.025, rel=1e-6)
 
 
 def test_the_closest_point_may_be_an_end():
