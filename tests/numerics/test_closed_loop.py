@@ -104,7 +104,7 @@ def test_the_bottom_of_a_valley_is_found(best):
     at, value = smallest_on_line(valley, 1e-2, 1e2)
     # golden sections down to 1e-4 of a logarithm
     assert np.log(at / best) == pytest.approx(0.0, abs=1e-4)
-    assert value == valley(at)
+    assert value == valley(at) == min(5.0 + np.log(x / best) ** 2 for x in asked)
     # 16 of a scan 0.614 apart, two sections, and one for each further one of the 1.23 around
     assert len(asked) - 1 == 16 + 2 + math.ceil(np.log(1.228e4) / np.log((1 + np.sqrt(5)) / 2))
     assert min(asked) >= 1e-2 * (1 - 1e-12)
