@@ -158,7 +158,8 @@ MODULES = {
     "numerics/rational": "tests/numerics/test_rational.py",
     "numerics/rational_bounds": "tests/frequency/test_fit_frf.py",
     "numerics/rational_fit": "tests/frequency/test_fit_frf.py",
-    "numerics/rational_search": "tests/frequency/test_fit_frf.py",
+    "numerics/rational_search": "tests/numerics/test_rational_search.py "
+    "tests/frequency/test_fit_frf.py",
     "numerics/rational_starts": "tests/frequency/test_fit_frf.py",
     "numerics/recurrence": "tests/numerics/test_lanczos.py",
     "numerics/recursive": "tests/numerics/test_recursive.py",

@@ -84,8 +84,6 @@ def fit_structures(
         for near in range(max(r - 1, 0), min(r + 1, n + 1) + 1):
             if near in (degrees if degrees is not None else range(1, n + 2)):
                 fits[n + 1, near] = _fit_one(data, ladder, fits, n + 1, near)
-        if max(key[0] for key in fits) == largest:
-            break
     return fits
 
 
