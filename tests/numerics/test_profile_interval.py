@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from ctrl_realize.numerics import profile_interval as module
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
 from ctrl_realize.numerics.profile_interval import delay_error, delay_profile, profile_limits
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, evaluate, fit_batch
@@ -69,3 +73,47 @@ def test_near_the_optimum_it_is_the_parabola_of_the_standard_error(found):
     # twice the noise, twice the interval
     wide = profile_limits(*delay_profile(problem, candidate, 4 * SIGMA**2, scales))
     assert wide[1] - wide[0] == pytest.approx(2 * (high - low), rel=0.05)
+
+
+def test_the_profile_ends_at_bounds_that_lie_within_its_interval(found):
+    problem, candidate, scales = found
+    error = delay_error(problem, candidate, SIGMA**2)
+    low, high = candidate.delay - 0.5 * error, candidate.delay + 0.25 * error
+    held = replace(scales, earliest=low, latest=high)
+    delay, excess = delay_profile(problem, candidate, SIGMA**2, held)
+    assert (delay[0], delay[-1]) == (low, high)
+    # squares of the distances in standard errors, but for the bend of the parabola
+    assert (excess[0], excess[-1]) == pytest.approx((0.25, 0.0625), rel=0.1)
+    assert profile_limits(delay, excess) == (low, high)
+
+
+def test_an_interval_ends_between_any_two_delays_of_its_grid_and_at_the_grid_where_it_is_open():
+    delay = np.array([1.0, 2.0, 3.0, 4.0])
+    # roots 4, 0, 1, 4 with an edge of 2: half of the way down, a third of the way up
+    assert profile_limits(delay, np.array([16.0, 0.0, 1.0, 16.0]), 4.0) == pytest.approx(
+        (1.5, 3 + 1 / 3)
+    )
+    assert profile_limits(delay, np.array([1.0, 0.0, 1.0, 16.0]), 4.0)[0] == 1.0
+    assert profile_limits(delay, np.array([16.0, 1.0, 0.0, 1.0]), 4.0)[1] == 4.0
+    # one delay alone inside, beside both ends of the grid
+    assert profile_limits(delay[:3], np.array([16.0, 0.0, 16.0]), 4.0) == pytest.approx((1.5, 2.5))
+
+
+@pytest.mark.parametrize(
+    ("by_delay", "by_lag", "error"),
+    [
+        ([2.0, 1.0, 0.0], [0.0, 3.0, 0.0], 0.5),  # the lag leaves 2 of it
+        ([2.0, 1.0, 0.0], [0.0, 0.0, 0.0], 5**-0.5),  # a lag that nothing shows: all of it
+        ([2.0, 1.0, 0.0], [4.0, 2.0, 0.0], np.inf),  # moves as the lag does
+        ([0.0, 0.0, 0.0], [0.0, 3.0, 0.0], np.inf),  # nothing moves
+    ],
+)
+def test_the_error_is_of_what_the_lags_leave_of_the_delay_and_infinite_of_nothing(
+    monkeypatch, by_delay, by_lag, error
+):
+    jacobian = np.array([by_delay, by_lag]).T
+    state = SimpleNamespace(jacobian=jacobian[None], sensitivity=np.full((1, 2), 5.0))
+    monkeypatch.setattr(module, "evaluate", lambda *asked: state)
+    candidate = Candidate(Structure(1, 1), np.zeros(2), 0.0)
+    assert delay_error(None, candidate, 1.0) == pytest.approx(error, rel=1e-12)
+    assert delay_error(None, candidate, 9.0) == pytest.approx(3 * error, rel=1e-12)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from ctrl_realize.numerics import structure_search as module
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure
 from ctrl_realize.numerics.step_problem import step_data, step_scales, window
@@ -117,6 +118,48 @@ def test_more_poles_are_searched_for_where_the_last_one_helped():
     assert _worth_a_search(Data, Structure(4, 4), several)
 
 
+def test_a_large_structure_without_smaller_ones_is_worth_a_search():
+    assert _worth_a_search(Data, Structure(4, 4), {})
+    assert _worth_a_search(Data, Structure(4, 4), {Structure(3, 3): candidate(3, 3)})
+
+
+def lags_of(*costs: float) -> dict[Structure, Candidate]:
+    """Lags of one, two, ... poles at these costs."""
+    return {Structure(n, n): candidate(n, n, cost) for n, cost in enumerate(costs, 1)}
+
+
+@pytest.mark.parametrize(
+    ("structure", "beside", "patterns"),
+    [
+        (Structure(3, 3), lags_of(100.0, 100.0), 8),  # up to three poles always
+        (Structure(4, 4), lags_of(100.0, 50.0, 25.0), 8),  # the last pole helped
+        (Structure(4, 4), lags_of(100.0, 50.0, 50.0), 0),  # it did not
+        (Structure(4, 3), lags_of(100.0, 50.0, 25.0, 12.0), 0),  # zeros, beside their optimum
+        (Structure(4, 3), {}, 4),  # nothing to start from
+    ],
+    ids=str,
+)
+def test_large_structures_are_searched_for_where_they_may_differ_from_their_neighbours(
+    monkeypatch, structure, beside, patterns
+):
+    asked = []
+
+    def fit(problem, structure, starts, bounds):
+        asked.extend(starts)
+        return starts, np.arange(len(starts), 0.0, -1.0)
+
+    monkeypatch.setattr(module, "fit_batch", fit)
+    found = search(Data, [structure], SCALES, beside)
+    near = neighbour_starts(structure, SCALES, beside)
+    assert len(asked) == len(near) + patterns
+    for start, neighbour in zip(asked, near, strict=False):
+        assert_array_equal(start, neighbour)
+    # the cheapest is kept: here the last one
+    assert_array_equal(found[structure].parameters, asked[-1])
+    assert found[structure].cost == 1.0
+    assert set(found) == {structure, *beside}
+
+
 def test_the_criterion_charges_every_parameter_with_the_log_of_the_samples():
     both = {
         s: candidate(s.order, s.relative_degree, 50.0) for s in (Structure(2, 2), Structure(3, 1))
@@ -150,6 +193,22 @@ def test_what_is_near_the_best_is_plausible_and_so_are_lags_that_fit_no_worse():
     # a chosen one whose simplicity counts: others have theirs counted as well
     assert Structure(5, 5) not in plausible(all_of, values, 0.5, chosen, 68.0)
     assert Structure(5, 5) in plausible(all_of, values, 0.5, chosen, 70.0)
+
+
+def test_one_lag_more_than_were_chosen_is_plausible_where_it_fits_and_two_more_are_not():
+    all_of = {Structure(n, n): candidate(n, n, 100.0) for n in range(1, 6)}
+    values = dict.fromkeys(all_of, 900.0)
+    for order, left in ((1, 3), (2, 3), (3, 4), (4, 5)):
+        chosen = all_of[Structure(order, order)]
+        found = plausible(all_of, values, 1.0, chosen, 60.0)
+        assert max(s.order for s in found) == left
+    # beside zeros it is three lags at most
+    chosen = all_of[Structure(4, 3)] = candidate(4, 3, 100.0)
+    values[Structure(4, 3)] = 900.0
+    assert plausible(all_of, values, 1.0, chosen, 60.0) == [
+        *(Structure(n, n) for n in (1, 2, 3)),
+        chosen.structure,
+    ]
 
 
 def step_problem(noise: float = 1e-3):
