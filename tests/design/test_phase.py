@@ -8,6 +8,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.numerics.phase_slope import dead_time_from_phase
 
 DT = 7.8125e-4
 
@@ -72,3 +73,16 @@ def test_wrong_uses_are_refused(valve):
         cr.design.unwrapped_phase(valve(3), [-1.0])
     with pytest.raises(UnsuitableSystemError, match="2 inputs"):
         cr.design.unwrapped_phase(cr.MeasuredFRF(np.ones((1, 2, 3)), [1, 2, 3]))
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_how_long_a_dead_time_can_be_told_depends_on_the_spacing_and_not_its_unit(unit):
+    # 4.5 rad from point to point at least: beyond half a turn, within one
+    uneven = np.cumsum([1.0, 1.0, 1.3, 1.1, 1.5, 1.2, 1.0, 1.4, 1.7, 1.3])
+    found = dead_time_from_phase(uneven / unit, np.exp(-4.5j * uneven))
+    assert found == pytest.approx(4.5 * unit, rel=1e-6)
+    # evenly spaced, 4.5 rad is 1.8 rad the other way round, which no delay is
+    even = np.arange(1.0, 11.0)
+    assert dead_time_from_phase(even / unit, np.exp(-2.5j * even)) == pytest.approx(2.5 * unit)
+    # the last delay tried is half a turn, or a sixty-fourth more
+    assert dead_time_from_phase(even / unit, np.exp(-4.5j * even)) < 1.05 * np.pi * unit

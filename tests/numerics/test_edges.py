@@ -205,3 +205,49 @@ def test_levels_beside_a_sample_are_medians_of_the_window_before_and_from_it_on(
     for k in range(values.size):
         assert before[k] == np.median(padded[k : k + width])
         assert after[k] == np.median(padded[k + width : k + 2 * width])
+
+
+def measured(values, k, noise=0.0):
+    return edges._measure(values, np.diff(values, prepend=values[0]), k, noise)
+
+
+def test_a_level_that_has_crept_away_is_left_where_the_input_last_held_still():
+    # a hundredth a sample for 30 samples: the last sample at rest is off by more than 2 %
+    creeping = 0.01 * np.arange(30)
+    found = measured(np.concatenate([creeping, np.full(40, 1.29)]), 30)
+    assert (found.index, found.samples) == (29, 2)
+    assert found.rest == pytest.approx(0.19)  # of the 21 samples up to there
+    assert found.amplitude == pytest.approx(1.1)
+
+
+def test_a_level_that_is_crept_to_is_reached_where_the_input_holds_still_again():
+    creeping = 1 + 0.01 * np.arange(40)
+    found = measured(np.concatenate([np.zeros(30), creeping]), 30)
+    # the median of the 20 samples from 31 on is 1.105, 2 % below which is above 1.01
+    assert (found.index, found.samples) == (30, 2)
+    assert found.amplitude == pytest.approx(1.105)
+
+
+def test_a_ramp_that_lasts_to_the_end_leads_to_the_last_sample():
+    for height in (10.0, -10.0):
+        ramp = height / 10 * np.clip(np.arange(60) - 49, 0, None)
+        assert find_edges(ramp, 0, 0.1) == [Edge(50, height, 0.0, 10, 0, 60)]
+
+
+def test_an_edge_in_noise_is_left_and_reached_in_its_middle():
+    # five sigma, 3.5, are more than half of the edge
+    values = levels((0, 30), (2, 1), (5, 30))
+    found = measured(values, 31, noise=0.7)
+    assert (found.index, found.samples, found.amplitude) == (31, 1, 5.0)
+
+
+def test_of_noise_a_median_over_three_samples_leaves_1_25_over_the_root_of_three():
+    # spikes at every third sample: two in three differences are +-1
+    spikes = 1.0 * (np.arange(180) % 3 == 1)
+    sigma = difference_noise(spikes)
+    assert sigma == pytest.approx(1 / 0.6745 / np.sqrt(2))
+    assert_array_equal(despike(spikes, 1), 0.0)
+    least = 10 * sigma * 1.25 / np.sqrt(3)
+    step = 1.0 * (np.arange(180) >= 90)
+    assert find_edges(spikes + 0.98 * least * step, 1, 0.5) == []
+    assert [e.index for e in find_edges(spikes + 1.02 * least * step, 1, 0.5)] == [90]

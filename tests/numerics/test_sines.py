@@ -54,6 +54,18 @@ def test_given_frequency_is_plain_linear_least_squares():
         )
 
 
+def test_a_drift_that_is_fitted_too_widens_the_phasor_as_in_linear_least_squares():
+    omega = 2.5  # little more than a period: sine and drift are alike
+    y = sine(omega, 1 + 0.5j, 0.3, -0.2) + 0.1 * np.random.default_rng(3).standard_normal(N)
+    fit = fit_sines(T, y[None, None], np.array([omega]), free_frequency=False, drift=True)
+    design = np.stack([np.cos(omega * T), -np.sin(omega * T), np.ones(N), T], axis=1)
+    expected, squares, _, _ = np.linalg.lstsq(design, y, rcond=None)
+    assert_allclose(fit.phasor[0, 0], expected[0] + 1j * expected[1], atol=1e-12)
+    assert_allclose([fit.offset[0, 0], fit.slope[0, 0]], expected[2:], atol=1e-12)
+    covariance = squares / (N - 4) * np.linalg.inv(design.T @ design)[:2, :2]
+    assert_allclose(fit.phasor_covariance[0, 0], covariance, rtol=1e-9)
+
+
 def test_masked_samples_do_not_count():
     y = sine(20.0, 1 + 1j, 0.5)
     spoilt = y.copy()
