@@ -249,6 +249,8 @@ def attempt(copy: Path, names: list[str], tests: list[str]) -> dict[str, str]:
     paths = {"MUTATION_NAMES": str(asked), "MUTATION_ENDS": str(ends), "MPLBACKEND": "Agg"}
     search = os.pathsep.join([str(copy), str(ROOT / "tools"), os.environ.get("PYTHONPATH", "")])
     options = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "mutation_loop"]
+    # nobody reads why a test fails, and to find out takes longer than most tests
+    options += ["--assert=plain", "--tb=no"]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *options, *tests],
         cwd=copy,
