@@ -13,6 +13,8 @@ Direction = tuple[str, complex, complex]
 """What moves (``"speed"`` or ``"damping"``), the pole, and its change per unit of the move."""
 FAITHFUL = 1e-6
 """Error of the factored form, as a share of the largest Markov parameter, that is still used."""
+ON_CIRCLE = 1e-9
+"""A pole that has moved this close to the unit circle has no damping left."""
 
 
 def pole_directions(poles: FloatArray, dt: float) -> list[Direction]:
@@ -124,7 +126,8 @@ def moved_core(
                 moved[k] = _moved_pole(moved[k], what, float(move), dt)
             elif pole.imag and np.isclose(near, np.conj(pole), rtol=1e-9, atol=0):
                 moved[k] = np.conj(_moved_pole(np.conj(moved[k]), what, float(move), dt))
-    if np.abs(moved).max(initial=0.0) >= 1:
+    # A pole that nothing moves may lie on the circle: an integrator's stays there.
+    if np.abs(moved[moved != poles]).max(initial=0.0) >= 1 - ON_CIRCLE:
         return None
     for what, pole, _ in directions:
         at = moved[int(np.abs(poles - pole).argmin())]

@@ -258,6 +258,15 @@ def test_the_model_has_gain_pole_and_delay_of_the_estimate(by_hand):
     assert not np.any(one.model.markov(30))
 
 
+def test_the_model_of_an_integrating_plant_has_the_moved_lag_too(by_hand):
+    core = ct.ss([[1.0, 0.1], [0.0, POLE]], [[0.0], [0.1]], [[1.0, 0.0]], [[0.0]], DT)
+    one = cr.DelayTracker(core, max_delay=20, memory=3.0)
+    by_hand.turn = [moved(0.03)]
+    feed(one, 60)
+    poles = np.sort(one.model.delay_free.poles().real)
+    assert_allclose(poles, [POLE ** np.exp(0.03), 1.0], rtol=1e-12)
+
+
 def test_a_direct_term_is_scaled_with_the_gain(by_hand):
     core = ct.ss([[POLE]], [[1.0]], [[0.1]], [[0.3]], DT)
     one = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
