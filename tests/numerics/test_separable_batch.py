@@ -338,7 +338,8 @@ def test_starts_that_are_far_behind_are_given_up_after_eight_turns(monkeypatch):
     _, cost = fit_batch(clean, ONE, starts, BOX, tolerance=0.0, most_iterations=14)
     sizes = [len(one) for one in rows[1:]]
     assert sizes[:9] == [4] * 9
-    assert max(sizes[9:]) == 2
+    # at the optimum rounding decides how long a start goes on
+    assert max(sizes[9:]) <= 2
     assert cost[2:].min() > 1.5 * cost.min()
     # with delays that are fixed every one is a point of a profile
     rows.clear()
