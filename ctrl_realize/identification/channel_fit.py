@@ -142,14 +142,14 @@ def from_starts(
 ) -> Outcome:
     """Fit from one estimate of the impulse response after the other, until nothing is left."""
     best: Outcome | None = None
-    refused: DataError | None = None
+    refused: list[DataError] = []
     at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
     starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else list(STARTS)
     for tried, way in enumerate(starts[:most_starts], start=1):
         try:
             found = _from_start(group, way, asked, delays, feedthrough, enough)
         except DataError as error:
-            refused = refused or error
+            refused.append(error)
             continue
         if best is None or found.bic < best.bic:
             best = found
@@ -158,8 +158,7 @@ def from_starts(
         if clear and all(check.independent for check in best.system.fit.checks):
             break
     if best is None:
-        assert refused is not None
-        raise refused
+        raise refused[0]
     return best
 
 
