@@ -13,7 +13,6 @@ import ctrl_realize as cr
 from ctrl_realize.errors import DataError
 from ctrl_realize.identification.averaging import (
     MeanStep,
-    _trend,
     aligned_steps,
     delay_outliers,
     mean_step,
@@ -221,12 +220,6 @@ def test_delays_that_grow_with_the_amplitude_are_a_trend():
     line = np.polynomial.Polynomial.fit(size, found.delays, 1, w=1 / found.errors)
     inflation = max(np.sum(weight * (found.delays - line(size)) ** 2) / 3, 1)
     assert found.trend_error == pytest.approx(np.sqrt(inflation / spread), rel=1e-9)
-
-
-def test_three_amplitudes_are_enough_for_a_trend():
-    slope, error = _trend(np.array([1.0, 2.0, 3.0]), np.array([5.0, 5.5, 6.0]), np.full(3, 0.1))
-    assert slope == pytest.approx(0.5)
-    assert error == pytest.approx(0.1 / np.sqrt(2))
 
 
 @pytest.mark.parametrize("amplitudes", [[16.0, 16.2, 16.4], [8.0, 16.0]])

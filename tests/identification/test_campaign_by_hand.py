@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import control as ct
 import numpy as np
@@ -11,8 +10,6 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError
-from ctrl_realize.identification import campaign as campaign_module
-from ctrl_realize.identification import campaign_run
 from ctrl_realize.identification.campaign import Campaign
 from ctrl_realize.identification.campaign_row import CampaignRow
 from ctrl_realize.identification.packed_model import PackedModel
@@ -103,63 +100,6 @@ def test_the_best_row_has_the_least_misfit():
     assert some.best.delay == 4.0
 
 
-def test_the_final_fit_takes_the_records_that_were_identified(monkeypatch):
-    asked = []
-    monkeypatch.setattr(
-        campaign_module, "fit_records", lambda given, **options: asked.append((given, options))
-    )
-    other = cr.Record(TIME, TIME > 1, 2 * TIME)
-    sources = (RECORD, RECORD, lambda: other)
-    _ = campaign([row(3.0), FAILED, row(4.0)], "output_error", sources, {"order": 2}).system
-    assert asked == [([RECORD, other], {"order": 2})]
-
-
-@pytest.fixture
-def realized(monkeypatch):
-    """Of a scan the arguments that it is realized with, and a system without names."""
-    asked = []
-
-    def realize(impulse, order, **how):
-        asked.append((impulse, order, how))
-        core = ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT)
-        return cr.DelayedStateSpace(core, how["delay"])
-
-    monkeypatch.setattr(campaign_module, "realize", realize)
-    return asked
-
-
-SCAN = SimpleNamespace(
-    impulse="pulses",
-    order=2,
-    samples=50,
-    realization=SimpleNamespace(feedthrough=True, hankel=(7, 8)),
-)
-AS_SCANNED = {"samples": 50, "feedthrough": True, "hankel": (7, 8)}
-
-
-def test_the_final_model_of_scans_is_the_best_record_at_the_mean_delay(realized):
-    rows = [row(40.0, misfit=0.2), row(43.0, model=packed(fit=SCAN)), row(42.0, misfit=0.3)]
-    final = campaign(rows).system  # a mean of 41.67
-    assert realized == [("pulses", 2, {"delay": 42, **AS_SCANNED})]
-    assert (final.delay, final.name) == (42, "own")
-    assert (final.input_labels, final.output_labels) == (["valve"], ["level"])
-
-
-def test_a_fit_that_was_kept_in_summary_is_made_again(realized, monkeypatch):
-    asked = []
-
-    def identify(record, **how):
-        asked.append((record, how))
-        return packed(fit=SCAN).unpack()
-
-    monkeypatch.setattr(campaign_module, "identify", identify)
-    rows = [row(40.0, misfit=0.2), row(44.0, model=packed(fit=SimpleNamespace(delay=44.0)))]
-    sources = ("not this one", lambda: RECORD)
-    assert campaign(rows, "paper", sources, {"samples": 50}).system.delay == 42
-    assert asked == [(RECORD, {"method": "paper", "samples": 50})]
-    assert len(realized) == 1
-
-
 def test_the_table_has_all_rows_in_their_order():
     flags = (Flag("hum", "there is hum"), Flag("drift", "and drift"))
     table = campaign([row(3.0, "a", flags=flags, model=packed(order=2)), FAILED]).table()
@@ -232,92 +172,3 @@ def test_one_record_has_no_scatter():
     assert shown["scatter"] == "unknown: one record has none"
     assert "variance" not in shown
     assert shown["delay, trimmed mean"] == "3.12 samples = 312.3 ms (0 of 1 left out)"
-
-
-@pytest.fixture
-def processes(monkeypatch):
-    """In the place of joblib a row after the other in this process; what was asked of it."""
-    asked = []
-
-    def parallel(**how):
-        asked.append(how)
-        return lambda tasks: (call(*args) for call, args, _ in tasks)
-
-    monkeypatch.setattr("joblib.Parallel", parallel)
-    return asked
-
-
-@pytest.fixture
-def rows_asked(monkeypatch, processes):
-    """In the place of an identification a row that is called by its place."""
-    asked = []
-
-    def identify_row(source, position, method, options, store):
-        asked.append((source, position, method, options, store))
-        return row(float(position))
-
-    monkeypatch.setattr(campaign_run, "identify_row", identify_row)
-    return asked
-
-
-def test_every_source_is_identified_at_its_place(rows_asked, processes):
-    def read():
-        raise AssertionError("it is read where it is identified")
-
-    given = (source for source in (RECORD, read))
-    options = {"order": 2, "samples": 9}
-    found = cr.identify_campaign(given, method="scan", store="store", **options)
-    assert rows_asked == [
-        (RECORD, 0, "scan", options, "store"),
-        (read, 1, "scan", options, "store"),
-    ]
-    assert found.delays.tolist() == [0.0, 1.0]
-    assert (found.sources, found.method, found.options) == ((RECORD, read), "scan", options)
-    assert cr.identify_campaign([RECORD]).method == "output_error"
-    assert [how["n_jobs"] for how in processes] == [1, 1]
-    assert rows_asked[-1] == (RECORD, 0, "output_error", {}, None)
-
-
-@pytest.mark.parametrize(("progress", "disable"), [(None, None), (True, False), (False, True)])
-def test_a_bar_is_shown_where_somebody_sees_it_or_as_asked(
-    rows_asked, monkeypatch, progress, disable
-):
-    shown = []
-
-    def tqdm(rows, **how):
-        shown.append(how)
-        return rows
-
-    monkeypatch.setattr("tqdm.auto.tqdm", tqdm)
-    cr.identify_campaign([RECORD, RECORD], progress=progress)
-    assert shown == [{"total": 2, "desc": "identify", "unit": "record", "disable": disable}]
-
-
-@pytest.mark.parametrize("n_jobs", [True, 1.5, "2", 0, 10_001, -10_001])
-def test_a_number_of_processes_is_a_whole_one_within_reason(rows_asked, processes, n_jobs):
-    with pytest.raises(OptionError, match="n_jobs="):
-        cr.identify_campaign([RECORD], n_jobs=n_jobs)
-    assert processes == []
-
-
-@pytest.mark.parametrize("n_jobs", [10_000, -10_000, -1, 1])
-def test_ten_thousand_processes_are_within_reason(rows_asked, processes, n_jobs):
-    cr.identify_campaign([RECORD], n_jobs=n_jobs)
-    assert processes == [{"n_jobs": n_jobs, "return_as": "generator"}]
-
-
-@pytest.mark.parametrize(
-    ("records", "options", "error", "match"),
-    [
-        (3, {}, DataError, "records is a int"),
-        ([], {}, DataError, "no records"),
-        ([RECORD, "a.csv"], {}, DataError, r"records\[1\] is a str"),
-        ([RECORD], {"method": "magic"}, OptionError, "magic"),
-        ([RECORD], {"record": 1}, OptionError, "record: identify takes cutoff_hz, "),
-        ([RECORD], {"b": 1, "a": 1}, OptionError, "a, b: identify takes"),
-    ],
-)
-def test_what_no_campaign_can_do_is_refused(rows_asked, records, options, error, match):
-    with pytest.raises(error, match=match):
-        cr.identify_campaign(records, **options)
-    assert rows_asked == []

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import control as ct
 import numpy as np
 import pytest
@@ -11,13 +9,9 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OrderError
-from ctrl_realize.identification import channel_fit
-from ctrl_realize.identification.channel_fit import Outcome, _choices, _silence, from_starts
 from ctrl_realize.identification.channel_search import (
     Candidate,
     Search,
-    _neighbours,
-    _within,
     experiments,
 )
 
@@ -61,32 +55,8 @@ def test_records_shorter_than_the_delays_are_left_out():
         experiments([ramps(10)], shares)
 
 
-def test_neighbours_are_one_sample_apart():
-    # of one input and output only the sum counts
-    assert _neighbours((2,), (0,)) == [((1,), (0,)), ((3,), (0,))]
-    assert _neighbours((0,), (0,)) == [((1,), (0,))]
-    assert _neighbours((0,), (3, 0)) == [
-        ((1,), (3, 0)),
-        ((0,), (2, 0)),
-        ((0,), (4, 0)),
-        ((0,), (3, 1)),
-    ]
-    assert _neighbours((1, 0), (0,)) == [
-        ((0, 0), (0,)),
-        ((2, 0), (0,)),
-        ((1, 1), (0,)),
-        ((1, 0), (1,)),
-    ]
-
-
 def candidate(order=1, inputs=(0,), outputs=(0,), direct=False, bic=0.0):
     return Candidate(None, order, inputs, outputs, direct, bic)
-
-
-def test_behind_a_hold_a_dead_time_lies_within_a_sample():
-    assert _within(candidate(inputs=(3,), outputs=(2,))) == (5, 6.0)
-    assert _within(candidate(inputs=(3,), outputs=(2,), direct=True)) == (4.0, 5.0)
-    assert _within(candidate(direct=True)) == (0.0, 0.0)
 
 
 class ByHand(Search):
@@ -228,37 +198,6 @@ def test_two_short_records_excite_what_one_does_not():
     assert Search(group[:1], markov, 4).orders(None) == (1,)
 
 
-def fitted(spread, variance, counts, order=2, direct=False, inputs=1):
-    found = SimpleNamespace(
-        spread=np.array(spread),
-        variance=np.array(variance),
-        counts=np.array(counts),
-        model=SimpleNamespace(D=np.zeros((len(spread), inputs))),
-    )
-    return Candidate(found, order, (0,) * inputs, (0,) * len(spread), direct, 0.0)
-
-
-def test_an_output_is_silent_where_its_parameters_explain_no_more_than_noise():
-    # four parameters of ln(400) = 6 each: 24 of log likelihood are needed, 0.06 a sample
-    gains = np.exp([0.059, 0.061])
-    flags = _silence(fitted(gains, [1.0, 1.0], [400, 400]))
-    assert [str(flag)[:8] for flag in flags] == ["output 0"]
-    assert flags[0].code == "no_response"
-    # a direct term of two inputs has two parameters more
-    wide = fitted(gains * np.exp(0.03), [1.0, 1.0], [400, 400], direct=True, inputs=2)
-    assert [str(flag)[:8] for flag in _silence(wide)] == ["output 0"]
-    assert len(_silence(fitted(gains, [1.0, 1.0], [400, 400], direct=True, inputs=2))) == 2
-
-
-def test_choices_say_what_else_was_tried_and_how_far_delays_moved():
-    best = candidate(3, (4,), (1,), bic=-100.0)
-    bic = {2: -88.6, 3: -100.0, 5: -99.0}
-    first, second = _choices(best, bic, ((2,), (1,)))
-    assert first == "order 3 has the least BIC; others: 2 (+11), 5 (+1)"
-    assert second.startswith("delays where the responses set in, (2,) and (1,), moved")
-    assert _choices(best, {3: -100.0}, ((4,), (1,))) == ()
-
-
 def test_a_search_starts_from_the_scaled_response_behind_the_delays():
     A, C = np.diag([0.8, 0.5]), [[1.0, 1.0], [1.0, -1.0]]
     core = ct.ss(A, [[1.0], [1.0]], C, np.zeros((2, 1)), 1.0)
@@ -301,15 +240,6 @@ def test_the_criterion_counts_parameters_and_samples_the_last_fit_sees_all(direc
     assert np.any(last.found.model.D) == direct
 
 
-def test_a_direct_term_has_a_parameter_for_every_channel():
-    search = ByHand(None, channels=(2, 3))
-    search._samples, search._enough = 100, 80
-    found = SimpleNamespace(counts=np.array([80, 80]), loss=5.0)
-    plain, direct = (search._judged(found, 4, ((0,) * 3, (0,) * 2), way) for way in (False, True))
-    assert plain.bic == pytest.approx(10.0 + 4 * 5 * np.log(80))
-    assert direct.bic - plain.bic == pytest.approx(6 * np.log(80))
-
-
 def test_sizes_of_signals_are_those_about_the_level_of_each_record():
     u = np.random.default_rng(0).standard_normal(50)
     k = np.arange(50.0)
@@ -329,76 +259,3 @@ def test_six_samples_tell_no_order_and_a_short_response_few():
     assert short._kung(5, ((0,), (0,))).matrices()[0].shape == (5, 5)
     with pytest.raises(OrderError, match="order=6"):
         short._kung(6, ((0,), (0,)))
-
-
-class Starts:
-    """Stands in for the fit from one start: a criterion, or the error that comes of it."""
-
-    def __init__(self, monkeypatch, *ends):
-        self.ends, self.ways = list(ends), []
-        monkeypatch.setattr(channel_fit, "_from_start", self)
-
-    def __call__(self, group, way, asked, delays, feedthrough, enough):
-        self.ways.append(way)
-        end = self.ends[len(self.ways) - 1]
-        if isinstance(end, Exception):
-            raise end
-        bic, seen, *independent = end
-        checks = [SimpleNamespace(independent=one) for one in independent]
-        return Outcome(bic, SimpleNamespace(fit=SimpleNamespace(checks=checks)), seen, None, None)
-
-
-def test_the_next_start_is_tried_until_nothing_is_left(monkeypatch):
-    moving = (ramps(),)
-    done = Starts(monkeypatch, (3.0, True, True, True))
-    assert from_starts(moving).bic == 3.0
-    assert done.ways == [("unknown", "auto")]
-    # a residual of one record that follows the input asks for another; the best of all is kept
-    all_four = Starts(
-        monkeypatch, (3.0, True, True, False), (1.0, True, False), (2.0, True, True), (4.0, True)
-    )
-    assert from_starts(moving).bic == 1.0
-    assert all_four.ways == list(channel_fit.STARTS)
-    only_two = Starts(monkeypatch, (3.0, True, False), (1.0, True, False))
-    assert from_starts(moving, most_starts=2).bic == 1.0
-    assert len(only_two.ways) == 2
-
-
-def test_an_output_that_the_first_start_does_not_see_gets_a_second_one(monkeypatch):
-    unseen = Starts(monkeypatch, (3.0, False, True), (5.0, True, True))
-    assert from_starts((ramps(),)).bic == 3.0
-    assert len(unseen.ways) == 2
-
-
-def test_a_start_that_is_refused_is_passed_over(monkeypatch):
-    first, second = DataError("first"), DataError("second")
-    Starts(monkeypatch, first, second, (3.0, True, True))
-    assert from_starts((ramps(),)).bic == 3.0
-    Starts(monkeypatch, first, second, first, second)
-    with pytest.raises(DataError, match="first"):
-        from_starts((ramps(),))
-
-
-def test_records_that_begin_at_rest_start_from_rest(monkeypatch):
-    k = np.arange(40.0)
-    still, soon = (cr.Record(k, (k >= n).astype(float), k) for n in (10, 9))
-    for group, start in (((still,), "rest"), ((soon,), "unknown"), ((still, soon), "unknown")):
-        way = Starts(monkeypatch, (0.0, True, True))
-        from_starts(group)
-        assert way.ways == [(start, "auto")]
-
-
-def test_the_highest_order_and_the_samples_are_handed_on_to_the_search(monkeypatch):
-    class ReachedError(Exception):
-        pass
-
-    def search(group, markov, top, enough):
-        raise ReachedError(markov.shape[:2], top, enough)
-
-    monkeypatch.setattr(channel_fit, "Search", search)
-    u = np.random.default_rng(0).standard_normal((2, 300))
-    record = cr.Record(np.arange(300.0), u, np.stack([u[0], u[1], u[0] - u[1]]))
-    for asked, top in (((2, 3), 3), (None, 20)):
-        with pytest.raises(ReachedError) as reached:
-            channel_fit._from_start((record,), ("unknown", "auto"), asked, None, None, 123)
-        assert reached.value.args == ((3, 2), top, 123)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import control as ct
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
-from ctrl_realize.identification import pulse_regression as module
 from ctrl_realize.identification.pulse_regression import (
     MOST_GROWTH,
     OKID_ORDERS,
@@ -200,21 +197,6 @@ def test_a_response_that_a_prior_takes_for_silence_is_weaker_than_its_noise():
     assert sum(told[:20]) >= 19
     assert 0 < sum(told[20:40]) < 20
     assert sum(told[40:]) == 0
-
-
-@pytest.mark.parametrize(("twice", "told"), [(5.99, 1), (6.01, 0)])
-def test_a_response_is_seen_from_a_bayes_factor_of_e_cubed_on(monkeypatch, twice, told):
-    one = record()
-    y = one.output[0, 5:]  # what has a past of six
-    # of no response: the level is taken out, and the variance integrated
-    none = -(y.size - 1) / 2 * np.log(((y - y.mean()) ** 2).sum())
-    fit = module.fit_kernel
-
-    def as_likely(*args):
-        return replace(fit(*args), evidence=none + twice / 2)
-
-    monkeypatch.setattr(module, "fit_kernel", as_likely)
-    assert len(with_prior((one,), 6, "unknown", ("TC",)).flags) == told
 
 
 @pytest.mark.parametrize(("m", "p"), [(1, 1), (2, 2)])

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DelayRangeError, OptionError, OrderError
 from ctrl_realize.identification.realization import (
-    _gap_flags,
-    _iae,
-    _pole_flags,
     uses_feedthrough,
 )
 
@@ -154,56 +149,3 @@ def test_three_standard_deviations_are_needed_to_believe_it():
 
 
 # what is left
-
-
-def lag_model(pole):
-    return SimpleNamespace(A=np.array([[pole]]), B=np.ones((1, 1)), C=np.ones((1, 1)))
-
-
-def test_misfits_are_summed_over_all_samples():
-    window = np.zeros((1, 1, 5))
-    # behind one sample: 3, 1, 0.5, 0.25
-    assert _iae(window, lag_model(0.5), np.array([[3.0]]), 1) == pytest.approx(4.75, rel=1e-12)
-    window[0, 0] = [-2.0, 3.0, 1.0, 1.0, 0.25]
-    assert _iae(window, lag_model(0.5), np.array([[3.0]]), 1) == pytest.approx(2.5, rel=1e-12)
-
-
-def test_a_model_that_grows_beyond_all_numbers_is_off_without_bound():
-    assert _iae(np.zeros((1, 1, 9)), lag_model(1e200), np.zeros((1, 1)), 0) == np.inf
-    turning = SimpleNamespace(
-        A=np.array([[0.0, -1e200], [1e200, 0.0]]), B=np.ones((2, 1)), C=np.ones((1, 2))
-    )
-    assert _iae(np.zeros((1, 1, 9)), turning, np.zeros((1, 1)), 0) == np.inf
-
-
-def test_poles_are_judged_by_what_they_keep():
-    assert codes(_pole_flags(np.diag([0.3, 1.0]), 9)) == ["unstable"]
-    assert codes(_pole_flags(np.diag([0.3, 1 - 1e-9]), 9)) == ["not_died_away"]
-    (kept,) = _pole_flags(np.diag([0.9, 0.1]), 2)
-    assert kept.code == "not_died_away"
-    assert "magnitude 0.90000 and keeps 81 % of its response at the end of the 2 " in kept.message
-    assert _pole_flags(np.diag([0.5, 0.1]), 3) == ()  # an eighth
-    turn = 0.5 * np.array([[0.6, -0.8], [0.8, 0.6]])  # a pair of magnitude 0.5
-    assert codes(_pole_flags(turn, 2)) == ["not_died_away"]
-
-
-def test_a_real_negative_pole_is_flagged_and_a_pair_is_none():
-    (flag,) = _pole_flags(np.diag([-0.3, -0.4, 0.2]), 50)
-    assert flag.code == "negative_pole"
-    assert "z = -0.4000" in flag.message
-    assert _pole_flags(np.array([[-0.3, 0.4], [-0.4, -0.3]]), 50) == ()
-    assert _pole_flags(np.array([[0.0]]), 50) == ()
-    assert codes(_pole_flags(np.diag([-1.5]), 50)) == ["unstable", "negative_pole"]
-
-
-def test_a_gap_is_one_below_four_fifths():
-    def of(following, order=2):
-        values = SimpleNamespace(singular_values=np.array([4.0, 2.0, 1.9]), following=following)
-        return _gap_flags(values, order)
-
-    assert of(1.59) == ()
-    (flag,) = of(1.6)
-    assert flag.code == "no_gap"
-    assert flag.message.startswith("singular values 2 and 3 are 2 and 1.6: ")
-    assert of(3.1, order=1) == ()
-    assert codes(of(3.3, order=1)) == ["no_gap"]

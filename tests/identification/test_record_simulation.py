@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import control as ct
 import numpy as np
 import pytest
@@ -12,9 +10,6 @@ from numpy.testing import assert_allclose
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
 from ctrl_realize.identification.record_simulation import (
-    PIECES,
-    _later,
-    _pieces,
     as_delayed,
     simulate_record,
 )
@@ -28,46 +23,6 @@ def core(pole=0.8, D=0.0, dt=DT):
 
 def record(u, y, dt=DT):
     return cr.Record(dt * np.arange(np.shape(u)[-1]), u, y)
-
-
-def test_pieces_lie_side_by_side_and_there_are_no_more_than_sixteen():
-    assert _pieces(0) == []
-    assert _pieces(3) == [(0, 1), (1, 2), (2, 3)]
-    assert _pieces(PIECES) == [(k, k + 1) for k in range(PIECES)]
-    long = _pieces(40)
-    assert len(long) == PIECES
-    assert (long[0][0], long[-1][1]) == (0, 40)
-    assert all(a[1] == b[0] for a, b in pairwise(long))
-    assert {b - a for a, b in long} == {2, 3}
-
-
-def test_later_responses_leave_the_record_at_its_end():
-    one = np.array([[1.0, 2.0, 3.0]])
-    assert_allclose(_later(one, 0), one)
-    assert_allclose(_later(one, 2), [[0.0, 0.0, 1.0]])
-    assert_allclose(_later(one, 3), 0.0)
-    assert_allclose(_later(one, 7), 0.0)
-
-
-@pytest.mark.parametrize("where", ["input", "output"])
-@pytest.mark.parametrize("delay", [1, 5, 40])
-def test_what_was_inside_a_dead_time_is_found(where, delay):
-    # before the record: an input in as many levels as there are pieces
-    rng = np.random.default_rng(0)
-    u = np.concatenate([np.zeros(delay), rng.standard_normal(60)])
-    for (a, b), level in zip(_pieces(delay), rng.standard_normal(PIECES), strict=False):
-        u[a:b] = level
-    # behind an output delay is what the core has answered, which is as free as the state
-    system = cr.DelayedStateSpace(
-        ct.ss([], [], [], [[2.0]], DT) if where == "output" else core(D=0.3),
-        delay if where == "input" else 0,
-        output_delay=delay if where == "output" else 0,
-    )
-    y = 4.0 + system.simulate(u)
-    one = record(u[delay:], y[delay:])
-    # exact to the rounding of a least-squares problem whose small values end at 1e-10
-    assert_allclose(simulate_record(system, one, "estimate")[0], one.output, rtol=0, atol=1e-9)
-    assert np.abs(simulate_record(system, one, "rest")[0] - one.output).max() > 0.1
 
 
 def test_a_dead_time_longer_than_the_record_leaves_what_the_record_shows():

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
-from scipy.stats import norm
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
-from ctrl_realize.identification.residuals import _flags, _outside
 from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
 MIMO = cr.DelayedStateSpace(TWO_INPUTS.delay_free, (2, 4), output_delay=(0, 3, 1))
@@ -137,27 +135,6 @@ def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
         assert [flag.code for flag in check.flags] == [told]
         assert check.independent == (told == "feedback")
         assert np.abs(check.cross[0, 0]).argmax() == 25 + shift
-
-
-def test_the_flag_of_a_wrong_model_names_the_lag_at_which_it_is_most_wrong():
-    cross = np.zeros((2, 1, 4))
-    cross[1, 0] = [0.1, 0.2, -0.4, 0.9]
-    later = np.abs(cross) > 0.15
-    later[1, 0, 3] = False
-    (flag,) = _flags(later, np.zeros_like(later), cross)
-    assert "most at lag 2:" in flag.message
-    assert _flags(np.zeros_like(later), np.zeros_like(later), cross) == ()
-
-
-@pytest.mark.parametrize("level", [0.9, 0.99])
-def test_all_lags_together_alarm_as_rarely_as_one(level):
-    # 51 lags: each may leave the bound in one case of 51 of those that all may
-    bound = norm.isf((1 - level) / 2)
-    limit = norm.isf((1 - level) / 2 / 51)
-    cross = np.full((1, 2, 51), 0.0)
-    cross[0, 0, 3], cross[0, 1, 4] = 1.0001 * limit, -0.9999 * limit
-    outside = _outside(cross, np.full((1, 2), bound), level)
-    assert np.argwhere(outside).tolist() == [[0, 0, 3]]
 
 
 def test_the_bound_of_the_autocorrelation_is_that_of_white_noise():

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.special import gammainc
 
-from ctrl_realize.numerics import lag_chains as module
 from ctrl_realize.numerics.lag_chains import (
-    _TANKS,
     LONGEST,
     SHORTEST,
     LagChain,
-    _error,
-    _fit,
-    _over_within_a_sample,
     chain_limits,
     chain_profile,
     fit_chains,
@@ -147,65 +141,6 @@ def test_the_profile_of_a_chain_ends_at_the_bounds_of_the_delay():
     delay, excess = chain_profile(chain, scales)
     assert (delay[0], delay[-1]) == (4.5, 5.25)
     assert (excess[0], excess[-1]) == (1.0, 0.25)
-
-
-@pytest.mark.parametrize(("total", "over"), [(0.07, True), (0.13, False)])
-def test_lags_are_over_within_a_sample_where_their_sum_is_shorter(total, over):
-    scales = Scales(onset=5.0, rise=1.0, length=50.0, dt=0.1, latest=6.0)
-    poles = -np.array([1, 1.2, 1.5, 2]) * (1 + 1 / 1.2 + 1 / 1.5 + 1 / 2) / total
-    at = np.append(5.0, parameters_from_poles(poles.astype(complex)))
-    chain = LagChain(Candidate(Structure(4, 4), at, 0.0), 0.0, 1.0)
-    assert _over_within_a_sample(chain, scales) is over
-
-
-@pytest.mark.parametrize(
-    ("start", "best", "end"),
-    [
-        (1.0, 1.25, 1.25),  # at the lower bound, and inwards
-        (3.0, 2.75, 2.75),  # at the upper one, and inwards
-        (1.0, 0.75, 1.0),  # outwards: held
-        (3.0, 3.25, 3.0),
-        (1.5, 2.0, 2.0),
-    ],
-)
-def test_a_delay_at_its_bound_moves_inwards_and_is_held_against_moving_out(
-    monkeypatch, start, best, end
-):
-    target = np.array([best, 0.5, 0.1])
-
-    def linear(problem, structure, law, x):
-        return np.append(x[0], np.zeros(4)), target - x, np.eye(3)
-
-    monkeypatch.setattr(module, "_evaluate", linear)
-    scales = Scales(onset=2.0, rise=1.0, length=50.0, dt=0.1, earliest=1.0, latest=3.0)
-    candidate, x = _fit(None, 4, _TANKS, np.array([start, 0.0, 0.2]), scales)
-    # where a delay is held, a turn that gains 1e-4 of its cost is the last: it starts from 0.0025
-    # away at most, and its damping leaves a ten-thousandth of that
-    assert x == pytest.approx([end, 0.5, 0.1], abs=1e-6)
-    assert candidate.delay == x[0]
-    assert candidate.cost == pytest.approx((end - best) ** 2, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("shown", "error"),
-    [
-        # what the lag leaves of the delay is 2 of its (2, 1, 0); the shape moves nothing
-        ([[2.0, 0.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 0.0]], 0.5),
-        # nor does the lag: all of it
-        ([[3.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 0.0, 0.0]], 0.2),
-        ([[0.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 1.0]], np.inf),
-    ],
-)
-def test_a_lag_that_nothing_shows_takes_nothing_off_the_error_of_the_delay(
-    monkeypatch, shown, error
-):
-    nothing = SimpleNamespace(jacobian=np.zeros((1, 3, 5)))
-    monkeypatch.setattr(module, "evaluate", lambda *asked: nothing)
-    monkeypatch.setattr(module, "_evaluate", lambda *asked: (None, None, np.array(shown)))
-    candidate = Candidate(Structure(4, 4), np.zeros(5), 0.0)
-    x = np.array([5.0, 0.0, 0.1**2])
-    assert _error(None, candidate, _TANKS, x, 1.0) == pytest.approx(error, rel=1e-12)
-    assert _error(None, candidate, _TANKS, x, 9.0) == pytest.approx(3 * error, rel=1e-12)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5])

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from ctrl_realize.numerics import profile_interval as module
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
 from ctrl_realize.numerics.profile_interval import delay_error, delay_profile, profile_limits
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, evaluate, fit_batch
@@ -97,23 +95,3 @@ def test_an_interval_ends_between_any_two_delays_of_its_grid_and_at_the_grid_whe
     assert profile_limits(delay, np.array([16.0, 1.0, 0.0, 1.0]), 4.0)[1] == 4.0
     # one delay alone inside, beside both ends of the grid
     assert profile_limits(delay[:3], np.array([16.0, 0.0, 16.0]), 4.0) == pytest.approx((1.5, 2.5))
-
-
-@pytest.mark.parametrize(
-    ("by_delay", "by_lag", "error"),
-    [
-        ([2.0, 1.0, 0.0], [0.0, 3.0, 0.0], 0.5),  # the lag leaves 2 of it
-        ([2.0, 1.0, 0.0], [0.0, 0.0, 0.0], 5**-0.5),  # a lag that nothing shows: all of it
-        ([2.0, 1.0, 0.0], [4.0, 2.0, 0.0], np.inf),  # moves as the lag does
-        ([0.0, 0.0, 0.0], [0.0, 3.0, 0.0], np.inf),  # nothing moves
-    ],
-)
-def test_the_error_is_of_what_the_lags_leave_of_the_delay_and_infinite_of_nothing(
-    monkeypatch, by_delay, by_lag, error
-):
-    jacobian = np.array([by_delay, by_lag]).T
-    state = SimpleNamespace(jacobian=jacobian[None], sensitivity=np.full((1, 2), 5.0))
-    monkeypatch.setattr(module, "evaluate", lambda *asked: state)
-    candidate = Candidate(Structure(1, 1), np.zeros(2), 0.0)
-    assert delay_error(None, candidate, 1.0) == pytest.approx(error, rel=1e-12)
-    assert delay_error(None, candidate, 9.0) == pytest.approx(3 * error, rel=1e-12)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.rise import _moving_mean, rise_time
+from ctrl_realize.numerics.rise import rise_time
 
 
 def ramp(start, length, size):
@@ -84,14 +84,6 @@ def test_of_less_than_forty_samples_every_one_counts():
     step[19] = 1.0
     # from 2.8 samples after 5 to where the last move, from 13/28 to one, passes 90 %
     assert rise_time(step, 1.0) == pytest.approx(18 + (0.9 - 13 / 28) / (15 / 28) - 7.8, rel=1e-12)
-
-
-def test_means_begin_at_rest_and_end_at_the_last_value():
-    values = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    assert _moving_mean(values, 1) is values
-    assert _moving_mean(values, 2) == pytest.approx(np.array([3, 7, 14, 28, 40]) / 3)
-    assert _moving_mean(values, 3) == pytest.approx(np.array([3, 7, 14, 28, 40]) / 3)
-    assert _moving_mean(values, 4) == pytest.approx(np.array([7, 15, 31, 46, 60]) / 5)
 
 
 def test_of_a_pulse_that_ends_at_rest_the_largest_value_is_the_level():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics import sampled_data as module
 from ctrl_realize.numerics.own_terms import FixedTerms
 from ctrl_realize.numerics.pole_factors import poles_from_parameters
 from ctrl_realize.numerics.sampled_data import SampledData, cut
@@ -18,44 +17,6 @@ def records(*lengths):
     rng = np.random.default_rng(0)
     outputs = [rng.standard_normal(n) for n in lengths]
     return outputs, [rng.standard_normal(n) + 5.0 for n in lengths]
-
-
-@pytest.fixture
-def short(monkeypatch):
-    monkeypatch.setattr(module, "MOST_SAMPLES", 100)
-    monkeypatch.setattr(module, "MOST_IN_ALL", 300)
-
-
-def test_records_are_used_from_their_first_sample_on(short):
-    outputs, inputs = records(150, 40)
-    data = cut(outputs, inputs, 0.5)
-    assert [y.tolist() for y in data.outputs] == [outputs[0][:100].tolist(), outputs[1].tolist()]
-    # the mean is that of what is used
-    for used, given in zip(data.inputs, inputs, strict=True):
-        kept = given[: used.size]
-        assert used == pytest.approx(kept - kept.mean(), abs=1e-14)
-    assert [u.size for u in data.inputs] == data.counts == [100, 40]
-    assert (data.starts, data.scales, data.dt, data.period) == ((0, 0), (1.0, 1.0), 0.5, np.inf)
-
-
-@pytest.mark.parametrize(
-    ("lengths", "kept"),
-    [
-        ((150, 150, 150), [100, 100, 100]),
-        # five of them are cut to a fifth each, in steps of a tenth of the longest allowed
-        ((90, 90, 90, 90, 90), [60, 60, 60, 60, 60]),
-        # 10 + 4 x 72 is less than 300 in all, 10 + 4 x 81 is not
-        ((10, 90, 90, 90, 90), [10, 72, 72, 72, 72]),
-        ((60, 60, 60, 60, 60), [60, 60, 60, 60, 60]),
-        ((7, 300), [7, 100]),
-    ],
-)
-def test_the_shortest_records_keep_all_they_have(short, lengths, kept):
-    assert cut(*records(*lengths), 0.5).counts == kept
-
-
-def test_no_record_is_cut_below_its_share(short):
-    assert cut(*records(*[90] * 7), 0.5).counts == [42] * 7
 
 
 def two(**changed):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics import section_fit
 from ctrl_realize.numerics.section_fit import Experiment, fit_sections
 from ctrl_realize.numerics.sections import in_sections, motion
 from ctrl_realize.numerics.state_space import markov, simulate
@@ -109,15 +108,3 @@ def test_the_spread_is_the_variance_of_what_was_measured():
     assert found.spread[0] == pytest.approx(squares / 480)
     squares = 300 * np.var(y[1]) + 200 * np.var(other.y[1])
     assert found.spread[1] == pytest.approx(squares / 500)
-
-
-def test_a_long_record_is_taken_in_pieces_without_seams(monkeypatch):
-    data = [experiment(2, 300)]
-    whole = fit_sections(data, near(), direct=False)
-    monkeypatch.setattr(section_fit, "_ROWS", 64)
-    pieces = fit_sections(data, near(), direct=False)
-    assert pieces.steps == whole.steps
-    # sums in another order
-    assert_allclose(
-        markov(*pieces.model.matrices(), 30), markov(*whole.model.matrices(), 30), atol=1e-9
-    )

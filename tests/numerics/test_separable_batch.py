@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics import separable_fit as module
 from ctrl_realize.numerics.delayed_modes import MoveTrain
 from ctrl_realize.numerics.own_terms import Stretches
 from ctrl_realize.numerics.pole_factors import poles_from_parameters
@@ -284,71 +283,11 @@ def test_steps_do_not_depend_on_the_unit_of_time():
         assert same == pytest.approx(cost, rel=1e-9)
 
 
-def counted(monkeypatch):
-    """Rows that are evaluated, from the starts on."""
-    rows = []
-
-    def counting(problem, structure, parameters):
-        rows.append(parameters.copy())
-        return evaluate(problem, structure, parameters)
-
-    monkeypatch.setattr(module, "evaluate", counting)
-    return rows
-
-
-def test_a_start_is_done_when_it_gains_no_more_than_the_tolerance(monkeypatch):
-    rows = counted(monkeypatch)
-    fitted(noisy(), [3.4, -1.0])
-    quick = len(rows)
-    rows.clear()
-    fitted(noisy(), [3.4, -1.0], tolerance=1e-13)
-    assert 2 <= quick < len(rows) < 30
-
-
-def test_a_start_that_no_step_improves_is_given_up_after_four(monkeypatch):
-    rows = counted(monkeypatch)
-    counting = module.evaluate
-    start = np.array([3.4, -1.0])
-
-    def stuck(problem, structure, parameters):
-        counting(problem, structure, parameters)
-        return evaluate(problem, structure, start[None])
-
-    monkeypatch.setattr(module, "evaluate", stuck)
-    x, _ = fitted(noisy(), start)
-    assert len(rows) == 1 + 4
-    assert x.tolist() == start.tolist()
-    # each of them is shorter than the one before
-    lengths = [np.abs(row[0] - start).max() for row in rows[1:]]
-    assert np.all(np.diff(lengths) < 0)
-
-
 @pytest.mark.parametrize("size", [1.0, 1e-9])
 def test_a_start_on_its_border_leaves_it_where_the_optimum_lies_inside(size):
     for start in ([BOX.low[0], -1.0], [BOX.high[0], -1.0], [3.3, BOX.low[1]], [3.3, BOX.high[1]]):
         x, _ = fitted(size * noisy(), start, tolerance=1e-12)
         assert x == pytest.approx(TRUTH, abs=0.15), start
-
-
-def test_starts_that_are_far_behind_are_given_up_after_eight_turns(monkeypatch):
-    rows = counted(monkeypatch)
-    clean = problem(noisy(noise=1e-9))
-    # two are at the optimum by then, and two still on their way
-    starts = np.array([[3.4, -0.9], [3.6, -0.8], [8.9, 1.36], [8.9, 1.26]])
-    _, cost = fit_batch(clean, ONE, starts, BOX, tolerance=0.0, most_iterations=14)
-    sizes = [len(one) for one in rows[1:]]
-    assert sizes[:9] == [4] * 9
-    # at the optimum rounding decides how long a start goes on
-    assert max(sizes[9:]) <= 2
-    assert cost[2:].min() > 1.5 * cost.min()
-    # with delays that are fixed every one is a point of a profile
-    rows.clear()
-    monkeypatch.setattr(module, "_TURNS_FOR_ALL", 0)
-    fit_batch(clean, ONE, starts, BOX, delay_fixed=True, tolerance=0.0, most_iterations=4)
-    assert [len(one) for one in rows] == [4] * 5
-    rows.clear()
-    fit_batch(clean, ONE, starts, BOX, tolerance=0.0, most_iterations=4)
-    assert len(rows[2]) < 4
 
 
 def test_poles_of_the_answer_are_those_of_its_parameters():

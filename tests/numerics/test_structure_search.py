@@ -6,20 +6,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from ctrl_realize.numerics import structure_search as module
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure
 from ctrl_realize.numerics.step_problem import step_data, step_scales, window
 from ctrl_realize.numerics.structure_search import (
-    ALL_STRUCTURES,
     FASTEST,
     PLAUSIBLE,
     SLOWER_WITH_ZEROS,
     Candidate,
     Scales,
-    _pattern_starts,
-    _pole_patterns,
-    _worth_a_search,
     choose,
     criteria,
     needless_charge,
@@ -39,15 +34,6 @@ def candidate(n: int, r: int, cost: float = 1.0, poles: object = None) -> Candid
     return Candidate(Structure(n, r), found, cost)
 
 
-@pytest.mark.parametrize("structure", ALL_STRUCTURES, ids=str)
-def test_every_start_lies_inside_the_bounds(structure):
-    bounds = parameter_bounds(structure, SCALES)
-    for start in _pattern_starts(structure, SCALES):
-        assert start.size == 1 + structure.order == bounds.low.size == bounds.high.size
-        assert np.all(start > bounds.low)
-        assert np.all(start < bounds.high)
-
-
 def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
     low, high = (
         getattr(parameter_bounds(Structure(1, 1), SCALES), side) for side in ("low", "high")
@@ -61,36 +47,6 @@ def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
     assert_allclose(np.exp(beside_a_zero.high[1:3]), SLOWER_WITH_ZEROS / 0.01)
 
 
-def test_starts_are_two_delays_times_the_patterns_and_one_delay_with_zeros():
-    delays = {start[0] for start in _pattern_starts(Structure(3, 3), SCALES)}
-    assert delays == {0.8, 2.0}
-    assert {start[0] for start in _pattern_starts(Structure(3, 2), SCALES)} == {1.4}
-    assert len(_pattern_starts(Structure(3, 3), SCALES)) == 8
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
-def test_patterns_are_equal_lags_slow_ones_and_ringing_pairs_all_stable(order):
-    rise = 2.0
-    patterns = _pole_patterns(order, SCALES)
-    assert len(patterns) == (3 if order == 1 else 4)
-    assert all(poles.size == order and poles.real.max() < 0 for poles in patterns)
-    # equal lags, together as long as the rise
-    assert_allclose(np.mean(patterns[0].real), -order * rise, rtol=0.2 if order == 1 else 1e-12)
-    assert np.ptp(patterns[0].real) <= 0.4 * order * rise * (1 + 1e-12)
-    # the slowest pole is a bit faster than the rise, and a twelfth of that
-    assert np.abs(patterns[1]).min() == pytest.approx(1.2 * rise)
-    assert np.abs(patterns[2]).min() == pytest.approx(0.1 * rise)
-    for poles, low, high in ((patterns[1], 5, 8), (patterns[2], 1.2, 6)):
-        fast = np.sort(np.abs(poles))[1:] / rise
-        assert np.all((fast >= low - 1e-9) & (fast <= high + 1e-9))
-    ringing = _pole_patterns(order, Scales(2.0, 0.5, 10.0, 0.01, 3.0, ringing=0.7))
-    assert len(ringing) == (3 if order == 1 else 5)
-    for poles, size, damping in zip(ringing[3:], (1.3 * rise, 0.7), (0.2, 0.1), strict=False):
-        assert_allclose(np.abs(poles[:2]), size, rtol=2e-3)
-        assert_allclose(poles[0], np.conj(poles[1]))
-        assert -poles[0].real / abs(poles[0]) == pytest.approx(damping, rel=0.01)
-
-
 def test_neighbours_are_one_zero_less_and_one_pole_less():
     known = {s: candidate(s.order, s.relative_degree) for s in (Structure(2, 1), Structure(2, 2))}
     assert neighbour_starts(Structure(1, 1), SCALES, known) == []
@@ -100,64 +56,6 @@ def test_neighbours_are_one_zero_less_and_one_pole_less():
     assert len(neighbour_starts(Structure(3, 2), SCALES, known)) == 2
     (fewer_zeros,) = neighbour_starts(Structure(2, 1), SCALES, {Structure(2, 2): candidate(2, 2)})
     assert_array_equal(fewer_zeros, candidate(2, 2).parameters)
-
-
-class Data:
-    data = np.zeros(400)
-
-
-def test_more_poles_are_searched_for_where_the_last_one_helped():
-    def found(two: float, three: float) -> dict[Structure, Candidate]:
-        return {Structure(2, 2): candidate(2, 2, two), Structure(3, 3): candidate(3, 3, three)}
-
-    # four of 400 samples: 1 %
-    assert _worth_a_search(Data, Structure(4, 4), found(100.0, 98.5))
-    assert not _worth_a_search(Data, Structure(4, 4), found(100.0, 99.5))
-    assert not _worth_a_search(Data, Structure(4, 3), found(100.0, 50.0))
-    several = {**found(100.0, 99.5), Structure(3, 2): candidate(3, 2, 90.0)}
-    assert _worth_a_search(Data, Structure(4, 4), several)
-
-
-def test_a_large_structure_without_smaller_ones_is_worth_a_search():
-    assert _worth_a_search(Data, Structure(4, 4), {})
-    assert _worth_a_search(Data, Structure(4, 4), {Structure(3, 3): candidate(3, 3)})
-
-
-def lags_of(*costs: float) -> dict[Structure, Candidate]:
-    """Lags of one, two, ... poles at these costs."""
-    return {Structure(n, n): candidate(n, n, cost) for n, cost in enumerate(costs, 1)}
-
-
-@pytest.mark.parametrize(
-    ("structure", "beside", "patterns"),
-    [
-        (Structure(3, 3), lags_of(100.0, 100.0), 8),  # up to three poles always
-        (Structure(4, 4), lags_of(100.0, 50.0, 25.0), 8),  # the last pole helped
-        (Structure(4, 4), lags_of(100.0, 50.0, 50.0), 0),  # it did not
-        (Structure(4, 3), lags_of(100.0, 50.0, 25.0, 12.0), 0),  # zeros, beside their optimum
-        (Structure(4, 3), {}, 4),  # nothing to start from
-    ],
-    ids=str,
-)
-def test_large_structures_are_searched_for_where_they_may_differ_from_their_neighbours(
-    monkeypatch, structure, beside, patterns
-):
-    asked = []
-
-    def fit(problem, structure, starts, bounds):
-        asked.extend(starts)
-        return starts, np.arange(len(starts), 0.0, -1.0)
-
-    monkeypatch.setattr(module, "fit_batch", fit)
-    found = search(Data, [structure], SCALES, beside)
-    near = neighbour_starts(structure, SCALES, beside)
-    assert len(asked) == len(near) + patterns
-    for start, neighbour in zip(asked, near, strict=False):
-        assert_array_equal(start, neighbour)
-    # the cheapest is kept: here the last one
-    assert_array_equal(found[structure].parameters, asked[-1])
-    assert found[structure].cost == 1.0
-    assert set(found) == {structure, *beside}
 
 
 def test_the_criterion_charges_every_parameter_with_the_log_of_the_samples():
