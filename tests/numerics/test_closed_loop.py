@@ -60,24 +60,6 @@ def test_ranges_of_gain_of_loops_on_the_negative_axis():
     assert high == pytest.approx((1.875, math.inf))
 
 
-def test_a_range_within_another_one_does_not_end_it():
-    # -1 is too near from 1/2 to 3/2, the second from 0.66 to 1.20
-    inner = -0.9 + 0.4j
-    later = -0.4 + 0j  # 5/4 to 15/4
-    found = gain_gaps(np.array([-1.0, inner, later]), 0.5)
-    assert found == [(0.0, 0.5), (pytest.approx(3.75), math.inf)]
-
-
-def test_what_never_comes_near_bears_any_gain():
-    # to the right, at rest, or past -1 at more than half: |sin| of its angle is 0.89
-    aside = np.array([1.0, 0.0, 2j, -1 + 2j, 3 - 4j])
-    assert gain_gaps(aside, 0.5) == [(0.0, math.inf)]
-    # or so small that its square vanishes
-    assert gain_gaps(np.array([-1e-200 + 0j]), 0.5) == [(0.0, math.inf)]
-    assert largest_gain(np.array([-1e-200 + 0j]), 0.5) == (math.inf, 0)
-    assert largest_gain(aside, 0.5) == (math.inf, 0)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_ranges_of_gain_are_those_of_brute_force(seed):
     rng = np.random.default_rng(seed)
@@ -109,24 +91,3 @@ def test_the_bottom_of_a_valley_is_found(best):
     assert len(asked) - 1 == 16 + 2 + math.ceil(np.log(1.228e4) / np.log((1 + np.sqrt(5)) / 2))
     assert min(asked) >= 1e-2 * (1 - 1e-12)
     assert max(asked) <= 1e2 * (1 + 1e-12)
-
-
-def test_the_lower_of_two_valleys_is_found():
-    def valleys(x):
-        return min(np.log(x / 0.1) ** 2, np.log(x / 20) ** 2 - 0.1)
-
-    assert smallest_on_line(valleys, 1e-2, 1e2)[0] == pytest.approx(20, rel=1e-4)
-    assert smallest_on_line(lambda x: valleys(2 / x), 1e-2, 1e2)[0] == pytest.approx(0.1, rel=1e-4)
-
-
-def test_at_an_end_of_the_range_the_end_is_found():
-    assert smallest_on_line(lambda x: x, 2.0, 50.0)[0] == pytest.approx(2.0, rel=1e-4)
-    assert smallest_on_line(lambda x: -x, 2.0, 50.0)[0] == pytest.approx(50.0, rel=1e-4)
-
-
-def test_a_finer_scan_finds_what_a_coarser_one_steps_over():
-    def narrow(x):
-        return -1.0 if abs(np.log(x)) < 0.02 else np.log(x + 1)
-
-    assert smallest_on_line(narrow, 0.1, 10.0, points=201)[1] == -1.0
-    assert smallest_on_line(narrow, 0.1, 10.0, points=4)[1] > 0

@@ -33,12 +33,6 @@ def test_bounds_are_those_computed_independently(plant, kwargs, samples):
     assert bound(plant, **kwargs) == pytest.approx(samples, rel=2e-3)
 
 
-@pytest.mark.parametrize("plant", [rigs.R1, rigs.R2, rigs.R3, rigs.R4])
-def test_one_superfluous_zero_leaves_no_information_on_the_delay(plant):
-    assert np.isfinite(bound(plant))
-    assert bound(plant, superfluous_zeros=1) == np.inf
-
-
 @pytest.mark.parametrize(("extra", "deficiency"), [(0, 0), (1, 1), (2, 1)])
 def test_fisher_matrix_loses_one_rank_with_a_superfluous_zero(extra, deficiency):
     # All parameters (delay, poles, numerator, offset) by central differences of the response:

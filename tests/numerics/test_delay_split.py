@@ -26,27 +26,6 @@ def test_delays_of_outputs_and_inputs_are_found_from_their_sums(outputs, inputs)
     assert behind.sum() + before.sum() == least + common * min(len(outputs), len(inputs))
 
 
-@given(st.integers(1, 4), st.integers(1, 4), st.integers(0, 10**6))
-def test_no_split_takes_more_than_an_entry_has(p, m, seed):
-    rng = np.random.default_rng(seed)
-    delays, known = rng.integers(0, 20, (p, m)), rng.random((p, m)) < 0.8
-    rests = []
-    for behind, before in split_delays(delays, known):
-        assert behind.min() >= 0
-        assert before.min() >= 0
-        rest = (delays - np.add.outer(behind, before))[known]
-        assert np.all(rest >= 0)
-        rests.append(rest.sum())
-        if m <= p:  # an output without any response gets no delay of its own
-            assert not np.any(behind[~known.any(axis=1)])
-    assert rests[0] == min(rests)
-
-
-def test_one_input_and_two_outputs_share_the_delay_at_the_input():
-    (behind, before), *_ = split_delays(np.array([[36], [38]]), np.ones((2, 1), dtype=bool))
-    assert (behind.tolist(), before.tolist()) == ([0, 2], [36])
-
-
 def test_what_no_split_explains_is_shared_out_inputs_first_and_outputs_first():
     # the third input has no response
     delays = np.array([[3, 20, -1], [5, 20, -1]])

@@ -72,15 +72,6 @@ def test_means_over_bins_are_those_of_their_samples(poles, widest):
             np.testing.assert_allclose(one[row], means, rtol=1e-8, atol=1e-12)
 
 
-def test_a_move_that_arrives_with_the_last_sample_of_a_bin_counts_in_it():
-    pole = np.array([[-0.5 + 0j]])
-    static, mode, slope = train([0, 4], [4, 2], [2.5], [2.0], dt=1.0).modes(np.zeros(1), pole)
-    assert static[0].tolist() == [0.5, 2.0]
-    late = np.exp(-0.5 * np.array([0.5, 1.5, 2.5]))
-    close(mode[0, :, 0], [2 * late[0] / 4, late[1] + late[2]])
-    close(slope[0, :, 0], [late[0] / 4, 1.5 * late[1] + 2.5 * late[2]])
-
-
 @pytest.mark.parametrize("count", [5, 100])
 @pytest.mark.parametrize("rate", [0.99e-4, 1.01e-4, 1e-6, 0.3])
 def test_the_mean_of_a_slow_mode_is_as_right_as_that_of_a_fast_one(rate, count):
@@ -92,47 +83,6 @@ def test_the_mean_of_a_slow_mode_is_as_right_as_that_of_a_fast_one(rate, count):
     # the next term of the series is (1e-4)^2 / 6; above, rounding is divided by 1e-4
     assert mode[0, 0, 0] == pytest.approx(np.exp(pole * time).mean(), rel=3e-9)
     assert slope[0, 0, 0] == pytest.approx((time * np.exp(pole * time)).mean(), rel=1e-8)
-
-
-def sampled(signal, dt, tau, poles):
-    """What a held signal does that moves at its samples, by definition."""
-    moves = np.diff(signal, prepend=0.0)
-    time = dt * np.arange(signal.size)
-    return by_definition(time, time, moves, tau, poles)
-
-
-@pytest.mark.parametrize("tau", [0.03, 0.77, 2.01])
-def test_a_sampled_input_moves_at_every_sample(tau):
-    signal = np.random.default_rng(0).standard_normal(40)
-    found = SampledInput(signal, 0.1).modes(np.array([tau, 0.5 * tau]), POLES)
-    for row, late in enumerate((tau, 0.5 * tau)):
-        for one, values in zip(found, sampled(signal, 0.1, late, POLES[row]), strict=True):
-            close(one[row], values)
-
-
-def test_a_delay_of_whole_samples_shifts_a_sampled_input():
-    signal = np.array([1.0, 3.0, -2.0, 0.5])
-    # 0.3 / 0.1 is not three in the last digit
-    static, mode, slope = SampledInput(np.concatenate([signal, np.zeros(4)]), 0.1).modes(
-        np.array([0.3]), np.array([[-2.0 + 0j]])
-    )
-    assert static[0].tolist() == [0, 0, 0, 1, 3, -2, 0.5, 0]
-    # a move is seen at once
-    close(mode[0, 3, 0], 1.0)
-    close(mode[0, 4, 0], np.exp(-0.2) + 2.0)
-    close(slope[0, 3:5, 0], [0.0, 0.1 * np.exp(-0.2)])
-
-
-def test_what_comes_later_than_the_record_is_not_seen():
-    signal = np.ones(5)
-    for tau, seen in ((0.4, 1), (0.41, 0), (0.5, 0), (0.77, 0)):
-        static, mode, slope = SampledInput(signal, 0.1).modes(np.array([tau]), POLES[:1])
-        assert np.count_nonzero(static) == seen
-        assert np.count_nonzero(mode) == 3 * seen
-        assert not slope.any()
-    # of several delays the others are
-    static, _, _ = SampledInput(signal, 0.1).modes(np.array([9.0, 0.0]), POLES)
-    assert static.tolist() == [[0.0] * 5, [1.0] * 5]
 
 
 def test_several_records_stand_one_after_the_other_without_their_first_samples():

@@ -32,7 +32,3 @@ def test_the_second_sample_from_each_end_uses_its_two_neighbours():
     assert_allclose(slope[[1, -2]], [4.0, (216 - 64) / 2])
     # one-sided: (-3 s0 + 4 s1 - s2) / 2
     assert_allclose(slope[[0, -1]], [(4 * 1 - 8) / 2, (3 * 216 - 4 * 125 + 64) / 2])
-
-
-def test_five_samples_have_one_central_value():
-    assert_allclose(central_difference(np.arange(5.0) ** 4)[2], 32)

@@ -11,7 +11,6 @@ from scipy.stats import invgauss
 from ctrl_realize.numerics.delayed_modes import MoveTrain
 from ctrl_realize.numerics.dispersed_flow import fit_flows, flow_profile
 from ctrl_realize.numerics.flow_modes import flow_modes
-from ctrl_realize.numerics.lag_chains import time_moments
 from ctrl_realize.numerics.profile_interval import profile_limits
 from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.structure_search import Candidate, Scales, search
@@ -99,41 +98,3 @@ def test_a_known_lag_is_not_the_flow_s():
     flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
     assert flow.lag == 0.0
     assert_allclose([flow.delay, flow.mean, flow.spread], [0.0373, 0.08, 0.6], rtol=0, atol=2e-3)
-
-
-def test_bins_change_nothing_that_noise_would_not():
-    problem, scales, like = flow_problem()
-    width = 4
-    first = problem.drive.first[::width]
-    drive = MoveTrain(
-        first, np.full(first.size, width), scales.dt, problem.drive.moves, problem.drive.sizes
-    )
-    means = problem.data.reshape(-1, width).mean(axis=1)
-    weight = np.full(first.size, np.sqrt(width))
-    binned = Problem(means, weight, drive, np.ones((first.size, 1)), problem.known)
-    single, mean = (
-        min(fit_flows(p, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
-        for p in (problem, binned)
-    )
-    # A quarter of the standard error of 0.2 ms: Simpson's rule is not what limits it.
-    assert mean.delay == pytest.approx(single.delay, abs=5e-5)
-
-
-def test_what_cannot_come_near_is_given_up_after_one_start():
-    problem, scales, like = flow_problem(lag=0.03)
-    flows = fit_flows(problem, like, scales, 1e-6, 7.0, -1e9)
-    assert len(flows) == 1
-    assert flows[0].excess > 1e8
-
-
-def test_a_flow_that_is_little_beside_its_lag_is_left_to_a_second_lag():
-    problem, scales, like = flow_problem(lag=0.3)
-    flows = fit_flows(problem, like, scales, 1e-6, 7.0, np.inf)
-    assert all(flow.lag == 0 and flow.cost > 5 * 1e-6 * problem.data.size for flow in flows)
-
-
-def test_what_does_not_spread_in_time_is_no_flow():
-    problem, scales, _ = flow_problem()
-    pair = Candidate(Structure(2, 2), np.array([0.0373, np.log(50.0), np.log(0.01)]), 1.0)
-    assert time_moments(problem, pair)[1] < 0
-    assert fit_flows(problem, pair, scales, 1e-6, 7.0, np.inf) == []

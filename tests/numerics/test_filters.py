@@ -11,7 +11,6 @@ from ctrl_realize.numerics.filters import (
     butterworth,
     butterworth_group_delay,
     low_pass,
-    settling_samples,
 )
 
 DT = 1 / 1280
@@ -33,19 +32,6 @@ def test_the_group_delay_is_the_slope_of_the_phase_at_zero(order):
     assert butterworth_group_delay(order, 50.0, DT) == pytest.approx(expected, rel=1e-6)
 
 
-def test_five_periods_settle_it():
-    assert settling_samples(50.0, DT) == 128
-    assert settling_samples(50.0, 0.99 * DT) == 130  # rounded up
-
-
-@pytest.mark.parametrize("zero_phase", [False, True])
-@pytest.mark.parametrize("level", [0.0, 7.0])
-def test_a_signal_at_rest_stays_at_rest(zero_phase, level):
-    values = np.full(300, level)
-    filtered = low_pass(values, 5, 50.0, DT, zero_phase=zero_phase)
-    assert_allclose(filtered, values, rtol=0, atol=1e-12 * max(level, 1))
-
-
 def test_the_causal_filter_looks_only_back_and_starts_at_rest():
     values = 3.0 + (np.arange(2000) >= 500)
     filtered = low_pass(values, 5, 50.0, DT, zero_phase=False)
@@ -53,12 +39,6 @@ def test_the_causal_filter_looks_only_back_and_starts_at_rest():
     assert filtered[500] != 3.0
     delay = np.sum(4.0 - filtered[500:])  # area above a unit step: its delay in samples
     assert delay == pytest.approx(butterworth_group_delay(5, 50.0, DT), rel=1e-9)
-
-
-def test_rest_is_the_first_value_and_not_the_second():
-    filtered = low_pass(np.r_[0.0, np.ones(50)], 5, 50.0, DT, zero_phase=False)
-    assert filtered[0] == 0
-    assert filtered[1] < 0.01
 
 
 def test_forward_and_backward_is_symmetric_and_halves_the_power():
@@ -70,21 +50,3 @@ def test_forward_and_backward_is_symmetric_and_halves_the_power():
     at_cutoff = np.sum(response * np.cos(2 * np.pi * 50.0 * DT * k))
     # twice through the filter: half the amplitude
     assert [response.sum(), at_cutoff] == pytest.approx([1, 0.5], abs=1e-9)
-
-
-@pytest.mark.parametrize("n", [2, 20, 127, 200])
-def test_records_shorter_than_the_settling_are_filtered(n):
-    values = np.linspace(0, 1, n)
-    filtered = low_pass(values, 5, 50.0, DT, zero_phase=True)
-    assert filtered.shape == (n,)
-    assert np.all(np.isfinite(filtered))
-
-
-def test_the_ends_are_continued_with_their_own_values():
-    # as if the record had gone on at both ends for longer than the filter remembers
-    values = np.r_[np.full(5, 2.0), np.linspace(2, 5, 400), np.full(5, 5.0)]
-    longer = np.r_[np.full(1000, 2.0), values, np.full(1000, 5.0)]
-    filtered = low_pass(values, 5, 50.0, DT, zero_phase=True)
-    expected = low_pass(longer, 5, 50.0, DT, zero_phase=True)[1000:-1000]
-    # five periods of the cut-off leave 1e-4 of what was
-    assert_allclose(filtered, expected, atol=3e-4)

@@ -13,7 +13,7 @@ from ctrl_realize.numerics.fit_window import (
     WindowFit,
 )
 from ctrl_realize.numerics.own_terms import Stretches
-from ctrl_realize.numerics.response_bins import Bins, response_bins
+from ctrl_realize.numerics.response_bins import response_bins
 from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure, evaluate, respond
 from ctrl_realize.numerics.structure_search import Candidate, Scales
 
@@ -71,14 +71,6 @@ def test_on_bins_and_on_samples_the_same_model_is_predicted():
     assert found[0] == pytest.approx(found[1], abs=0.005)
 
 
-def test_other_values_are_averaged_where_there_are_bins():
-    means, samples = windows()
-    values = np.random.default_rng(0).standard_normal(SIZE)
-    assert np.array_equal(means.with_output(values).data, means.bins.average(values))
-    assert np.array_equal(samples.with_output(values).data, values)
-    assert means.with_output(values).root_weight is means.problem.root_weight
-
-
 def test_a_free_response_is_predicted_at_every_sample():
     means, _ = windows()
     clock = DT * np.arange(SIZE)
@@ -129,9 +121,3 @@ def test_a_model_with_a_given_delay_is_the_best_one_with_it():
 
 
 # --- residuals
-
-
-def test_means_of_bins_are_those_of_a_window():
-    bins = Bins(np.array([0, 2]), np.array([2, 2]))
-    window = replace(windows()[0], bins=bins)
-    assert window.with_output(np.array([1.0, 3.0, 5.0, 9.0])).data.tolist() == [2.0, 7.0]

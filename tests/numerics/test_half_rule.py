@@ -39,7 +39,3 @@ def test_factors_of_several_leads_multiply_the_largest_lead_first():
     assert kept == [0.5]
     # the smaller one first would take the 8, and leave the 2 to the larger
     assert factor != pytest.approx(2 / 8 * 10 / 2)
-
-
-def test_leads_without_lags_change_nothing_more():
-    assert reduced([2.0], [4.0, 3.0], 1.0) == (2.0, [0.0], 1.0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.special import gammainc
@@ -12,8 +10,6 @@ from ctrl_realize.numerics.lag_chains import (
     LONGEST,
     SHORTEST,
     LagChain,
-    chain_limits,
-    chain_profile,
     fit_chains,
     fit_diffusion,
     still_improving,
@@ -21,7 +17,7 @@ from ctrl_realize.numerics.lag_chains import (
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, fit_batch
 from ctrl_realize.numerics.step_problem import step_data, step_scales, window
-from ctrl_realize.numerics.structure_search import Candidate, Scales, parameter_bounds
+from ctrl_realize.numerics.structure_search import Candidate, parameter_bounds
 
 SIGMA = 1e-3
 
@@ -64,36 +60,6 @@ def test_a_longer_chain_needs_less_delay(problem):
     assert len(delays) <= LONGEST - SHORTEST + 1
 
 
-def test_the_search_stays_within_the_bounds_of_the_delay(problem):
-    data, like, scales = problem
-    held = replace(scales, earliest=25.0, latest=30.0)
-    for chain in fit_chains(data, like, held, SIGMA**2, 7.0):
-        assert 25.0 <= chain.candidate.delay <= 30.0
-
-
-def test_the_criterion_charges_four_parameters(problem):
-    cheap, dear = fitted(problem, 5.0), fitted(problem, 7.0)
-    for a, b in zip(cheap, dear, strict=False):
-        assert b.criterion - a.criterion == pytest.approx(8.0)
-
-
-def test_a_model_without_spread_starts_no_chain(problem):
-    data, _, scales = problem
-    ringing = -0.001 + 0.1j * np.array([1, -1])
-    like = Candidate(
-        Structure(2, 2), np.append(20.0, parameters_from_poles(ringing.astype(complex))), 1.0
-    )
-    assert fit_chains(data, like, scales, SIGMA**2, 7.0) == []
-
-
-def test_noise_widens_the_error_and_uneven_lags_keep_it_from_zero(problem):
-    data, like, scales = problem
-    quiet, loud, louder = (
-        fit_chains(data, like, scales, (part * SIGMA) ** 2, 7.0)[1].error for part in (0.01, 1, 2)
-    )
-    assert 0 < quiet < loud < louder
-
-
 def made(criteria: list[float]) -> list[LagChain]:
     return [
         LagChain(Candidate(Structure(n, n), np.zeros(n + 1), 0.0), value, 1.0)
@@ -114,33 +80,6 @@ def made(criteria: list[float]) -> list[LagChain]:
 )
 def test_chains_are_open_ended_while_they_improve_up_to_the_longest(criteria, more):
     assert still_improving(made(criteria)) is more
-
-
-def test_what_is_hidden_is_taken_off_the_lower_end(problem):
-    _, _, scales = problem
-    chain = min(fitted(problem), key=lambda chain: chain.criterion)
-    low, high = chain_limits(chain, scales)
-    assert high - low == pytest.approx(2 * 1.96 * chain.error)
-    assert chain_limits(replace(chain, hidden=3.0), scales) == pytest.approx((low - 3.0, high))
-    assert chain_limits(replace(chain, hidden=1e3), scales)[0] == scales.earliest
-
-
-def test_the_profile_of_a_chain_is_the_parabola_of_its_error(problem):
-    _, _, scales = problem
-    chain = min(fitted(problem), key=lambda chain: chain.criterion)
-    delay, excess = chain_profile(chain, scales)
-    assert np.all(np.diff(delay) > 0)
-    assert excess[delay == chain.candidate.delay] == 0
-    at = np.interp(chain.candidate.delay + 2 * chain.error, delay, excess)
-    assert at == pytest.approx(4.0, rel=1e-6)
-
-
-def test_the_profile_of_a_chain_ends_at_the_bounds_of_the_delay():
-    scales = Scales(onset=5.0, rise=1.0, length=50.0, dt=0.1, earliest=4.5, latest=5.25)
-    chain = LagChain(Candidate(Structure(4, 4), np.append(5.0, np.zeros(4)), 0.0), 0.0, 0.5)
-    delay, excess = chain_profile(chain, scales)
-    assert (delay[0], delay[-1]) == (4.5, 5.25)
-    assert (excess[0], excess[-1]) == (1.0, 0.25)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.moving_mean import moving_mean
 
@@ -21,16 +21,3 @@ def test_narrow_and_wide_windows_are_the_sum_of_their_samples(width, size):
     values = np.random.default_rng(width).standard_normal(size) + 3
     # a thousand sums of numbers of 3 round by 1e-13
     assert_allclose(moving_mean(values, width), window_by_window(values, width), rtol=1e-12)
-
-
-def test_a_wild_sample_spoils_the_means_that_hold_it_and_no_other():
-    values = np.ones(4000)
-    values[900] = 1e20
-    found = moving_mean(values, 301)
-    assert_array_equal(found[1051:3850], 1.0)
-    assert_array_equal(found[150:750], 1.0)
-    assert np.all(found[750:1051] > 1e17)
-
-
-def test_a_window_longer_than_the_signal_has_the_length_of_the_window():
-    assert moving_mean(np.ones(5), 8).size == 8

@@ -52,18 +52,6 @@ def test_std_of_the_slope_is_its_scatter():
     assert_allclose(found[:, 0].std(), np.sqrt(np.mean(found[:, 1] ** 2)), rtol=0.12)  # 3.5 %
 
 
-def test_only_the_share_at_the_top_of_the_band_counts():
-    omega = np.linspace(1, 51, 101)  # the upper third begins at 34.33
-    phase = -0.5 * omega
-    phase[omega >= 34.3] = -0.07 * omega[omega >= 34.3]
-    slope, std = phase_slope(omega, phase, 1 / 3)
-    assert_allclose([slope, std], [0.07, 0], rtol=1e-9, atol=1e-12)
-    # with any more of it the kink shows
-    assert phase_slope(omega, phase, 0.36)[0] < 0
-    # three points at least
-    assert_allclose(phase_slope(omega, phase, 1e-6)[0], 0.07, rtol=1e-9)
-
-
 def test_offsets_do_not_matter():
     rng = np.random.default_rng(3)
     u = rng.normal(size=2000)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -71,18 +69,6 @@ def test_near_the_optimum_it_is_the_parabola_of_the_standard_error(found):
     # twice the noise, twice the interval
     wide = profile_limits(*delay_profile(problem, candidate, 4 * SIGMA**2, scales))
     assert wide[1] - wide[0] == pytest.approx(2 * (high - low), rel=0.05)
-
-
-def test_the_profile_ends_at_bounds_that_lie_within_its_interval(found):
-    problem, candidate, scales = found
-    error = delay_error(problem, candidate, SIGMA**2)
-    low, high = candidate.delay - 0.5 * error, candidate.delay + 0.25 * error
-    held = replace(scales, earliest=low, latest=high)
-    delay, excess = delay_profile(problem, candidate, SIGMA**2, held)
-    assert (delay[0], delay[-1]) == (low, high)
-    # squares of the distances in standard errors, but for the bend of the parabola
-    assert (excess[0], excess[-1]) == pytest.approx((0.25, 0.0625), rel=0.1)
-    assert profile_limits(delay, excess) == (low, high)
 
 
 def test_an_interval_ends_between_any_two_delays_of_its_grid_and_at_the_grid_where_it_is_open():

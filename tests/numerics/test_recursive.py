@@ -74,15 +74,6 @@ def test_the_bank_solves_the_weighted_least_squares_of_every_delay(low, restart)
         )
 
 
-def test_poles_that_cannot_change_speed_have_no_direction():
-    poles = np.array([1.0, 0.0, -0.4, 0.5, 0.3 + 0.2j, 0.3 - 0.2j])
-    assert [(what, p) for what, p, _ in pole_directions(poles, DT)] == [
-        ("speed", 0.5),
-        ("speed", 0.3 + 0.2j),
-        ("damping", 0.3 + 0.2j),
-    ]
-
-
 def test_a_moved_core_has_the_moved_poles_and_the_same_gain():
     A, B, C, D = matrices(R3)
     zeros = cr.delayed_ss(R3, delay=0, dt=DT).zeros()
@@ -104,12 +95,6 @@ def test_a_moved_core_has_the_moved_poles_and_the_same_gain():
     assert [what for what, _, _ in fresh] == [what for what, _, _ in directions]
     for (_, before, _), (_, after, _) in zip(directions, fresh, strict=True):
         assert abs(after - before) < 0.1
-
-
-def test_a_core_without_simple_poles_is_not_moved():
-    twice = (np.array([[0.9, 1.0], [0.0, 0.9]]), np.array([0.0, 1.0]), np.array([1.0, 0.0]), 0.0)
-    directions = pole_directions(np.array([0.9]), DT)
-    assert moved_core(twice, np.zeros(0, complex), directions, np.array([0.1]), DT) is None
 
 
 def test_an_integrator_stays_where_it_is_and_the_lag_beside_it_moves():

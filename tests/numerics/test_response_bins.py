@@ -16,16 +16,6 @@ def test_means_are_those_of_the_samples_of_each_bin():
     assert bins.average(both).tolist() == [[5.0, -10.0], [3.0, -6.0], [8.0, -16.0]]
 
 
-def test_bins_before_the_edge_are_of_one_size():
-    bins = response_bins(30, [24], 3, at_rest=4)
-    assert bins.first.tolist() == [0, 6, 12, 18, *range(24, 30)]
-    assert bins.width.tolist() == [6, 6, 6, 6, *[1] * 6]
-    # twelve, unless there are fewer samples
-    assert response_bins(48, [36], 3).width[:12].tolist() == [3] * 12
-    assert response_bins(12, [5], 3).first.tolist() == list(range(12))
-    assert response_bins(3, [0], 3).first.tolist() == [0, 1, 2]
-
-
 def test_bins_are_4_percent_of_the_distance_from_the_first_motion_wide():
     bins = response_bins(2000, [100], 20)
     away = np.abs(bins.first[12:] - 120)
@@ -40,15 +30,6 @@ def test_bins_are_4_percent_of_the_distance_from_the_first_motion_wide():
     assert width[:-1].max() <= 75
     assert len(set(width.tolist())) <= 20
     assert bins.width.sum() == 2000
-
-
-def test_the_distance_is_that_from_the_nearest_beginning_on_either_side():
-    # between the edge and a late first motion the bins shrink again
-    bins = response_bins(400, [12], 200)
-    at = {int(first): int(width) for first, width in zip(bins.first, bins.width, strict=True)}
-    assert at[12] == 8  # 4 % of 200
-    near = [width for first, width in at.items() if abs(first - 212) < 50]
-    assert set(near) == {1}
 
 
 def test_every_edge_starts_a_new_response():

@@ -27,14 +27,6 @@ def test_a_lag_rises_for_the_logarithm_of_nine_times_itself():
     assert rise_time(step, 0.1) == pytest.approx(0.1 * 200 * np.log(9), rel=0.005)
 
 
-def test_a_jump_takes_four_fifths_of_a_sample():
-    for size in (5, 39, 1000):
-        step = 1.0 * (np.arange(size) >= 2)
-        assert rise_time(step, 0.25) == pytest.approx(0.2, rel=1e-12)
-        # at rest in no sample at all
-        assert rise_time(np.ones(size), 0.25) == pytest.approx(0.2, rel=1e-12)
-
-
 def test_noise_neither_starts_nor_ends_the_rise():
     noise = 0.1 * np.random.default_rng(0).standard_normal(2000)
     slow = ramp(200, 1000, 2000) + noise
@@ -43,34 +35,12 @@ def test_noise_neither_starts_nor_ends_the_rise():
     assert rise_time(slow, 1.0) == pytest.approx(800, abs=40)
 
 
-def test_the_final_level_is_that_of_the_last_tenth():
-    # an overshoot is no level; nor are single wild samples at the end
-    step = ramp(10, 100, 1000)
-    step[300:500] = 1.4
-    assert rise_time(step, 1.0) == pytest.approx(80.0, rel=1e-12)
-    step[-49:] = 7.0
-    assert rise_time(step, 1.0) == pytest.approx(80.0, rel=1e-12)
-    # a tenth is three samples at least
-    assert rise_time(np.array([0, 0, 10, 10, 10, 20, 20.0]), 1.0) == pytest.approx(4.8 - 1.2)
-
-
 def test_the_rise_ends_at_the_first_crossing_and_begins_at_the_last_before_it():
     # 39 samples are taken one by one; a dip to below 10 % before, and one to below 90 % after
     step = np.ones(39)
     step[:14] = [0, 0.5, 0.5, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0]
     # from 3.5 (10 %) to 7.5 (90 %)
     assert rise_time(step, 1.0) == pytest.approx(4.0, rel=1e-12)
-
-
-def test_a_dip_behind_the_rise_is_no_beginning():
-    step = np.array([0, 0, 0.3, 0.6, 0.95, 0.0, 1, 1, 1, 1, 1, 1])
-    # 10 % is a third behind sample 1, 90 % six sevenths behind sample 3
-    assert rise_time(step, 1.0) == pytest.approx(3 + 6 / 7 - 4 / 3, rel=1e-12)
-
-
-def test_what_begins_above_10_percent_is_counted_from_its_second_sample():
-    step = np.clip(0.5 + 0.025 * np.arange(39), None, 1.0)
-    assert rise_time(step, 1.0) == pytest.approx(15.0, rel=1e-12)
 
 
 def test_a_spike_does_not_end_a_rise():
@@ -84,35 +54,3 @@ def test_of_less_than_forty_samples_every_one_counts():
     step[19] = 1.0
     # from 2.8 samples after 5 to where the last move, from 13/28 to one, passes 90 %
     assert rise_time(step, 1.0) == pytest.approx(18 + (0.9 - 13 / 28) / (15 / 28) - 7.8, rel=1e-12)
-
-
-def test_of_a_pulse_that_ends_at_rest_the_largest_value_is_the_level():
-    pulse = np.zeros(39)
-    pulse[3:15] = np.concatenate([np.arange(1, 9), [6, 4, 2, 1]])
-    # 0.8 at 2.8, 7.2 at 9.2, in samples
-    assert rise_time(pulse, 1.0) == pytest.approx(6.4, rel=1e-12)
-    assert rise_time(-pulse, 1.0) == pytest.approx(6.4, rel=1e-12)
-    assert rise_time(np.zeros(39), 1.0) > 0
-
-
-def test_a_spike_that_no_mean_shows_is_looked_at_sample_by_sample():
-    spike = np.zeros(1000)
-    spike[500] = 2.0
-    assert rise_time(spike, 1.0) == pytest.approx(0.8, rel=1e-12)
-
-
-def test_levels_may_be_met_exactly_and_at_once():
-    assert rise_time(np.array([0, 0.1, 0.5, 0.9, 1, 1, 1]), 1.0) == pytest.approx(2.0, rel=1e-12)
-    # at the first of two samples at 90 %
-    assert rise_time(np.array([0, 0.9, 0.9, 1, 1, 1, 1]), 1.0) == pytest.approx(8 / 9, rel=1e-12)
-    # at the last of several samples at 10 %
-    assert rise_time(np.array([0, 0.1, 0.1, 0.1, 1, 1, 1]), 1.0) == pytest.approx(8 / 9, rel=1e-12)
-    # between the first two samples
-    assert rise_time(np.array([0, 0.5, 1, 1, 1, 1, 1]), 1.0) == pytest.approx(1.6, rel=1e-12)
-
-
-def test_what_never_stays_at_its_level_rises_to_the_end():
-    # the median is one, means over 51 samples are 0.6
-    step = np.tile([1.0, 1.0, 0.0, 1.0, 0.0], 200)
-    step[:300] = 0.6 * ramp(100, 200, 300)
-    assert rise_time(step, 1.0) == pytest.approx(999 - (100 + 200 / 6), rel=1e-12)

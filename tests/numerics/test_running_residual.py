@@ -30,10 +30,6 @@ def test_samples_held_for_ten_count_as_a_tenth():
     assert 7 < inflation(held) < 13  # known to 15 %, too
 
 
-def test_before_anything_is_left_samples_count_as_they_are():
-    assert inflation([]) == inflation(np.zeros(50)) == 1.0
-
-
 def test_inflation_is_the_ratio_of_sums_that_are_forgotten():
     residual = RunningResidual(0.5)
     residual.add(1.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.own_terms import FixedTerms
 from ctrl_realize.numerics.pole_factors import poles_from_parameters
 from ctrl_realize.numerics.sampled_data import SampledData, cut
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, evaluate, respond
@@ -70,37 +69,6 @@ def test_slow_cosines_go_down_to_the_shortest_period():
     # shorter periods are left out, whatever comes close
     assert two(period=2.01).problem(NOTHING).stretches.shapes == 4 + 3
     assert two(period=7.0).problem(NOTHING).stretches.shapes == 2 + 2
-
-
-def test_a_record_with_fewer_cosines_keeps_what_they_would_take():
-    problem = two(period=2.0).problem(NOTHING)
-    time = np.linspace(0, 1, 5)
-    own = np.stack([np.ones(5), time, np.cos(np.pi * time), np.cos(2 * np.pi * time)], axis=1)
-    fast = np.cos(4 * np.pi * time)
-    basis = FixedTerms(problem.stretches, problem.root_weight).parts[1][0]
-    assert np.abs(own - basis @ (basis.T @ own)).max() < 1e-12
-    # of what none of the four is, as much is left as by least squares
-    left = fast - own @ np.linalg.lstsq(own, fast, rcond=None)[0]
-    assert np.abs(left).max() > 0.1
-    assert fast - basis @ (basis.T @ fast) == pytest.approx(left, abs=1e-12)
-    # level, drift, cosines and a state of one pole
-    assert problem.own_count(1) == (5 + 1) + (4 + 1)
-
-
-def test_what_is_known_has_a_free_response_in_every_record():
-    known = KnownFactor(np.array([-0.7 + 0j, -0.2 + 3j, -0.2 - 3j]), np.ones(1))
-    shapes = two().problem(known).stretches.regressors
-    assert shapes.shape[1] == 2 + 3
-    clock = np.concatenate([0.5 * np.arange(7), 0.5 * np.arange(5)])
-    wave = np.exp((-0.2 + 3j) * clock)
-    expected = np.stack([np.exp(-0.7 * clock), wave.real, wave.imag], axis=1)
-    assert shapes[:, 2:] == pytest.approx(expected)
-
-
-def test_records_of_one_sample_have_a_clock_that_stands():
-    outputs, inputs = records(1)
-    data = SampledData(tuple(inputs), tuple(outputs), (0,), (1.0,), 0.5)
-    assert data.problem(NOTHING).stretches.regressors.tolist() == [[1.0, 0.0]]
 
 
 def test_two_records_of_one_plant_leave_nothing_of_either():

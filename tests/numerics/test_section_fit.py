@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -73,38 +71,3 @@ def test_samples_that_are_missing_are_left_out():
     assert_allclose(markov(*gaps.model.matrices(), 30), markov(*PLANT, 30), atol=0.2)
     wrong = fit_sections([Experiment(data.v, spoiled)], near(), direct=False)
     assert np.abs(markov(*wrong.model.matrices(), 30) - markov(*PLANT, 30)).max() > 0.2
-
-
-def test_two_real_poles_become_a_pair_where_the_data_ask_for_it():
-    A, C = np.array([[0.9, 0.3], [-0.3, 0.9]]), np.array([[1.0, 0.0]])
-    ring = A, np.ones((2, 1)), C, np.zeros((1, 1))
-    v = np.random.default_rng(0).standard_normal((1, 300))
-    start = in_sections(np.diag([0.5, 0.8]), *ring[1:])
-    found = fit_sections([Experiment(v, simulate(*ring, v))], start, direct=False).model
-    assert_allclose(np.sort_complex(found.poles), [0.9 - 0.3j, 0.9 + 0.3j], atol=1e-8)
-
-
-def test_an_unstable_start_is_drawn_inside():
-    start = in_sections(PLANT[0] * 1.6, *PLANT[1:])
-    assert np.abs(start.poles).max() > 1
-    found = fit_sections([experiment(0)], start, direct=False)
-    assert np.abs(found.model.poles).max() < 1
-
-
-def test_the_loss_is_that_of_the_variances():
-    found = fit_sections([experiment(0)], near(), direct=True)
-    assert found.loss == pytest.approx(found.counts @ np.log(found.variance) / 2)
-    assert np.any(found.model.D)
-    without = fit_sections([experiment(0)], replace(near(), D=np.ones((2, 2))), direct=False)
-    assert not np.any(without.model.D)
-
-
-def test_the_spread_is_the_variance_of_what_was_measured():
-    one, other = experiment(0, 300, level=3.0), experiment(1, 200)
-    y = one.y.copy()
-    y[0, 20:40] = np.nan
-    found = fit_sections([Experiment(one.v, y), other], near(), direct=False)
-    squares = 280 * np.nanvar(y[0]) + 200 * np.var(other.y[0])
-    assert found.spread[0] == pytest.approx(squares / 480)
-    squares = 300 * np.var(y[1]) + 200 * np.var(other.y[1])
-    assert found.spread[1] == pytest.approx(squares / 500)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.sections import in_sections, motion
 from ctrl_realize.numerics.state_space import markov
@@ -83,31 +83,3 @@ def test_equal_poles_are_no_obstacle(coupled):
     model = A, np.array([[0.0], [1.0]]), C, np.zeros((2, 1))
     # half of the digits are lost
     assert_allclose(markov(*in_sections(*model).matrices(), 20), markov(*model, 20), atol=1e-6)
-
-
-def test_equal_poles_are_shaken_in_the_same_way_every_time():
-    A = np.array([[0.5, 1.0], [0.0, 0.5]])
-    model = A, np.eye(2), np.eye(2), np.zeros((2, 2))
-    once, again = in_sections(*model), in_sections(*model)
-    for one, other in zip(once.matrices(), again.matrices(), strict=True):
-        assert_array_equal(one, other)
-
-
-@pytest.mark.parametrize("order", [3, 4])
-def test_only_what_may_move_is_free(order):
-    sections = in_sections(*some_model(3, order))
-    q, p, m = 2, 2, 3
-    a, B, C, D = np.split(sections.free(direct=True), np.cumsum([2 * q, 2 * q * m, 2 * p * q]))
-    single = order % 2
-    # a single state leaves a2, a row of B and a column of C at zero
-    assert (a.sum(), B.sum(), C.sum()) == (
-        2 * q - single,
-        (2 * q - single) * m,
-        (2 * q - single) * p,
-    )
-    assert D.all()
-    assert sections.free(direct=False).sum() == a.sum() + B.sum() + C.sum()
-    # with the poles held, their residues are B's alone
-    held = sections.free(direct=True, poles=False)
-    assert held.sum() == B.sum() + D.size
-    assert not held[: 2 * q].any()

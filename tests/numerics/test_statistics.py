@@ -11,7 +11,6 @@ from scipy import stats
 
 from ctrl_realize.numerics.statistics import (
     circle_quantile,
-    mixture_quantile,
     trimmed_statistics,
     upper_quantile,
 )
@@ -65,27 +64,3 @@ def test_a_complex_error_over_its_scatter_is_distributed_as_f_and_student_say(re
         radius = circle_quantile(level, repeats)
         assert radius**2 == pytest.approx(stats.f.ppf(level, 2, freedom), rel=1e-9)
         assert upper_quantile(1 - level, repeats) == pytest.approx(stats.t.ppf(level, freedom))
-
-
-def test_a_known_scatter_is_that_of_very_many():
-    assert circle_quantile(0.95, None) == pytest.approx(circle_quantile(0.95, 1e9), rel=1e-8)
-    assert upper_quantile(0.025, None) == pytest.approx(upper_quantile(0.025, 1e9), rel=1e-8)
-    assert circle_quantile(0.95, None) == pytest.approx(np.sqrt(stats.chi2.ppf(0.95, 2) / 2))
-
-
-@pytest.mark.parametrize("level", [0.025, 0.5, 0.999])
-def test_so_much_of_a_mixture_lies_below_its_quantile(level):
-    centres, spreads, shares = np.array([-3.0, 1.0, 50.0]), np.array([0.5, 2.0, 0.1]), [3.0, 6, 1]
-    found = mixture_quantile(level, centres, spreads, np.array(shares))
-    below = stats.norm.cdf(found, centres, spreads) @ shares / 10
-    assert below == pytest.approx(level, rel=1e-9)
-    # of one distribution it is that one's, wherever it lies
-    for centre in (-1e3, 1e3):
-        one = mixture_quantile(level, np.array([centre]), np.array([2.0]), np.ones(1))
-        assert one == pytest.approx(stats.norm.ppf(level, centre, 2.0), abs=1e-9)
-
-
-def test_the_mean_of_equal_values_is_that_value():
-    value = 3.0000216123935806  # the sum of three of them is rounded down
-    assert np.full(3, value).mean() < value
-    assert trimmed_statistics(np.full(3, value), 0).mean == value

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
@@ -14,7 +12,6 @@ from ctrl_realize.numerics.noise_level import (
     colouring,
     correlation_time,
     hum_frequencies,
-    quantisation_step,
     rest_noise,
     winsorised_sigma,
 )
@@ -25,17 +22,6 @@ from tests import rigs
 
 def white(n, seed=0):
     return np.random.default_rng(seed).standard_normal(n)
-
-
-@given(st.floats(1e-6, 1e6), st.floats(-100, 100))
-def test_the_step_of_a_quantiser_is_found_in_any_unit(step, offset):
-    values = step * (np.round(5 * white(400)) + offset)
-    assert quantisation_step(values) == pytest.approx(step, rel=1e-6)
-
-
-def test_a_signal_that_is_not_quantised_has_no_step():
-    assert quantisation_step(white(2000)) == 0
-    assert quantisation_step(np.ones(50)) == 0
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.9, 0.97])
@@ -100,12 +86,6 @@ def test_correlation_time_of_a_first_order_process(pole):
     # 1 + 2 (a + a^2 + ...) = (1 + a) / (1 - a)
     assert correlation_time(process) == pytest.approx((1 + pole) / (1 - pole), rel=0.1)
     assert colouring(process, float(process.std())) > 1.4
-
-
-def test_white_noise_counts_sample_by_sample():
-    for seed in range(20):
-        assert correlation_time(white(2000, seed)) == 1
-        assert colouring(white(2000, seed), 1.0) == 1
 
 
 def test_hum_is_found_to_a_small_part_of_a_period_over_the_record():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure
@@ -18,7 +18,6 @@ from ctrl_realize.numerics.structure_search import (
     choose,
     criteria,
     needless_charge,
-    neighbour_starts,
     parameter_bounds,
     plausible,
     refine,
@@ -45,17 +44,6 @@ def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
         np.exp(beside_a_zero.low), np.exp([0.25, np.log(1e-5), np.log(1e-3), np.log(0.005)])
     )
     assert_allclose(np.exp(beside_a_zero.high[1:3]), SLOWER_WITH_ZEROS / 0.01)
-
-
-def test_neighbours_are_one_zero_less_and_one_pole_less():
-    known = {s: candidate(s.order, s.relative_degree) for s in (Structure(2, 1), Structure(2, 2))}
-    assert neighbour_starts(Structure(1, 1), SCALES, known) == []
-    (only,) = neighbour_starts(Structure(3, 3), SCALES, known)
-    added = parameters_from_poles(np.array([-1.0, -2.0, -20.0], dtype=np.complex128))
-    assert_allclose(only, [1.5, *added], atol=1e-12)
-    assert len(neighbour_starts(Structure(3, 2), SCALES, known)) == 2
-    (fewer_zeros,) = neighbour_starts(Structure(2, 1), SCALES, {Structure(2, 2): candidate(2, 2)})
-    assert_array_equal(fewer_zeros, candidate(2, 2).parameters)
 
 
 def test_the_criterion_charges_every_parameter_with_the_log_of_the_samples():
@@ -91,22 +79,6 @@ def test_what_is_near_the_best_is_plausible_and_so_are_lags_that_fit_no_worse():
     # a chosen one whose simplicity counts: others have theirs counted as well
     assert Structure(5, 5) not in plausible(all_of, values, 0.5, chosen, 68.0)
     assert Structure(5, 5) in plausible(all_of, values, 0.5, chosen, 70.0)
-
-
-def test_one_lag_more_than_were_chosen_is_plausible_where_it_fits_and_two_more_are_not():
-    all_of = {Structure(n, n): candidate(n, n, 100.0) for n in range(1, 6)}
-    values = dict.fromkeys(all_of, 900.0)
-    for order, left in ((1, 3), (2, 3), (3, 4), (4, 5)):
-        chosen = all_of[Structure(order, order)]
-        found = plausible(all_of, values, 1.0, chosen, 60.0)
-        assert max(s.order for s in found) == left
-    # beside zeros it is three lags at most
-    chosen = all_of[Structure(4, 3)] = candidate(4, 3, 100.0)
-    values[Structure(4, 3)] = 900.0
-    assert plausible(all_of, values, 1.0, chosen, 60.0) == [
-        *(Structure(n, n) for n in (1, 2, 3)),
-        chosen.structure,
-    ]
 
 
 def step_problem(noise: float = 1e-3):

@@ -76,18 +76,3 @@ def test_a_million_samples_need_no_covariance_of_a_million():
     width = float(bins.width[-1])
     assert width > 10_000
     assert white[-1, -1] ** -2 == pytest.approx(growth / width, rel=0.01)
-
-
-def test_white_noise_keeps_its_weights():
-    bins = response_bins(900, [300], 320)
-    white = whitener(bins, np.ones(1))
-    assert white == pytest.approx(np.diag(np.sqrt(bins.width)), abs=1e-5)
-
-
-def test_noise_that_follows_nothing_is_white():
-    quiet = np.tile([1.0, 1.0, -1.0, -1.0], 25)
-    found = noise_covariance(np.random.default_rng(0).permutation(quiet), 1000)
-    # without a coefficient it has died away at once
-    assert found[0] == 1.0
-    assert found.size < 5
-    assert found[1:] == pytest.approx(np.zeros(found.size - 1), abs=1e-15)
