@@ -12,6 +12,7 @@ from ..checks import positive, whole
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError, OrderError
 from ..numerics.arrays import FloatArray, read_only
+from ..numerics.blas_threads import single_threaded
 from ..numerics.gramians import balanced_truncation
 from ..numerics.modes import Part, split_modes
 from ..results import Result
@@ -71,6 +72,7 @@ class BalancedReduction(Result):
         )
 
 
+@single_threaded
 def hankel_singular_values(system: Any) -> FloatArray:
     """Hankel singular values of the stable part of a discrete core, falling.
 
@@ -98,6 +100,7 @@ def hankel_singular_values(system: Any) -> FloatArray:
     return balanced_truncation(A, B, C, 0)[3]
 
 
+@single_threaded
 def reduce(
     system: Any, order: int | None = None, *, tolerance: float | None = None
 ) -> DelayedStateSpace:

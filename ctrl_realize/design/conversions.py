@@ -13,6 +13,7 @@ from ..checks import positive
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.inverse_hold import inverse_zero_order_hold, split_fraction
 from ..results import Result
 from ..wording import in_time
@@ -154,6 +155,7 @@ def _rebuild_model(
     return ContinuousModel(core, dead_time, dt)
 
 
+@single_threaded
 def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     """Undo the zero-order hold of the core; the dead time stays apart.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import OptionError
 from ..numerics.arrays import BoolArray, FloatArray, IntArray, locked, read_only
+from ..numerics.blas_threads import single_threaded
 from ..results import Result
 from ..wording import in_time, interval_in_time
 from .loops import Loop, open_loop
@@ -135,6 +136,7 @@ class DelayRobustness(Result):
         return f"<DelayRobustness {word} in {low:.4g}...{high:.4g} s>"
 
 
+@single_threaded
 def delay_robustness(
     system: Any, controller: Any, dead_time_interval: tuple[float, float] | None = None
 ) -> DelayRobustness:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..delayed import DelayedStateSpace
 from ..delayed.chains import augment
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
+from ..numerics.blas_threads import single_threaded
 from ..results import Result
 from ..wording import in_numbers
 from .riccati import riccati, weight_matrix
@@ -67,6 +68,7 @@ class KalmanPredictor(Result):
         return f"<KalmanPredictor order {self.gain.shape[0]}>"
 
 
+@single_threaded
 def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) -> KalmanPredictor:
     """Steady Kalman filter of a system with dead time.
 

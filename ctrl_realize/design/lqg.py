@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 from ..delayed import DelayedStateSpace
 from ..delayed.chains import augment
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from .delay_line import DelayLineController
 from .estimator import kalman_predictor
 from .regulator import predictor_lqr
 from .siso import delayed_system
 
 
+@single_threaded
 def lqg(
     system: DelayedStateSpace,
     Q: ArrayLike,

@@ -12,6 +12,7 @@ from ..checks import positive
 from ..delayed import DelayedStateSpace
 from ..errors import ModelWarning, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.closed_loop import damped_circle, step_on_circle
 from ..wording import in_time
 from .loops import open_loop
@@ -99,6 +100,7 @@ def step_responses(
     return setpoint, load
 
 
+@single_threaded
 def performance(
     plant: DelayedStateSpace, controller: Any, total_time: float | None = None
 ) -> Performance:
@@ -146,7 +148,7 @@ def performance(
             f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its errors "
             "are those up to there. A longer sample time would show all of it",
             ModelWarning,
-            stacklevel=2,
+            stacklevel=3,  # one frame more: the limit of BLAS threads
         )
     return measured(setpoint, load, float(plant.dt))
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..checks import one_of, positive, real
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError, UnsuitableSystemError
+from ..numerics.blas_threads import single_threaded
 from .margins import margins
 from .pid_controller import DISCRETIZATIONS, PIDController
 from .pid_optimal import optimal
@@ -26,6 +27,7 @@ SETTLED = 10_000
 """Samples behind the delay after which a step response has the sign of the gain."""
 
 
+@single_threaded
 def pid(
     system: Any,
     rule: str = "simc",

@@ -13,6 +13,7 @@ from ..checks import one_of
 from ..delayed import DelayedStateSpace
 from ..errors import UnsuitableSystemError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.half_rule import half_rule
 from ..numerics.modes import split_modes
 from ..numerics.process_step import process_step
@@ -26,6 +27,7 @@ FIT_POINTS = 1500
 """Points of the step response that a fit looks at; more do not move the parameters."""
 
 
+@single_threaded
 def reduce_fopdt(
     system: Any, *, method: str = "optimal", dead_time: float | None = None
 ) -> ProcessModel:
@@ -69,6 +71,7 @@ def reduce_fopdt(
     return _reduce(system, method, dead_time, 1)
 
 
+@single_threaded
 def reduce_sopdt(
     system: Any, *, method: str = "optimal", dead_time: float | None = None
 ) -> ProcessModel:

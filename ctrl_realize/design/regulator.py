@@ -19,6 +19,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics import state_space
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
+from ..numerics.blas_threads import single_threaded
 from ..numerics.delayed_regulator import line_gain
 from ..results import Result
 from ..wording import in_numbers
@@ -87,6 +88,7 @@ class PredictorLQR(Result):
         return f"<PredictorLQR order {n}, delay {self.delay}, gain {self.gain.shape}>"
 
 
+@single_threaded
 def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     """Linear-quadratic regulator of a system with dead time.
 

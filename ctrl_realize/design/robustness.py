@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.blas_threads import single_threaded
 from ..results import Result
 from .loops import open_loop
 from .margin_result import Margins
@@ -224,6 +225,7 @@ def uncertainty_bound(
     )
 
 
+@single_threaded
 def robust_stability(uncertainty: UncertaintyBound, controller: Any) -> RobustnessCheck:
     """Check that a controller stabilizes every plant within a bound.
 

@@ -12,6 +12,7 @@ from ..checks import one_of
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
+from ..numerics.blas_threads import single_threaded
 from ..numerics.spectra import hold_response, unwrapped_phase
 from ..results import Flag
 from .comparison import FRFComparison, decibels, hertz
@@ -23,6 +24,7 @@ _LEAST = 1e-70
 """What is smaller is zero: nothing can be put in relation to it."""
 
 
+@single_threaded
 def compare_frf(
     system: ct.LTI,
     frf: ct.FrequencyResponseData,

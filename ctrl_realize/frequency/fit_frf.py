@@ -13,6 +13,7 @@ from ..checks import positive, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.rational_fit import FRFData
 from ..numerics.rational_search import DEFAULT_ORDERS, dead_time_bound, fit_structures
 from ..numerics.rational_starts import longest_search
@@ -24,6 +25,7 @@ from .points import frf_points
 _SAMPLES_PER_SHORTEST_PERIOD = 20
 
 
+@single_threaded
 def fit_frf(
     frf: ct.FrequencyResponseData,
     order: int | Sequence[int] | None = None,

@@ -11,6 +11,7 @@ from ..checks import one_of, positive, whole
 from ..errors import DataError
 from ..identification.impulse_estimate import ImpulseEstimate
 from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.fir_kernels import cautious_std, fit_kernel
 from ..numerics.lagged import NormalEquations
 from ..numerics.spectra import hold_response
@@ -31,6 +32,7 @@ _LEAST_NOISE = 1e-3
 fully fills the frequencies between the points with anything."""
 
 
+@single_threaded
 def impulse_from_frf(
     frf: ct.FrequencyResponseData,
     dt: float,

@@ -12,6 +12,7 @@ from ..checks import whole
 from ..delayed import DelayedStateSpace
 from ..errors import CtrlRealizeError, DataError, OptionError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.noise_level import correlation_time, kept_in_blocks
 from ..results import Flag, Result
 from ..signals import Record
@@ -151,6 +152,7 @@ class Bootstrap(Result):
         return rows
 
 
+@single_threaded
 def bootstrap(
     records: Record | Sequence[Record],
     estimator: Estimator = fit_delay,

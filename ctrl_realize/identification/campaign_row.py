@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import control as ct
 import numpy as np
+import scipy
 
 from ..checks import spelled_out
 from ..delayed import DelayedStateSpace
@@ -164,8 +165,8 @@ def read_source(source: RecordSource) -> Record:
 
 
 def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:
-    """SHA-256 of a record's samples, of what is done with them, and by which version."""
-    digest = hashlib.sha256(_version().encode())
+    """SHA-256 of a record's samples, of what is done with them, and by which versions."""
+    digest = hashlib.sha256(repr(sorted(versions().items())).encode())
     for values in (record.time, record.input, record.output):
         digest.update(str(values.shape).encode())
         digest.update(np.ascontiguousarray(values).tobytes())
@@ -174,8 +175,13 @@ def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:
     return digest.hexdigest()
 
 
+def versions() -> dict[str, str]:
+    """Versions of the packages that a row's numbers depend on."""
+    return {"ctrl-realize": _own_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+
+
 @functools.cache
-def _version() -> str:
+def _own_version() -> str:
     try:
         return metadata.version("ctrl-realize")
     except metadata.PackageNotFoundError:

@@ -14,6 +14,7 @@ from ..checks import whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, DataWarning, OptionError, OrderError, UnsuitableSystemError
 from ..numerics.arrays import IntArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.delay_split import split_delays
 from ..numerics.section_fit import fit_sections
 from ..numerics.sections import in_sections
@@ -42,6 +43,7 @@ STILL = 10
 """Samples that an input stands still at the start of a record for the plant to count as at rest."""
 
 
+@single_threaded
 def fit_channels(
     records: Record | Sequence[Record],
     order: int | Sequence[int] | None = None,
@@ -234,6 +236,7 @@ def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str
     return tuple(choices)
 
 
+@single_threaded
 def refine(
     system: ct.StateSpace,
     records: Record | Sequence[Record],

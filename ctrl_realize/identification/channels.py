@@ -12,6 +12,7 @@ from ..checks import one_of, real, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray, IntArray, read_only
+from ..numerics.blas_threads import single_threaded
 from ..numerics.delay_split import split_delays
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
@@ -147,6 +148,7 @@ def channel_delays(
     return np.where(seen.any(axis=-1), np.maximum(seen.argmax(axis=-1) - 1, 0), -1).astype(np.int64)
 
 
+@single_threaded
 def realize_channels(
     impulse: ImpulseResponse | ArrayLike,
     order: int,

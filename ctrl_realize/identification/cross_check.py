@@ -6,6 +6,7 @@ import numpy as np
 
 from ..checks import whole
 from ..errors import CtrlRealizeError, DataError
+from ..numerics.blas_threads import single_threaded
 from ..numerics.onset import correlation_onset, phase_slope
 from ..numerics.phase_slope import dead_time_from_phase, unwrap_with_dead_time
 from ..results import Flag
@@ -31,6 +32,7 @@ DOUBTFUL = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_lead
 """Flags by which a method says that its data do not carry its answer."""
 
 
+@single_threaded
 def check_delay(
     record: Record | None = None,
     *,

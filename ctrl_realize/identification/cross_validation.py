@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DataError
+from ..numerics.blas_threads import single_threaded
 from ..numerics.correlation import fit_percent
 from ..signals import Record
 from ..signals.given import as_records
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+@single_threaded
 def cross_validate(
     systems: Mapping[str, Any] | ct.StateSpace,
     records: Record | Sequence[Record],

@@ -13,6 +13,7 @@ from ..checks import one_of, positive, system_name
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.output_error import fit_output_error
 from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.separable_fit import KnownFactor, Structure
@@ -40,6 +41,7 @@ _HOLDS = 0.2  # part of the step by which an input may stray between its edges
 _DWELL = 3  # times the first motion: steps that follow faster hide each other's onset
 
 
+@single_threaded
 def fit_delay(
     records: Record | Sequence[Record],
     *,

@@ -9,6 +9,7 @@ from ..checks import whole
 from ..delayed import DelayedStateSpace
 from ..errors import OrderError
 from ..numerics.arrays import read_only
+from ..numerics.blas_threads import single_threaded
 from ..signals import ImpulseResponse
 from .delay_scan_result import Candidates, DelayScan
 from .realization import realize
@@ -17,6 +18,7 @@ from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
 from .scan_surface import Surface, scan_surface
 
 
+@single_threaded
 def estimate_delay(
     impulse: ImpulseResponse | ArrayLike,
     order: int,

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..checks import one_of, whole
 from ..errors import DataError, DataWarning, OptionError
+from ..numerics.blas_threads import single_threaded
 from ..numerics.onset import correlation_onset
 from ..results import Flag
 from ..signals import Record
@@ -35,6 +36,7 @@ TAIL = 0.05
 """Part of the largest Markov parameter that may be left at the end of the window."""
 
 
+@single_threaded
 def impulse_from_io(
     records: Record | Sequence[Record],
     length: int | None = None,
@@ -143,7 +145,8 @@ def impulse_from_io(
         count = min(2 * count, most)
     for flag in found.flags:
         if flag.code == "partly_excited":
-            warnings.warn(flag.message, DataWarning, stacklevel=2)
+            # one frame more: the limit of BLAS threads around this function
+            warnings.warn(flag.message, DataWarning, stacklevel=3)
     flags = found.flags + tail
     siso = group[0].input.ndim == 1 and group[0].output.ndim == 1
     return ImpulseEstimate(

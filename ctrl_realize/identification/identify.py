@@ -13,6 +13,7 @@ from ..checks import one_of, system_name, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..signals import Record, StepResponse
 from ..signals.given import as_records
 from .channel_fit import fit_channels
@@ -34,6 +35,7 @@ PAPER_ORDER, PAPER_SAMPLES, PAPER_MAX_DELAY, PAPER_CUTOFF_HZ = 3, 1000, 100, 50.
 """Section 3.2 of the paper (`ctrl_realize.paper.SETTINGS`, which stands above this layer)."""
 
 
+@single_threaded
 def identify(
     record: Record | Sequence[Record],
     *,

@@ -13,6 +13,7 @@ from ..checks import whole
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray, read_only
+from ..numerics.blas_threads import single_threaded
 from ..results import Flag, Result
 from ..signals import ImpulseResponse
 from .delay_scan import best_of
@@ -179,6 +180,7 @@ class OrderScan(Result):
         )
 
 
+@single_threaded
 def scan_orders(
     impulse: ImpulseResponse | ArrayLike,
     orders: int | Iterable[int] = 8,

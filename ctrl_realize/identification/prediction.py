@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import whole
 from ..numerics.arrays import FloatArray, read_only
+from ..numerics.blas_threads import single_threaded
 from ..numerics.correlation import autoregression, fit_percent, predict_ahead
 from ..results import Result
 from ..signals import Record
@@ -74,6 +75,7 @@ class Prediction(Result):
         return f"<Prediction {self.steps} ahead: fit {fit} %>"
 
 
+@single_threaded
 def predict(
     system: ct.StateSpace, record: Record, steps: int, *, start: Start = "estimate"
 ) -> Prediction:

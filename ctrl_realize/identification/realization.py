@@ -11,6 +11,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import OrderError
 from ..numerics import state_space
 from ..numerics.arrays import FloatArray, read_only
+from ..numerics.blas_threads import single_threaded
 from ..numerics.delay_models import OneModel, realize_at
 from ..results import Flag
 from ..signals import ImpulseResponse
@@ -29,6 +30,7 @@ CLEAR = 3.0
 """Standard deviations of the noise from which a direct term is believed."""
 
 
+@single_threaded
 def realize(
     impulse: ImpulseResponse | ArrayLike,
     order: int,

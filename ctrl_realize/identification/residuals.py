@@ -10,6 +10,7 @@ from ..checks import real, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError
 from ..numerics.arrays import BoolArray, FloatArray, read_only
+from ..numerics.blas_threads import single_threaded
 from ..numerics.correlation import correlation, cross_bound, fit_percent, whiteness
 from ..results import Flag
 from ..signals import Record
@@ -21,6 +22,7 @@ EXACT = 1e-8
 """Residual, as a part of the range of the output, below which a model counts as exact."""
 
 
+@single_threaded
 def check_residuals(
     system: ct.StateSpace,
     record: Record,

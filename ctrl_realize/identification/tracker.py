@@ -11,6 +11,7 @@ import numpy as np
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
 from ..numerics.pole_moves import Core, Direction, moved_core, pole_directions, sensitivity_system
 from ..numerics.recursive import DelayBank
 from ..numerics.running_residual import RunningResidual
@@ -182,6 +183,7 @@ class DelayTracker:
             ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt), told.delay, fit=told
         )
 
+    @single_threaded
     def run(self, record: Record) -> DelayTrack:
         """Take in a whole record, and return the course of the estimate.
 

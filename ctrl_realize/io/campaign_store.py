@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileFormatError, OptionError
-from ..identification.campaign_row import CampaignRow
+from ..identification.campaign_row import CampaignRow, versions
 from ..identification.packed_model import PackedModel
 from ..results import Flag
 from .atomic import write_text
@@ -18,7 +18,7 @@ from .json_content import field
 from .model_files import MAX_MODEL_BYTES, model_from_text, model_to_text
 
 FORMAT = "ctrl_realize campaign row"
-SCHEMA = 2
+SCHEMA = 3
 _NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain")
 
 
@@ -26,9 +26,10 @@ class CampaignStore:
     """Folder that keeps the result of each record of a campaign as it is finished.
 
     Each row is one JSON file, written whole or not at all, named by the SHA-256 of the record's
-    samples, of the settings and of this package's version, and holding that of its own content;
-    processes and machines that share the folder can write to it at once. A file that is damaged
-    is made anew. Only this package's files are ever read, and none is deleted.
+    samples, of the settings and of the versions of this package, NumPy and SciPy, and holding that
+    of its own content; processes and machines that share the folder can write to it at once. What
+    another version has made, or a file that is damaged, is not taken: the record is identified
+    anew. Only this package's files are ever read, and none is deleted.
 
     Parameters
     ----------
@@ -87,6 +88,7 @@ class CampaignStore:
             "format": FORMAT,
             "schema": SCHEMA,
             "key": key,
+            "versions": versions(),
             "name": row.name,
             # Infinity and NaN have no place in JSON; their text has.
             "numbers": {name: repr(float(getattr(row, name))) for name in _NUMBERS},
@@ -104,7 +106,9 @@ def _row_from(content: Any, key: str) -> CampaignRow:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise FileFormatError("not a row of a campaign")
     if content.get("schema") != SCHEMA or content.get("key") != key:
-        raise FileFormatError("a row of another version, or under another name")
+        raise FileFormatError("a row of another format, or under another name")
+    if content.get("versions") != versions():
+        raise FileFormatError("a row that other versions have made")
     if content.get("sha256") != _checksum(content):
         raise FileFormatError("the checksum does not fit the content")
     numbers: dict[str, Any] = {

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import expm, logm
+from scipy.linalg import expm
 from scipy.optimize import brentq, minimize_scalar
 
 from .arrays import FloatArray
+from .matrix_logarithm import principal_logarithm
 from .sampling import zero_order_hold
 
 
@@ -34,7 +35,7 @@ def inverse_zero_order_hold(
     n = A.shape[0]
     if n == 0:
         return A.copy(), B.copy()
-    F = np.asarray(np.real(logm(A)) / dt, dtype=np.float64)
+    F = principal_logarithm(A) / dt
     _, spread = zero_order_hold(F, np.eye(n), dt)
     return F, np.asarray(np.linalg.solve(spread, B), dtype=np.float64)
 
@@ -60,7 +61,7 @@ def split_fraction(
         None where no fraction explains the direct term.
     """
     n = A.shape[0]
-    F = np.asarray(np.real(logm(A)) / dt, dtype=np.float64)
+    F = principal_logarithm(A) / dt
 
     def held(seconds: float) -> FloatArray:
         return zero_order_hold(F, np.eye(n), seconds)[1]

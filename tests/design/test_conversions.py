@@ -199,3 +199,31 @@ def test_a_sample_time_is_not_taken_for_the_dead_time_of_a_model(valve):
     assert finer.dead_time == pytest.approx(model.dead_time, abs=DT / 2)
     replaced = cr.design.to_discrete(model, 10 * DT, DT)
     assert replaced.dead_time == pytest.approx(10 * DT)
+
+
+def test_a_conversion_draws_nothing_from_numpys_global_generator():
+    core = ct.ss(
+        np.diag([0.9, 0.8, 0.7, 0.6, 0.5]) + np.diag([0.3] * 4, 1), np.eye(5), np.eye(5), 0, 1
+    )
+    before = np.random.get_state()  # noqa: NPY002 - it is what must not be touched
+    cr.design.to_continuous(cr.delayed_ss(core, 2))
+    after = np.random.get_state()  # noqa: NPY002
+    np.testing.assert_array_equal(before[1], after[1])
+    assert before[2:] == after[2:]
+
+
+@pytest.mark.parametrize(
+    "F",
+    [
+        np.diag([-1.0, -1.0, -1.0]) + np.diag([5.0, 5.0], 1),  # one Jordan block
+        np.diag([-1.0, -1.0 - 1e-9, -1.0 + 1e-9]) + np.diag([1.0, 1.0], 1),  # nearly one
+        np.array([[-0.1, 3.1, 1.0], [-3.1, -0.1, 2.0], [0.0, 0.0, -5.0]]),  # by the Nyquist pole
+        np.diag([-1e-6, -1.0, -20.0]) + np.diag([10.0, 100.0], 1),
+    ],
+    ids=["defective", "nearly defective", "near Nyquist", "far apart"],
+)
+def test_a_core_and_back_is_the_core(F):
+    core = ct.ss(F, [[0.0], [0.0], [1.0]], [[1.0, 0.0, 0.0]], 0)
+    back = cr.design.to_continuous(cr.design.to_discrete(core, 3.0, 1.0)).core
+    # exp keeps 1e-16 of its norm; the logarithm loses what the slowest mode has less than that
+    np.testing.assert_allclose(back.A, F, rtol=0, atol=1e-7 * np.abs(F).max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import json
 import os
 import signal
@@ -128,10 +129,23 @@ def test_systems_that_look_alike_are_other_rows(records, monkeypatch):
     assert fingerprint(records[0], "output_error", {"known": again}) in keys
 
 
-def test_rows_of_another_version_are_made_anew(records, monkeypatch):
-    mine = fingerprint(records[0], "paper", {})
-    monkeypatch.setattr("ctrl_realize.identification.campaign_row._version", lambda: "99.0")
-    assert fingerprint(records[0], "paper", {}) != mine
+@pytest.mark.parametrize("package", ["ctrl-realize", "numpy", "scipy"])
+def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
+    store = cr.CampaignStore(tmp_path)
+    first = cr.identify_campaign(records[:1], method="paper", store=store)
+    (path,) = tmp_path.glob("row-*.json")
+    content = json.loads(path.read_text())
+    assert content["versions"]["numpy"] == np.__version__
+    # the same file as another version would have written it, whole and with its checksum
+    content["versions"][package] = "0.0"
+    content["numbers"]["delay"] = "99.0"
+    del content["sha256"]
+    canonical = json.dumps(content, sort_keys=True).encode("ascii")
+    content["sha256"] = hashlib.sha256(canonical).hexdigest()
+    path.write_text(json.dumps(content))
+    again = cr.identify_campaign(records[:1], method="paper", store=store)
+    assert_same_results(first, again)
+    assert json.loads(path.read_text())["versions"] != content["versions"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are those of POSIX")
