@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 from typing import Any
 
@@ -69,5 +69,27 @@ def spelled_out(text: str) -> str:
 
 
 def system_name(name: str) -> str:
-    """Make a name that python-control takes: it allows no dots."""
+    """Make a name that python-control takes: a dot stands between system and signal there."""
     return name.replace(".", "_")
+
+
+def system_names(names: Sequence[str]) -> list[str]:
+    """Make names of signals that python-control takes, different ones where the given ones are.
+
+    Examples
+    --------
+    >>> from ctrl_realize.checks import system_names
+    >>> system_names(["FIC101.OP", "FIC101_OP", "TIC7.PV"])
+    ['FIC101_OP_2', 'FIC101_OP', 'TIC7_PV']
+    """
+    made = [system_name(name) for name in names]
+    taken = {name for name in names if "." not in name}
+    for position, (name, wish) in enumerate(zip(names, made, strict=True)):
+        if name == wish:
+            continue
+        number = 2
+        while made[position] in taken:
+            made[position] = f"{wish}_{number}"
+            number += 1
+        taken.add(made[position])
+    return made

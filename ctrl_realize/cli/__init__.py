@@ -67,8 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0: done. 1: done, but some records failed. 2: wrong usage or unusable input; nothing was
-        written. 130: interrupted.
+        0: done. 1: done, but some records or the report failed. 2: wrong usage or unusable input;
+        nothing was written. 130: interrupted.
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     command = _command()

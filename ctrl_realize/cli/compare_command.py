@@ -13,6 +13,7 @@ from ..io import load_model, read_frf
 from ..io.csv_files import write_csv
 from ..report import write_comparison
 from .inputs import check_files, typed_call
+from .results import told_if_it_fails
 from .staging import appearing
 from .terminal import printable, say
 
@@ -77,18 +78,20 @@ def compare(
             words += [f"--{name.replace('_', '-')}", unit]
         with appearing(output) as folder:
             write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
-            write_comparison(
-                folder / "report.html",
-                system,
-                measured,
-                comparison,
-                files=[model, frf],
-                calls=[("In a terminal", typed_call("compare", words))],
-                figures=folder / "figures",
-            )
+            with told_if_it_fails(folder, "the comparison") as written:
+                write_comparison(
+                    folder / "report.html",
+                    system,
+                    measured,
+                    comparison,
+                    files=[model, frf],
+                    calls=[("In a terminal", typed_call("compare", words))],
+                    figures=folder / "figures",
+                )
+                written.append("report.html, figures/")
     say(printable(f"{model}: {system!r}"))
     say(comparison.report())
     if output is not None:
-        written = "frf_comparison.csv, report.html, figures/"
-        say(f"\nwritten to {printable(str(output))}: {written}")
-    return 0
+        names = ", ".join(["frf_comparison.csv", *written])
+        say(f"\nwritten to {printable(str(output))}: {names}")
+    return 0 if output is None or written else 1

@@ -107,17 +107,12 @@ def identify(
     calls = _calls(files, settings, how, words)
     if separate and len(files) > 1:
         return _each_alone(files, output, settings, how, measured, words)
-    failed = False
     if len(files) > 1:
-        failed = _many(files, output, settings, how, measured, calls, jobs)
-    else:
-        with appearing(output) as folder:
-            _one(files[0], folder, settings, how, measured, calls)
-    names = "model.json, report.html, figures/"
-    if len(files) > 1:
-        names += ", records.csv, models/"
-    say(f"\nwritten to {printable(str(output))}: {names}")
-    return 1 if failed else 0
+        return _many(files, output, settings, how, measured, calls, jobs)
+    with appearing(output) as folder:
+        reported = _one(files[0], folder, settings, how, measured, calls)
+    _say_what_is_written(output, ["model.json"], reported)
+    return 0 if reported else 1
 
 
 def _one(
@@ -127,11 +122,12 @@ def _one(
     how: Reading,
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
-) -> None:
+) -> bool:
+    """Identify one file into a folder; tell whether its report is there."""
     record = how.source(file)()
     system = identify_record(record, **settings)
     comparison = None if frf is None else compare_frf(system, frf)
-    write_record_files(
+    reported = write_record_files(
         folder, system, record, file,
         frf=frf, comparison=comparison, settings=settings, calls=calls,
     )  # fmt: skip
@@ -140,6 +136,12 @@ def _one(
     if comparison is not None:
         say()
         say(comparison.report())
+    return reported
+
+
+def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None:
+    more = ["report.html", "figures/"] if reported else []
+    say(f"\nwritten to {printable(str(output))}: {', '.join([*names, *more])}")
 
 
 def _many(
@@ -150,7 +152,7 @@ def _many(
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
     jobs: int | None,
-) -> bool:
+) -> int:
     n_jobs = jobs if jobs is not None else -1 if len(files) >= _MANY else 1
     sources = [how.source(file) for file in files]
     with kept_rows(output) as store:
@@ -158,7 +160,7 @@ def _many(
         _refuse_useless(campaign)
         comparison = None if frf is None else compare_frf(campaign.system, frf)
         with appearing(output) as folder:
-            write_campaign_files(
+            reported = write_campaign_files(
                 folder, campaign, files,
                 frf=frf, comparison=comparison, settings=settings, calls=calls,
             )  # fmt: skip
@@ -171,7 +173,8 @@ def _many(
     if comparison is not None:
         say()
         say(comparison.report())
-    return bool(campaign.failed)
+    _say_what_is_written(output, ["model.json", "records.csv", "models/"], reported)
+    return 1 if campaign.failed or not reported else 0
 
 
 def _refuse_useless(campaign: Campaign) -> None:
@@ -202,7 +205,8 @@ def _each_alone(
         try:
             # each appears as it is finished, so that an interruption loses no other
             with appearing(output / name) as folder:
-                _one(file, folder, settings, how, frf, _calls([file], settings, how, words))
+                if not _one(file, folder, settings, how, frf, _calls([file], settings, how, words)):
+                    failed += 1
         except (CtrlRealizeError, OSError) as error:
             failed += 1
             complain(f"{printable(str(file))}: {one_line(error)}")

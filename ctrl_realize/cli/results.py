@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from ..io import save_model
 from ..io.csv_files import write_csv
 from ..signals import Record
 from ..wording import in_digits, time_unit
-from .terminal import printable, table
+from .terminal import complain, one_line, printable, table
 
 
 def write_record_files(
@@ -30,22 +32,25 @@ def write_record_files(
     comparison: FRFComparison | None,
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
-) -> None:
-    """Write model, report and figures of one record."""
+) -> bool:
+    """Write model, report and figures of one record; tell whether the report is there."""
     save_model(folder / "model.json", system, settings=settings, note=f"from {file.name}")
-    report.write_identification(
-        folder / "report.html",
-        system,
-        record,
-        files=[file],
-        frf=frf,
-        comparison=comparison,
-        settings=settings,
-        calls=calls,
-        figures=folder / "figures",
-    )
     if comparison is not None:
         write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
+    with told_if_it_fails(folder, "the model") as written:
+        report.write_identification(
+            folder / "report.html",
+            system,
+            record,
+            files=[file],
+            frf=frf,
+            comparison=comparison,
+            settings=settings,
+            calls=calls,
+            figures=folder / "figures",
+        )
+        written.append("report.html")
+    return bool(written)
 
 
 def write_campaign_files(
@@ -57,26 +62,43 @@ def write_campaign_files(
     comparison: FRFComparison | None,
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
-) -> None:
-    """Write table, models, report and figures of many records."""
+) -> bool:
+    """Write table, models, report and figures of many records; tell whether the report is there."""
     system = campaign.system
     note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
     save_model(folder / "model.json", system, settings=settings, note=note)
     write_csv(folder / "records.csv", campaign.table(), index=True)
     save_models(folder, campaign, settings)
-    report.write_campaign(
-        folder / "report.html",
-        campaign,
-        files=files,
-        frf=frf,
-        comparison=comparison,
-        settings=settings,
-        calls=calls,
-        title=f"Campaign of {len(campaign.rows)} records",
-        figures=folder / "figures",
-    )
     if comparison is not None:
         write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
+    with told_if_it_fails(folder, "the model") as written:
+        report.write_campaign(
+            folder / "report.html",
+            campaign,
+            files=files,
+            frf=frf,
+            comparison=comparison,
+            settings=settings,
+            calls=calls,
+            title=f"Campaign of {len(campaign.rows)} records",
+            figures=folder / "figures",
+        )
+        written.append("report.html")
+    return bool(written)
+
+
+@contextmanager
+def told_if_it_fails(folder: Path, result: str) -> Iterator[list[str]]:
+    """Let the writing of a report fail without costing the result: the list then stays empty."""
+    written: list[str] = []
+    try:
+        yield written
+    except Exception as error:  # whatever it is: a defect of ours, a full disk
+        shutil.rmtree(folder / "figures", ignore_errors=True)
+        complain(
+            f"the report could not be written ({type(error).__name__}: {one_line(error)}); "
+            f"{result} is"
+        )
 
 
 def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -> None:

@@ -9,8 +9,8 @@ from typing import Any, TextIO
 import typer
 
 EXIT_CODES = (
-    "Exit codes: 0 done; 1 done, but some records failed; 2 wrong usage or unusable input, "
-    "nothing written; 130 interrupted."
+    "Exit codes: 0 done; 1 done, but some records or the report failed; 2 wrong usage or unusable "
+    "input, nothing written; 130 interrupted."
 )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import system_names
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, IntArray
 from .chains import Matrices, augment, chain_labels
@@ -139,6 +140,6 @@ def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter:
             raise OptionError(f"{given!r} is no list of names")
         if len(names) != len(core):
             raise OptionError(f"names {list(names)} for {len(core)} signals; give one for each")
-        return list(names)
+        return system_names(names)
     generic = [f"{letter}[{i}]" for i in range(len(core))]
     return [letter] if list(core) == generic and len(generic) == 1 else list(core)

@@ -16,6 +16,7 @@ from typing import Any
 
 import control as ct
 
+from ..checks import system_name
 from ..errors import DelayRangeError
 from ..numerics.arrays import read_only
 from .algebra import DelayedAlgebra
@@ -50,7 +51,9 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
     fit : optional
         How the model was found; any result of this toolbox.
     name, inputs, outputs : optional
-        Names, as for `control.ss`. Signals are named as those of `core`, or ``u`` and ``y``.
+        Names, as for `control.ss`. Signals are named as those of `core`, or ``u`` and ``y``. A dot,
+        which python-control keeps for ``system.signal``, becomes an underscore: ``FIC101.OP`` of a
+        record is ``FIC101_OP`` of its model.
 
     Attributes
     ----------
@@ -134,7 +137,7 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             outputs=output_names,
             states=core_states,
             dt=core.dt,
-            name=name,
+            name=None if name is None else system_name(name),
         )
         # The chain's states get their names when somebody asks for them.
         self.nstates = core.nstates + sum(before) + sum(behind)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
-from ..checks import system_name
 from ..delayed import DelayedStateSpace
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.gramians import balanced_truncation
@@ -211,6 +210,5 @@ def fitted_system(
     )
     first = group[0]
     labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}
-    # python-control takes no dots in names
-    name = {"name": system_name(first.name)} if first.name else {}
+    name = {"name": first.name} if first.name else {}
     return system.replace(fit=fit, **labels, **name)

@@ -9,7 +9,7 @@ from typing import Literal, TypedDict
 import control as ct
 import numpy as np
 
-from ..checks import one_of, positive, system_name
+from ..checks import one_of, positive
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import DataError, NoStepError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
@@ -156,7 +156,7 @@ def fit_delay(
         dead_time=result.dead_time,
         dt=result.dt,
         fit=result,
-        name=system_name(several[0].name) or None,
+        name=several[0].name or None,
         inputs=list(several[0].input_labels),
         outputs=list(several[0].output_labels),
     )

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of, system_name, whole
+from ..checks import one_of, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
@@ -270,7 +270,7 @@ def _named(
     if record is not None:
         names |= {"inputs": list(record.input_labels), "outputs": list(record.output_labels)}
         if record.name:
-            names["name"] = system_name(record.name)
+            names["name"] = record.name
     return system.replace(**names)
 
 

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from ..checks import system_name
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..signals import MeasuredFRF
@@ -137,7 +136,7 @@ def read_frf(
             _frequency_hz(table, columns["frequency"], units.frequency),
             coherence=coherence_values,
             std=std_values,
-            name=system_name(Path(path).stem) if name is None else name,
+            name=Path(path).stem if name is None else name,
         )
     except DataError as error:
         if str(error).startswith(str(table.path)):

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..checks import one_of, system_name
+from ..checks import one_of
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
 from ..signals import Record
@@ -257,8 +257,7 @@ def _stacked(table: Table, indices: list[int], keep_missing: bool) -> FloatArray
 
 
 def _labels(table: Table, indices: list[int]) -> list[str] | None:
-    # python-control keeps dots for its own use
-    names = [system_name(table.columns[k].name) for k in indices]
+    names = [table.columns[k].name for k in indices]
     return names if all(names) and len(set(names)) == len(names) else None
 
 

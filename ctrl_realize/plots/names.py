@@ -26,6 +26,11 @@ def plain(text: str, longest: int = 80) -> str:
     >>> print(plain("_price in $\n"))
     price in \$?
     """
+    return _shown(text, longest).replace("$", r"\$")
+
+
+def _shown(text: str, longest: int) -> str:
+    """Return the letters of a name that can be drawn, at most so many."""
     known = _letters(tuple(mpl.rcParams["font.family"]), tuple(mpl.rcParams["font.sans-serif"]))
     shown = "".join(
         letter if letter.isprintable() and ord(letter) in known else "?"
@@ -34,7 +39,7 @@ def plain(text: str, longest: int = 80) -> str:
     ends = list(accumulate(map(_width, shown)))
     if ends and ends[-1] > longest:
         shown = shown[: bisect_right(ends, longest - 1)] + "…"
-    return shown.replace("$", r"\$") or "signal"
+    return shown or "signal"
 
 
 @cache
@@ -56,4 +61,6 @@ def _width(letter: str) -> float:
 
 def wrapped(text: str, width: int) -> str:
     """Break a name into at most three short lines."""
-    return "\n".join(wrap(plain(text), width)[:3])
+    # the dollar signs last: between one and its backslash no line may end
+    lines = wrap(_shown(text, 80), width)[:3] or ["signal"]
+    return "\n".join(lines).replace("$", r"\$")

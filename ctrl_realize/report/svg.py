@@ -156,7 +156,8 @@ def _scale(axis: Axis, ends: tuple[float, float], labels: list[str]) -> list[Any
     if isinstance(axis.get_major_locator(), FixedLocator):
         return None
     units = [re.search(r"\[([^\]]*)\]$", label) for label in labels]
-    unit = next((found[1] for found in units if found), "")
+    # in a label a backslash keeps matplotlib from reading formulas between dollar signs
+    unit = next((found[1].replace(r"\$", "$") for found in units if found), "")
     low, high = (float(f"{end:.9g}") for end in ends)
     return [low, high, axis.get_scale() == "log", unit]
 
@@ -165,22 +166,33 @@ def _at_home(document: str, key: str, description: str, data: str) -> str:
     body = document[document.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, count=1, flags=re.DOTALL)
-    body = re.sub(r'\bid="', f'id="{key}-', body)
-    body = body.replace("url(#", f"url(#{key}-").replace('href="#', f'href="#{key}-')
-    body = re.sub(r"font-family: [^;\"]*", "font-family: inherit", body)
-    body = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 inherit", body)
-    for colour, variable in _VARIABLES.items():
-        body = body.replace(colour, variable)
-    # Hundredths of a point are finer than any printer.
-    body = re.sub(r'(?<= )(d|x|y|transform)="[^"]*"', _rounded, body)
+    # Between the tags stand names that came with the data: "#0072b2" or 'id="' may be one.
+    body = re.sub(r"<[^>]*>", lambda tag: _tag_at_home(tag[0], key), body)
     body = re.sub(r"\s*\n\s*", " ", body)
     head = (
         f'<svg role="img" aria-label="{_attribute(description)}" class="plot" '
         f'data-axes="{_attribute(data)}" '
     )
-    return re.sub(
-        r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" ', head, body, count=1
-    ).replace('xmlns="http://www.w3.org/2000/svg" ', "", 1)
+    # By functions, not templates: a name in the data may hold a backslash.
+    body = re.sub(
+        r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" ',
+        lambda _: head,
+        body,
+        count=1,
+    )
+    return body.replace('xmlns="http://www.w3.org/2000/svg" ', "", 1)
+
+
+def _tag_at_home(tag: str, key: str) -> str:
+    """Put a tag into the page: its id is the page's, its colours are variables."""
+    tag = re.sub(r'\bid="', f'id="{key}-', tag)
+    tag = tag.replace("url(#", f"url(#{key}-").replace('href="#', f'href="#{key}-')
+    tag = re.sub(r"font-family: [^;\"]*", "font-family: inherit", tag)
+    tag = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 inherit", tag)
+    for colour, variable in _VARIABLES.items():
+        tag = tag.replace(colour, variable)
+    # Hundredths of a point are finer than any printer.
+    return re.sub(r'(?<= )(d|x|y|transform)="[^"]*"', _rounded, tag)
 
 
 def _rounded(match: re.Match[str]) -> str:

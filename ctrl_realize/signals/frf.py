@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import positive, real
+from ..checks import positive, real, system_name, system_names
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.statistics import circle_quantile
@@ -40,7 +40,7 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         `fit_frf`, `compare_frf` and `impulse_from_frf` then reckon with it.
     name : str, optional
     inputs, outputs : str or sequence of str, optional
-        Signal names, as python-control takes them.
+        Signal names. In all names a dot becomes an underscore, as python-control takes no dots.
 
     Attributes
     ----------
@@ -110,10 +110,15 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         order = np.argsort(grid, kind="stable")
         grid = grid[order]
         values = values[..., order]
-        signals = {key: given for key, given in (("inputs", inputs), ("outputs", outputs)) if given}
+        signals: dict[str, Any] = {
+            key: system_names([names] if isinstance(names, str) else names)
+            for key, names in (("inputs", inputs), ("outputs", outputs))
+            if names
+        }
         # Not smooth: python-control would draw the interpolating splines far beyond the measured
         # band, where they run off. Margins and products with systems do without.
-        super().__init__(values, 2 * np.pi * grid, dt=None, name=str(name), smooth=False, **signals)
+        signals["name"] = system_name(str(name))
+        super().__init__(values, 2 * np.pi * grid, dt=None, smooth=False, **signals)
         self._single = values.ndim == 1
         self.frequency_hz = read_only(grid)
         self.coherence = _beside(coherence, values, order, "coherence")

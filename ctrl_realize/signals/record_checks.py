@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import spelled_out
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.time_axis import EXTREME
@@ -82,7 +83,8 @@ def labelled(
         return (letter,) if count == 1 else tuple(f"{letter}[{i}]" for i in range(count))
     if not isinstance(given, Sequence):
         raise OptionError(f"{argument} is a {type(given).__name__}; needed are {count} names")
-    labels = (given,) if isinstance(given, str) else tuple(str(label) for label in given)
+    labels = (given,) if isinstance(given, str) else tuple(given)
+    labels = tuple(spelled_out(str(label)) for label in labels)
     if len(labels) != count or len(set(labels)) != count:
         raise OptionError(f"{argument}={labels!r}; needed are {count} different names")
     return labels

@@ -123,7 +123,7 @@ def test_names_of_columns_become_labels(tmp_path):
     file = tmp_path / "a.csv"
     file.write_text(table(header="t,u.1,pressure [bar]"))
     record = read_record(file, input=1)
-    assert record.input_labels == ("u_1",)
+    assert record.input_labels == ("u.1",)
     assert record.output_labels == ("pressure [bar]",)
 
 
