@@ -73,7 +73,7 @@ def interval_in_time(low: float, high: float) -> str:
     --------
     >>> from ctrl_realize.wording import interval_in_time
     >>> interval_in_time(0.0256, 0.03737), interval_in_time(0.124534, 0.125411)
-    ('25.6 to 37.4 ms', '124.5 to 125.4 ms')
+    ('25.6 to 37.4 ms', '124.53 to 125.41 ms')
     >>> interval_in_time(0.0, 0.00327)
     '0 to 3.27 ms'
     >>> interval_in_time(0.026, 0.0374)
@@ -81,25 +81,65 @@ def interval_in_time(low: float, high: float) -> str:
     """
     if not (np.isfinite(low) and np.isfinite(high)):
         return f"{in_time(low)} to {in_time(high)}"
-    digits = interval_digits(low, high)
     factor, name = time_unit(max(abs(low), abs(high)))
-    ends = (_in_full(end * factor, digits) for end in (low, high))
+    low, high = factor * low, factor * high
+    ends = numbers_alike((low, high), low, high)
     return f"{' to '.join(ends)} {name}"
 
 
-def interval_digits(low: float, high: float) -> int:
-    """Return how many digits the ends of an interval need to be told apart, at least 3."""
-    width, largest = high - low, max(abs(low), abs(high))
-    if not 0 < width < np.inf:
-        return 4
-    return int(np.clip(2 + np.floor(np.log10(largest / width)), 3, 9))
+def time_within(value: float, low: float, high: float) -> str:
+    """Write an estimate in the unit of its interval, and rounded to the same place.
+
+    What is rounded alike keeps its order: an estimate never seems to lie outside.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import interval_in_time, time_within
+    >>> time_within(0.12486, 0.12473, 0.12612), interval_in_time(0.12473, 0.12612)
+    ('124.9 ms', '124.7 to 126.1 ms')
+    >>> time_within(0.0304, 0.0, 41.2), interval_in_time(0.0, 41.2)
+    ('0.0 s', '0 to 41.2 s')
+    """
+    if not (np.isfinite(low) and np.isfinite(high) and np.isfinite(value)):
+        return in_time(value, 4)
+    factor, name = time_unit(max(abs(low), abs(high)))
+    return f"{number_within(factor * value, factor * low, factor * high)} {name}"
 
 
-def _in_full(value: float, digits: int) -> str:
-    """Write a number with its zeros, which tell how exact it is."""
-    if 1e-3 < abs(value) < 10**digits:
-        return f"{value:#.{digits}g}".rstrip(".")
-    return _plainly(value, digits)
+def number_within(value: float, low: float, high: float) -> str:
+    """Write an estimate rounded to the place to which the ends of its interval are.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import number_within
+    >>> number_within(37.0712, 36.9, 38.2), number_within(2.0, 2.0, 2.0)
+    ('37.1', '2.000')
+    """
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return f"{value:.4g}"
+    return numbers_alike((value,), low, high)[0]
+
+
+def numbers_alike(values: Iterable[float], low: float, high: float) -> list[str]:
+    """Write numbers with one number of decimals, such that ``high - low`` has two digits.
+
+    The larger end has at least three digits in all, four where there is no width.
+
+    Examples
+    --------
+    >>> from ctrl_realize.wording import numbers_alike
+    >>> numbers_alike([9.1234, 37.44], 9.0, 37.0), numbers_alike([0.0, 12345.6], 0.0, 12e3)
+    (['9.1', '37.4'], ['0', '12346'])
+    """
+    several = [float(value) for value in values]
+    largest, width = max(abs(low), abs(high)), high - low
+    if largest == 0 or not 1e-3 < largest < 1e6:
+        return [f"{value:.6g}" for value in several]
+    least = (4 if width <= 0 else 3) - 1 - int(np.floor(np.log10(largest)))
+    # a width of one that was computed as 0.9999... is one
+    shown = 1 - int(np.floor(np.log10(width) + 1e-9)) if width > 0 else least
+    decimals = int(np.clip(max(shown, least), 0, 9))
+    return ["0" if value == 0 else f"{value:.{decimals}f}" for value in several]
 
 
 def _plainly(value: float, digits: int) -> str:

@@ -296,7 +296,7 @@ def test_exact_data_with_a_free_direct_term_fit_two_delays_and_the_convention_ch
     assert scan.iae[5] < 1e-9 * np.abs(g).sum()
     assert scan.iae[6] < 1e-9 * np.abs(g).sum()
     assert scan.iae[7] > 0.1
-    low, high = scan.interval
+    low, high = scan.delay_interval
     assert low <= 5 < 6 <= high
 
 

@@ -45,7 +45,8 @@ def any_input(kind: str, plant: str, noise: float, seed: int) -> Seen:
         with patch.object(cross_check, "fit_delay", lambda record: model):
             check = cr.check_delay(case.record)
     fit = model.fit
-    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    reach = 1.96 * fit.std_given_structure
+    near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {
         "fit_delay, moving input: interval": inside(fit.interval, truth),
         "fit_delay, moving input: -+ 1.96 std": inside(near, truth),
@@ -65,7 +66,8 @@ def joined(kind: str, plant: str, noise: float, seed: int) -> Seen:
     with quietly():
         fit = cr.fit_delay([case.record for case in cases]).fit
     truth = delay * DRIVEN_DT
-    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    reach = 1.96 * fit.std_given_structure
+    near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {
         "fit_delay, three records of moving input: interval": inside(fit.interval, truth),
         "fit_delay, three records of moving input: -+ 1.96 std": inside(near, truth),
@@ -107,7 +109,8 @@ def response_fits(kind: str, plant: str, noise: float, seed: int) -> Seen:
         case, frf = multisine(kind, noise, seed)
         fit = cr.fit_frf(frf, dt=DRIVEN_DT, hold="zoh").fit
     truth = case.delay * DRIVEN_DT
-    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    reach = 1.96 * fit.std_given_structure
+    near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {
         "fit_frf: interval": inside(fit.interval, truth),
         "fit_frf: -+ 1.96 std": inside(near, truth),

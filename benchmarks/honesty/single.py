@@ -30,7 +30,8 @@ def fit_once(kind: str, plant: str, noise: float, seed: int) -> Seen:
             fit = cr.fit_delay(case.record).fit
         except cr.CtrlRealizeError as error:
             return Seen("fit", kind, plant, noise, seed, failed=str(error))
-    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    reach = 1.96 * fit.std_given_structure
+    near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {"interval": inside(fit.interval, truth), "std": inside(near, truth)}
     rows = {(row.order, row.relative_degree): row for row in fit.structures}
     own = rows.get(STRUCTURES.get(plant, (0, 0)))

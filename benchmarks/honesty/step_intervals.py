@@ -22,7 +22,8 @@ def given(kind: str, plant: str, noise: float, seed: int) -> Seen:
     truth = case.delay * DT
     structure = STRUCTURES.get(plant, (3, 3))
     fit = cr.fit_delay(case.record, structures=[structure]).fit
-    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    reach = 1.96 * fit.std_given_structure
+    near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {
         "fit_delay, structure given: interval": inside(fit.interval, truth),
         "fit_delay, structure given: -+ 1.96 std": inside(near, truth),
@@ -40,7 +41,7 @@ def scans(kind: str, plant: str, noise: float, seed: int) -> Seen:
     with quietly():
         fit = cr.identify(case.record, method="scan").fit
         orders = cr.scan_orders(fit.impulse, 5, max_delay=fit.max_delay)
-    low, high = orders.intervals[orders.orders.index(orders.order)]
+    low, high = orders.delay_intervals[orders.orders.index(orders.order)]
     covered = {
         "identify(method='scan'): flat set": inside(fit.dead_time_interval, truth),
         "scan_orders: flat set of the suggested order": inside((low, high), case.delay),
@@ -93,7 +94,8 @@ def several(kind: str, plant: str, noise: float, seed: int) -> Seen:
     with quietly():
         fit = cr.fit_delay(records).fit
         campaign = cr.identify_campaign(records, method="scan")
-    near = (fit.dead_time - 1.96 * fit.std, fit.dead_time + 1.96 * fit.std)
+    reach = 1.96 * fit.std_given_structure
+    near = (fit.dead_time - reach, fit.dead_time + reach)
     repeats = fit.repeatability
     deviation = np.abs(repeats.delays - np.mean(repeats.delays)) / repeats.errors
     covered = {

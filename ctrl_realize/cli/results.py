@@ -17,6 +17,7 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
 from ..io import save_model
 from ..io.csv_files import write_csv
+from ..report.tables import dead_time_cells
 from ..signals import Record
 from ..wording import in_digits, time_unit
 from .terminal import complain, one_line, printable, table
@@ -127,15 +128,15 @@ def campaign_table(campaign: Campaign) -> str:
             rows.append([printable(row.name), in_digits(row.amplitude), "", "", "", "",
                          printable(row.error or "failed")])  # fmt: skip
             continue
-        low, high = row.interval
+        low, wait, high = dead_time_cells(row, scale)
         remarks = ", ".join(flag.code for flag in row.flags)
         rows.append(
             [
                 printable(row.name),
                 in_digits(row.amplitude),
                 f"{row.delay:.4g}",
-                f"{scale * row.dead_time:.4g}",
-                f"{scale * low:.4g} ... {scale * high:.4g}",
+                wait,
+                f"{low} ... {high}",
                 str(row.order),
                 remarks,
             ]

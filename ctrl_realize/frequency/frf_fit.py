@@ -10,7 +10,7 @@ import numpy as np
 
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
-from ..wording import in_time, interval_digits, interval_in_time
+from ..wording import in_time, interval_in_time, time_within
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,8 +56,8 @@ class FRFFit(Result):
     order, relative_degree : int
     dead_time : float
         In s, not rounded to samples.
-    std : float
-        Standard deviation of `dead_time` in the chosen structure, in s.
+    std_given_structure : float
+        Standard deviation of `dead_time` in s if the chosen structure is the plant's.
     interval : tuple of float
         95 % interval of the dead time in s.
     frequency_hz : ndarray, shape (K,)
@@ -93,14 +93,14 @@ class FRFFit(Result):
     >>> noise = 0.01 * np.random.default_rng(0).standard_normal((80, 2)) @ [1, 1j]
     >>> frf = cr.MeasuredFRF(2 * np.exp(-0.0289 * s) / (0.08 * s + 1) ** 2 + noise, f)
     >>> fit = cr.fit_frf(frf, 2).fit
-    >>> print(f"{1e3 * fit.dead_time:.2f} ms, standard error {1e3 * fit.std:.2f} ms")
-    29.48 ms, standard error 0.36 ms
+    >>> print(f"{1e3 * fit.dead_time:.2f} ms, std {1e3 * fit.std_given_structure:.2f} ms")
+    29.48 ms, std 0.36 ms
     """
 
     order: int
     relative_degree: int
     dead_time: float
-    std: float
+    std_given_structure: float
     interval: tuple[float, float]
     frequency_hz: FloatArray
     measured: ComplexArray
@@ -163,12 +163,11 @@ class FRFFit(Result):
             for p, error in zip(self.poles, self.pole_std, strict=True)
             if p.imag >= 0
         ]
-        digits = max(4, interval_digits(*self.interval))
         hold = []
         if self.hold_time is not None:
             hold.append(("hold", f"that of samples every {in_time(self.hold_time)}, divided out"))
         return [
-            ("dead time", f"{in_time(self.dead_time, digits)}, {self._std_in_words()}"),
+            ("dead time", f"{time_within(self.dead_time, *self.interval)}, {self._std_in_words()}"),
             ("95 % interval", interval_in_time(*self.interval)),
             ("total delay at DC", in_time(self.total_delay, 5)),
             ("structure", f"order {self.order}, relative degree {self.relative_degree}"),
@@ -191,9 +190,9 @@ class FRFFit(Result):
     def _std_in_words(self) -> str:
         low, high = self.interval
         # At a bound, or with a superfluous zero, the curvature says nothing; the interval does.
-        if self.std > 2 * (high - low):
+        if self.std_given_structure > 2 * (high - low):
             return "its standard deviation is not determined"
-        return f"std {in_time(self.std, 2)}"
+        return f"std {in_time(self.std_given_structure, 2)} in this structure"
 
     def __repr__(self) -> str:
         low, high = self.interval

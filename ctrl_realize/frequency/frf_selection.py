@@ -103,7 +103,7 @@ def chosen_model(
         order=n,
         relative_degree=r,
         dead_time=best.dead_time,
-        std=best.std,
+        std_given_structure=best.std,
         interval=interval,
         frequency_hz=read_only(frequency),
         measured=locked(points.response),

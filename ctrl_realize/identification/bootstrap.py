@@ -17,7 +17,7 @@ from ..numerics.noise_level import correlation_time, kept_in_blocks
 from ..results import Flag, Result
 from ..signals import Record
 from ..signals.given import as_records
-from ..wording import in_time, interval_in_time
+from ..wording import in_time, interval_in_time, time_within
 from .delay_fit import fit_delay
 
 Estimator: TypeAlias = Callable[[Any], DelayedStateSpace]
@@ -141,7 +141,7 @@ class Bootstrap(Result):
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
         rows = [
-            ("dead time", f"{in_time(float(np.median(self.dead_times)), 5)} (median)"),
+            ("dead time", f"{time_within(float(np.median(self.dead_times)), low, high)} (median)"),
             ("middle 95 %", interval_in_time(low, high)),
             ("standard deviation", in_time(self.std)),
             ("gain", f"{self.gains.mean():.5g} +- {self.gains.std(ddof=1):.2g}"),

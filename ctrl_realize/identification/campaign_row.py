@@ -99,6 +99,11 @@ class CampaignRow:
         """Sample time of the model in s; NaN without one."""
         return float("nan") if self.model is None else self.model.dt
 
+    @property
+    def delay_interval(self) -> tuple[float, float]:
+        """Interval of the delay in samples; NaN without a model."""
+        return self.interval[0] / self.dt, self.interval[1] / self.dt
+
     def __repr__(self) -> str:
         what = self.error if self.model is None else f"delay {self.delay:.4g} samples"
         return f"<CampaignRow {self.name!r}: {what}>"

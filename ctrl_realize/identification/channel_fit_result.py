@@ -12,7 +12,7 @@ from ..numerics.arrays import FloatArray, read_only
 from ..numerics.gramians import balanced_truncation
 from ..results import Flag, Result
 from ..signals import Record
-from ..wording import in_percent, in_time, interval_in_time
+from ..wording import in_percent, in_time, interval_in_time, time_within
 from .channel_search import Candidate
 from .delay_fit_result import DelayFit
 from .residual_check import ResidualCheck
@@ -137,7 +137,7 @@ class ChannelFit(Result):
         if self.dead_time is None or self.interval is None:
             return []
         rows = [
-            ("dead time", f"{in_time(self.dead_time, 4)} = {self.delay} samples"),
+            ("dead time", f"{time_within(self.dead_time, *self.interval)} = {self.delay} samples"),
             (self.interval_label, interval_in_time(*self.interval)),
         ]
         if self.lags is not None:

@@ -170,7 +170,7 @@ def _scan(record: Record, stepped: bool, most: int, order: int, total: float) ->
         length = min(most + max(tail, 8 * order), record.n_samples // 4)
         impulse = impulse_from_io(record, length)
     scan = estimate_delay(impulse, order, max_delay=min(most, impulse.n_samples // 2)).fit
-    low, high = scan.interval
+    low, high = scan.delay_interval
     return DelayView(
         "scan",
         "record",

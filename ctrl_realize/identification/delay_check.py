@@ -8,7 +8,7 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING, Literal
 
 from ..results import Flag, Result
-from ..wording import in_time, interval_in_time
+from ..wording import interval_in_time, time_within
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,7 +138,7 @@ class DelayCheck(Result):
         kind = "" if view.kind == "dead time" else ", upper bound"
         doubt = "; in doubt" if view.doubt else ""
         ends = interval_in_time(view.low, view.high)
-        return f"{in_time(view.value, 4)}{samples} ({ends}{kind}{doubt})"
+        return f"{time_within(view.value, view.low, view.high)}{samples} ({ends}{kind}{doubt})"
 
     def __repr__(self) -> str:
         verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
 from ..signals import Record
-from ..wording import in_time, interval_digits, interval_in_time, poles_in_words
+from ..wording import in_time, interval_in_time, number_within, poles_in_words, time_within
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,12 @@ class DelayFit(Result):
 
     Attributes
     ----------
-    dead_time, std : float
-        Transport delay of the model, in s, and its standard error if the chosen structure is the
-        plant's (the spread of the views where the residual is not noise). Where the structure is
-        in doubt, `interval` knows, `std` does not.
+    dead_time : float
+        Transport delay of the model, in s.
+    std_given_structure : float
+        Standard error of the dead time in s if the chosen structure is the plant's (that of the
+        spread of the views where the residual is not noise). It knows nothing of the doubt about
+        the structure, which is mostly the larger part: `interval` does.
     interval : tuple of float
         95 % interval of the dead time in s: of all structures that the data cannot rule out
         where the residual is noise (and wider where a zero leaves the beginning open), of the
@@ -99,7 +101,7 @@ class DelayFit(Result):
     """
 
     dead_time: float
-    std: float
+    std_given_structure: float
     interval: tuple[float, float]
     onset: float
     total_delay: float
@@ -160,13 +162,14 @@ class DelayFit(Result):
         )
 
     def _title(self) -> str:
-        return f"Output-error fit: dead time {in_time(self.dead_time, 4)}"
+        return f"Output-error fit: dead time {time_within(self.dead_time, *self.interval)}"
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
-        digits = max(4, interval_digits(low, high))
+        wait = time_within(self.dead_time, low, high)
+        samples = number_within(self.delay, *self.delay_interval)
         rows = [
-            ("dead time", f"{in_time(self.dead_time, digits)} = {self.delay:.{digits}g} samples"),
+            ("dead time", f"{wait} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
             *([("first motion", in_time(self.onset, 4))] if self.onset == self.onset else []),
             ("total delay", f"{in_time(self.total_delay, 5)} (dead time and lags: firm)"),

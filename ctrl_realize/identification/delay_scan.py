@@ -99,7 +99,7 @@ def estimate_delay(
     >>> import ctrl_realize as cr
     >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]
     >>> sys = cr.estimate_delay(pulse, 1, max_delay=60, dt=0.01)
-    >>> sys.delay, sys.fit.interval
+    >>> sys.delay, sys.fit.delay_interval
     (37, (37, 38))
     """
     order = whole(order, "order", 1)
@@ -132,7 +132,7 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
     fit = DelayScan(
         iae=read_only(iae),
         delay=delay,
-        interval=flat_set(iae, delay, rounding),
+        delay_interval=flat_set(iae, delay, rounding),
         order=order,
         samples=surface.samples,
         feedthrough=surface.feedthrough is not False,

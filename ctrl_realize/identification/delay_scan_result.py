@@ -63,9 +63,9 @@ class DelayScan(Result):
     iae : ndarray, shape (max_delay + 1,)
     delay : int
         Best delay in samples.
-    interval : tuple of int
+    delay_interval : tuple of int
         Smallest and largest delay, in samples, with a misfit within 5 % of
-        the least. It tells how flat the curve is, and is no confidence
+        the least; `interval` is the same in s. It tells how flat the curve is, and is no confidence
         interval: the bias of the method is not in it.
     order, samples : int
         Order of all models; Markov parameters behind each delay used.
@@ -93,13 +93,13 @@ class DelayScan(Result):
     >>> import ctrl_realize as cr
     >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]     # 37 samples, then a lag
     >>> scan = cr.estimate_delay(pulse, 1, max_delay=60, dt=0.01).fit
-    >>> print(scan.delay, scan.interval, scan.iae[[30, 36, 38]].round(3))
+    >>> print(scan.delay, scan.delay_interval, scan.iae[[30, 36, 38]].round(3))
     37 (37, 38) [1.133 0.302 0.   ]
     """
 
     iae: FloatArray
     delay: int
-    interval: tuple[int, int]
+    delay_interval: tuple[int, int]
     order: int
     samples: int
     feedthrough: bool
@@ -126,9 +126,14 @@ class DelayScan(Result):
         return self.delay * self.dt
 
     @property
+    def interval(self) -> tuple[float, float]:
+        """`delay_interval` in s."""
+        return (self.delay_interval[0] * self.dt, self.delay_interval[1] * self.dt)
+
+    @property
     def dead_time_interval(self) -> tuple[float, float]:
-        """`interval` in s."""
-        return (self.interval[0] * self.dt, self.interval[1] * self.dt)
+        """Interval of the dead time in s, the same as `interval`."""
+        return self.interval
 
     @property
     def misfit(self) -> float:
@@ -158,7 +163,7 @@ class DelayScan(Result):
         return f"Delay scan: {self.delay} samples ({in_time(self.delay * self.dt, 5)})"
 
     def _rows(self) -> list[tuple[str, str]]:
-        low, high = self.interval
+        low, high = self.delay_interval
         rows = [
             ("within 5 % of the least misfit", f"{low}...{high} samples"),
             ("tried", f"0...{self.max_delay} samples of {in_time(self.dt, 6)}"),
@@ -174,7 +179,7 @@ class DelayScan(Result):
 
     def __repr__(self) -> str:
         flags = f", {len(self.flags)} flags" if self.flags else ""
-        low, high = self.interval
+        low, high = self.delay_interval
         return (
             f"<DelayScan: d = 0...{self.max_delay}, best {self.delay} ({low}...{high}), "
             f"order {self.order}{flags}>"

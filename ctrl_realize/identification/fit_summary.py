@@ -30,7 +30,7 @@ def summarise(
     zeros = np.roots(fit.numerator[::-1]).astype(np.complex128)
     return DelayFit(
         dead_time=fit.delay,
-        std=fit.std,
+        std_given_structure=fit.std,
         interval=(fit.low, fit.high),
         onset=onset,
         total_delay=fit.delay + lag_sum(poles[poles != 0], fit.numerator),

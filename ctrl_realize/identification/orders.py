@@ -32,7 +32,7 @@ class OrderScan(Result):
 
     ``iae[i, d]`` is the integrated absolute error of order ``orders[i]``
     behind d samples, as `DelayScan.iae` has it; ``delays[i]`` is the best
-    delay of that order, ``intervals[i]`` all within 5 % of its misfit.
+    delay of that order, ``delay_intervals[i]`` all within 5 % of its misfit.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class OrderScan(Result):
         An order above the numerical rank has the misfit of the rank.
     delays : tuple of int
         Best delay of each order, in samples.
-    intervals : tuple of (int, int)
+    delay_intervals : tuple of (int, int)
         Delays of each order within 5 % of its least misfit, in samples.
     singular_values : ndarray, shape (max_delay + 1, max(orders))
         Of the Hankel matrix behind each delay.
@@ -77,7 +77,7 @@ class OrderScan(Result):
     orders: tuple[int, ...]
     iae: FloatArray
     delays: tuple[int, ...]
-    intervals: tuple[tuple[int, int], ...]
+    delay_intervals: tuple[tuple[int, int], ...]
     singular_values: FloatArray
     noise_floor: float | None
     order: int
@@ -129,8 +129,8 @@ class OrderScan(Result):
         Returns
         -------
         pandas.DataFrame
-            Index ``order``; columns ``delay`` and its 5 % range ``low``,
-            ``high`` in samples, ``dead_time`` in s, ``iae``, ``contrast``,
+            Index ``order``; columns ``delay`` and its 5 % range
+            ``delay_low``, ``delay_high`` in samples, ``dead_time`` in s, ``iae``, ``contrast``,
             ``singular_value``, ``noise_ratio``, ``suggested``.
         """
         import pandas as pd
@@ -143,8 +143,8 @@ class OrderScan(Result):
                 {
                     "order": order,
                     "delay": self.delays[i],
-                    "low": self.intervals[i][0],
-                    "high": self.intervals[i][1],
+                    "delay_low": self.delay_intervals[i][0],
+                    "delay_high": self.delay_intervals[i][1],
                     "dead_time": self.delays[i] * self.dt,
                     "iae": least,
                     "contrast": float(self.iae[i, 0]) / least if least > 0 else np.inf,
@@ -161,7 +161,7 @@ class OrderScan(Result):
     def _rows(self) -> list[tuple[str, str]]:
         rows = []
         for i, order in enumerate(self.orders):
-            low, high = self.intervals[i]
+            low, high = self.delay_intervals[i]
             value = self.last_singular_value(order)
             noise = f", {value / self.noise_floor:.2f} x noise" if self.noise_floor else ""
             rows.append(
@@ -234,7 +234,7 @@ def scan_orders(
         orders=surface.orders,
         iae=read_only(surface.iae),
         delays=delays,
-        intervals=tuple(
+        delay_intervals=tuple(
             flat_set(row, d, rounding) for row, d in zip(surface.iae, delays, strict=True)
         ),
         singular_values=read_only(surface.models.singular_values),

@@ -15,8 +15,8 @@ from ..results import Flag, Result
 from .json_content import MAX_TEXT, field
 
 _KEPT = (
-    "delay", "order", "dead_time", "dead_time_interval", "std", "interval", "total_delay", "onset",
-    "method",
+    "delay", "order", "dead_time", "dead_time_interval", "std_given_structure", "interval",
+    "delay_interval", "total_delay", "onset", "method",
 )  # fmt: skip
 _MAX_ROWS = 200
 
@@ -28,7 +28,7 @@ class FitSummary(Result):
     """Report of a fit, without its curves, as a model file keeps it.
 
     ``summary[key]`` is what ``fit.key`` was, for the main numbers of a fit (`delay`, `order`,
-    `dead_time`, `std`, `interval`, ...) that are there; the dead time and its interval are
+    `dead_time`, `interval`, ...) that are there; the dead time and its interval are
     attributes as well. ``report()`` is the text that the fit had.
 
     Attributes
@@ -77,7 +77,7 @@ class FitSummary(Result):
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Interval as the fit had it: in s, of a scan in samples; None if it had none."""
+        """Interval as the fit had it, in s; None if it had none."""
         match dict(self.values).get("interval"):
             case (low, high) if _is_end(low) and _is_end(high) and float(low) <= float(high):
                 return float(low), float(high)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..delayed import DelayedStateSpace
-from ..wording import in_time, interval_digits, interval_in_time
+from ..wording import in_time, interval_in_time, number_within, time_within
 from . import style
 
 
@@ -29,9 +29,10 @@ def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None
     """Draw the dead time as a line, its interval as a band; `factor` is in units per s."""
     wait = estimate_of(system)
     interval = interval_of(system)
-    digits = 3 if interval is None else interval_digits(*interval)
-    text = f"dead time\n{in_time(wait, digits)} = {wait / system.dt:.{digits}g} samples"
+    text = f"dead time\n{in_time(wait)} = {wait / system.dt:.3g} samples"
     if interval is not None:
+        samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
+        text = f"dead time\n{time_within(wait, *interval)} = {samples} samples"
         text += f"\n{interval_in_time(*interval)}"
         if interval[1] > interval[0]:
             low, high = (factor * bound for bound in interval)

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..identification.delay_fit_result import DelayFit
-from ..wording import in_time, interval_digits, interval_in_time
+from ..wording import interval_in_time, time_within
 from . import style
 from .names import plain, wrapped
 from .scales import time_unit
@@ -218,7 +218,6 @@ def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel(f"dead time [{unit}]")
-    wait = in_time(result.dead_time, interval_digits(low, high))
-    said = f"{wait} ({interval_in_time(low, high)})"
+    said = f"{time_within(result.dead_time, low, high)} ({interval_in_time(low, high)})"
     axes.set_title(said, loc="left", fontsize=11)
     return points

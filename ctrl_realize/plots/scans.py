@@ -63,7 +63,7 @@ def delay_plot(
             "identify(record, method='scan')"
         )
     looks = {"color": style.MODEL, "label": f"order {result.order}", **kwargs}
-    low, high = result.interval
+    low, high = result.delay_interval
     with style.canvas(ax, title=title, default_title=result.impulse.name) as (axes,):
         lines = list(axes.plot(np.arange(result.iae.size), result.iae, **looks))
         axes.plot(

@@ -12,9 +12,10 @@ import numpy as np
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign import Campaign
+from ..identification.campaign_row import CampaignRow
 from ..results import Result
 from ..signals import Record
-from ..wording import in_digits, time_unit
+from ..wording import in_digits, numbers_alike, time_unit
 from .page import Column, Row, Table, pairs
 from .provenance import file_sha256, record_sha256
 
@@ -114,20 +115,29 @@ def campaign_table(campaign: Campaign) -> Table:
             cells = (row.name, in_digits(row.amplitude), "", "", "", "", "", row.error or "")
             rows.append(Row(cells, "failed"))
             continue
-        low, high = row.interval
+        low, wait, high = dead_time_cells(row, scale)
         remarks = [flag.code.replace("_", " ") for flag in row.flags]
         cells = (
             row.name,
             in_digits(row.amplitude),
             f"{row.delay:.4g}",
-            f"{scale * row.dead_time:.4g}",
-            f"{scale * low:.4g} to {scale * high:.4g}",
+            wait,
+            f"{low} to {high}",
             str(row.order),
             f"{row.misfit:.3g}",
             ", ".join([*remarks, *row.warnings]),
         )
         rows.append(Row(cells, "best" if row.name == best else ""))
     return Table("Records", tuple(rows), columns, note="In bold: the record of least misfit.")
+
+
+def dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
+    """Lower end, estimate and upper end, rounded alike."""
+    low, high = row.interval
+    seen = [scale * value for value in (low, row.dead_time, high)]
+    if not np.isfinite(seen).all():
+        return [f"{value:.4g}" for value in seen]
+    return numbers_alike(seen, seen[0], seen[2])
 
 
 def amplitude_table(campaign: Campaign) -> Table:

@@ -14,7 +14,7 @@ from ..identification.campaign import Campaign
 from ..identification.delay_scan_result import DelayScan
 from ..plots.dead_times import estimate_of, interval_of
 from ..results import Flag
-from ..wording import in_time, interval_in_time, poles_in_words
+from ..wording import in_time, interval_in_time, number_within, poles_in_words, time_within
 
 SEVERE = frozenset(
     {
@@ -138,10 +138,12 @@ def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> 
 def headline_of(system: DelayedStateSpace) -> str:
     """Say the model in one sentence."""
     wait = estimate_of(system)
-    sentence = (
-        f"Dead time {in_time(wait, 4)} ({wait / system.dt:.4g} samples of {in_time(system.dt, 6)})"
-    )
     interval = interval_of(system)
+    said, samples = in_time(wait, 4), f"{wait / system.dt:.4g}"
+    if interval is not None:
+        said = time_within(wait, *interval)
+        samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
+    sentence = f"Dead time {said} ({samples} samples of {in_time(system.dt, 6)})"
     if interval is not None:
         sentence += f", {interval_name(system)} {interval_in_time(*interval)}"
     order = system.delay_free.nstates
@@ -160,13 +162,13 @@ def interval_name(system: DelayedStateSpace) -> str:
 
 def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
     """List the main numbers of a model."""
-    facts = [("dead time", in_time(estimate_of(system), 4))]
-    interval = interval_of(system)
+    wait, interval = estimate_of(system), interval_of(system)
+    facts = [("dead time", in_time(wait, 4) if interval is None else time_within(wait, *interval))]
     if interval is not None:
         name = interval_name(system)
         facts.append((name, interval_in_time(*interval)))
     for attribute, label in (
-        ("std", "standard error, structure given"),
+        ("std_given_structure", "standard error, structure given"),
         ("onset", "visible onset"),
         ("total_delay", "total delay of slow signals"),
     ):

@@ -72,7 +72,7 @@ def test_model_is_the_continuous_fit_behind_a_hold_with_its_fractional_delay():
 def test_dead_times_scatter_as_the_stated_deviation_and_are_covered():
     fits = [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(50)]
     error = np.array([fit.dead_time - 0.04 for fit in fits])
-    std = np.array([fit.std for fit in fits])
+    std = np.array([fit.std_given_structure for fit in fits])
     # Standard deviation of 50 runs is known to 10 %; three of them.
     assert error.std() == pytest.approx(std.mean(), rel=0.3)
     assert abs(error.mean()) < 3 * std.mean() / np.sqrt(50)
@@ -103,7 +103,7 @@ def test_stated_deviations_are_the_cramer_rao_bounds():
     fit = cr.fit_frf(noisy(3), 2, relative_degree=2, dt=1e-3).fit
     # The misfit of 76 degrees of freedom scales them: 8 % above at most here. The poles' are
     # taken where the fit is, not at the truth.
-    assert [fit.std, *fit.pole_std] == pytest.approx(bound_of(0.01), rel=0.15)
+    assert [fit.std_given_structure, *fit.pole_std] == pytest.approx(bound_of(0.01), rel=0.15)
 
 
 def test_delay_and_poles_reach_their_cramer_rao_bounds():
@@ -193,7 +193,9 @@ def test_units_of_output_and_time_change_nothing_else(size, rate):
     moved = cr.MeasuredFRF(frf.complex * size, F * rate, std=frf.std * size)
     other = cr.fit_frf(moved, 2, dt=1e-3 / rate).fit
     # Minima are found to 1e-9 of the cost, so to 1e-5 of a standard deviation or better.
-    assert other.dead_time * rate == pytest.approx(plain.dead_time, abs=1e-3 * plain.std)
+    assert other.dead_time * rate == pytest.approx(
+        plain.dead_time, abs=1e-3 * plain.std_given_structure
+    )
     assert other.gain == pytest.approx(plain.gain * size, rel=1e-5)
     assert other.misfit == pytest.approx(plain.misfit, rel=1e-6)
     assert_allclose(np.array(other.interval) * rate, plain.interval, rtol=1e-3)
@@ -310,7 +312,7 @@ def test_resonances_over_three_decades_are_found_in_noise():
     for w in centres:
         k = int(np.argmin(np.abs(fit.poles - w * complex(-0.01, 1))))
         assert abs(fit.poles[k] - w * complex(-0.01, 1)) < 4 * fit.pole_std[k] < 0.02 * w
-    assert fit.dead_time == pytest.approx(2e-4, abs=4 * fit.std)
+    assert fit.dead_time == pytest.approx(2e-4, abs=4 * fit.std_given_structure)
 
 
 def test_motor_bench_resonance_and_one_sample_of_delay(shared_data):
@@ -435,7 +437,9 @@ def test_shift_of_time_moves_the_dead_time_alone():
     plain = cr.fit_frf(frf, 2, relative_degree=2, dt=1e-3).fit
     later = cr.MeasuredFRF(frf.complex * np.exp(-S * 0.3), F, std=frf.std)
     moved = cr.fit_frf(later, 2, relative_degree=2, dt=1e-3).fit
-    assert moved.dead_time - plain.dead_time == pytest.approx(0.3, abs=1e-3 * plain.std)
+    assert moved.dead_time - plain.dead_time == pytest.approx(
+        0.3, abs=1e-3 * plain.std_given_structure
+    )
     assert_allclose(moved.poles, plain.poles, rtol=1e-4)
     assert_allclose(moved.pole_std, plain.pole_std, rtol=1e-3)
 

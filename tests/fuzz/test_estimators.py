@@ -73,7 +73,7 @@ def test_any_response_is_scanned_for_its_delay_or_refused(rng):
         assert scan.delay == model.delay
         # the smallest, or the first of those that rounding cannot tell from it
         assert scan.iae[scan.delay] <= scan.iae.min() + 1e-10 * np.abs(g).sum()
-        low, high = scan.interval
+        low, high = scan.delay_interval
         assert low <= scan.delay <= high
 
 
@@ -101,7 +101,7 @@ def test_an_exact_response_is_found_exactly(rng):
     (model,) = models
     # with a direct term one sample less fits as well, and the first of those counts
     assert model.delay in (delay - 1, delay)
-    assert model.fit.interval[0] <= delay <= model.fit.interval[1]
+    assert model.fit.delay_interval[0] <= delay <= model.fit.delay_interval[1]
     np.testing.assert_allclose(model.markov(n), g, atol=1e-8 * np.abs(g).max())
 
 

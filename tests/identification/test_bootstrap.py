@@ -30,7 +30,7 @@ def drawn(record):
 
 def test_the_scatter_is_that_of_the_likelihood(record, drawn):
     # 60 draws know a standard deviation to 9 %
-    assert drawn.std == pytest.approx(R1_FIT(record).fit.std, rel=0.35)
+    assert drawn.std == pytest.approx(R1_FIT(record).fit.std_given_structure, rel=0.35)
     assert drawn.interval[0] < 37 * TS < drawn.interval[1]
     assert drawn.failed == 0
 

@@ -96,7 +96,7 @@ def test_the_card_tells_the_scatter_and_what_it_does_not_see():
     low, high = result.interval
     assert result.report().splitlines() == [
         "Bootstrap of residuals: 3 models",
-        "  dead time           1.2 s (median)",
+        "  dead time           1.20 s (median)",
         f"  middle 95 %         {interval_in_time(low, high)}",
         f"  standard deviation  {in_time(np.sqrt(0.13))}",
         "  gain                3 +- 1",

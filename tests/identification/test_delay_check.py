@@ -83,9 +83,9 @@ def test_views_that_agree_are_listed_with_what_to_rely_on():
     card = check([A, DOUBTED, bound("d", 4.0)], (1.0, 3.0)).report()
     assert card.splitlines() == [
         "Delay seen in several ways",
-        f"  a (record)  2 s = 4 samples ({interval_in_time(1.0, 3.0)})",
+        f"  a (record)  2.00 s = 4 samples ({interval_in_time(1.0, 3.0)})",
         f"  c (record)  2.05 s = 4.1 samples ({interval_in_time(2.0, 2.1)}; in doubt)",
-        f"  d (record)  2 s = 4 samples ({interval_in_time(0.0, 4.0)}, upper bound)",
+        f"  d (record)  2.00 s = 4 samples ({interval_in_time(0.0, 4.0)}, upper bound)",
         f"  they agree  yes, on {interval_in_time(1.0, 3.0)}",
         "  rely on     a: the narrowest interval of those that count",
         "  c in doubt  of noise",
@@ -112,8 +112,8 @@ def test_agreement_is_told_in_one_line():
     assert repr(check([A, B])) == "<DelayCheck: 2 views that agree>"
 
 
-def test_numbers_are_told_in_four_digits():
+def test_an_estimate_is_rounded_as_its_interval_is():
     shown = dict(
         check([DelayView("a", "FRF", "dead time", 0.0123456, 0.012, 0.013)], dt=0.01)._rows()
     )
-    assert shown["a (FRF)"].startswith("12.35 ms = 1.235 samples (")
+    assert shown["a (FRF)"].startswith("12.3 ms = 1.235 samples (12.0 to")

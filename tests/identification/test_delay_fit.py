@@ -38,7 +38,7 @@ def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(valve
     fit = valve.fit
     assert fit.structure == (3, 3)
     assert abs(fit.delay - 36.4) < 4 * 0.092  # four times the Cramer-Rao bound at 0.1 %
-    assert fit.std / TS == pytest.approx(0.092, rel=0.15)
+    assert fit.std_given_structure / TS == pytest.approx(0.092, rel=0.15)
     assert covers(fit, 36.4)
     assert fit.at_noise_level
     assert not fit.views
@@ -102,7 +102,9 @@ def test_any_unit_of_time_gives_the_same_answer_in_samples(unit):
     # nothing but rounding: all thresholds are relative
     assert same.delay == pytest.approx(fit.delay, rel=1e-6)
     assert_allclose(same.delay_interval, fit.delay_interval, rtol=1e-4)
-    assert same.std / same.dt == pytest.approx(fit.std / fit.dt, rel=1e-4)
+    assert same.std_given_structure / same.dt == pytest.approx(
+        fit.std_given_structure / fit.dt, rel=1e-4
+    )
 
 
 def test_the_callers_record_is_not_changed():
@@ -120,8 +122,8 @@ def test_an_unknown_sensor_widens_the_interval_and_a_known_one_narrows_it():
         blind = cr.fit_delay(record).fit
         assert covers(blind, 37)  # the order chosen is 3, which alone would be off by 5.4
         told = cr.fit_delay(record, known=sensor, structures=[(3, 3)]).fit
-        assert abs(told.delay - 37) < 3 * told.std / TS
-        assert told.std < 1.2 * 0.48 * TS  # the Cramer-Rao bound is 0.48 samples
+        assert abs(told.delay - 37) < 3 * told.std_given_structure / TS
+        assert told.std_given_structure < 1.2 * 0.48 * TS  # the Cramer-Rao bound is 0.48 samples
         assert_allclose(np.sort(told.poles.real), np.sort(rigs.R3.poles().real), rtol=0.1)
 
 
@@ -187,7 +189,7 @@ def test_outliers_hardly_move_the_delay():
         assert "outliers" in codes(robust)
         assert abs(robust.delay - 37) < 3 * 0.54  # three times the scatter over many seeds
         # 2 % of 10 sigma: least squares sees sqrt(1 + 0.02 * 100) = 1.7 times the noise
-        assert plain.std / robust.std > 1.3
+        assert plain.std_given_structure / robust.std_given_structure > 1.3
 
 
 def test_eight_bit_quantisation_is_seen_and_the_interval_covers():
@@ -207,7 +209,7 @@ def test_the_standard_error_knows_that_neighbours_are_rounded_alike():
         step = 1.25 / 256
         y = step * np.round(y / step + rng.uniform())  # eight bits, five times the noise
         fit = cr.fit_delay(cr.Record(k * TS, 1.0 * (k >= 600), y), structures=[(1, 1)]).fit
-        scores.append((fit.delay - delay) / (fit.std / TS))
+        scores.append((fit.delay - delay) / (fit.std_given_structure / TS))
     # chi-square of forty: 55.8 is exceeded once in 20; 67 with the residual alone
     assert np.sum(np.square(scores)) < 55.8
 
@@ -327,7 +329,7 @@ def test_correlated_noise_widens_the_interval():
     white = cr.fit_delay(rigs.step_record(noise=0.002), structures=[(3, 3)]).fit
     # (1 + 0.9) / (1 - 0.9) = 19 samples count as one: 4.4 times the standard error
     assert coloured.correlation == pytest.approx(19, rel=0.4)
-    assert 3 < coloured.std / white.std < 6
+    assert 3 < coloured.std_given_structure / white.std_given_structure < 6
     assert covers(coloured, 37)
 
 

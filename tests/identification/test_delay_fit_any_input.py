@@ -31,8 +31,8 @@ def cut_from_operation(kind, plant, seed, n=1200, skip=300):
 def test_the_dead_time_is_found_from_operation_with_unknown_start(kind, plant):
     fit = cr.fit_delay(cut_from_operation(kind, plant, seed=1)).fit
     error = fit.dead_time / DT - DELAY
-    assert abs(error) < 4 * fit.std / DT
-    assert fit.std / DT < 0.2
+    assert abs(error) < 4 * fit.std_given_structure / DT
+    assert fit.std_given_structure / DT < 0.2
     assert fit.interval[0] <= DELAY * DT <= fit.interval[1]
     assert fit.structure == ((1, 1) if plant is R1 else (3, 3))
 
@@ -53,8 +53,8 @@ def test_what_was_before_the_record_may_ring_or_creep_through_all_of_it(plant, s
     # decay times of 2.1 s and 3.2 s, in a record of 12 s that starts in the middle of motion
     fit = cr.fit_delay(cut_from_operation("prbs", plant, seed=2)).fit
     assert fit.structure == structure
-    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std / DT
-    assert fit.std / DT < 0.06
+    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std_given_structure / DT
+    assert fit.std_given_structure / DT < 0.06
     assert fit.measured.shape == fit.fitted.shape == fit.time.shape
 
 

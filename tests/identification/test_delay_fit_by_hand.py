@@ -24,13 +24,13 @@ def record(name="", n=120, amplitude=2.0, delay=7.3, seed=0, **labels):
 def test_one_lag_is_found_in_one_record_and_in_four():
     lag = {"structures": [(1, 1)]}
     one = cr.fit_delay(record(), **lag).fit
-    assert one.delay == pytest.approx(7.3, abs=4 * one.std / DT)
+    assert one.delay == pytest.approx(7.3, abs=4 * one.std_given_structure / DT)
     several = [record(str(seed), seed=seed) for seed in range(4)]
     four = cr.fit_delay(several, **lag).fit
     # half the standard error, but that noise is estimated
-    assert four.std == pytest.approx(one.std / 2, rel=0.3)
-    assert four.delay == pytest.approx(7.3, abs=4 * four.std / DT)
+    assert four.std_given_structure == pytest.approx(one.std_given_structure / 2, rel=0.3)
+    assert four.delay == pytest.approx(7.3, abs=4 * four.std_given_structure / DT)
     assert four.time[40] == 0.0
     apart = cr.fit_delay([*several, record("late", delay=7.9, seed=9)], **lag).fit
     assert apart.repeatability.outlying == ("late",)
-    assert apart.dead_time == pytest.approx(four.dead_time, abs=2 * four.std)
+    assert apart.dead_time == pytest.approx(four.dead_time, abs=2 * four.std_given_structure)

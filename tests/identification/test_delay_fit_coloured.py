@@ -81,7 +81,7 @@ def test_structures_that_are_given_profit_as_well():
     data, delay = record(1, ringing, 0.005)
     fit = cr.fit_delay(data, structures=[(1, 1)]).fit
     assert fit.delay == pytest.approx(delay, abs=0.12)  # four standard errors
-    assert 1.96 * fit.std / fit.dt < 0.12
+    assert 1.96 * fit.std_given_structure / fit.dt < 0.12
 
 
 def test_colour_that_only_the_response_has_is_a_misfit():

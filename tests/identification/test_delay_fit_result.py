@@ -12,7 +12,7 @@ def result(**changed):
     """2 lags behind 28.90625 ms, 37 samples, within 28.5 to 29.5 ms."""
     values = {
         "dead_time": 0.02890625,
-        "std": 1e-4,
+        "std_given_structure": 1e-4,
         "interval": (0.0285, 0.0295),
         "onset": 0.0312345,
         "total_delay": 0.112346,
@@ -60,8 +60,8 @@ def test_the_result_says_itself_in_one_line():
 
 def test_the_card_tells_every_number_with_its_unit():
     assert result().report().splitlines() == [
-        "Output-error fit: dead time 28.91 ms",
-        "  dead time      28.91 ms = 37 samples",
+        "Output-error fit: dead time 28.9 ms",
+        "  dead time      28.9 ms = 37.0 samples",
         "  95 % interval  28.5 to 29.5 ms",
         "  first motion   31.23 ms",
         "  total delay    112.35 ms (dead time and lags: firm)",
@@ -74,8 +74,8 @@ def test_the_card_tells_every_number_with_its_unit():
 
 def test_a_narrow_interval_gets_digits_that_tell_its_ends_apart():
     shown = dict(result(dead_time=0.028906789, interval=(0.0289065, 0.0289071))._rows())
-    # 0.6 µs of 28.9 ms: 2 + 4 digits
-    assert shown["dead time"] == "28.9068 ms = 37.0007 samples"
+    # 0.6 µs of 28.9 ms: two digits of the width
+    assert shown["dead time"] == "28.90679 ms = 37.00069 samples"
 
 
 def test_views_are_listed_and_a_first_motion_only_where_there_is_one():

@@ -29,7 +29,7 @@ def sixteen():
 
 
 def test_the_mean_of_sixteen_records_is_four_times_as_exact(sixteen):
-    assert sixteen.std / TS == pytest.approx(0.46 / 4, rel=0.25)
+    assert sixteen.std_given_structure / TS == pytest.approx(0.46 / 4, rel=0.25)
     assert abs(sixteen.delay - 37) < 4 * 0.46 / 4
     assert sixteen.at_noise_level
     assert sixteen.gain == pytest.approx(1.0, abs=0.002)
@@ -51,7 +51,7 @@ def test_trigger_jitter_is_seen_and_widens_the_interval():
     found = fit.repeatability.delays / TS
     # every record's delay is found to its own error, a tenth of a sample
     np.testing.assert_allclose(found - found.mean(), jitter - jitter.mean(), atol=0.5)
-    assert fit.std / TS > 0.8 * jitter.std(ddof=1) / np.sqrt(10)
+    assert fit.std_given_structure / TS > 0.8 * jitter.std(ddof=1) / np.sqrt(10)
 
 
 def test_an_outlying_record_is_named_and_left_out():

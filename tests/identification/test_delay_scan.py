@@ -93,7 +93,7 @@ def test_a_delay_of_d_samples_is_found_as_d(delay, seed, order):
 def test_of_the_two_exact_delays_of_a_strictly_proper_plant_the_smaller_is_found(delay):
     sys = cr.estimate_delay(valve_pulse("clean", delay=float(delay)), 3, max_delay=50, dt=TS)
     assert sys.delay == delay
-    assert sys.fit.interval == (delay, delay + 1)
+    assert sys.fit.delay_interval == (delay, delay + 1)
 
 
 def test_paper_order_three_on_the_clean_valve_with_a_fractional_delay_rounds_up():
@@ -152,7 +152,7 @@ def test_result_reports_itself_and_pickles():
     assert twin.candidates[fit.delay].delay == fit.delay
     assert f"best {fit.delay}" in repr(fit)
     assert "\n" not in repr(fit)
-    assert f"{fit.interval[0]}...{fit.interval[1]} samples" in fit.report()
+    assert f"{fit.delay_interval[0]}...{fit.delay_interval[1]} samples" in fit.report()
     assert not fit.iae.flags.writeable
     assert len(list(fit.candidates)) == 101
     assert [c.delay for c in fit.candidates[3:5]] == [3, 4]

@@ -82,7 +82,7 @@ def test_error_and_standard_error_are_those_of_the_bound(values):
         fit = cr.fit_delay([record for record, _ in made], structures=structures).fit
         limits.append(bound([u for _, u in made], [sigma for *_, sigma in KINDS], values))
         errors.append(fit.delay - DELAY)
-        claims.append(fit.std / DT)
+        claims.append(fit.std_given_structure / DT)
         assert fit.at_noise_level
         assert fit.repeatability.p_value > 1e-3
     # noise levels are known from 250 samples each, and Huber's loss costs 2 %
@@ -112,7 +112,7 @@ def test_level_and_drift_of_a_record_change_nothing():
     ]
     plain, other = (cr.fit_delay(group, structures=[(1, 1)]).fit for group in (records, moved))
     # iterations end within 1e-4 of the cost: a hundredth of the standard error
-    assert abs(other.delay - plain.delay) < 0.02 * plain.std / DT
+    assert abs(other.delay - plain.delay) < 0.02 * plain.std_given_structure / DT
     assert other.gain == pytest.approx(plain.gain, abs=1e-4)
 
 
@@ -120,7 +120,7 @@ def test_units_of_input_and_output_only_change_the_gain():
     records = [operation("prbs", seed, 300, (DELAY, 1.0, 2.0))[0] for seed in range(2)]
     scaled = [cr.Record(r.time, 1e3 * r.input, 1e-4 * r.output) for r in records]
     plain, other = (cr.fit_delay(group, structures=[(1, 1)]).fit for group in (records, scaled))
-    assert abs(other.delay - plain.delay) < 0.02 * plain.std / DT
+    assert abs(other.delay - plain.delay) < 0.02 * plain.std_given_structure / DT
     assert other.gain == pytest.approx(1e-7 * plain.gain, rel=1e-4)
     assert other.residual == pytest.approx(1e-4 * plain.residual, rel=1e-3)
 
@@ -131,7 +131,7 @@ def test_a_noisy_record_does_no_harm_to_a_good_one():
     alone = cr.fit_delay(good, structures=[(1, 1)]).fit
     noisy, _ = operation("prbs", 2, 500, values, sigma=0.4)
     both = cr.fit_delay([good, noisy], structures=[(1, 1)]).fit
-    assert both.std < 1.02 * alone.std
+    assert both.std_given_structure < 1.02 * alone.std_given_structure
 
 
 def test_steps_and_random_inputs_go_together():
@@ -141,7 +141,7 @@ def test_steps_and_random_inputs_go_together():
     u = np.where(k < 100, 0.0, 2.0)
     y = respond(u, values) + 0.02 * np.random.default_rng(5).standard_normal(400)
     fit = cr.fit_delay([random, cr.Record(DT * k, u, y, name="step")], structures=[(1, 1)]).fit
-    assert abs(fit.delay - DELAY) < 4 * fit.std / DT
+    assert abs(fit.delay - DELAY) < 4 * fit.std_given_structure / DT
     assert fit.repeatability.p_value > 0.01
     assert fit.repeatability.amplitudes.tolist() == [2.0, 2.0]
 
@@ -153,7 +153,7 @@ def test_records_of_different_delays_are_told_apart_and_widen_the_interval():
     assert "records_differ" in {flag.code for flag in fit.flags}
     # each is found to its own error, a few hundredths of a sample
     assert_allclose(fit.repeatability.delays / DT, delays, rtol=0, atol=0.3)
-    assert fit.std / DT > 0.8 * delays.std(ddof=1) / 2
+    assert fit.std_given_structure / DT > 0.8 * delays.std(ddof=1) / 2
 
 
 def test_a_record_of_another_delay_or_of_no_plant_is_left_out():
@@ -162,7 +162,7 @@ def test_a_record_of_another_delay_or_of_no_plant_is_left_out():
     late, _ = operation("prbs", 9, 300, (20.0, 1.0, 2.0), name="late")
     fit = cr.fit_delay([*good, late], structures=[(1, 1)]).fit
     assert fit.repeatability.outlying == ("late",)
-    assert abs(fit.delay - DELAY) < 4 * fit.std / DT
+    assert abs(fit.delay - DELAY) < 4 * fit.std_given_structure / DT
     noise = 0.02 * np.random.default_rng(3).standard_normal(300)
     dead = cr.Record(good[0].time, good[0].input, noise, name="cable off")
     fit = cr.fit_delay([*good, dead], structures=[(1, 1)]).fit

@@ -37,7 +37,7 @@ def test_rows_are_the_delay_scans_of_their_orders():
         scan = cr.estimate_delay(pulse, order, max_delay=60, samples=400, dt=TS).fit
         np.testing.assert_allclose(surface.iae[i], scan.iae, rtol=1e-8)
         assert surface.delays[i] == scan.delay
-        assert surface.intervals[i] == scan.interval
+        assert surface.delay_intervals[i] == scan.delay_interval
 
 
 def test_system_of_an_order_is_what_estimate_delay_finds():

@@ -89,7 +89,7 @@ class Fit(Result):
 
     delay = np.int64(37)
     dead_time = 0.0289
-    std = np.float64(1e-4)
+    std_given_structure = np.float64(1e-4)
     interval = np.array([0.0287, np.inf])
     method = "scan"
     flags = (Flag("delay_at_bound", "the best delay is max_delay=100; try a larger one"),)
@@ -108,7 +108,11 @@ def test_the_main_numbers_of_a_fit_its_report_and_its_flags_stay(tmp_path, model
     assert isinstance(summary, FitSummary)
     assert summary.report() == fit.report()
     assert summary.flags == fit.flags
-    assert (summary["delay"], summary["std"], summary["method"]) == (37, 1e-4, "scan")
+    assert (summary["delay"], summary["std_given_structure"], summary["method"]) == (
+        37,
+        1e-4,
+        "scan",
+    )
     # JSON has no infinity
     assert summary["interval"] == (0.0287, "inf")
     assert summary.interval == (0.0287, np.inf)
