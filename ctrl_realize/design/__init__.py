@@ -18,6 +18,7 @@ from .delay_robustness import DelayRobustness as DelayRobustness
 from .delay_robustness import delay_robustness as delay_robustness
 from .estimator import KalmanPredictor as KalmanPredictor
 from .estimator import kalman_predictor as kalman_predictor
+from .loop_check import LoopCheck as LoopCheck
 from .lqg import lqg as lqg
 from .margin_result import Margins as Margins
 from .margins import margins as margins
@@ -45,6 +46,7 @@ __all__ = [
     "DelayLineController",
     "DelayRobustness",
     "KalmanPredictor",
+    "LoopCheck",
     "Margins",
     "PIDComparison",
     "PIDController",

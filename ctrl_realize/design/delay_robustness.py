@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics.arrays import BoolArray, FloatArray, IntArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
@@ -176,19 +177,33 @@ def delay_robustness(
             "the system carries no interval of its dead time; give "
             "dead_time_interval=(low, high) in s"
         )
+    loop = open_loop(plant, controller)
+    return over_interval(plant, loop, loop_margins(loop), interval, MAX_DELAYS)
+
+
+def over_interval(
+    plant: DelayedStateSpace,
+    loop: Loop,
+    found: Margins,
+    interval: tuple[float, float],
+    most: int,
+) -> DelayRobustness:
+    """Vary the delay of a loop's first factor, the plant; `found` are the loop's own margins.
+
+    Within the interval at most `most` delays are tried, its ends always.
+    """
     low, high = interval
     nominal, dt, held = int(plant.delay), float(plant.dt), held_fraction(plant)
     first = int(np.floor((low + held) / dt + 1e-9))
     last = int(np.ceil((high + held) / dt - 1e-9))
-    step = max(1, -(-(last - first) // (MAX_DELAYS - 1)))
+    step = max(1, -(-(last - first) // (most - 1)))
     delays = np.unique([*range(first, last, step), last, nominal]).astype(np.int64)
-    loop = open_loop(plant, controller)
-    found = [_margin(loop, int(d)) for d in delays]
-    earlier, later = _room(loop_margins(loop))
+    sizes = np.array([_modulus(found if d == nominal else _at(loop, int(d))) for d in delays])
+    earlier, later = _room(found)
     return DelayRobustness(
         delays=locked(delays),
-        stable_at=locked(np.array(found) > 0),
-        modulus_margin=read_only(np.array(found)),
+        stable_at=locked(sizes > 0),
+        modulus_margin=read_only(sizes),
         dead_time_interval=interval,
         nominal=nominal,
         dt=dt,
@@ -198,10 +213,13 @@ def delay_robustness(
     )
 
 
-def _margin(loop: Loop, delay: int) -> float:
+def _at(loop: Loop, delay: int) -> Margins:
     # The chain of so long a delay need not exist for its response to be known.
     plant = replace(loop.factors[0], delay=delay)
-    found = loop_margins(replace(loop, factors=(plant, *loop.factors[1:])))
+    return loop_margins(replace(loop, factors=(plant, *loop.factors[1:])))
+
+
+def _modulus(found: Margins) -> float:
     return found.modulus_margin if found.stable else 0.0
 
 

@@ -11,16 +11,23 @@ from ..checks import one_of, positive, real
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.blas_threads import single_threaded
+from .loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
 from .margins import margins
 from .pid_controller import DISCRETIZATIONS, PIDController
 from .pid_optimal import optimal
 from .pid_rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
 from .process_model import ProcessModel
+from .reduction import METHODS as REDUCTIONS
 from .reduction import reduce_fopdt, reduce_sopdt
 from .siso import delayed_system
 
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
+SAFE = ("amigo", "simc", "lambda")
+"""Rules that are tried in place of one whose loop is unstable; then the optimal PI."""
+MOST_SENSITIVE = 2.0
+"""Largest Ms of a loop to recommend: gain and phase margin are then at least 2 and 29 deg
+(Astrom and Hagglund, Advanced PID Control, 2006, section 4.6)."""
 FINE = 1000
 """Samples within the total time of a process model, so many that sampling does not matter."""
 SETTLED = 10_000
@@ -73,14 +80,22 @@ def pid(
     Returns
     -------
     PIDController
-        A `control.StateSpace` from error to plant input, with the parameters as attributes.
+        A `control.StateSpace` from error to plant input, with the parameters as attributes. Its
+        `check`, a `LoopCheck`, tells what the loop does on `system` itself, not on what the rule
+        made of it, and over the interval of dead times that an identified system carries.
+
+    Warns
+    -----
+    ModelWarning
+        The loop is unstable for some dead time within that interval.
 
     Raises
     ------
     OptionError
         A rule or kind that does not exist, or options that do not belong together.
     UnsuitableSystemError
-        An unstable plant, several channels, an integrating plant for a rule that has no answer.
+        An unstable plant, several channels, an integrating plant for a rule that has no answer;
+        a rule whose controller makes the loop unstable on `system` itself.
 
     Examples
     --------
@@ -92,6 +107,37 @@ def pid(
     >>> cr.design.pid(cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029))
     <PIDController 'PI_simc': kp = 1.379, ti = 0.08 s, continuous>
     """
+    options: dict[str, Any] = {
+        "closed_loop_time": closed_loop_time,
+        "max_sensitivity": max_sensitivity,
+        "derivative_filter": derivative_filter,
+        "reduction": reduction,
+        "method": method,
+        "dt": dt,
+    }
+    made, plant = tuned(system, rule, kind, **options, name=name)
+    check = closed_on(system, plant, made)
+    if not check.stable:
+        works = _one_that_works(system, rule, kind, options)
+        refuse_unstable(check, f"the {kind} controller of rule={rule!r}", works)
+    warn_of(check, "a slower rule ('amigo', 'lambda') may be stable over all of it")
+    return made.checked(check)
+
+
+def tuned(
+    system: Any,
+    rule: str = "simc",
+    kind: str = "PI",
+    *,
+    closed_loop_time: float | None = None,
+    max_sensitivity: float = 1.4,
+    derivative_filter: float = 10.0,
+    reduction: str = "optimal",
+    method: str = "tustin",
+    dt: float | None = None,
+    name: str | None = None,
+) -> tuple[PIDController, DelayedStateSpace]:
+    """Follow a rule, see `pid`, without a look at the loop; returns the plant it was for too."""
     one_of(rule, "rule", RULES)
     one_of(kind, "kind", KINDS)
     one_of(method, "method", DISCRETIZATIONS)
@@ -121,9 +167,42 @@ def pid(
         )
     else:
         kp, ti, td = _ultimate(plant, kind)
-    return PIDController(
+    made = PIDController(
         kp, ti, td, td / ratio, dt=step, method=method, rule=rule, model=model, name=name
     )
+    return made, plant
+
+
+def closed_on(system: Any, plant: DelayedStateSpace, controller: PIDController) -> LoopCheck:
+    """Check a controller on the system that it was tuned for, `plant` in discrete form."""
+    if isinstance(system, ProcessModel) and not controller.dt:
+        return loop_check(system.transfer_function(), controller, system.dead_time)
+    return loop_check(plant, controller)
+
+
+def _one_that_works(system: Any, rule: str, kind: str, options: dict[str, Any]) -> str:
+    """Say which rule gives a loop that is stable and not on the verge of being unstable."""
+    tries = [
+        (name, form, reduction)
+        for form in dict.fromkeys((kind, "PI"))
+        for name in dict.fromkeys((rule, *SAFE))
+        for reduction in REDUCTIONS
+        if name in MODEL_RULES
+    ]
+    tried = (rule, kind, options["reduction"])
+    for name, form, reduction in [*tries, ("optimal", "PI", options["reduction"])]:
+        if form not in kinds_of(name) or (name, form, reduction) == tried:
+            continue
+        changed = {**options, "closed_loop_time": None, "reduction": reduction}
+        try:
+            made, plant = tuned(system, name, form, **changed)
+        except ValueError:
+            continue
+        found = closed_on(system, plant, made).margins
+        if found.stable and found.ms <= MOST_SENSITIVE:
+            how = f"rule={name!r}, kind={form!r}, reduction={reduction!r}"
+            return f"Use {how}, which is stable on it with Ms = {found.ms:.3g}"
+    return "None of the other rules does better; look at design.compare_pid, or use design.lqg"
 
 
 def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, float]:

@@ -10,8 +10,9 @@ import numpy as np
 from ..checks import one_of, positive, real
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
-from ..results import html_card
+from ..results import html_card, text_card
 from ..wording import in_time
+from .loop_check import LoopCheck
 from .process_model import ProcessModel
 
 DISCRETIZATIONS = ("tustin", "forward", "backward")
@@ -42,6 +43,8 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     model : ProcessModel, optional
         What the rule looked at.
     name : str, optional
+    check : LoopCheck, optional
+        What the loop does on the model that the controller was tuned for.
 
     Examples
     --------
@@ -65,6 +68,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         rule: str = "given",
         model: ProcessModel | None = None,
         name: str | None = None,
+        check: LoopCheck | None = None,
     ) -> None:
         self.kp = real(kp, "kp", "gain")
         self.ti = float("inf") if ti == float("inf") else positive(ti, "ti", "integral time in s")
@@ -73,6 +77,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         self.method = one_of(method, "method", DISCRETIZATIONS)
         self.rule = rule
         self.model = model
+        self.check = check
         if self.td < 0 or self.tf < 0 or (self.td > 0 and self.tf == 0):
             raise OptionError(
                 f"td={self.td:g} s, tf={self.tf:g} s; needed are td >= 0 and, with a derivative, "
@@ -120,12 +125,22 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     def discretised(self, dt: float, method: str | None = None) -> PIDController:
         """Sample the controller (or sample it anew) with `dt` in s."""
         positive(dt, "dt", "sample time in s")
-        return self._again(dt=dt, method=method or self.method)
+        # What was found of the loop was found of this sample time.
+        return self._again(dt=dt, method=method or self.method, check=None)
 
     @property
     def continuous(self) -> PIDController:
         """The same controller in continuous time."""
-        return self._again(dt=0.0)
+        return self._again(dt=0.0, check=None)
+
+    def checked(self, check: LoopCheck) -> PIDController:
+        """The same controller with what was found of its loop."""
+        return self._again(check=check)
+
+    def report(self) -> str:
+        """Tell the parameters, and what the loop does on its model, as plain text."""
+        title, rows, flags = self._card()
+        return text_card(title, rows, flags=flags)
 
     def _again(self, **changes: Any) -> PIDController:
         settings = {**self._settings(), **changes}
@@ -133,7 +148,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
 
     def _settings(self) -> dict[str, Any]:
         """All that makes this controller, beside its four parameters."""
-        names = ("dt", "method", "rule", "model", "name")
+        names = ("dt", "method", "rule", "model", "name", "check")
         return {name: getattr(self, name) for name in names}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -155,7 +170,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         # python-control's shows matrices, in which nobody finds the parameters again.
         return f"{self!r}\n\n{super().__str__()}"
 
-    def _repr_html_(self) -> str:
+    def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]
         if "I" in self.kind:
             rows.append(("integral time ti", in_time(self.ti, 4)))
@@ -163,7 +178,15 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
             rows.append(("derivative time td", in_time(self.td, 4)))
             rows.append(("its filter tf", in_time(self.tf, 4)))
         step = f"{in_time(self.dt, 6)}, {self.method} rule" if self.dt else "none: continuous"
-        return html_card(f"PID controller {self.name}", [*rows, ("sample time", step)])
+        rows.append(("sample time", step))
+        if self.check is None:
+            return f"PID controller {self.name}", rows, []
+        rows += self.check.rows()
+        return f"PID controller {self.name}", rows, [str(flag) for flag in self.check.flags]
+
+    def _repr_html_(self) -> str:
+        title, rows, flags = self._card()
+        return html_card(title, rows, flags=flags)
 
     def _repr_markdown_(self) -> None:
         return None

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 from ..checks import one_of
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
+from ..numerics.blas_threads import single_threaded
 from ..results import Result
+from .loop_check import loop_check
 from .margin_result import Margins
-from .margins import margins
 from .performance import Performance, measured, plant_time, settled_responses
-from .pid import KINDS, RULES, pid, reference_plant
+from .pid import KINDS, RULES, reference_plant, tuned
 from .pid_controller import PIDController
 from .pid_rules import kinds_of
 from .process_model import ProcessModel
@@ -83,18 +84,29 @@ class PIDComparison(Result):
         )
 
     def best(self, max_sensitivity: float = 2.0) -> PIDController:
-        """Controller of least load error among the stable ones with Ms within the limit."""
+        """Controller of least load error among the stable ones with Ms within the limit.
+
+        Where the system carries an interval of dead times, the loop must be stable over all of
+        it.
+        """
         fit = [
             (p.load_error, i)
             for i, (m, p) in enumerate(zip(self.margins, self.performance, strict=True))
-            if m.stable and m.ms <= max_sensitivity
+            if m.stable and m.ms <= max_sensitivity and not self._unsafe(i)
         ]
         if not fit:
+            unsafe = sum(map(self._unsafe, range(len(self.controllers))))
             raise OptionError(
                 f"no controller has Ms <= {max_sensitivity:g}; the smallest is "
                 f"{min((m.ms for m in self.margins if m.stable), default=float('inf')):.3g}"
+                + (f"; {unsafe} are unstable within the interval of the dead time" * bool(unsafe))
             )
         return self.controllers[min(fit)[1]]
+
+    def _unsafe(self, i: int) -> bool:
+        """Whether a controller is unstable for some dead time of the interval."""
+        check = self.controllers[i].check
+        return check is not None and check.stable_within_interval is False
 
     def _title(self) -> str:
         return "PID rules"
@@ -112,13 +124,20 @@ class PIDComparison(Result):
         ]
 
     def _notes(self) -> list[str]:
-        return [f"{kind} {rule}: {reason}" for rule, kind, reason in self.refused]
+        refused = [f"{kind} {rule}: {reason}" for rule, kind, reason in self.refused]
+        unsafe = [
+            f"{c.kind} {c.rule}: {c.check.flags[0]}"
+            for i, c in enumerate(self.controllers)
+            if c.check is not None and self._unsafe(i)
+        ]
+        return unsafe + refused
 
     def __repr__(self) -> str:
         stable = sum(m.stable for m in self.margins)
         return f"<PIDComparison: {len(self.controllers)} controllers, {stable} stable>"
 
 
+@single_threaded
 def compare_pid(
     system: Any,
     rules: Sequence[str] | None = None,
@@ -164,15 +183,15 @@ def compare_pid(
             if kind not in kinds_of(rule):
                 continue
             try:
-                controller = pid(system, rule, kind, **options)
+                controller, _ = tuned(system, rule, kind, **options)
             except ValueError as error:
                 # A rule without an answer for this plant is a row of the result, not its end.
                 refused.append((rule, kind, str(error)))
                 continue
             sampled = controller if controller.dt else controller.discretised(plant.dt)
-            found = margins(plant, sampled)
-            reached = _performance(plant, sampled, total) if found.stable else UNSTABLE
-            made.append((controller, found, reached))
+            check = loop_check(plant, sampled)
+            reached = _performance(plant, sampled, total) if check.stable else UNSTABLE
+            made.append((controller.checked(check), check.margins, reached))
     if not made:
         reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
         raise OptionError(f"no rule could tune this plant: {reasons or 'none knows these kinds'}")

@@ -19,7 +19,7 @@ from ..numerics.modes import split_modes
 from ..numerics.process_step import process_step
 from .conversions import ContinuousModel, to_continuous, to_discrete
 from .process_model import ProcessModel
-from .siso import delayed_system, proper_ss
+from .siso import delayed_system, held_fraction, proper_ss
 
 METHODS = ("optimal", "half_rule")
 MOST_SAMPLES = 2**18
@@ -39,7 +39,9 @@ def reduce_fopdt(
         One input and one output, stable or with one integrator. An integrating system becomes
         ``gain exp(-theta s) / s``.
     method : {"optimal", "half_rule"}, optional
-        ``"optimal"`` fits the step response by least squares with the static gain kept.
+        ``"optimal"`` fits the step response by least squares with the static gain kept and no
+        less dead time than the system has: a lag in its place would promise phase that is not
+        there.
         ``"half_rule"`` is Skogestad's, from the poles and zeros of the continuous core (a complex
         pair counts as two equal lags of the same sum).
     dead_time : float, optional
@@ -109,7 +111,8 @@ def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> Pr
     if method == "half_rule":
         model = _by_half_rule(continuous or to_continuous(plant), order, integrating, gain)
     else:
-        model = _by_fit(time, step / gain, order, integrating, gain)
+        least = continuous.dead_time if continuous else _dead_time(plant)
+        model = _by_fit(time, step / gain, order, integrating, gain, least)
     total = _total(time, step / gain, integrating)
     square = np.trapezoid((model.step(time) - step) ** 2, time) / total
     scale = total if integrating else 1.0
@@ -140,6 +143,16 @@ def _both_forms(
             model = ContinuousModel(core, wait, step)
         return model, to_discrete(model)
     return None, delayed_system(system, "a reduction")
+
+
+def _dead_time(plant: DelayedStateSpace) -> float:
+    """Dead time in s, without the fraction of a sample that a direct term may hold."""
+    if plant.delay and np.any(plant.delay_free.D):
+        try:
+            return float(to_continuous(plant).dead_time)
+        except UnsuitableSystemError:
+            return float(plant.dead_time) - held_fraction(plant)
+    return float(plant.dead_time)
 
 
 def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool, float]:
@@ -201,8 +214,14 @@ def _by_half_rule(
 
 
 def _by_fit(
-    time: FloatArray, shape: FloatArray, order: int, integrating: bool, gain: float
+    time: FloatArray,
+    shape: FloatArray,
+    order: int,
+    integrating: bool,
+    gain: float,
+    dead_time: float,
 ) -> ProcessModel:
+    """Fit lags and a dead time of at least `dead_time`."""
     lags = order - int(integrating)
     # Total of dead time and lags: the area over the step response, or the offset of the ramp.
     total = _total(time, shape, integrating)
@@ -217,7 +236,8 @@ def _by_fit(
         return process_step(time, lag, second, wait, integrating=integrating) - shape
 
     tiny = 1e-9 * span
-    lower, upper = np.array([*[tiny] * lags, 0.0]), np.full(lags + 1, 2 * span)
+    lower = np.array([*[tiny] * lags, dead_time])
+    upper = np.full(lags + 1, 2 * span + dead_time)
     best: Any = None
     for share in (0.1, 0.4, 0.7):
         parts = {0: [total], 1: [(1 - share) * total, share * total]}.get(

@@ -20,6 +20,7 @@ RAISED_BY = {
     "frf_selection": "fit_frf",
     "identify": "identify",
     "impulses": "realize",
+    "loop_check": "design.pid",
     "margins": "design.margins",
     "mode_choice": "identify",
     "pulse_regression": "impulse_from_io",

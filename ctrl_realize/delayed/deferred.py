@@ -1,0 +1,108 @@
+"""State-space systems whose matrices are made when somebody asks for them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..errors import DelayRangeError
+from ..numerics.arrays import FloatArray
+from .chains import Matrices
+
+MAX_STATES = 20_000
+"""A is dense, as python-control needs it: 20 000 states are 3 GB."""
+
+
+class DeferredMatrices(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+    """What is known by a few numbers and a line of past samples; matrices at the first look.
+
+    A class of this kind makes the matrices in `_make_matrices` and the names of its states in
+    `_name_states`; `_without_matrices` says what to do where they would be too large.
+    """
+
+    _augmented: Matrices | None
+    _state_names: dict[str, int] | None
+
+    def _begin(self, states: list[str], nstates: int, dt: float, **names: Any) -> None:
+        """Set up the system without matrices; `states` are those beside the line."""
+        # Not StateSpace.__init__, which would need the matrices now.
+        ct.NonlinearIOSystem.__init__(
+            self, self._next_state, self._output, states=states, dt=dt, **names
+        )
+        # The line's states get their names when somebody asks for them.
+        self.nstates = nstates
+        self._state_names = None
+        self._augmented = None
+
+    def _make_matrices(self) -> Matrices:
+        raise NotImplementedError
+
+    def _name_states(self) -> list[str]:
+        raise NotImplementedError
+
+    def _without_matrices(self) -> str:
+        raise NotImplementedError
+
+    @property
+    def state_index(self) -> dict[str, int]:
+        """Names of the states and where they stand; past samples last."""
+        if self._state_names is None:
+            self._state_names = {name: i for i, name in enumerate(self._name_states())}
+        return self._state_names
+
+    @state_index.setter
+    def state_index(self, names: dict[str, int] | None) -> None:
+        self._state_names = names
+
+    def _matrices(self) -> Matrices:
+        if self._augmented is None:
+            if self.nstates > MAX_STATES:
+                raise DelayRangeError(
+                    f"matrices of {self.nstates} states have {8 * self.nstates**2 // 10**9} GB; "
+                    f"they are made up to {MAX_STATES} states. {self._without_matrices()}"
+                )
+            made = self._make_matrices()
+            for M in made:
+                M.flags.writeable = False
+            self._augmented = made
+        return self._augmented
+
+    def _next_state(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
+        A, B, _, _ = self._matrices()
+        return np.asarray(A @ np.atleast_1d(x) + B @ np.atleast_1d(u))
+
+    def _output(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
+        _, _, C, D = self._matrices()
+        return np.asarray(C @ np.atleast_1d(x) + D @ np.atleast_1d(u))
+
+    @property
+    def A(self) -> FloatArray:
+        """Dynamics matrix, the line's states last; read-only."""
+        return self._matrices()[0]
+
+    @property
+    def B(self) -> FloatArray:
+        """Input matrix, read-only."""
+        return self._matrices()[1]
+
+    @property
+    def C(self) -> FloatArray:
+        """Output matrix, read-only."""
+        return self._matrices()[2]
+
+    @property
+    def D(self) -> FloatArray:
+        """Direct term, read-only."""
+        return self._matrices()[3]
+
+    def __setattr__(self, attribute: str, value: Any) -> None:
+        # What the matrices are made of would fall out of step with them, and python-control's
+        # `append` is known to do it.
+        if attribute in ("A", "B", "C", "D", "dt") and self.__dict__.get("_locked", False):
+            raise AttributeError(
+                f"{attribute} of a {type(self).__name__} is fixed; build a new one "
+                "(delayed_ss, or the design function), or take a plain copy with ct.ss(sys)"
+            )
+        super().__setattr__(attribute, value)
