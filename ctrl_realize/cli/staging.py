@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..errors import CtrlRealizeError, OptionError
 from ..io import CampaignStore
+from ..io.atomic import refuse_irregular
 from .terminal import complain, printable
 
 ROWS = "rows"
@@ -120,6 +121,9 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _move_into(staged: Path, target: Path) -> None:
+    for path in staged.rglob("*"):
+        if path.is_file():
+            refuse_irregular(target / path.relative_to(staged))
     for path in sorted(staged.rglob("*")):
         place = target / path.relative_to(staged)
         if path.is_dir():

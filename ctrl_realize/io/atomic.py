@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -32,7 +33,8 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     OSError
-        If the folder is missing or cannot be written.
+        If the folder is missing or cannot be written, or `path` is a folder, a device, a pipe or
+        a socket.
 
     Examples
     --------
@@ -50,6 +52,7 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
     except ValueError as error:
         # a NUL character in the name
         raise OSError(errno.EINVAL, str(error), os.fspath(path)) from error
+    refuse_irregular(target)
     # Created by hand, not by tempfile, so that the file gets the permissions of any new file.
     temporary = target.with_name(f".{target.name[:40]}-{secrets.token_hex(8)}.tmp")
     os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
@@ -66,13 +69,34 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
 
 
+def refuse_irregular(path: Path) -> None:
+    """Refuse to replace what is there and is no regular file.
+
+    Who may do everything could put a file in the place of a device, which all programs use.
+
+    Raises
+    ------
+    OSError
+    """
+    try:
+        kind = path.stat().st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISDIR(kind):
+        raise IsADirectoryError(errno.EISDIR, "is a folder; a file is to be written", str(path))
+    if not stat.S_ISREG(kind):
+        raise FileExistsError(
+            errno.EEXIST, "is a device, a pipe or a socket, and is not replaced", str(path)
+        )
+
+
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write `text` as UTF-8 with plain line ends, whole or not at all.
 
     Raises
     ------
     OSError
-        If the folder is missing or cannot be written; `path` is then as it was.
+        As for `replaced_when_complete`; `path` is then as it was.
     """
     with replaced_when_complete(path) as temporary:
         # names of files that are no UTF-8 are spelled out

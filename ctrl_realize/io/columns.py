@@ -100,10 +100,10 @@ def named(table: Table, names: Iterable[str], taken: Iterable[int] = ()) -> list
 
 def holds_numbers(table: Table, index: int) -> bool:
     """Tell whether a column is meant to hold numbers, even if some cells are bad."""
-    cells = table.columns[index].cells
+    cells = table.columns[index].first(10)
     if cells.dtype.kind in "biufc":
         return True
-    first = [str(cell).strip() for cell in cells[:10]]
+    first = [str(cell).strip() for cell in cells]
     return any(NUMBER[table.decimal].fullmatch(cell) for cell in first)
 
 

@@ -47,6 +47,10 @@ class Column:
     unit: str
     cells: np.ndarray[Any, np.dtype[Any]]
 
+    def first(self, count: int) -> np.ndarray[Any, np.dtype[Any]]:
+        """Return the first cells."""
+        return self.cells[:count]
+
 
 @dataclass(frozen=True, eq=False)
 class Table:

@@ -1,10 +1,16 @@
 from __future__ import annotations
 
+import os
 import stat
 
+import control as ct
+import pandas as pd
 import pytest
 
+import ctrl_realize as cr
+from ctrl_realize.cli.staging import appearing
 from ctrl_realize.io.atomic import replaced_when_complete, write_text
+from ctrl_realize.io.csv_files import write_csv
 
 
 def names(folder):
@@ -56,3 +62,35 @@ def test_a_link_stays_a_link(tmp_path):
     write_text(tmp_path / "link.txt", "new")
     assert (tmp_path / "link.txt").is_symlink()
     assert (tmp_path / "target.txt").read_text() == "new"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+def test_what_is_no_regular_file_is_not_replaced(tmp_path):
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    model = cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 37)
+    table = pd.DataFrame({"a": [1]})
+    for target in (pipe, link, "/dev/null"):
+        for write in (
+            lambda path: cr.save_model(path, model),
+            lambda path: write_text(path, "text"),
+            lambda path: write_csv(path, table, index=False),
+        ):
+            with pytest.raises(OSError, match="is not replaced"):
+                write(target)
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert link.is_symlink()
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+    assert names(tmp_path) == ["link", "pipe"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+def test_results_replace_nothing_in_their_folder_that_is_no_regular_file(tmp_path):
+    os.mkfifo(tmp_path / "b.txt")
+    (tmp_path / "a.txt").write_text("old")
+    with pytest.raises(OSError, match="is not replaced"), appearing(tmp_path) as staged:  # noqa: PT012
+        for name in ("a.txt", "b.txt"):
+            (staged / name).write_text("new")
+    assert names(tmp_path) == ["a.txt", "b.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"  # all or nothing

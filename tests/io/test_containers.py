@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import io
 import pickle
 import struct
 import sys
+import tracemalloc
 import warnings
 import zipfile
 import zlib
@@ -326,8 +328,61 @@ def test_a_parquet_bomb_is_refused_before_it_is_unpacked(tmp_path):
     pytest.importorskip("pyarrow")
     pd.DataFrame({"u": np.zeros(2_000_000), "y": np.zeros(2_000_000)}).to_parquet(tmp_path / "a")
     assert (tmp_path / "a").stat().st_size < 1e5
-    with pytest.raises(FileFormatError, match=r"unpacked, is 30\.5"):
-        read_record(tmp_path / "a", max_bytes=2**20)
+    with pytest.raises(FileFormatError, match=r"unpacked, is 15\.2"):
+        read_record(tmp_path / "a", dt=0.1, max_bytes=2**20)
+
+
+def test_a_few_kilobytes_of_parquet_do_not_fill_the_memory(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet")
+    pa = pytest.importorskip("pyarrow")
+    zeros = pa.array(np.zeros(20_000_000))
+    # 480 MB of zeros, less than max_bytes allows
+    table = pa.table({"time_s": zeros, "u": zeros, "y": zeros})
+    long = {"row_group_size": 2**30, "data_page_size": 2**30, "max_rows_per_page": 2**30}
+    known = inspect.signature(pq.write_table).parameters  # pages of older versions are so anyway
+    chosen = {name: value for name, value in long.items() if name in known}
+    pq.write_table(table, tmp_path / "a", compression="zstd", **chosen)
+    size = (tmp_path / "a").stat().st_size
+    assert size < 10_000
+    with pytest.raises(FileFormatError, match=r"unpacked, is 152\.6 MiB"):
+        read_record(tmp_path / "a")
+
+
+def test_only_the_wanted_columns_of_a_parquet_file_are_read(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet")
+    pa = pytest.importorskip("pyarrow")
+    long = pa.DictionaryArray.from_arrays(np.zeros(N, dtype=np.int32), ["x" * 1_000_000])
+    columns = {"time_s": T, "u": U, "y": Y, "note": long, "matrix": [[1.0, 2.0]] * N}
+    path = tmp_path / "a.parquet"
+    pq.write_table(pa.table(columns), path, store_schema=False)
+    tracemalloc.start()
+    try:
+        check(read_record(path))
+        with pytest.raises(DataError, match=r"'note', row 0: 'xxx"):
+            read_record(path, output="note")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 5e6  # N texts of a million letters would be 200 MB
+    with pytest.raises(FileFormatError, match=r"column 'matrix' holds list"):
+        read_record(path, output="matrix")
+
+
+@pytest.mark.parametrize("kind", ["decimal128(30, 4)", "float16", "int32", "category", "gaps"])
+def test_numbers_of_any_parquet_type_are_read(tmp_path, kind):
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    values = np.arange(6) % 3
+    y = {
+        "decimal128(30, 4)": lambda: pa.array(values).cast(pa.decimal128(30, 4)),
+        "float16": lambda: pa.array(values.astype(np.float16)),
+        "int32": lambda: pa.array(values, pa.int32()),
+        "category": lambda: pa.array(values.astype(str)).dictionary_encode(),
+        "gaps": lambda: pa.array([None, 1, 2, 0, 1, 2], pa.int64()),
+    }[kind]()
+    pq.write_table(pa.table({"time_s": 0.1 * np.arange(6), "u": values, "y": y}), tmp_path / "a")
+    record = read_record(tmp_path / "a", missing="keep")
+    assert record.output[1:].tolist() == values[1:].tolist()
+    assert record.n_missing == (kind == "gaps")
 
 
 def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
