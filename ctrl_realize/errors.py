@@ -7,6 +7,12 @@ that one should look at.
 
 from __future__ import annotations
 
+import sys
+import warnings
+
+_INSIDE = ("ctrl_realize", "control")
+"""Packages whose lines nobody has written who reads a warning."""
+
 
 class CtrlRealizeError(Exception):
     """Base of all errors that this toolbox raises on purpose."""
@@ -58,3 +64,21 @@ class DataWarning(CtrlRealizeWarning):
 
 class ModelWarning(CtrlRealizeWarning):
     """The model has a property that one should know before using it."""
+
+
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Warn at the line that called this toolbox, directly or through python-control.
+
+    Examples
+    --------
+    >>> from ctrl_realize.errors import DataWarning, warn_caller
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     warn_caller("half of it is missing", DataWarning)
+    >>> print(caught[0].message)
+    half of it is missing
+    """
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in _INSIDE:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, category, stacklevel=level)

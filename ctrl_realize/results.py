@@ -8,10 +8,13 @@ things that one should know before trusting it.
 from __future__ import annotations
 
 import html
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
+
+import numpy as np
 
 SHORT_LABEL = 16
 """Letters of a label that is never broken."""
@@ -170,3 +173,43 @@ def html_card(
         f"<div style='font-weight:600;margin-bottom:4px'>{html.escape(title)}</div>"
         f"<table style='border-collapse:collapse;margin:0'>{body}</table>{lines}</div>"
     )
+
+
+def as_asked(system: Any) -> str:
+    """Write a system as its `repr_format`, or that of python-control's settings, asks for.
+
+    What python-control takes where nothing was set, "eval", lists every number. Systems of this
+    toolbox show their one line there, and "eval" only where it was set on the system itself.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> valve = cr.delayed_ss(ct.ss([], [], [], [[2.0]], 0.1), 3, name="valve")
+    >>> valve
+    <DelayedStateSpace 'valve': u -> y, order 0, z^-3 (0.3 s), dt = 0.1 s>
+    >>> valve.repr_format = "latex"
+    >>> repr(valve)[:4]
+    '<div'
+    """
+    asked = system.repr_format
+    if asked == "eval" and system._repr_format is not None:
+        return str(system._repr_eval_())
+    if asked not in ("eval", "info", "latex"):
+        raise ValueError(f"format {asked!r} unknown")
+    html_text = system._repr_html_() if asked == "latex" else None
+    return str(html_text or system._repr_info_())
+
+
+def as_code(values: Any) -> str:
+    """Write an array, or a system of python-control, as code that has all its digits.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.results import as_code
+    >>> print(as_code(np.array([1 / 3])))
+    array([0.3333333333333333])
+    """
+    with np.printoptions(precision=17, floatmode="unique", threshold=sys.maxsize):
+        return str(values._repr_eval_() if hasattr(values, "_repr_eval_") else repr(values))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import OptionError
 from .chains import common
-from .parts import CoreAndDelays
+from .parts import CoreAndDelays, named
 
 _ENDS = ("prefix", "suffix")
 
@@ -24,6 +24,10 @@ class DelayedAlgebra(CoreAndDelays):
             "outputs": self.output_labels,
         }
         settings.update(changes)
+        states = settings.pop("states", None) or self._core_states()
+        if len(states) == core.nstates and len(set(states)) == core.nstates:
+            # python-control's operators number the states anew.
+            core = named(core, core.input_labels, core.output_labels, states)
         return type(self)(core, settings.pop("delay", self.input_delays), **settings)
 
     def _plain(self) -> ct.StateSpace:
@@ -33,7 +37,7 @@ class DelayedAlgebra(CoreAndDelays):
         """Choose channels, by number or name; each keeps its own delay."""
         # The host names what it chose, and knows what is no key.
         try:
-            chosen = self._core[key]
+            chosen = self.delay_free[key]
             empty = not (chosen.noutputs and chosen.ninputs)
         except ct.ControlDimension:
             empty = True
@@ -70,9 +74,11 @@ class DelayedAlgebra(CoreAndDelays):
                 names = self.input_labels if other.shape[1] == self.ninputs else None
                 return self._around(self._core * other, delay=delays, inputs=names)
             return self._plain() * other
-        if type(other) is not ct.StateSpace and not isinstance(other, CoreAndDelays):
+        if isinstance(other, ct.FrequencyResponseData):
+            return NotImplemented  # it evaluates this system at its own frequencies
+        if not isinstance(other, ct.StateSpace):
             return self._plain() * other
-        return self._series(self, other)
+        return self._series(self, _linear(other))
 
     def __rmul__(self, other: Any) -> Any:
         """Series: first this system, then `other`."""
@@ -91,9 +97,9 @@ class DelayedAlgebra(CoreAndDelays):
                 )
                 return self._around(core, output_delay=delays, outputs=names)
             return other * self._plain()
-        if type(other) is not ct.StateSpace:
-            return other * self._plain() if isinstance(other, ct.StateSpace) else NotImplemented
-        return self._series(other, self)
+        if not isinstance(other, ct.StateSpace):
+            return NotImplemented
+        return self._series(_linear(other), self)
 
     def append(self, other: Any) -> ct.StateSpace:
         """Append `other`; a plain system, as python-control makes it."""
@@ -122,7 +128,19 @@ class DelayedAlgebra(CoreAndDelays):
             output_delay=getattr(second, "output_delays", (0,) * second.noutputs),
             inputs=first.input_labels,
             outputs=second.output_labels,
+            states=[*_core_states(first), *_core_states(second)],
         )
+
+
+def _linear(system: ct.StateSpace) -> ct.StateSpace:
+    """Take a controller with a class of its own, or joined subsystems, for their matrices."""
+    if type(system) is ct.StateSpace or isinstance(system, CoreAndDelays):
+        return system
+    return ct.StateSpace(system, remove_useless_states=False)
+
+
+def _core_states(system: ct.StateSpace) -> list[str]:
+    return list(getattr(system, "delay_free", system).state_labels)
 
 
 def _is_scalar(value: Any) -> bool:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import numpy as np
 
 from ..numerics.arrays import ComplexArray
-from ..results import html_card
+from ..results import as_asked, as_code, html_card
 from ..wording import in_time
 from .parts import CoreAndDelays
 
@@ -29,6 +31,20 @@ class DelayedCards(CoreAndDelays):
         return "" if self.fit is None else f"{self.fit!r}"
 
     def __repr__(self) -> str:
+        return as_asked(self)
+
+    def _repr_eval_(self) -> str:
+        core = as_code(self.delay_free)
+        delays = [f"delay={self.input_delays!r}"]
+        if any(self.output_delays):
+            delays.append(f"output_delay={self.output_delays!r}")
+        return f"DelayedStateSpace(\n{core},\n{', '.join(delays)}, name={self.name!r})"
+
+    def _repr_info_(self, html: bool = False) -> str:
+        line = self._line()
+        return escape(line) if html else line
+
+    def _line(self) -> str:
         name = "" if self._generic_name_check() else f" {self.name!r}"
         signals = f"{', '.join(self.input_labels)} -> {', '.join(self.output_labels)}"
         fit = f", fit: {self._fit_line()}" if self.fit is not None else ""
@@ -38,7 +54,7 @@ class DelayedCards(CoreAndDelays):
         )
 
     def __str__(self) -> str:
-        lines = [repr(self), "", "core:"]
+        lines = [self._line(), "", "core:"]
         for letter in "ABCD":
             lines.append(f"{letter} =")
             lines += [f"    {row}" for row in str(getattr(self._core, letter)).splitlines()]

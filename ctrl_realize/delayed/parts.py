@@ -10,8 +10,9 @@ import numpy as np
 
 from ..checks import system_names
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.arrays import FloatArray, IntArray, read_only
 from .chains import Matrices, augment, chain_labels
+from .polynomials import warn_of_a_transfer_function
 
 MAX_STATES = 20_000
 """The augmented A is dense, as python-control needs it: 20 000 states are 3 GB."""
@@ -33,12 +34,15 @@ class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     @property
     def state_index(self) -> dict[str, int]:
         """Names of the states and where they stand: those of the core, then past inputs."""
-        if self._state_names is None:
-            delays = self.input_delays, self.output_delays
-            chain = chain_labels(self.input_labels, self.output_labels, *delays)
-            names = [*self._core.state_labels, *chain]
-            self._state_names = {name: i for i, name in enumerate(names)}
-        return self._state_names
+        if self._state_names is not None:
+            return self._state_names
+        delays = self.input_delays, self.output_delays
+        chain = chain_labels(self.input_labels, self.output_labels, *delays)
+        names = dict.fromkeys([*self._core.state_labels, *chain])
+        if len(names) < self.nstates:
+            # A core that was itself made of core and chain has the names of registers.
+            names = dict.fromkeys([*(f"x[{i}]" for i in range(self._core.nstates)), *chain])
+        return {name: i for i, name in enumerate(names)}
 
     @state_index.setter
     def state_index(self, names: dict[str, int] | None) -> None:
@@ -72,6 +76,7 @@ class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     @property
     def A(self) -> FloatArray:
         """Dynamics matrix of ``[core; chains]``, read-only."""
+        warn_of_a_transfer_function(self.nstates - self._core.nstates)
         return self._matrices()[0]
 
     @property
@@ -101,7 +106,18 @@ class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     @property
     def delay_free(self) -> ct.StateSpace:
         """The core, a plain `control.StateSpace`."""
+        names = self.input_labels, self.output_labels, self._core_states()
+        core = self._core
+        if names != (core.input_labels, core.output_labels, core.state_labels):
+            # python-control has renamed the signals of the system in the meantime.
+            self._core = named(core, *names, name=f"{self.name}_core")
         return self._core
+
+    def _core_states(self) -> list[str]:
+        """Names of the core's states, as they were last given."""
+        if self._state_names is None:
+            return list(self._core.state_labels)
+        return list(self._state_names)[: self._core.nstates]
 
     @property
     def delay(self) -> Any:
@@ -116,6 +132,28 @@ class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     def dead_time(self) -> Any:
         """Dead time in s: ``delay * dt``."""
         return self.delay * self.dt
+
+
+def named(
+    core: ct.StateSpace,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    states: Sequence[str],
+    name: str | None = None,
+) -> ct.StateSpace:
+    """Make the same core, with matrices that cannot be written and these names."""
+    made = ct.StateSpace(
+        *(read_only(M) for M in (core.A, core.B, core.C, core.D)),
+        core.dt,
+        inputs=list(inputs),
+        outputs=list(outputs),
+        states=list(states),
+        name=name,
+        remove_useless_states=False,
+    )
+    for M in (made.A, made.B, made.C, made.D):
+        M.flags.writeable = False
+    return made
 
 
 def check_core(core: Any) -> None:

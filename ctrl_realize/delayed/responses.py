@@ -19,7 +19,7 @@ from .parts import CoreAndDelays
 class DelayedResponses(CoreAndDelays):
     """Responses whose cost does not grow with the delay."""
 
-    _schur: tuple[ComplexArray, ComplexArray] | None
+    _schur: state_space.Schur | None
 
     def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
         """Evaluate the transfer matrix: core(x) x^-d, shape (outputs, inputs, K).

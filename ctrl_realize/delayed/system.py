@@ -11,19 +11,18 @@ transform its d poles at 0 drift out to |z| = eps^(1/d), 0.37 for d = 37.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
 
 import control as ct
 
 from ..checks import system_name
 from ..errors import DelayRangeError
-from ..numerics.arrays import read_only
 from .algebra import DelayedAlgebra
 from .analysis import DelayedAnalysis
 from .cards import DelayedCards
 from .chains import parse_delays
-from .parts import check_core, signal_names
+from .parts import check_core, named, signal_names
 from .responses import DelayedResponses
 
 MAX_DELAY = 10_000_000
@@ -75,9 +74,13 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
     and the plots of frequency responses, `step`, `simulate`, `markov`, poles and products.
     ``cr.design.to_discrete(*cr.design.to_continuous(sys), dt)`` samples such a system more slowly.
 
-    ``tf * sys`` is the one product that python-control decides alone: it makes a transfer
-    function of the augmented matrices, which is wrong from d = 50 or so on. Write ``sys * tf``
-    or ``ct.ss(tf) * sys``.
+    ``tf * sys``, ``tf + sys``, ``ct.feedback(tf, sys)``, ``ct.tf(sys)`` and ``ct.margin(sys)`` are
+    decided by python-control alone: it makes a transfer function of the augmented matrices, which
+    is noise from d = 50 or so on. Beyond 20 samples a `ModelWarning` says so. Write ``sys * tf``,
+    ``sys + tf``, ``ct.feedback(ct.ss(tf), sys)``, ``sys.to_tf()`` and ``cr.design.margins(sys)``.
+
+    ``repr(sys)`` is one line. A `repr_format` that is set on the system, or another than "eval" in
+    ``ct.config.defaults["iosys.repr_format"]``, is followed; "eval" is core and delay as a call.
 
     Raises
     ------
@@ -126,7 +129,6 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             )
         input_names = signal_names(inputs, core.input_labels, "u")
         output_names = signal_names(outputs, core.output_labels, "y")
-        core_states = [f"x[{i}]" for i in range(core.nstates)]
         self._locked = False
         # Not StateSpace.__init__, which would need the augmented matrices now.
         ct.NonlinearIOSystem.__init__(
@@ -135,29 +137,21 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             self._output,
             inputs=input_names,
             outputs=output_names,
-            states=core_states,
+            states=core.nstates,
             dt=core.dt,
             name=None if name is None else system_name(name),
         )
         # The chain's states get their names when somebody asks for them.
         self.nstates = core.nstates + sum(before) + sum(behind)
         self._state_names = None
-        self._core = ct.StateSpace(
-            *(read_only(M) for M in (core.A, core.B, core.C, core.D)),
-            core.dt,
-            inputs=input_names,
-            outputs=output_names,
-            states=core_states,
-            name=f"{self.name}_core",
-            remove_useless_states=False,
+        self._core = named(
+            core, input_names, output_names, core.state_labels, name=f"{self.name}_core"
         )
         self.input_delays = before
         self.output_delays = behind
         self.fit = fit
         self._augmented = None
         self._schur = None
-        for M in (self._core.A, self._core.B, self._core.C, self._core.D):
-            M.flags.writeable = False
         self._locked = True
 
     def replace(self, **changes: Any) -> DelayedStateSpace:
@@ -174,22 +168,30 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
         if unknown:
             raise TypeError(f"replace() takes {', '.join(settings)}; got {', '.join(unknown)}")
         settings.update(changes)
-        return DelayedStateSpace(self._core, settings.pop("delay"), **settings)
+        made = DelayedStateSpace(self.delay_free, settings.pop("delay"), **settings)
+        return made._as_shown(self._state_names, self._repr_format)
+
+    def _as_shown(self, states: Iterable[str] | None, repr_format: str | None) -> Self:
+        """Take over names of states that somebody gave, where they fit, and `repr_format`."""
+        if states is not None and len(labels := list(states)) == self.nstates:
+            self.set_states(labels)
+        self.repr_format = repr_format
+        return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        core = self._core
-        return (
-            _rebuild,
-            (
-                (core.A, core.B, core.C, core.D, core.dt),
-                self.input_delays,
-                self.output_delays,
-                self.fit,
-                self.name,
-                tuple(self.input_labels),
-                tuple(self.output_labels),
-            ),
-        )
+        core = self.delay_free
+        settings = {
+            "output_delay": self.output_delays,
+            "fit": self.fit,
+            "name": self.name,
+            "inputs": self.input_labels,
+            "outputs": self.output_labels,
+        }
+        given = None if self._state_names is None else list(self._state_names)
+        matrices = core.A, core.B, core.C, core.D, core.dt
+        return _rebuild, (
+            matrices, core.state_labels, self.input_delays, settings, given, self._repr_format,
+        )  # fmt: skip
 
     def __deepcopy__(self, memo: dict[int, Any]) -> DelayedStateSpace:
         # Everything inside is read-only, so a copy may share it; the closures of python-control
@@ -199,19 +201,11 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
 
 def _rebuild(
     matrices: tuple[Any, ...],
-    input_delays: tuple[int, ...],
-    output_delays: tuple[int, ...],
-    fit: Any,
-    name: str,
-    inputs: tuple[str, ...],
-    outputs: tuple[str, ...],
+    core_states: list[str],
+    delay: tuple[int, ...],
+    settings: dict[str, Any],
+    states: list[str] | None,
+    repr_format: str | None,
 ) -> DelayedStateSpace:
-    return DelayedStateSpace(
-        ct.StateSpace(*matrices, remove_useless_states=False),
-        input_delays,
-        output_delay=output_delays,
-        fit=fit,
-        name=name,
-        inputs=inputs,
-        outputs=outputs,
-    )
+    core = ct.StateSpace(*matrices, states=core_states, remove_useless_states=False)
+    return DelayedStateSpace(core, delay, **settings)._as_shown(states, repr_format)

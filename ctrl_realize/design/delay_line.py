@@ -6,15 +6,17 @@ outputs u[k-1] ... u[k-d] that they have sent into the dead time.
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..delayed import DelayedStateSpace
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.state_space import frequency_response, schur_form
-from ..results import html_card
+from ..results import as_asked, html_card
 from ..wording import in_time
 
 CHUNK = 2048
@@ -98,7 +100,7 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
             M.flags.writeable = False
         self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
         self._form = schur_form(self._parts[0])
-        self._line = _low_rank(np.vstack([E, h]))
+        self._taps = _low_rank(np.vstack([E, h]))
         self.line_length = d
         self.inner_poles: ComplexArray = np.diag(self._form[0]).copy()
         self.notes: dict[str, Any] = dict(notes or {})
@@ -109,7 +111,18 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
             return notes[attribute]
         raise AttributeError(f"{type(self).__name__} has no attribute {attribute!r}")
 
+    def __mul__(self, other: Any) -> Any:
+        """Series: first `other`, then the controller. A plant with dead time keeps it."""
+        return NotImplemented if isinstance(other, DelayedStateSpace) else super().__mul__(other)
+
     def __repr__(self) -> str:
+        return as_asked(self)
+
+    def _repr_info_(self, html: bool = False) -> str:
+        line = self._line()
+        return escape(line) if html else line
+
+    def _line(self) -> str:
         # python-control's lists every matrix, of as many states as the line is long.
         return (
             f"<{type(self).__name__} {self.name!r}: order {self.inner_poles.size}, line of "
@@ -117,7 +130,7 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         )
 
     def __str__(self) -> str:
-        return repr(self)
+        return self._line()
 
     def _repr_html_(self) -> str:
         largest = float(np.abs(self.inner_poles).max(initial=0.0))
@@ -163,7 +176,7 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         """
         A, B, C, D, _, _ = self._parts
         n = A.shape[0]
-        mix, rows_of_line = self._line
+        mix, rows_of_line = self._taps
         forward = np.empty(z.size, dtype=np.complex128)
         back = np.empty(z.size, dtype=np.complex128)
         eye = np.eye(n)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 import control as ct
 import numpy as np
 
 from ..checks import one_of, positive, real
+from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
-from ..results import html_card, text_card
+from ..results import as_asked, html_card, text_card
 from ..wording import in_time
 from .loop_check import LoopCheck
 from .process_model import ProcessModel
@@ -157,7 +159,28 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     def __deepcopy__(self, memo: dict[int, Any]) -> PIDController:
         return self._again()
 
+    def __mul__(self, other: Any) -> Any:
+        """Series: first `other`, then the controller. A plant with dead time keeps it."""
+        return NotImplemented if isinstance(other, DelayedStateSpace) else super().__mul__(other)
+
     def __repr__(self) -> str:
+        return as_asked(self)
+
+    def _repr_eval_(self) -> str:
+        parameters = ", ".join(
+            f"float('{value!r}')" if np.isinf(value) else repr(value)
+            for value in (self.kp, self.ti, self.td, self.tf)
+        )
+        # Not the model that a rule looked at, nor what was found of the loop.
+        settings = self._settings()
+        words = ", ".join(f"{key}={settings[key]!r}" for key in ("dt", "method", "rule", "name"))
+        return f"PIDController({parameters}, {words})"
+
+    def _repr_info_(self, html: bool = False) -> str:
+        line = self._line()
+        return escape(line) if html else line
+
+    def _line(self) -> str:
         words = [f"kp = {self.kp:.4g}"]
         if "I" in self.kind:
             words.append(f"ti = {self.ti:.4g} s")
@@ -168,7 +191,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
 
     def __str__(self) -> str:
         # python-control's shows matrices, in which nobody finds the parameters again.
-        return f"{self!r}\n\n{super().__str__()}"
+        return f"{self._line()}\n\n{super().__str__()}"
 
     def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]

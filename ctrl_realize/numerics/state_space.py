@@ -8,8 +8,10 @@ eigenvectors, so defective and unstable A are fine.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
-from scipy.linalg import schur
+from scipy.linalg import matrix_balance, schur
 
 from .arrays import ComplexArray, FloatArray
 
@@ -17,8 +19,17 @@ BLOCK = 64
 """Samples that are computed together; block powers are built by doubling up to here."""
 
 
-def schur_form(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return T and Q with A = Q T Q^H, T upper triangular.
+Schur: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
+"""T, V and W with A = V T W and W = V^-1."""
+
+
+def schur_form(A: FloatArray) -> Schur:
+    """Return T, V and W with A = V T W, W = V^-1, T upper triangular.
+
+    A is balanced first (Parlett and Reinsch, Numerische Mathematik 13, 1969): the Schur form is
+    exact to rounding of the largest entry of A, and series of controllers and plants in
+    companion form have entries from 1e-7 to 1e4, of which all count. Unbalanced the response of
+    such a loop is wrong by 7e-3.
 
     Parameters
     ----------
@@ -26,17 +37,21 @@ def schur_form(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
 
     Returns
     -------
-    T, Q : ndarray, shape (n, n)
+    T, V, W : ndarray, shape (n, n)
     """
     if A.shape[0] == 0:
         empty = np.zeros((0, 0), dtype=np.complex128)
-        return empty, empty
-    T, Q = schur(A, output="complex")
-    return np.asarray(T, dtype=np.complex128), np.asarray(Q, dtype=np.complex128)
+        return empty, empty, empty
+    balanced, scale = matrix_balance(A)
+    T, Q = schur(balanced, output="complex")
+    # The scale is a permuted diagonal matrix of powers of two: all of this is exact.
+    back = np.divide(1.0, scale, where=scale != 0, out=np.zeros_like(scale)).T
+    V, W = scale @ Q, Q.conj().T @ back
+    return np.asarray(T, dtype=np.complex128), np.asarray(V), np.asarray(W)
 
 
 def frequency_response(
-    form: tuple[ComplexArray, ComplexArray],
+    form: Schur,
     B: FloatArray,
     C: FloatArray,
     D: FloatArray,
@@ -46,7 +61,7 @@ def frequency_response(
 
     Parameters
     ----------
-    form : (T, Q)
+    form : (T, V, W)
         Schur form of A, from `schur_form`.
     B, C, D : ndarray, shapes (n, m), (p, n), (p, m)
     points : ndarray, shape (K,)
@@ -56,13 +71,13 @@ def frequency_response(
     -------
     ndarray, shape (p, m, K)
     """
-    T, Q = form
+    T, V, W = form
     n, m = B.shape
     K = points.size
     if n == 0:
         return np.repeat(D[:, :, None].astype(np.complex128), K, axis=2)
-    right = Q.conj().T @ B
-    left = C @ Q
+    right = W @ B
+    left = C @ V
     states = np.empty((n, m * K), dtype=np.complex128)
     for i in range(n - 1, -1, -1):
         row = np.repeat(right[i], K)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 import control as ct
@@ -12,10 +13,13 @@ from ..checks import positive, real, system_name, system_names
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.statistics import circle_quantile
+from ..results import as_asked, as_code
+from .frf_algebra import FRFAlgebra
+from .frf_operands import SAME
 from .record_checks import check_size, numbers, unmasked
 
 
-class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is untyped
+class MeasuredFRF(FRFAlgebra):
     """Measured frequency response function.
 
     It is a `control.FrequencyResponseData` without a time base (``dt=None``), the form in which
@@ -65,19 +69,20 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
     ``sqrt(3) * std``, hold 95 % only where there are many. `circle` and the intervals of
     `design.margins` reckon with `repeats`.
 
+    Arithmetic carries deviation, coherence, repeats and sample time along. Exact systems and
+    numbers scale the deviation; two measured responses count as independent, one with itself does
+    not. ``frf.feedback(K)`` knows that the response stands twice in ``frf / (1 + K frf)``. Where
+    the coherence or the hold of a result is not known a `DataWarning` says that it is left out.
+
     Examples
     --------
     >>> import ctrl_realize as cr
     >>> frf = cr.MeasuredFRF([1.0, 0.5 - 0.5j, -0.1j], [0.1, 1.0, 10.0])
     >>> frf.between_hz(0.5, 20.0)
     <MeasuredFRF 'measured': 2 points, 1...10 Hz>
+    >>> (2 * cr.MeasuredFRF([1.0], [0.1], std=[0.1], sample_time=0.01)).std
+    array([0.2])
     """
-
-    coherence: FloatArray | None
-    std: FloatArray | None
-    repeats: float | None
-    sample_time: float | None
-    frequency_hz: FloatArray
 
     def __init__(
         self,
@@ -140,6 +145,27 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
         )
 
     def __repr__(self) -> str:
+        return as_asked(self)
+
+    def _repr_eval_(self) -> str:
+        parts = [
+            as_code(self.frdata[0, 0] if self._single else self.frdata),
+            as_code(self.frequency_hz),
+        ]
+        for name in ("coherence", "std"):
+            if getattr(self, name) is not None:
+                parts.append(f"{name}={as_code(getattr(self, name))}")
+        for name in ("repeats", "sample_time", "name"):
+            if getattr(self, name) is not None:
+                parts.append(f"{name}={getattr(self, name)!r}")
+        parts.append(f"inputs={self.input_labels!r}, outputs={self.output_labels!r}")
+        return f"MeasuredFRF({', '.join(parts)})"
+
+    def _repr_info_(self, html: bool = False) -> str:
+        line = self._line()
+        return escape(line) if html else line
+
+    def _line(self) -> str:
         return (
             f"<MeasuredFRF {self.name!r}: {self.frequency_hz.size} points, "
             f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz>"
@@ -147,10 +173,23 @@ class MeasuredFRF(ct.FrequencyResponseData):  # type: ignore[misc]  # control is
 
     def __str__(self) -> str:
         # python-control's lists every point.
-        return repr(self)
+        return self._line()
 
     def _repr_html_(self) -> str | None:
         return None
+
+    def eval(self, omega: Any, squeeze: bool | None = None) -> Any:
+        """Return the response at measured frequencies, in rad/s.
+
+        See `control.FrequencyResponseData.eval`. A frequency may differ from the measured one by
+        the rounding of a conversion, as 6.283185307179586 * f and 2 * (f * pi) do.
+        """
+        asked = np.asarray(omega, dtype=np.float64)
+        right = np.clip(np.searchsorted(self.omega, asked), 1, max(self.omega.size - 1, 1))
+        near = [self.omega[np.minimum(at, self.omega.size - 1)] for at in (right - 1, right)]
+        for own in near:
+            asked = np.where(np.abs(own - asked) <= SAME * own, own, asked)
+        return super().eval(asked, squeeze)
 
     def __getitem__(self, key: Any) -> Any:
         """Take channels as python-control does, ``frf[output, input]`` by number, name or slice.

@@ -42,6 +42,18 @@ def test_frequency_response_equals_the_solve(seed, n, m, p):
     assert_allclose(fast, direct, rtol=0, atol=1e-10 * np.abs(direct).max())
 
 
+def test_units_of_the_states_do_not_change_the_response():
+    A, B, C, D = system(3)
+    units = 2.0 ** np.linspace(-40, 40, A.shape[0]).round()  # exact in binary
+    z = np.exp(1j * np.linspace(0.01, np.pi, 9))
+    plain = state_space.frequency_response(state_space.schur_form(A), B, C, D, z)
+    scaled = state_space.frequency_response(
+        state_space.schur_form(units[:, None] * A / units), units[:, None] * B, C / units, D, z
+    )
+    # balanced with another start the rounding is another
+    assert_allclose(scaled, plain, rtol=0, atol=1e-11 * np.abs(plain).max())
+
+
 def test_frequency_response_of_a_defective_matrix_is_right():
     A = np.array([[0.5, 1.0, 0.0], [0.0, 0.5, 1.0], [0.0, 0.0, 0.5]])
     B, C, D = np.eye(3)[:, 2:], np.eye(3)[:1], np.zeros((1, 1))

@@ -1,0 +1,302 @@
+r"""Arithmetic of measured frequency responses: what becomes of deviation, coherence and hold.
+
+Errors are carried to first order (JCGM 100:2008, GUM, section 5.1.2, for complex numbers with
+circular errors): with a response *H* of deviation :math:`\sigma`, and *G* exact,
+
+* :math:`G H` has :math:`|G| \sigma`, :math:`H + G` has :math:`\sigma`,
+* :math:`1 / H` has :math:`\sigma / |H|^2`, :math:`H / (1 + K H)` has
+  :math:`\sigma / |1 + K H|^2`,
+* errors of two responses are independent, and those of channels too: variances add, each times
+  the square of the derivative.
+
+Coherence is the part of the output's power that the input explains. An exact factor and an inverse
+leave it; sums and products of two have one that hangs on powers that nobody has measured.
+
+An input that is held between samples leaves one hold in a response. It stays in what is linear in
+that response, cancels in a quotient of two, and there are two of it in a product.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..errors import DataError, DataWarning, warn_caller
+from ..numerics.arrays import ComplexArray, FloatArray
+from .frf_operands import (
+    SAME,
+    Operand,
+    blocks,
+    check_shapes,
+    common_hold,
+    in_z,
+    is_number,
+    last_axis,
+    matmul,
+    one_hold,
+    power,
+    same_hold,
+    warn_of_hold,
+)
+
+
+class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is untyped
+    """Operators of `MeasuredFRF`; names and channels stay where the shape does."""
+
+    coherence: FloatArray | None
+    std: FloatArray | None
+    repeats: float | None
+    sample_time: float | None
+    frequency_hz: FloatArray
+
+    def _operand(self) -> Operand:
+        shape = self.frdata.shape
+        return Operand(
+            self.frdata,
+            None if self.std is None else self.std.reshape(shape) ** 2,
+            None if self.coherence is None else self.coherence.reshape(shape),
+            self.sample_time,
+            self.repeats,
+            measured=True,
+        )
+
+    def _other(self, other: Any) -> Operand | None:
+        """Take the other side at the frequencies of this one; None for what is no system."""
+        if isinstance(other, FRFAlgebra):
+            self._check_same_frequencies(other)
+            return other._operand()
+        if isinstance(other, ct.FrequencyResponseData):
+            self._check_same_frequencies(other)
+            return Operand(np.asarray(other.frdata))
+        if isinstance(other, (ct.StateSpace, ct.TransferFunction)):
+            points = np.exp(1j * self.omega * other.dt) if in_z(other) else 1j * self.omega
+            return Operand(np.asarray(other(points, squeeze=False)))
+        if isinstance(other, (int, float, complex, np.number)):
+            return Operand(np.full((1, 1, 1), complex(other)))
+        if isinstance(other, np.ndarray) and other.ndim <= 2 and other.dtype.kind in "biufc":
+            return Operand(np.atleast_2d(other).astype(np.complex128)[:, :, None])
+        return None
+
+    def _check_same_frequencies(self, other: ct.FrequencyResponseData) -> None:
+        one, two = self.omega, np.asarray(other.omega)
+        if one.size != two.size or not np.allclose(one, two, rtol=SAME, atol=0):
+            raise DataError(
+                f"{self!r} and {other.name!r} have other frequencies ({two.size} points, "
+                f"{two[0] / (2 * np.pi):g}...{two[-1] / (2 * np.pi):g} Hz); measure or cut both "
+                "to the same"
+            )
+
+    def _made(
+        self,
+        what: str,
+        values: ComplexArray,
+        variance: FloatArray,
+        sides: tuple[Operand, ...],
+        hold: float | None,
+        coherence: FloatArray | None = None,
+    ) -> Any:
+        """Build the result, and say what it lost."""
+        measured = [side for side in sides if side.measured]
+        known = all(side.variance is not None for side in measured)
+        lost = []
+        if coherence is None and any(side.coherence is not None for side in measured):
+            lost.append("coherence")
+        if not known and any(side.variance is not None for side in measured):
+            lost.append("standard deviation")
+        if lost:
+            warn_caller(
+                f"{what} of measured responses has no {' and no '.join(lost)} that is known; left "
+                "out",
+                DataWarning,
+            )
+        values = np.asarray(values + np.zeros(self.omega.size))
+        single = values.shape[:2] == (1, 1) and self._single
+        repeats = [side.repeats for side in measured if side.repeats is not None]
+        names = {}
+        if values.shape == self.frdata.shape:
+            names = {"inputs": self.input_labels, "outputs": self.output_labels}
+
+        def shaped(array: Any) -> Any:
+            return np.broadcast_to(array, values.shape)[(0, 0) if single else ...]
+
+        return type(self)(
+            shaped(values),
+            self.frequency_hz,
+            coherence=None if coherence is None else shaped(coherence),
+            std=shaped(np.sqrt(variance)) if known else None,
+            # The fewest: at most as many as Welch and Satterthwaite's formula gives.
+            repeats=min(repeats) if repeats and known else None,
+            sample_time=hold,
+            name=self.name,
+            **names,
+        )
+
+    def __neg__(self) -> Any:
+        return self * -1
+
+    def __add__(self, other: Any) -> Any:
+        """Parallel connection; errors of two measured responses are independent."""
+        if other is self:
+            return self * 2
+        one, two = self._operand(), self._other(other)
+        if two is None:
+            return NotImplemented
+        check_shapes(one, two, same=True)
+        # An exact path leaves noise and hold of the measured one.
+        hold = one.hold if not two.measured else common_hold(one, two, "a sum")
+        return self._made(
+            "a sum", one.values + two.values, one.spread + two.spread, (one, two), hold
+        )
+
+    def __radd__(self, other: Any) -> Any:
+        return self + other
+
+    def __sub__(self, other: Any) -> Any:
+        if other is self:
+            return self * 0
+        if isinstance(other, (ct.InputOutputSystem, np.ndarray)):
+            return self + -1 * other
+        return self + -other if is_number(other) else NotImplemented
+
+    def __rsub__(self, other: Any) -> Any:
+        return (self * -1) + other
+
+    def __mul__(self, other: Any) -> Any:
+        """Series: first `other`, then this response."""
+        if other is self:
+            return self**2
+        two = self._other(other)
+        return NotImplemented if two is None else self._product(self._operand(), two)
+
+    def __rmul__(self, other: Any) -> Any:
+        """Series: first this response, then `other`."""
+        two = self._other(other)
+        return NotImplemented if two is None else self._product(two, self._operand())
+
+    def _product(self, one: Operand, two: Operand) -> Any:
+        check_shapes(one, two, same=False)
+        if one.measured and two.measured:
+            coherence, hold = None, one_hold(one, two)
+        else:
+            kept, exact = (one, two) if one.measured else (two, one)
+            # A mixture of channels has another coherence; a gain of zero has none.
+            plain = exact.is_scalar and bool(np.all(exact.values))
+            coherence, hold = kept.coherence if plain else None, kept.hold
+        return self._made(
+            "a product",
+            matmul(one.values, two.values),
+            matmul(one.spread, power(two.values)) + matmul(power(one.values), two.spread),
+            (one, two),
+            hold,
+            coherence,
+        )
+
+    def __truediv__(self, other: Any) -> Any:
+        """Divide by one channel."""
+        if other is self and self.issiso():
+            return self**0
+        one, two = self._operand(), self._other(other)
+        if two is None:
+            return NotImplemented
+        if not two.is_scalar:
+            raise DataError("a quotient needs one channel below; choose it with frf[output, input]")
+        return self._quotient(one, two)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        two = self._other(other)
+        if two is None:
+            return NotImplemented
+        if not self.issiso():
+            raise DataError("a quotient needs one channel below; choose it with frf[output, input]")
+        return self._quotient(two, self._operand())
+
+    def _quotient(self, one: Operand, two: Operand) -> Any:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = one.values / two.values
+            variance = (one.spread + power(values) * two.spread) / power(two.values)
+        coherence = None
+        if not (one.measured and two.measured):
+            coherence = one.coherence if one.measured else two.coherence
+            if not (one.measured or one.is_scalar):
+                coherence = None
+        if two.hold is None:
+            hold = one.hold
+        else:
+            hold = None
+            if not (one.hold is not None and same_hold(one.hold, two.hold)):
+                warn_of_hold("a quotient", two.hold)
+        return self._made("a quotient", values, variance, (one, two), hold, coherence)
+
+    def __pow__(self, other: Any) -> Any:
+        """Power of one channel, to a whole number."""
+        if type(other) is not int:
+            raise ValueError(f"exponent {other!r}; needed is a whole number")
+        if not self.issiso():
+            raise DataError("a power needs one channel; choose it with frf[output, input]")
+        if other in (1, -1):
+            return self * 1 if other == 1 else 1 / self
+        one = self._operand()
+        if other == 0:
+            return self._made("", np.ones_like(one.values), np.zeros(1), (), None)
+        if one.hold is not None:
+            warn_of_hold("a power", one.hold)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = other * one.values ** (other - 1)
+            values = one.values**other
+        return self._made("a power", values, power(slope) * one.spread, (one,), None)
+
+    def feedback(self, other: Any = 1, sign: float = -1) -> Any:
+        """Close a loop around this response: ``H / (1 - sign other H)``.
+
+        Parameters
+        ----------
+        other : number, matrix, system or measured response
+            What stands in the feedback.
+        sign : float
+            -1 for negative feedback.
+
+        Returns
+        -------
+        MeasuredFRF
+            With the deviation of the closed loop, which ``L / (1 + L)`` would not have: there the
+            errors of both L would be taken as independent.
+        """
+        one, two = self._operand(), self._other(other)
+        if two is None:
+            raise TypeError(f"{type(other).__name__} is no system, number or matrix")
+        H = np.moveaxis(one.values, 2, 0)
+        p, m = self.noutputs, self.ninputs
+        if two.is_scalar and p == m:
+            two = Operand(
+                two.values * np.eye(p)[:, :, None], two.variance, None, two.hold, two.repeats,
+                two.measured,
+            )  # fmt: skip
+        if two.values.shape[:2] != (m, p):
+            raise DataError(
+                f"feedback of shape {two.values.shape[:2]} around {p} outputs and {m} inputs; "
+                f"needed is {(m, p)}"
+            )
+        K = sign * np.moveaxis(two.values, 2, 0)
+        left, right = np.linalg.inv(np.eye(p) - H @ K), np.linalg.inv(np.eye(m) - K @ H)
+        closed = np.moveaxis(H @ right, 0, 2)
+        # dT = left dH right + T dK T
+        spread = matmul(matmul(power(last_axis(left)), one.spread), power(last_axis(right)))
+        spread = spread + matmul(matmul(power(closed), two.spread), power(closed))
+        hold = one.hold if not two.measured else one_hold(one, two)
+        return self._made("a closed loop", closed, spread, (one, two), hold)
+
+    def append(self, other: Any) -> Any:
+        """Put another response beside this one; the paths between them are zero."""
+        one, two = self._operand(), self._other(other)
+        if two is None:
+            raise TypeError(f"{type(other).__name__} is no system, number or matrix")
+        hold = one.hold if not two.measured else common_hold(one, two, "a response beside another")
+        return self._made(
+            "one beside another",
+            blocks(one.values, two.values, self.omega.size),
+            blocks(one.spread, two.spread, self.omega.size),
+            (one, two),
+            hold,
+        )

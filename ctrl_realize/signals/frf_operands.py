@@ -1,0 +1,118 @@
+"""What stands on either side of an operation with a measured frequency response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import DataError, DataWarning, warn_caller
+from ..numerics.arrays import ComplexArray, FloatArray
+
+SAME = 1e-9
+"""Relative difference up to which two frequencies are one: rounding of a unit's conversion."""
+
+
+@dataclass(frozen=True)
+class Operand:
+    """One side of an operation, shapes (p, m, K) or (p, m, 1); what is exact has no variance."""
+
+    values: ComplexArray
+    variance: FloatArray | None = None
+    coherence: FloatArray | None = None
+    hold: float | None = None
+    repeats: float | None = None
+    measured: bool = False
+
+    @property
+    def spread(self) -> FloatArray:
+        """The variance, zero for what is exact."""
+        return np.zeros(self.values.shape) if self.variance is None else self.variance
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether it acts on each entry alone."""
+        return self.values.shape[:2] == (1, 1)
+
+
+def is_number(value: Any) -> bool:
+    """Whether something is a number of Python or NumPy."""
+    return isinstance(value, (int, float, complex, np.number))
+
+
+def in_z(system: Any) -> bool:
+    """Whether a system is sampled, with a sample time that is known."""
+    if system.dt is True:
+        raise DataError(
+            f"{system.name!r} is discrete with dt=True; give it its sample time in s, so that it "
+            "can be evaluated at frequencies"
+        )
+    return bool(system.isdtime(strict=True))
+
+
+def power(values: ComplexArray) -> FloatArray:
+    """Square of the magnitude."""
+    return np.asarray(values.real**2 + values.imag**2)
+
+
+def last_axis(values: Any) -> ComplexArray:
+    """Move frequencies from the first axis to the last."""
+    return np.moveaxis(values, 0, 2)
+
+
+def matmul(one: Any, two: Any) -> Any:
+    """Multiply matrices at each frequency; one channel scales all entries."""
+    if (1, 1) in (one.shape[:2], two.shape[:2]):
+        return one * two
+    return np.moveaxis(np.moveaxis(one, 2, 0) @ np.moveaxis(two, 2, 0), 0, 2)
+
+
+def blocks(one: Any, two: Any, count: int) -> Any:
+    """Put two matrices on the diagonal, at each of `count` frequencies."""
+    (p, m), (q, n) = one.shape[:2], two.shape[:2]
+    out = np.zeros((p + q, m + n, count), dtype=np.result_type(one, two))
+    out[:p, :m], out[p:, m:] = one, two
+    return out
+
+
+def check_shapes(one: Operand, two: Operand, *, same: bool) -> None:
+    """Refuse matrices that do not fit."""
+    (p, m), (q, n) = one.values.shape[:2], two.values.shape[:2]
+    if one.is_scalar or two.is_scalar or ((p, m) == (q, n) if same else m == q):
+        return
+    how = "a sum needs the same" if same else "a product needs as many inputs as then outputs"
+    raise DataError(f"{p} outputs, {m} inputs and {q} outputs, {n} inputs; {how}")
+
+
+def same_hold(one: float, two: float) -> bool:
+    """Whether two sample times are one."""
+    return abs(one - two) <= 1e-6 * two
+
+
+def warn_of_hold(what: str, hold: float) -> None:
+    """Say that a result has none or two of the holds that its sample time would stand for."""
+    warn_caller(
+        f"{what} of measured responses has not one hold of {hold:g} s in it any more, so its "
+        "sample_time is left out; give hold and dt where the result is fitted or compared",
+        DataWarning,
+    )
+
+
+def common_hold(one: Operand, two: Operand, what: str) -> float | None:
+    """Hold of a sum: that of both."""
+    known = [side.hold for side in (one, two) if side.hold is not None]
+    if len(known) == 2 and same_hold(*known):
+        return known[0]
+    if known:
+        warn_of_hold(what, known[0])
+    return None
+
+
+def one_hold(one: Operand, two: Operand) -> float | None:
+    """Hold of a product: that of one of them."""
+    known = [side.hold for side in (one, two) if side.hold is not None]
+    if len(known) == 2:
+        warn_of_hold("a product", known[0])
+        return None
+    return known[0] if known else None

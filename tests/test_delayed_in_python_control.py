@@ -1,0 +1,239 @@
+"""Systems with dead time in python-control's hands: products, names, texts, warnings."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import ModelWarning
+from tests.rigs import R3, TS
+
+Z = np.exp(1j * np.geomspace(0.5, 0.9 * np.pi / TS, 30) * TS)
+NAMED = ct.ss(np.diag([0.5, 0.2]), [[1], [1]], [[1, 1]], 0, TS, states=["position", "speed"])
+
+
+def plant(delay: int) -> cr.DelayedStateSpace:
+    return cr.delayed_ss(R3, delay, dt=TS)
+
+
+def controllers() -> dict[str, ct.StateSpace]:
+    pid = cr.design.PIDController(0.5, 0.2, dt=TS)
+    return {
+        "PID": pid,
+        "Smith predictor": cr.design.smith_predictor(plant(5), ct.tf([0.5, -0.45], [1, -1], TS)),
+        "joined subsystems": ct.interconnect(
+            [ct.ss(pid, name="P", inputs="e", outputs="v"), ct.ss(NAMED, name="F", inputs="v")],
+            inplist="P.e",
+            outlist="F.y[0]",
+        ),
+    }
+
+
+@pytest.mark.parametrize("kind", ["PID", "Smith predictor", "joined subsystems"])
+@pytest.mark.parametrize("delay", [0, 300])
+def test_a_loop_with_a_controller_of_any_class_keeps_the_delay(kind, delay):
+    G, K = plant(delay), controllers()[kind]
+    expected = G(Z) * K(Z)
+    # The Schur form of a loop whose states have units from 1e-7 to 1e4 leaves 1e-9; near Nyquist
+    # the gain is 1e-8 and cancels from parts as large as the largest.
+    close = {"rtol": 1e-8, "atol": 1e-13 * np.abs(expected).max()}
+    for loop in (G * K, ct.series(K, G)):
+        assert isinstance(loop, cr.DelayedStateSpace)
+        assert loop.delay == delay
+        assert loop.delay_free.nstates == 3 + K.nstates
+        assert_allclose(loop(Z), expected, **close)
+    if kind != "joined subsystems":
+        behind = K * G
+        assert isinstance(behind, cr.DelayedStateSpace)
+        assert behind.delay == delay
+        assert_allclose(behind(Z), expected, **close)
+
+
+def test_margins_of_a_loop_with_our_controller_are_those_of_its_two_parts():
+    G, pid = plant(100), cr.design.PIDController(0.5, 0.2, dt=TS)
+    joined, apart = cr.design.margins(G * pid), cr.design.margins(G, pid)
+    assert joined.phase_margin == pytest.approx(apart.phase_margin, rel=1e-9)
+    assert joined.gain_margin == pytest.approx(apart.gain_margin, rel=1e-9)
+
+
+FILTER = ct.tf([0.5], [1, -0.5], TS)
+POLYNOMIALS = {
+    "tf * sys": lambda S: FILTER * S,
+    "tf + sys": lambda S: FILTER + S,
+    "tf - sys": lambda S: FILTER - S,
+    "feedback(tf, sys)": lambda S: ct.feedback(FILTER, S),
+    "tf(sys)": ct.tf,
+    "ss2tf": ct.ss2tf,
+    "margin": ct.margin,
+    "stability_margins": ct.stability_margins,
+    "root locus": lambda S: ct.root_locus_map(S, gains=[0.1]),
+}
+
+
+# python-control has its own word on margins at times, and SciPy on the polynomial
+@pytest.mark.filterwarnings("ignore:stability_margins")
+@pytest.mark.filterwarnings("ignore::scipy.signal.BadCoefficients")
+@pytest.mark.parametrize("asked", POLYNOMIALS)
+def test_polynomials_of_a_long_chain_are_warned_of_with_the_right_call(asked):
+    with pytest.warns(ModelWarning, match=r"50.*design\.margins.*to_tf.*sys \+ tf") as caught:
+        POLYNOMIALS[asked](plant(60))
+    # where the user wrote it, not inside python-control
+    assert {warning.filename for warning in caught if warning.category is ModelWarning} == {
+        __file__
+    }
+
+
+@pytest.mark.filterwarnings("ignore:stability_margins")
+@pytest.mark.filterwarnings("ignore::scipy.signal.BadCoefficients")
+@pytest.mark.parametrize("asked", POLYNOMIALS)
+def test_polynomials_of_a_short_chain_are_not_warned_of(asked):
+    POLYNOMIALS[asked](plant(5))
+
+
+def test_the_calls_that_the_warning_names_are_right():
+    G = plant(100)
+    g, f = G(Z), FILTER(Z)
+    calls = {
+        "sys * tf": (G * FILTER, g * f),
+        "sys + tf": (G + FILTER, g + f),
+        "ct.ss(tf) * sys": (ct.ss(FILTER) * G, g * f),
+        "ct.feedback(ct.ss(tf), sys)": (ct.feedback(ct.ss(FILTER), G), f / (1 + f * g)),
+        "sys.to_tf()": (G.to_tf(), g),
+    }
+    for call, (made, expected) in calls.items():
+        # the polynomial of the core loses digits near Nyquist, where the gain is 1e-8
+        assert_allclose(made(Z), expected, rtol=1e-6, atol=1e-9, err_msg=call)
+
+
+RENAMINGS = {
+    "update_names": lambda S: S.update_names(inputs=["current"], outputs=["position"]),
+    "set_inputs": lambda S: (S.set_inputs(["current"]), S.set_outputs(["position"])),
+    "dictionaries": lambda S: (
+        setattr(S, "input_index", {"current": 0}),
+        setattr(S, "output_index", {"position": 0}),
+    ),
+}
+
+
+@pytest.mark.parametrize("renaming", RENAMINGS)
+def test_channels_are_chosen_by_the_names_that_python_control_gave(renaming):
+    G = plant(3)
+    RENAMINGS[renaming](G)
+    part = G["position", "current"]
+    assert isinstance(part, cr.DelayedStateSpace)
+    assert (part.input_labels, part.output_labels, part.delay) == (["current"], ["position"], 3)
+    assert_array_equal(part(Z), G(Z))
+    assert G.state_labels[-1] == "current[k-3]"
+    assert G.delay_free.input_labels == ["current"]
+    assert G[0, 0].delay_free.output_labels == ["position"]
+    with pytest.raises((ValueError, KeyError)):
+        G["y", "u"]
+
+
+KEEPING = {
+    "as made": lambda S: S,
+    "negated": lambda S: -S,
+    "scaled": lambda S: 2 * S * 0.5,
+    "matrix": lambda S: np.array([[2.0]]) * S * np.array([[2.0]]),
+    "indexed": lambda S: S[0, 0],
+    "copied": copy.deepcopy,
+    "pickled": lambda S: pickle.loads(pickle.dumps(S)),
+    "renamed": lambda S: S.replace(name="other"),
+    "delayed again": lambda S: cr.delayed_ss(S, 0),
+}
+
+
+@pytest.mark.parametrize("operation", KEEPING)
+def test_the_names_of_the_core_s_states_are_kept(operation):
+    S = KEEPING[operation](cr.delayed_ss(NAMED, 2))
+    assert S.state_labels == ["position", "speed", "u[k-1]", "u[k-2]"]
+    assert S.delay_free.state_labels == ["position", "speed"]
+
+
+def test_a_product_has_the_names_of_both_cores_where_they_differ():
+    S = cr.delayed_ss(NAMED, 1)
+    integral = ct.ss(1, 1, 1, 0, TS, states=["sum"])
+    assert (S * integral).delay_free.state_labels == ["sum", "position", "speed"]
+    assert (integral * S).delay_free.state_labels == ["position", "speed", "sum"]
+    assert (S * S).delay_free.state_labels == ["x[0]", "x[1]", "x[2]", "x[3]"]
+
+
+def test_a_core_made_of_core_and_chain_has_a_name_for_each_state():
+    twice = cr.delayed_ss(ct.ss(cr.delayed_ss(NAMED, 2)), 3)
+    assert len(set(twice.state_labels)) == twice.nstates == 7
+
+
+def test_names_that_were_given_to_all_states_stay_through_copies():
+    S = cr.delayed_ss(NAMED, 2)
+    S.set_states(["a", "b", "c", "d"])
+    for kept in (S, S.copy(), pickle.loads(pickle.dumps(S)), S.replace(fit=1)):
+        assert kept.state_labels == ["a", "b", "c", "d"]
+        assert kept.delay_free.state_labels == ["a", "b"]
+    assert S.replace(delay=1).state_labels == ["a", "b", "u[k-1]"]
+
+
+SHOWN = {
+    "system": lambda: cr.delayed_ss(NAMED, 4, name="valve"),
+    "controller": lambda: cr.design.PIDController(0.3, dt=TS, name="valve"),
+    "predictor": lambda: cr.design.smith_predictor(
+        plant(5), ct.tf([0.5, -0.45], [1, -1], TS), name="valve"
+    ),
+    "response": lambda: cr.MeasuredFRF(
+        [1.0, 1 / 3], [0.1, 0.2], coherence=[1.0, 0.9], std=[0.1, 0.2], repeats=3, name="valve"
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", SHOWN)
+def test_the_form_of_the_text_is_the_one_that_python_control_was_told(kind):
+    shown = SHOWN[kind]()
+    line = repr(shown)
+    assert "\n" not in line
+    assert "valve" in line
+    shown.repr_format = "info"
+    assert repr(shown) == ct.iosys_repr(shown, format="info") == line
+    assert ct.iosys_repr(shown, format="eval") != line
+    shown.repr_format = "latex"
+    assert repr(shown) == (shown._repr_html_() or line)
+    shown.repr_format = "music"
+    with pytest.raises(ValueError, match="music"):
+        repr(shown)
+    shown.repr_format = None
+    with ct.config.defaults({"iosys.repr_format": "latex"}):
+        assert repr(shown) == (shown._repr_html_() or line)
+
+
+@pytest.mark.parametrize("kind", ["system", "controller", "response"])
+def test_the_text_that_can_be_loaded_makes_the_same_again(kind):
+    shown = SHOWN[kind]()
+    shown.repr_format = "eval"
+    names = {
+        "array": np.array,
+        "StateSpace": ct.StateSpace,
+        "DelayedStateSpace": cr.DelayedStateSpace,
+        "PIDController": cr.design.PIDController,
+        "MeasuredFRF": cr.MeasuredFRF,
+    }
+    again = eval(repr(shown), names)
+    assert type(again) is type(shown)
+    again.repr_format = "eval"
+    assert repr(again) == repr(shown)
+    assert (again.name, again.input_labels) == (shown.name, shown.input_labels)
+    if kind == "response":
+        assert_array_equal(again.frdata, shown.frdata)
+    else:
+        assert_array_equal(again.A, shown.A)
+        assert again.state_labels == shown.state_labels
+
+
+def test_the_form_of_the_text_goes_with_a_copy():
+    S = cr.delayed_ss(NAMED, 4)
+    S.repr_format = "eval"
+    for kept in (S.copy(), pickle.loads(pickle.dumps(S)), S.replace(name="b")):
+        assert kept.repr_format == "eval"
