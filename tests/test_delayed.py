@@ -213,6 +213,15 @@ def test_poles_of_the_delay_are_exactly_zero():
     assert_allclose(np.sort(poles[:3]), np.sort(valve(0).poles()), rtol=0, atol=0)
 
 
+@pytest.mark.parametrize("delay", [0, 37, 300])
+def test_zeros_are_those_that_were_given(delay):
+    zeros = [0.3 - 0.4j, 0.3 + 0.4j]
+    core = ct.ss(ct.zpk(zeros, [0.2, 0.5, 0.8], 2.0, dt=TS))
+    found = cr.delayed_ss(core, delay).zeros()
+    # far apart from each other: a few digits are lost in the companion form
+    assert_allclose(np.sort_complex(found), zeros, rtol=1e-10)
+
+
 def test_zeros_are_those_of_the_core():
     assert_allclose(valve(300).zeros(), valve(0).zeros(), rtol=1e-12)
 
