@@ -14,7 +14,6 @@ from ctrl_realize.errors import DataError
 from ctrl_realize.identification.averaging import (
     MeanStep,
     aligned_steps,
-    delay_outliers,
     mean_step,
     repeatability,
     widened,
@@ -54,13 +53,6 @@ def test_records_of_different_sample_times_are_refused_by_name():
     assert len(aligned_steps(records([SHAPE]) + records([SHAPE], dt=0.01 * (1 + 1e-9)))) == 2
 
 
-def spiked(count, height):
-    """As many responses, each with a spike in a place of its own, so that none lies apart."""
-    shapes = np.tile(SHAPE, (count, 1))
-    shapes[np.arange(count), 9 * np.arange(count)] += height
-    return list(shapes)
-
-
 def test_the_mean_covers_what_all_records_have():
     long, short = records([SHAPE], before=80)[0], records([SHAPE[:150]], before=30)[0]
     mean = mean_step(aligned_steps((long, short)))
@@ -74,20 +66,6 @@ def test_records_count_by_the_square_of_their_amplitude():
     # noise per unit of input falls with the amplitude
     mean = mean_step(steps([SHAPE, 1.2 * SHAPE], [1.0, -3.0]))
     assert_allclose(mean.output[mean.edge :], (1 + 9 * 1.2) / 10 * SHAPE, atol=1e-14)
-
-
-@pytest.mark.parametrize(("second", "together"), [(2.059, True), (2.061, False)])
-def test_amplitudes_within_three_percent_are_trimmed_together(second, together):
-    mean = mean_step(steps(spiked(5, 1.0), [second, 2.0, 2.0, 2.0, 2.0]))
-    # alone, the first record keeps its spike; one of five, it is cut off
-    assert (abs(mean.output[mean.edge]) < 1e-12) == together
-
-
-@pytest.mark.parametrize(("count", "left"), [(3, 1 / 3), (4, 1 / 4), (5, 0), (19, 0), (20, 0)])
-def test_the_largest_and_smallest_tenth_go_from_five_records_on(count, left):
-    mean = mean_step(steps(spiked(count, 1e-3)))
-    places = mean.edge + 9 * np.arange(count)
-    assert_allclose((mean.output[mean.edge :] - SHAPE)[places - mean.edge], 1e-3 * left, atol=1e-12)
 
 
 def test_two_of_twenty_go_at_each_end():
@@ -108,15 +86,6 @@ def test_a_record_apart_from_four_others_is_left_out():
     # of three records nobody can say which is apart
     few = mean_step(steps(shapes[:3]))
     assert (few.used, few.left_out) == ((0, 1, 2), ())
-
-
-def test_records_to_skip_are_skipped_unless_none_is_left():
-    made = steps([SHAPE, SHAPE, 2 * SHAPE])
-    mean = mean_step(made, skip=(2,))
-    assert (mean.used, mean.left_out) == ((0, 1), (2,))
-    assert_allclose(mean.output[mean.edge :], SHAPE, atol=1e-14)
-    everything = mean_step(made, skip=(0, 1, 2))
-    assert (everything.used, everything.left_out) == ((0, 1, 2), ())
 
 
 def simulated(delays, amplitudes, *, noise=0.0, gains=None, names=None):
@@ -171,26 +140,6 @@ def test_errors_and_chi_square_are_those_of_the_noise():
     assert found.p_value > 0.001
 
 
-def test_the_error_of_a_delay_does_not_hang_on_how_far_it_lies_from_the_model():
-    made = simulated([37.0], [16.0], noise=0.01)
-    mean = mean_step(made)
-    errors = [
-        repeatability(made, mean, model_of(mean, delay), delay * TS, LEVEL).errors[0]
-        for delay in (37.0, 97.0)
-    ]
-    # the same record seen from two models; its slope is interpolated
-    assert errors[1] == pytest.approx(errors[0], rel=0.01)
-
-
-def test_a_drift_before_the_step_stays_in_the_record():
-    # the mean has the drift of all, which is fitted with it
-    (drifting,) = records([SHAPE], before=100)
-    line = 0.5 * drifting.time
-    (kept,) = aligned_steps((cr.Record(drifting.time, drifting.input, drifting.output + line),))
-    assert kept.drift == 0.0
-    assert_allclose(np.diff(kept.pre), 0.5 * 0.01 / 2.0, rtol=1e-9)
-
-
 def test_what_a_record_has_for_itself_moves_its_delay_no_more_than_noise_does():
     made = simulated([37.0] * 3, [16.0] * 3, noise=1e-3)
     mean = mean_step(made)
@@ -220,42 +169,6 @@ def test_delays_that_grow_with_the_amplitude_are_a_trend():
     line = np.polynomial.Polynomial.fit(size, found.delays, 1, w=1 / found.errors)
     inflation = max(np.sum(weight * (found.delays - line(size)) ** 2) / 3, 1)
     assert found.trend_error == pytest.approx(np.sqrt(inflation / spread), rel=1e-9)
-
-
-@pytest.mark.parametrize("amplitudes", [[16.0, 16.2, 16.4], [8.0, 16.0]])
-def test_no_trend_is_told_from_one_amplitude_or_two_records(amplitudes):
-    made = simulated([37.0] * len(amplitudes), amplitudes, noise=1e-3)
-    mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
-    assert (found.trend, found.trend_error) == (0.0, 0.0)
-
-
-def test_a_delay_apart_from_the_others_is_an_outlier():
-    made = simulated([37.0, 37.0, 47.0, 37.0, 37.0], [16.0] * 5, noise=2e-3)
-    mean = mean_step(made, skip=(2,))
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
-    assert found.outlying == ("record 2",)
-    # it counts neither for the chi-square nor for the centre
-    assert found.p_value > 0.001
-    assert found.delays[2] / TS == pytest.approx(47, abs=0.5)
-    assert delay_outliers(found, (0, 1, 2, 3, 4)) == (2,)
-    assert delay_outliers(found, (0, 1, 3, 4)) == ()
-
-
-def test_errors_are_those_of_the_delay_and_so_fall_with_the_gain():
-    # the same noise, relative to the step, beside a response of half and of twice the size
-    made = simulated([37.0] * 3, [16.0] * 3, noise=0.01, gains=[0.5, 1.0, 2.0])
-    louder = []
-    for step, gain in zip(made, [0.5, 1.0, 2.0], strict=True):
-        record = step.record
-        exact = gain * rigs.step_record(rigs.R3, amplitude=16.0, before=300, after=1300).output
-        noise = (record.output - exact) / gain
-        louder.append(cr.Record(record.time, record.input, exact + noise))
-    made = aligned_steps(tuple(louder))
-    mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
-    # correlation and seeds leave 10 %
-    assert_allclose(found.errors / found.errors[1], [2, 1, 0.5], rtol=0.15)
 
 
 @dataclass(frozen=True)

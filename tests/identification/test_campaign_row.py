@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError
 from ctrl_realize.identification.campaign_row import (
     fingerprint,
-    identify_row,
-    read_source,
 )
 
 DT = 0.1
@@ -21,19 +18,6 @@ TIME = DT * np.arange(200)
 def record(name="", step=-4.0, offset=0.0, **labels):
     moved = step * (np.arange(200) >= 60)
     return cr.Record(TIME, moved, offset + 2 * moved, name=name, **labels)
-
-
-def of(source, position=0, method="scan", options=None, store=None):
-    return identify_row(source, position, method, {} if options is None else options, store)
-
-
-def test_a_function_that_gives_no_record_is_named_by_what_it_gives():
-    assert of(dict).error.startswith("DataError: the function gave a dict")
-    one = record()
-    assert read_source(one) is one
-    assert read_source(lambda: one) is one
-    with pytest.raises(DataError, match="gave a str"):
-        read_source(str)
 
 
 def test_the_key_of_a_row_depends_on_samples_labels_method_and_options_alone():
@@ -55,17 +39,6 @@ def test_the_key_of_a_row_depends_on_samples_labels_method_and_options_alone():
     assert len(set(keys)) == len(keys)
     ways = [{"order": 2, "samples": 9}, {"samples": 9, "order": 2}]
     assert len({fingerprint(one, "scan", way) for way in ways}) == 1
-
-
-def test_the_key_tells_inputs_from_outputs():
-    u, y, x = np.random.default_rng(0).standard_normal((3, 200))
-    two_inputs = cr.Record(
-        TIME, np.stack([u, y]), x[None], output_labels=["c"], input_labels=["a", "b"]
-    )
-    two_outputs = cr.Record(
-        TIME, u[None], np.stack([y, x]), input_labels=["a"], output_labels=["b", "c"]
-    )
-    assert len({fingerprint(r, "scan", {}) for r in (two_inputs, two_outputs)}) == 2
 
 
 @pytest.mark.parametrize(

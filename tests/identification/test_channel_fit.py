@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-import pickle
-from dataclasses import replace
-
 import control as ct
 import numpy as np
 import pytest
@@ -16,7 +13,6 @@ from ctrl_realize.errors import (
     OrderError,
     UnsuitableSystemError,
 )
-from ctrl_realize.wording import interval_in_time
 
 DT = 0.1
 CORE = ct.ss(
@@ -74,19 +70,6 @@ def test_units_of_channels_change_the_gains_alone():
     expected = cr.fit_channels(first, 3).markov(60)
     # a fit ends where a step gains less than 0.01 of log likelihood, 0.1 standard deviations
     assert_allclose(scaled, expected, rtol=0, atol=1e-3 * np.abs(expected).max())
-
-
-def test_a_later_output_has_a_longer_delay():
-    late = cr.DelayedStateSpace(CORE, (2, 5), output_delay=(4, 11))
-    found = cr.fit_channels(record(plant=late), 3)
-    assert found.delay.tolist() == [[6, 9], [13, 16]]
-
-
-def test_exact_data_give_the_plant_back():
-    found = cr.fit_channels(record(noise=0.0))
-    assert found.fit.order == 3
-    assert_allclose(found.markov(60), PLANT.markov(60), rtol=0, atol=1e-7)
-    assert found.fit.flags == ()
 
 
 def test_several_records_and_missing_outputs_are_used():
@@ -238,42 +221,3 @@ def test_refining_asks_for_a_system_that_fits_the_record():
         cr.refine(cr.delayed_ss(ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT), 900), one)
     with pytest.raises(UnsuitableSystemError):
         cr.refine(ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), record())
-
-
-def test_labels_name_and_steps_come_from_the_record_and_the_fit():
-    data = record(name="rig 1.2", input_labels=["valve", "pump"], output_labels=["p", "q"])
-    found = cr.refine(PLANT, data)
-    assert (found.name, found.input_labels, found.output_labels) == (
-        "rig 1_2",
-        ["valve", "pump"],
-        ["p", "q"],
-    )
-    assert 1 <= found.fit.steps < 50
-    assert (found.fit.choices, found.fit.bic) == ((), {})
-    assert found.fit.records == (data,)
-
-
-def test_records_that_all_have_gaps_are_not_said_to_leave_something():
-    first = record()
-    y = first.output.copy()
-    y[:, 50] = np.nan
-    found = cr.refine(PLANT, cr.Record(first.time, first.input, y, missing="keep"))
-    assert (found.fit.checks, found.fit.flags) == ((), ())
-
-
-def test_the_card_tells_a_dead_time_where_there_is_one(model):
-    assert "dead time" not in dict(model.fit._rows())
-    known = replace(model.fit, dead_time=0.23456, interval=(0.2, 0.3))
-    rows = dict(known._rows())
-    assert rows["dead time"] == "234.6 ms = 2 samples"
-    assert rows["not ruled out"] == interval_in_time(0.2, 0.3)
-    assert "instead of" not in rows
-    assert known.delay_interval == pytest.approx((2.0, 3.0))
-    assert known.dead_time_interval == (0.2, 0.3)
-
-
-def test_it_is_a_result_like_the_others(model):
-    again = pickle.loads(pickle.dumps(model)).fit
-    assert again.report() == model.fit.report()
-    assert "order 3 has the least BIC" in model.fit.report()
-    assert repr(model.fit).startswith("<ChannelFit: order 3, fit 90.")

@@ -90,26 +90,12 @@ def test_other_units_change_no_delay_and_no_pole():
         assert np.array_equal(cr.channel_delays(unit * data, dt=DT), [[3, 4], [9, 10]])
 
 
-def test_what_is_rough_in_the_first_half_is_no_noise():
-    rough = np.concatenate([(-1.0) ** np.arange(100), np.zeros(100)])
-    assert cr.channel_delays(rough, dt=DT).tolist() == [[0]]
-
-
 def test_noise_of_other_channels_hides_no_response():
     data = separate([[3], [5], [7]])
     data[2] *= 0.01
     # five standard deviations of their noise are 25 times the largest value of the third
     data[:2] += 0.05 * np.random.default_rng(1).standard_normal(data[:2].shape)
     assert cr.channel_delays(data, dt=DT)[2, 0] == 7
-
-
-def test_where_a_split_explains_the_delays_one_core_is_made():
-    data = separate([[3], [5]])  # of two poles: one state for each output would be nearer
-    sys = cr.realize_channels(data, 1, dt=DT)
-    assert sys.fit.structure == "common"
-    assert sys.fit.orders == (1,)
-    apart = cr.realize_channels(data, 1, dt=DT, structure="rows")
-    assert apart.fit.misfit.max() < 1e-9 < 0.01 < sys.fit.misfit.max()
 
 
 def test_the_longest_delay_leaves_three_samples():
@@ -139,20 +125,6 @@ def test_lines_with_a_pure_gain_and_without_response_have_no_tap_too_many(struct
     assert fit.states == 4 + 20 + 20
 
 
-def test_a_filter_in_the_data_is_told():
-    markov = separate([[3], [5]])
-    lagging = cr.ImpulseResponse(markov, DT, filter=cr.FilterSpec(2, 1.0, False, DT))
-    assert [flag.code for flag in cr.realize_channels(lagging, 2).fit.flags] == ["filter_delay"]
-
-
-def test_an_entry_without_response_puts_no_limit():
-    data = separate(np.array([[3, 4], [9, 10]]))
-    data[0, 1] = 0.0
-    assert cr.channel_delays(data, dt=DT).tolist() == [[3, -1], [9, 10]]
-    sys = cr.realize_channels(data, 3, dt=DT)
-    assert_allclose(sys.markov(200), data, rtol=0, atol=1e-9)
-
-
 def test_noise_is_not_taken_for_a_response():
     plant = cr.DelayedStateSpace(CORE, (4, 7), output_delay=(0, 2, 0))
     rng = np.random.default_rng(0)
@@ -166,17 +138,6 @@ def test_noise_is_not_taken_for_a_response():
     fresh = rng.standard_normal((2, 1000))
     check = cr.check_residuals(sys, cr.Record(DT * np.arange(1000), fresh, plant.simulate(fresh)))
     assert np.all(check.fit_percent > 97)
-
-
-def test_noise_on_a_plain_array_is_seen_in_its_second_half():
-    plant = cr.DelayedStateSpace(CORE, (4, 7), output_delay=(0, 2, 0))
-    exact = plant.markov(400)
-    noisy = exact + 2e-3 * np.random.default_rng(0).standard_normal(exact.shape)
-    for level in (0.0, 0.02):
-        assert np.array_equal(cr.channel_delays(noisy, level=level, dt=DT), plant.delay)
-    sys = cr.realize_channels(noisy, 3, level=0.0, dt=DT)
-    assert np.array_equal(sys.delay, plant.delay)
-    assert np.abs(sys.markov(400) - exact).max() < 0.02
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -105,11 +104,6 @@ def test_a_view_in_doubt_is_shown_and_does_not_count():
     assert "narrowest" in check.report()
 
 
-def test_where_all_are_in_doubt_nothing_is_agreed_on():
-    low, high = replace(view("a", 1, 2), doubt="x"), replace(view("b", 1, 5), doubt="y")
-    assert common_dead_time([low, high]) == (None, ())
-
-
 def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
     rng = np.random.default_rng(0)
     u, y = rng.standard_normal((2, 1500))
@@ -133,23 +127,6 @@ def test_a_shift_of_the_record_is_a_shift_of_the_views_and_a_scale_is_none(both)
     # The noise meets other samples of the response: within the intervals, not to the digit.
     fit = next(v for v in later.views if v.method == "output error")
     assert fit.value - both.views[0].value == pytest.approx(20 * DT, abs=fit.high - fit.low)
-
-
-def test_two_bounds_never_contradict_each_other():
-    views = [view("a", 4.0, 5.0, "upper bound"), view("b", 1.0, 2.0, "upper bound")]
-    assert common_dead_time(views) == ((0.0, 2.0), ())
-
-
-def test_what_could_not_be_done_is_said():
-    rng = np.random.default_rng(0)
-    noise = cr.Record(DT * np.arange(400), rng.normal(size=400), rng.normal(size=400))
-    check = cr.check_delay(noise)
-    assert "no_correlation" in [flag.code for flag in check.flags]
-    assert "up to lag" in check.report()
-
-
-def test_the_check_pickles(both):
-    assert pickle.loads(pickle.dumps(both)).views == both.views
 
 
 def test_unusable_data_are_refused():

@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.errors import OptionError
 from tests import rigs
 
 BEFORE, N = 600, 1600
@@ -69,21 +68,6 @@ def test_white_noise_is_fitted_as_before_to_the_last_digit():
     assert found.interval == plain.interval
 
 
-def test_the_report_says_how_the_noise_was_weighed():
-    data, _ = record(0, ringing, 0.005)
-    assert "generalised least squares" in cr.fit_delay(data).fit.report()
-    plain = cr.fit_delay(data, noise="white").fit.report()
-    assert "generalised" not in plain
-    assert "samples count as one" in plain
-
-
-def test_structures_that_are_given_profit_as_well():
-    data, delay = record(1, ringing, 0.005)
-    fit = cr.fit_delay(data, structures=[(1, 1)]).fit
-    assert fit.delay == pytest.approx(delay, abs=0.12)  # four standard errors
-    assert 1.96 * fit.std_given_structure / fit.dt < 0.12
-
-
 def test_colour_that_only_the_response_has_is_a_misfit():
     # White at rest; a ringing that no model of the toolbox has is left in the response.
     data, _ = record(2, lambda rng: rng.standard_normal(N), 0.005)
@@ -112,14 +96,6 @@ def test_records_fitted_together_know_the_noise_of_their_mean():
     assert fit.delay == pytest.approx(36.4, abs=0.1)
     low, high = fit.delay_interval
     assert low <= 36.4 <= high
-
-
-def test_unknown_noise_is_refused():
-    data, _ = record(0, slow, 0.005)
-    with pytest.raises(OptionError, match="noise"):
-        cr.fit_delay(data, noise="pink")
-    with pytest.raises(OptionError, match="noise: not for method='scan'"):
-        cr.identify(data, method="scan", noise="white")
 
 
 def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow(shared_data):

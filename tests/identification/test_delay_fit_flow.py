@@ -82,15 +82,3 @@ def test_lags_are_not_read_as_a_flow(plant):
     for seed in range(2):
         fit = cr.fit_delay(rigs.step_record(plant, noise=0.005, seed=seed)).fit
         assert "dispersed_flow" not in codes(fit)
-
-
-def test_with_structures_given_no_flow_is_tried():
-    fit = cr.fit_delay(flow_record(0.45, 0.001), structures=[(4, 4), (5, 5)]).fit
-    assert fit.delay > 45
-    assert "dispersed_flow" not in codes(fit)
-
-
-def test_the_report_says_what_the_dead_time_is():
-    text = cr.identify(flow_record(0.7, 0.001)).fit.report()
-    assert "a flow that disperses" in text
-    assert "Peclet number" in text

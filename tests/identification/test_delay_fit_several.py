@@ -102,13 +102,6 @@ def test_records_that_were_not_at_rest_are_fitted_together(drifts):
     assert fit.total_delay == pytest.approx(6.6, rel=0.01)
 
 
-def test_records_of_different_sample_times_are_refused():
-    one = record(0)
-    other = cr.Record(2 * one.time, one.input, one.output)
-    with pytest.raises(cr.errors.DataError, match="one sample time"):
-        cr.fit_delay([one, other])
-
-
 def test_a_record_that_came_twice_is_told():
     records = [record(k) for k in range(3)]
     apart, twice = (cr.fit_delay([*records, more]).fit for more in (record(3), records[1]))

@@ -62,14 +62,3 @@ def test_the_model_is_the_ratio_of_its_polynomials(poles, numerator):
     for s in (0.3j * size, 1.7j * size, (0.2 + 0.1j) * size):
         exact = np.polyval(numerator[::-1], s) / np.prod(s - poles)
         assert complex(core(s)) == pytest.approx(exact, rel=1e-9)
-
-
-def test_the_entries_of_the_model_are_comparable():
-    # poles 1 and 100: in units of 10 rad/s the polynomial is s^2 + 10.1 s + 1
-    core = fitted_core(fit(numerator=np.array([500.0])), np.array([-1.0, -100.0, 0.0]) + 0j)
-    np.testing.assert_allclose(core.A, 10 * np.array([[0, 1, 0], [0, 0, 1], [0, -1, -10.1]]))
-    np.testing.assert_allclose(core.B, [[0.0], [0.0], [10.0]])
-    np.testing.assert_allclose(core.C, [[0.5, 0.0, 0.0]])  # 500 / 10^3
-    np.testing.assert_array_equal(core.D, [[0.0]])
-    alone = fitted_core(fit(numerator=np.array([2.0])), np.array([0j]))
-    assert (alone.A.item(), alone.B.item(), alone.C.item()) == (0.0, 1.0, 2.0)

@@ -8,12 +8,9 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, DelayRangeError, OptionError, OrderError
 from ctrl_realize.identification.impulses import (
-    MAX_WINDOWS,
     MOST_WORK,
-    as_impulse,
     check_order,
     check_samples,
-    filter_flags,
     noise_floor,
     settled_samples,
 )
@@ -25,17 +22,6 @@ def decay(pole: float, n: int = 2000) -> np.ndarray:
 
 def impulse(markov: np.ndarray, **beside: object) -> cr.ImpulseResponse:
     return cr.ImpulseResponse(markov, 0.1, **beside)
-
-
-def test_an_array_needs_a_sample_time_and_a_response_has_its_own():
-    made = as_impulse(decay(0.5, 20), 0.1)
-    assert (made.dt, made.n_samples) == (0.1, 20)
-    assert as_impulse(made, None) is made
-    assert as_impulse(made, 0.1) is made
-    with pytest.raises(OptionError, match="leave dt out"):
-        as_impulse(made, 0.2)
-    with pytest.raises(OptionError, match="give its sample time"):
-        as_impulse(decay(0.5, 20), None)
 
 
 def test_three_times_the_settling_time_is_used():
@@ -62,17 +48,6 @@ def test_more_delays_than_can_be_scanned_are_refused_with_what_to_do():
         settled_samples(slow, 3, 5000)
     # who asks for it gets it
     assert check_samples(slow, 20_000, 3, 5000, padded=False, what="max_delay") == 20_000
-
-
-def test_each_channel_settles_by_its_own_range():
-    assert settled_samples(impulse(100 * decay(0.98)), 3, 0) == settled_samples(
-        impulse(decay(0.98)), 3, 0
-    )
-    # beside a large quick channel the small slow one would count as settled
-    both = np.stack([1000 * decay(0.5), decay(0.98)])[:, None]
-    alone = settled_samples(impulse(decay(0.98)), 3, 0)
-    assert settled_samples(impulse(both), 3, 0) == alone
-    assert settled_samples(impulse(both.transpose(1, 0, 2)), 3, 0) == alone
 
 
 def test_samples_and_orders_that_do_not_fit_are_refused():
@@ -107,28 +82,3 @@ def test_the_noise_floor_is_a_singular_value_of_noise_alone():
     assert noise_floor(impulse(decay(0.9), noise=noise), 800) == pytest.approx(
         2 * noise_floor(impulse(decay(0.9), noise=noise), 200)
     )
-
-
-def test_little_noise_or_several_channels_have_no_floor():
-    noise = np.random.default_rng(0).standard_normal(400)
-    assert noise_floor(impulse(decay(0.9)), 50) is None
-    assert noise_floor(impulse(decay(0.9), noise=noise[:31]), 10) is None
-    assert noise_floor(impulse(decay(0.9), noise=noise[:32]), 10) is not None
-    assert noise_floor(impulse(decay(0.9)[None, None], noise=noise), 50) is None
-
-
-@pytest.mark.parametrize("where", [slice(0, 19), slice(-19, None)])
-def test_windows_reach_from_the_first_to_the_last_sample_of_a_long_rest(where):
-    noise = 1e-3 * np.random.default_rng(0).standard_normal(20 * MAX_WINDOWS * 10)
-    noise[where] *= 1000
-    assert noise_floor(impulse(decay(0.9), noise=noise), 10) > 1.0
-
-
-def test_a_causal_filter_is_told_with_its_delay_in_samples_and_in_time():
-    causal = cr.FilterSpec(5, 1.0, zero_phase=False, dt=0.1)
-    (flag,) = filter_flags(impulse(decay(0.9), filter=causal))
-    assert f"{causal.group_delay:.1f} samples ({1e3 * causal.group_delay * 0.1:.3g} ms)" in str(
-        flag
-    )
-    assert filter_flags(impulse(decay(0.9))) == ()
-    assert filter_flags(impulse(decay(0.9), filter=cr.FilterSpec(5, 1.0, True, 0.1))) == ()

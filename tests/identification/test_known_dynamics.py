@@ -36,12 +36,6 @@ def test_a_factor_has_the_response_of_its_system(system):
     assert_allclose(response(known_factor(system)), system(S), rtol=1e-9)
 
 
-def test_nothing_known_is_one():
-    factor = known_factor(None)
-    assert factor.poles.size == 0
-    assert_allclose(factor.numerator, [1])
-
-
 @pytest.mark.parametrize("times", [2, 3])
 def test_coinciding_poles_are_given_apart_by_a_thousandth(times):
     system = lag(30.0) ** times
@@ -51,12 +45,6 @@ def test_coinciding_poles_are_given_apart_by_a_thousandth(times):
     assert gaps.max() < 4e-3
     # the frequency response moves by no more than the poles do
     assert_allclose(response(known_factor(system)), system(S), rtol=2e-3 * times)
-
-
-def test_distinct_poles_stay_where_they_are():
-    system = lag(30.0) * lag(30.1)
-    found = np.sort(known_factor(system).poles.real)
-    assert_allclose(found, -2 * np.pi * np.array([30.1, 30.0]), rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
@@ -40,16 +38,6 @@ def test_modes_take_the_place_of_lags_that_leave_structure(chosen):
     assert abs(cr.check_residuals(chosen, another).fit_percent[0] - 90) < 1.5
     assert cr.check_residuals(cr.fit_delay(another), another).fit_percent[0] < 60
     assert "input_in_residual" not in codes(chosen)
-
-
-def test_the_report_says_what_was_chosen_and_why(chosen):
-    fit = chosen.fit
-    assert isinstance(fit.lags, cr.DelayFit)
-    report = fit.report()
-    assert "instead of" in report
-    assert "the residual of the lags follows the input" in report
-    assert "autoregressive noise" in report
-    assert pickle.loads(pickle.dumps(fit)).interval == fit.interval
 
 
 def test_modes_have_a_delay_with_its_interval(chosen):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
@@ -27,34 +25,6 @@ def test_surface_is_the_dense_surface(kind):
     off = np.abs(scan.iae[:, delays] - misfit)
     assert real[:3].all()
     assert np.all(off[real] <= allowed[real])
-
-
-def test_rows_are_the_delay_scans_of_their_orders():
-    pulse = valve_pulse("causal", n=461)
-    surface = cr.scan_orders(pulse, [2, 4], max_delay=60, samples=400, dt=TS)
-    assert surface.orders == (2, 4)
-    for i, order in enumerate(surface.orders):
-        scan = cr.estimate_delay(pulse, order, max_delay=60, samples=400, dt=TS).fit
-        np.testing.assert_allclose(surface.iae[i], scan.iae, rtol=1e-8)
-        assert surface.delays[i] == scan.delay
-        assert surface.delay_intervals[i] == scan.delay_interval
-
-
-def test_system_of_an_order_is_what_estimate_delay_finds():
-    pulse = valve_pulse("zero-phase", n=461)
-    surface = cr.scan_orders(pulse, 5, max_delay=60, samples=400, feedthrough=True, dt=TS)
-    for order in (2, 3):
-        direct = cr.estimate_delay(pulse, order, max_delay=60, samples=400, feedthrough=True, dt=TS)
-        system = surface.system(order)
-        assert system.delay == direct.delay
-        assert np.array_equal(system.delay_free.A, direct.delay_free.A)
-        assert np.array_equal(system.delay_free.D, direct.delay_free.D)
-        np.testing.assert_allclose(system.fit.iae, direct.fit.iae, rtol=1e-8)
-        assert system.fit.interval == direct.fit.interval
-        assert system.fit.candidates[7].nstates == order + 7
-    assert surface.system().fit.order == surface.order
-    with pytest.raises(OptionError, match="order=7 was not scanned"):
-        surface.system(7)
 
 
 def rest(noise: float, seed: int = 77) -> np.ndarray:
@@ -108,13 +78,6 @@ def test_table_holds_one_row_for_each_order():
     assert table.loc[3, "dead_time"] == scan.delays[2] * TS
     assert table.loc[3, "noise_ratio"] == scan.last_singular_value(3) / scan.noise_floor
     assert table.loc[3, "iae"] == scan.iae[2].min()
-
-
-def test_result_reports_itself_and_pickles():
-    scan = cr.scan_orders(valve_pulse("zero-phase"), 4, max_delay=60, dt=TS)
-    assert np.array_equal(pickle.loads(pickle.dumps(scan)).iae, scan.iae)
-    assert f"suggested {scan.order}" in repr(scan)
-    assert all(f"order {k}" in scan.report() for k in scan.orders)
 
 
 @pytest.mark.parametrize(

@@ -48,22 +48,6 @@ def test_unpacking_gives_the_model_bit_by_bit(system):
         assert twin.state_labels == system.state_labels
 
 
-@pytest.mark.parametrize("removed", [False, True])
-def test_states_that_nothing_reaches_are_kept(monkeypatch, removed):
-    # whatever python-control is told to do with them when a system is made
-    core = ct.ss(np.diag([0.5, 0.0]), [[1.0], [0.0]], [[1.0, 0.0]], [[0.0]], 0.1)
-    system = cr.DelayedStateSpace(core, 3)
-    assert system.delay_free.nstates == 2
-    monkeypatch.setitem(ct.config.defaults, "statesp.remove_useless_states", removed)
-    assert_array_equal(PackedModel.of(system).unpack().delay_free.A, system.delay_free.A)
-
-
-def test_the_fit_is_the_same_object():
-    fit = object()
-    packed = PackedModel.of(cr.DelayedStateSpace(SISO, 3, fit=fit))
-    assert packed.unpack().fit is fit
-
-
 def test_a_long_delay_takes_no_more_than_a_short_one():
     short, long = (
         len(pickle.dumps(PackedModel.of(cr.DelayedStateSpace(SISO, d)))) for d in (3, 2000)
@@ -101,11 +85,3 @@ def test_a_row_that_comes_from_a_worker_takes_a_few_kilobytes(kept):
         tracemalloc.stop()
     # 4.5 kB, most of it the report's text; it was 39 kB with the matrices
     assert grown < 8000
-
-
-def test_a_row_builds_its_model_on_access(kept):
-    row = kept.rows[0]
-    assert row.system is not row.system
-    assert row.system.fit is row.system.fit
-    assert (row.order, row.dt) == (row.system.delay_free.nstates, row.system.dt)
-    assert row.system.delay == row.delay

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
@@ -108,59 +105,6 @@ def test_fit_says_what_its_docstring_promises(hankel, samples):
         assert fit.error_bound >= 2 * tail.sum() * (1 - 1e-12)
 
 
-@pytest.mark.parametrize("hankel", ["square", "padded"])
-def test_the_report_says_the_numbers_of_the_result(hankel):
-    g = np.concatenate([np.zeros(4), 0.2 * 0.8 ** np.arange(120) + 0.1 * 0.5 ** np.arange(120)])
-    fit = cr.realize(g, 2, delay=4, samples=100, hankel=hankel, dt=0.05).fit
-    rows = dict(fit._rows())
-    assert rows["dead time"] == "200 ms (4 samples of 50 ms)"
-    assert rows["Hankel matrix"] == f"{hankel}, 100 samples"
-    assert rows["direct term"] == "G[4]"
-    first, second = fit.singular_values[:2]
-    assert rows["singular values"].startswith(f"{first:.4g}, {second:.4g} (next ")
-    assert rows["sum of |error|"] == f"{fit.iae:.4g}"
-    bound = f"{fit.error_bound:.4g} at any frequency" if hankel == "padded" else None
-    assert rows.get("error bound") == bound
-    assert all(text in fit.report() for text in rows.values())
-
-
-def test_cards_tell_flags_a_missing_direct_term_and_six_digits_of_the_sample_time():
-    g = np.concatenate([np.zeros(4), 0.8 ** np.arange(100)])
-    fit = cr.realize(g, 1, delay=3, feedthrough=False, dt=0.012345678).fit
-    rows = dict(fit._rows())
-    assert rows["dead time"] == "37.037 ms (3 samples of 12.3457 ms)"
-    assert rows["direct term"] == "0"
-    assert repr(fit).endswith(f"IAE {fit.iae:.4g}>")
-    grown = cr.realize(1.1 ** np.arange(50), 1, dt=0.1)
-    assert codes(grown) == {"unstable"}
-    assert repr(grown.fit).endswith(", 1 flags>")
-
-
-def test_leading_singular_values_are_as_many_as_the_matrix_has():
-    assert cr.realize(0.8 ** np.arange(50), 1, dt=0.1).fit.leading_singular_values(1).shape == (1,)
-    for p, m in ((1, 1), (2, 2), (2, 3)):
-        markov = np.random.default_rng(0).standard_normal((p, m, 9))
-        for hankel, size in (("square", 4), ("padded", 8)):
-            fit = cr.realize(markov, 1, hankel=hankel, dt=0.1).fit
-            whole = dense.hankel(markov[:, :, 1:], size, size)
-            values = np.linalg.svd(whole, compute_uv=False)
-            assert values.size == size * min(p, m)
-            assert_allclose(fit.leading_singular_values(100), values, rtol=0, atol=1e-12)
-
-
-def test_result_is_frozen_and_survives_copies():
-    sys = cr.realize(valve_pulse("zero-phase"), 3, delay=37, dt=TS)
-    assert not sys.fit.singular_values.flags.writeable
-    with pytest.raises(AttributeError):
-        sys.fit.order = 4
-    for twin in (pickle.loads(pickle.dumps(sys)), copy.deepcopy(sys)):
-        assert twin.delay == 37
-        assert twin.fit.iae == sys.fit.iae
-    assert "order 3 behind 37 samples" in repr(sys.fit)
-    assert "\n" not in repr(sys.fit)
-    assert "G[37]" in sys.fit.report()
-
-
 def test_direct_term_within_the_noise_is_left_out():
     rng = np.random.default_rng(1)
     pulse, noise = (
@@ -227,13 +171,3 @@ def test_order_above_the_numerical_rank_is_refused_by_name(n):
 def test_unusable_input_is_refused_with_what_is_needed(pulse, order, kwargs, error, match):
     with pytest.raises(error, match=match):
         cr.realize(pulse, order, **{"dt": 1.0, **kwargs})
-
-
-def test_smallest_possible_data_are_realized():
-    sys = cr.realize([1.0, 0.5, 0.25], 1, dt=1.0)
-    assert_allclose(sys.markov(5), [1, 0.5, 0.25, 0.125, 0.0625], atol=1e-15)
-
-
-def test_a_pure_delay_beyond_the_matrix_is_a_chain():
-    sys = cr.realize(np.eye(60)[3], 3, dt=1.0)  # no delay taken out: three states hold it
-    assert_allclose(sys.markov(20), np.eye(60)[3][:20], atol=1e-15)

@@ -60,37 +60,6 @@ def test_units_of_the_outputs_do_not_matter():
     assert_allclose(scaled / units, found, rtol=0, atol=1e-6)
 
 
-def test_an_output_that_stands_still_has_a_start_as_well():
-    still = ct.ss([[0.8]], [[1.0]], [[1.0], [0.0]], np.zeros((2, 1)), DT)
-    u = np.random.default_rng(0).standard_normal(60)
-    y = cr.DelayedStateSpace(still, 3).simulate(u) + np.array([[2.0], [5.0]])
-    found = simulate_record(cr.DelayedStateSpace(still, 3), record(u[10:], y[:, 10:]), "estimate")
-    assert_allclose(found, y[:, 10:], rtol=0, atol=1e-9)
-    calm = record(np.ones(9), np.full((2, 9), 4.0))
-    assert_allclose(simulate_record(still, calm, "rest"), 4.0, rtol=0, atol=1e-12)
-
-
-def test_at_rest_means_at_the_first_sample_of_the_input():
-    u = np.r_[2.0, 5.0, np.zeros(8)]
-    found = simulate_record(core(D=1.0), record(u, np.zeros(10)), "rest")[0]
-    answer = cr.DelayedStateSpace(core(D=1.0)).simulate(u - 2.0)
-    # the offset that fits best an output of zero
-    assert_allclose(found, answer - answer.mean(), rtol=0, atol=1e-12)
-
-
-def test_a_plain_gain_has_no_state_to_start_from():
-    gain = ct.ss([], [], [], [[2.0]], DT)
-    u = np.random.default_rng(0).standard_normal(10)
-    assert_allclose(simulate_record(gain, record(u, 3 + 2 * u), "estimate")[0], 3 + 2 * u)
-
-
-def test_a_transfer_function_is_simulated_as_its_states():
-    u = np.r_[0.0, np.random.default_rng(0).standard_normal(30)]
-    plain = ct.tf([0.2], [1.0, -0.8], DT)
-    y = cr.DelayedStateSpace(core()).simulate(u)
-    assert_allclose(simulate_record(plain, record(u, y), "rest")[0], y, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("system", "error", "match"),
     [
@@ -107,23 +76,6 @@ def test_a_transfer_function_is_simulated_as_its_states():
 def test_systems_that_do_not_fit_the_record_are_refused(system, error, match):
     with pytest.raises(error, match=match):
         as_delayed(system, record(np.ones(9), np.ones(9)))
-
-
-def test_sample_times_of_nanoseconds_differ_as_well():
-    one = record(np.ones(9), np.ones(9), dt=1e-9)
-    assert as_delayed(core(dt=1e-9), one).dt == 1e-9
-    with pytest.raises(DataError, match="1e-09 s, the system 2e-09 s"):
-        as_delayed(core(dt=2e-9), one)
-
-
-def test_systems_that_just_fit_are_taken():
-    one = record(np.ones(9), np.ones(9))
-    assert as_delayed(core(dt=1.0009 * DT), one).delay == 0
-    for border in (core(1.0), core(1 + 0.9e-6)):
-        assert as_delayed(border, one).delay == 0
-    assert as_delayed(core(1.5), one, stable=False).delay == 0
-    late = cr.DelayedStateSpace(core(), 3)
-    assert as_delayed(late, one) is late
 
 
 def test_a_start_has_one_of_two_names_and_a_record_no_holes():

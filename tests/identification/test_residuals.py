@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
@@ -57,14 +55,6 @@ def test_a_start_at_rest_is_taken_as_rest():
     y = TWO_STATES.simulate(u - 2.0) - 4
     check = cr.check_residuals(TWO_STATES, cr.Record(DT * np.arange(n), u, y), start="rest")
     assert_allclose(check.residual, 0, atol=1e-12)
-
-
-def test_residual_and_simulation_add_up_to_the_record():
-    one = record(MIMO)
-    check = cr.check_residuals(MIMO, one)
-    assert_allclose(check.simulated + check.residual, one.output, rtol=0, atol=1e-12)
-    assert check.cross.shape == (3, 2, 51)
-    assert check.lags[[0, 25, 50]].tolist() == [-25, 0, 25]
 
 
 @pytest.mark.parametrize("delay", [4, 6])
@@ -137,12 +127,6 @@ def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
         assert np.abs(check.cross[0, 0]).argmax() == 25 + shift
 
 
-def test_the_bound_of_the_autocorrelation_is_that_of_white_noise():
-    check = cr.check_residuals(TWO_STATES, record(n=400), confidence=0.95)
-    assert_allclose(check.bound, 1.959964 / 20, rtol=1e-6)
-    assert check.confidence == 0.95
-
-
 def test_the_bound_of_the_cross_correlation_grows_where_both_are_coloured():
     one = record(n=20_000, colour=0.9, drive=0.9)
     check = cr.check_residuals(TWO_STATES, one, confidence=0.95)
@@ -154,12 +138,6 @@ def test_the_bound_of_the_cross_correlation_grows_where_both_are_coloured():
     assert_allclose(plain.cross_bound[0, 0], white, rtol=0.05)
 
 
-def test_three_samples_for_each_lag_are_enough():
-    assert cr.check_residuals(TWO_STATES, record(n=75), lags=25).lags.size == 51
-    with pytest.raises(DataError, match="needs 75 samples, the record has 74"):
-        cr.check_residuals(TWO_STATES, record(n=74), lags=25)
-
-
 def test_what_rounding_leaves_says_nothing_about_the_model():
     one = record(noise=0.0)
     for size, whether in ((1e-9, True), (1e-7, False)):
@@ -167,35 +145,6 @@ def test_what_rounding_leaves_says_nothing_about_the_model():
         check = cr.check_residuals(TWO_STATES, cr.Record(one.time, one.input, y))
         assert check.white == whether
         assert np.all(check.residual == 0) == whether
-
-
-def test_what_rounding_leaves_is_small_beside_its_own_output():
-    one = record(MIMO)
-    y = one.output * np.array([[1e9], [1.0], [1.0]])
-    core = MIMO.delay_free
-    C, D = (np.diag([1e9, 1.0, 1.0]) @ M for M in (core.C, core.D))
-    system = cr.DelayedStateSpace(
-        ct.ss(core.A, core.B, C, D, DT), MIMO.input_delays, output_delay=MIMO.output_delays
-    )
-    check = cr.check_residuals(system, cr.Record(one.time, one.input, y))
-    assert_allclose(check.residual.std(axis=1), [0.05e9, 0.05, 0.05], rtol=0.1)
-
-
-def test_results_have_the_shape_of_the_output():
-    one = record(n=90)
-    for each in (one, cr.Record(one.time, one.input, one.output[None]), record(MIMO, n=90)):
-        system = MIMO if each.n_outputs == 3 else TWO_STATES
-        check = cr.check_residuals(system, each, lags=1)
-        assert check.simulated.shape == check.residual.shape == each.output.shape
-        assert check.cross.shape == (each.n_outputs, each.n_inputs, 3)
-
-
-@pytest.mark.parametrize("confidence", [0.0, 1e-13, 1 - 1e-13, np.nan, "high"])
-def test_a_confidence_is_a_probability(confidence):
-    with pytest.raises(OptionError, match="confidence"):
-        cr.check_residuals(TWO_STATES, record(), confidence=confidence)
-    for border in (1e-12, 1 - 1e-12):
-        assert cr.check_residuals(TWO_STATES, record(), confidence=border).confidence == border
 
 
 def test_predictions_fall_from_the_noise_model_to_the_simulation():
@@ -218,24 +167,6 @@ def test_several_models_are_compared_on_records_that_they_have_not_seen():
     assert (table.loc["true"] > table.loc["late"] + 20).all()
 
 
-def test_one_model_and_one_record_need_no_collection_and_no_record_is_lost_for_its_name():
-    one, other = record(seed=1, label="day"), record(seed=2, label="day")
-    assert cr.cross_validate(TWO_STATES, one).shape == (1, 1)
-    assert list(cr.cross_validate(TWO_STATES, [one, other])) == ["day", "day (1)"]
-    with pytest.raises(DataError, match="needed is a Record"):
-        cr.cross_validate(TWO_STATES, [one.output])
-    with pytest.raises(DataError, match="no models"):
-        cr.cross_validate({}, one)
-
-
-def test_results_pickle_report_and_show_in_one_line():
-    check = cr.check_residuals(TWO_STATES, record())
-    again = pickle.loads(pickle.dumps(check))
-    assert_allclose(again.cross, check.cross, rtol=0)
-    assert "free of the input" in check.report()
-    assert "\n" not in repr(check)
-
-
 @pytest.mark.parametrize(
     ("system", "options", "error", "match"),
     [
@@ -253,16 +184,6 @@ def test_results_pickle_report_and_show_in_one_line():
 def test_unusable_choices_are_refused(system, options, error, match):
     with pytest.raises(error, match=match):
         cr.check_residuals(system, record(), **options)
-
-
-def test_missing_samples_and_empty_lists_are_refused():
-    y = record().output.copy()
-    y[4] = np.nan
-    holes = cr.Record(record().time, record().input, y, missing="keep")
-    with pytest.raises(DataError, match="1 of this record are missing"):
-        cr.check_residuals(TWO_STATES, holes)
-    with pytest.raises(DataError, match="no records"):
-        cr.cross_validate({"a": TWO_STATES}, [])
 
 
 @pytest.mark.parametrize(

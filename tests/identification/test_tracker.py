@@ -163,17 +163,6 @@ def test_offsets_and_units_do_not_matter():
     assert abs(second.gain_ratio - first.gain_ratio) < 1e-6
 
 
-def test_streaming_and_running_give_the_same():
-    record, _ = worn_valve(seconds=6, last=37.0)
-    one, other = tracker(memory=1.0), tracker(memory=1.0)
-    track = one.run(record)
-    for sample in zip(record.input, record.output, strict=True):
-        other.update(*sample)
-    assert one.estimate().dead_time == other.estimate().dead_time
-    assert "DelayTrack" in repr(track)
-    assert "told" in track.report()
-
-
 def test_asking_changes_nothing():
     record, _ = worn_valve(seconds=3, last=37.0)
     silent, asked = tracker(memory=1.0), tracker(memory=1.0)

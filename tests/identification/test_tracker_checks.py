@@ -9,7 +9,6 @@ import pytest
 from ctrl_realize.errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ctrl_realize.identification.tracker_checks import (
     LONGEST,
-    check_candidates,
     check_memory,
     check_start,
 )
@@ -21,19 +20,6 @@ def core(pole=0.5, C=1.0, D=0.0, dt=DT):
     return ct.ss([[pole]], [[1.0]], [[C]], [[D]], dt)
 
 
-def test_two_candidates_are_enough():
-    assert check_candidates(0, 1) == (0, 1)
-    assert check_candidates(3, 9) == (3, 9)
-    with pytest.raises(DelayRangeError, match=r"3\.\.\.3 leave nothing"):
-        check_candidates(3, 3)
-    with pytest.raises(DelayRangeError, match=r"0\.\.\.0 leave nothing"):
-        check_candidates(0, 0)
-    with pytest.raises(OptionError, match="min_delay"):
-        check_candidates(-1, 5)
-    with pytest.raises(OptionError, match="max_delay"):
-        check_candidates(0, 4.5)
-
-
 def test_a_memory_is_longer_than_the_largest_candidate_and_not_without_end():
     assert check_memory(2.5, 0.5, 4) == 5.0
     with pytest.raises(DelayRangeError, match="5 samples, and delays up to 5"):
@@ -43,17 +29,6 @@ def test_a_memory_is_longer_than_the_largest_candidate_and_not_without_end():
         check_memory(1.001 * LONGEST, 1.0, 5)
     with pytest.raises(OptionError, match=r"memory=0.*time in s"):
         check_memory(0.0, 1.0, 5)
-
-
-@pytest.mark.parametrize("pole", [1.0, -1.0, 1 + 0.9e-9])
-def test_a_model_may_be_at_the_border_of_stability(pole):
-    check_start(core(pole))
-
-
-@pytest.mark.parametrize("pole", [1 + 1.1e-9, -1.01])
-def test_an_unstable_model_is_refused(pole):
-    with pytest.raises(UnsuitableSystemError, match="unstable"):
-        check_start(core(pole))
 
 
 def test_a_model_needs_an_answer_of_either_kind():

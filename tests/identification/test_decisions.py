@@ -1,0 +1,333 @@
+"""What an estimate decides by itself, each decision on simulated data whose truth is known."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, NoStepError
+from tests import rigs
+
+DT = 0.1
+LAG = ct.tf([3.0], [1.0, 1.0])
+ONE = {"structures": [(1, 1)]}
+
+
+def codes(fit):
+    return {flag.code for flag in fit.flags}
+
+
+def lag_record(seed=0, *, n=120, edge=40, delay=7.3, noise=0.02, height=1.0, name=""):
+    """A step at 4 s into a lag of 1 s with a gain of 3; the delay in samples."""
+    time = DT * np.arange(n)
+    y = height * rigs.exact_step(LAG, time - DT * (edge + delay))
+    y += noise * np.random.default_rng(seed).standard_normal(n)
+    return cr.Record(time, height * (np.arange(n) >= edge), y, name=name)
+
+
+def driven(u, seed=0, *, delay=5, core=LAG, noise=0.02, extra=0.0, name="", **options):
+    """Any input into a plant behind whole samples of delay."""
+    plant = cr.delayed_ss(core, delay=delay, dt=DT)
+    y = plant.simulate(u) + extra
+    y = y + noise * np.random.default_rng(seed).standard_normal(u.size)
+    return cr.Record(DT * np.arange(u.size), u, y, name=name, **options)
+
+
+def random_levels(seed, n=600, held=5):
+    return np.repeat(np.random.default_rng(seed).standard_normal(-(-n // held)), held)[:n]
+
+
+# --- one step record: deviation, interval, structure
+
+
+@pytest.fixture(scope="module")
+def forty():
+    return [cr.fit_delay(lag_record(seed), **ONE).fit for seed in range(40)]
+
+
+def test_the_standard_deviation_is_the_scatter_over_forty_records(forty):
+    scatter = np.std([fit.dead_time for fit in forty], ddof=1)
+    # forty values tell a deviation to 11 %; a third is three of them
+    assert scatter == pytest.approx(np.mean([fit.std_given_structure for fit in forty]), rel=0.33)
+
+
+def test_intervals_of_95_percent_hold_the_truth_in_35_of_forty_records_or_more(forty):
+    inside = sum(fit.interval[0] <= 0.73 <= fit.interval[1] for fit in forty)
+    assert inside >= 35  # fewer than that have a chance of 5 in 1000
+    widths = [np.diff(fit.interval)[0] / fit.std_given_structure for fit in forty]
+    assert np.mean(widths) == pytest.approx(2 * 1.96, rel=0.05)
+
+
+def test_structures_that_the_data_do_not_rule_out_widen_the_interval():
+    record = rigs.step_record(rigs.R3, noise=0.01, seed=1, before=800, after=1200)
+    free, given = cr.fit_delay(record).fit, cr.fit_delay(record, structures=[(3, 3)]).fit
+    for fit in (free, given):
+        assert fit.interval[0] <= 37 * rigs.TS <= fit.interval[1]
+    assert np.diff(free.interval) > 1.5 * np.diff(given.interval)
+    assert free.interval[0] <= given.interval[0]
+
+
+def test_zeros_and_lags_that_are_not_there_are_not_chosen():
+    chosen = []
+    for seed in range(5):
+        record = rigs.step_record(
+            rigs.R2, noise=0.005, seed=seed, before=100, after=150, dt=6e-3, delay=8
+        )
+        fit = cr.fit_delay(record).fit
+        chosen.append((fit.order, fit.relative_degree))
+    assert chosen.count((2, 2)) >= 4
+
+
+def test_a_short_record_does_not_lose_its_interval_to_models_that_know_no_delay():
+    record = rigs.step_record(rigs.R1, noise=0.02, seed=1, before=60, after=120, dt=5e-3, delay=10)
+    low, high = np.array(cr.fit_delay(record).fit.interval) / 5e-3
+    assert low <= 10 <= high
+    assert low > 5
+    assert high < 12
+
+
+def test_where_no_model_leaves_noise_the_delay_is_the_median_of_five_views():
+    record = rigs.step_record(rigs.R2, noise=2e-3, seed=2, before=600, after=1500)
+    slew = np.ravel(record.output).copy()
+    for k in range(1, slew.size):  # a valve that moves by so much in a sample and no more
+        slew[k] = slew[k - 1] + np.clip(record.output[k] - slew[k - 1], -0.05, 0.05)
+    slew += 0.03 * np.random.default_rng(0).standard_normal(slew.size)
+    fit = cr.fit_delay(cr.Record(record.time, record.input, slew)).fit
+    assert "structured_misfit" in codes(fit)
+    views = list(fit.views.values())
+    assert len(views) == 6
+    assert fit.dead_time == pytest.approx(np.median(views[:5]), rel=1e-9)
+    # the earliest is left out of the interval, which one wrong view would open to nothing
+    assert fit.interval == pytest.approx((sorted(views)[1], max(views)), rel=1e-9)
+    believed = cr.fit_delay(cr.Record(record.time, record.input, slew), structures=[(2, 2)]).fit
+    assert not believed.views
+
+
+def test_wild_samples_move_least_squares_more_than_the_usual_loss():
+    errors = {"huber": [], "least_squares": []}
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        record = lag_record(seed)
+        wild = np.where(rng.random(120) < 0.05, 1.5 * rng.standard_normal(120), 0.0)
+        spoilt = cr.Record(record.time, record.input, record.output + wild)
+        for loss, found in errors.items():
+            found.append(cr.fit_delay(spoilt, loss=loss, **ONE).fit.dead_time - 0.73)
+    rms = {loss: np.sqrt(np.mean(np.square(found))) for loss, found in errors.items()}
+    assert rms["huber"] < 0.08
+    assert rms["least_squares"] > 1.3 * rms["huber"]
+
+
+def test_slow_noise_at_rest_is_no_drift():
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        slow = lfilter([0.05], [1.0, -0.8], rng.standard_normal(1000))[200:]
+        clean = lag_record(noise=0.0, n=800, edge=300)
+        fit = cr.fit_delay(cr.Record(clean.time, clean.input, clean.output + slow), **ONE).fit
+        assert "drift" not in codes(fit)
+        assert np.diff(fit.interval)[0] < 0.15
+        assert fit.dead_time == pytest.approx(0.73, abs=4 * fit.std_given_structure)
+
+
+def test_noise_that_is_coloured_at_rest_is_weighed_unless_that_is_not_wanted():
+    noise = lfilter([0.02], [1.0, -1.6, 0.9], np.random.default_rng(1).standard_normal(1100))[200:]
+    clean = lag_record(noise=0.0, n=900, edge=400)
+    record = cr.Record(clean.time, clean.input, clean.output + noise)
+    made_white, plain = (cr.fit_delay(record, noise=way, **ONE).fit for way in ("auto", "white"))
+    assert made_white.std_given_structure < 0.7 * plain.std_given_structure
+    assert made_white.interval[0] <= 0.73 <= made_white.interval[1]
+
+
+# --- what is a step experiment
+
+
+@pytest.mark.parametrize(("edges", "stepped"), [(1, True), (12, True), (13, False)])
+def test_an_input_of_more_than_twelve_edges_is_any_input(edges, stepped):
+    u = np.repeat(np.arange(edges + 1) % 2, 40).astype(float)
+    fit = cr.fit_delay(driven(u), **ONE).fit
+    assert np.isfinite(fit.onset) == stepped
+    assert fit.delay == pytest.approx(5, abs=0.3)
+
+
+def test_an_input_that_does_not_hold_its_level_is_any_input():
+    rng = np.random.default_rng(0)
+    # an edge of 4, and half a unit of noise at every sample: an eighth; or a whole one: a quarter
+    for size, stepped in ((0.2, True), (1.0, False)):
+        u = np.repeat([0.0, 4.0], 150) + size * rng.standard_normal(300)
+        fit = cr.fit_delay(driven(u, noise=0.05), **ONE).fit
+        assert np.isfinite(fit.onset) == stepped
+        assert fit.delay == pytest.approx(5, abs=0.5)
+
+
+def test_steps_that_follow_before_the_first_one_is_seen_are_any_input():
+    for second, stepped in ((100, True), (48, False)):
+        u = 1.0 * (np.arange(200) >= 40) + 1.0 * (np.arange(200) >= second)
+        fit = cr.fit_delay(driven(u), **ONE).fit
+        assert np.isfinite(fit.onset) == stepped
+        assert fit.delay == pytest.approx(5, abs=0.3)
+
+
+def test_an_input_that_moves_in_its_last_five_samples_alone_is_no_experiment():
+    with pytest.raises(NoStepError, match="nothing was recorded after it"):
+        cr.fit_delay(driven(1.0 * (np.arange(60) >= 59)))
+    with pytest.raises(DataError, match="does not leave its rest level"):
+        cr.fit_delay(driven(1.0 * (np.arange(60) >= 56)))
+
+
+# --- several records
+
+
+def test_a_record_that_comes_late_is_named_and_does_not_move_the_mean():
+    records = [lag_record(k, name=f"r{k}") for k in range(4)]
+    alone = cr.fit_delay(records, **ONE).fit
+    late = lag_record(9, delay=8.4, name="late")
+    together = cr.fit_delay([*records, late], **ONE).fit
+    assert together.repeatability.outlying == ("late",)
+    assert together.dead_time == pytest.approx(alone.dead_time, abs=alone.std_given_structure)
+
+
+def test_delays_that_differ_from_record_to_record_widen_the_interval():
+    jitter = np.linspace(-0.5, 0.5, 6)
+    alike = cr.fit_delay([lag_record(k) for k in range(6)], **ONE).fit
+    apart = cr.fit_delay([lag_record(k, delay=7.3 + d) for k, d in enumerate(jitter)], **ONE).fit
+    assert "records_differ" in codes(apart) - codes(alike)
+    assert apart.std_given_structure > 1.5 * alike.std_given_structure
+    # the standard error of a mean of delays that scatter by 0.37 samples
+    assert apart.std_given_structure == pytest.approx(
+        np.hypot(alike.std_given_structure, DT * jitter.std(ddof=1) / 6**0.5), rel=0.3
+    )
+
+
+def test_a_noisy_record_of_any_input_weighs_little_beside_a_quiet_one():
+    quiet = driven(random_levels(1), 1, noise=0.02)
+    noisy = driven(random_levels(2), 2, noise=1.0)
+    alone = cr.fit_delay(quiet, **ONE).fit
+    both = cr.fit_delay([quiet, noisy], **ONE).fit
+    assert both.std_given_structure < 1.2 * alone.std_given_structure
+    assert both.delay == pytest.approx(5, abs=5 * both.std_given_structure / DT)
+
+
+def test_a_record_of_any_input_with_another_delay_is_left_out():
+    records = [driven(random_levels(k), k, name=f"r{k}") for k in range(5)]
+    fit = cr.fit_delay([*records, driven(random_levels(7), 7, delay=9, name="late")], **ONE).fit
+    assert fit.repeatability.outlying == ("late",)
+    assert fit.delay == pytest.approx(5, abs=0.1)
+
+
+def test_gains_that_scatter_by_more_than_their_noise_are_an_alarm():
+    gains = (0.9, 1.0, 1.1)
+    alike = [driven(random_levels(k), k) for k in range(3)]
+    apart = [driven(random_levels(k), k, core=g * LAG) for k, g in enumerate(gains)]
+    assert "gains_differ" not in codes(cr.fit_delay(alike, **ONE).fit)
+    assert "gains_differ" in codes(cr.fit_delay(apart, **ONE).fit)
+
+
+# --- lags, or modes and zeros
+
+
+SPRING = (  # two modes, a zero pair between them, and an actuator
+    ct.tf([1.0, 0.2, 9.0], [1.0, 1.0, 16.0])
+    * ct.tf([4.0], [1.0, 0.3, 4.0])
+    * ct.tf([2.0], [1.0, 2.0])
+)
+
+
+def test_a_plant_with_a_resonance_and_zeros_gets_states_instead_of_lags():
+    record = driven(random_levels(1, 500, 3), core=SPRING, delay=4, noise=0.01)
+    modes = cr.identify(record)
+    assert modes.fit.lags is not None
+    assert modes.fit.interval[0] - 1e-9 <= 0.4 <= modes.fit.interval[1] + 1e-9
+    poles = np.log(modes.delay_free.poles().astype(complex)) / DT
+    assert np.abs(poles - (-0.5 + 1j * np.sqrt(15.75))).min() < 0.1
+    asked = cr.identify(record, order=1)
+    assert "input_in_residual" in codes(asked.fit)
+    near = cr.identify(record, max_delay=2)
+    assert near.fit.dead_time <= 2 * DT * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lags_under_any_input_stay_lags(seed):
+    record = driven(random_levels(seed, 900, 3), seed, core=rigs.lag(0.4) * rigs.lag(1.1))
+    system = cr.identify(record)
+    assert system.fit.order == 2
+    assert not hasattr(system.fit, "lags")
+    assert "input_in_residual" not in codes(system.fit)
+
+
+# --- the impulse response from any input
+
+
+def test_the_estimate_that_predicts_better_is_taken():
+    u = random_levels(4, 1200, 2)
+    rings = cr.delayed_ss(ct.tf([25.0], [1.0, 0.05, 25.0]), delay=3, dt=DT)
+    settles = cr.delayed_ss(LAG, delay=3, dt=DT)
+    for plant, okid in ((rings, True), (settles, False)):
+        y = plant.simulate(u)
+        y = y + 0.02 * y.std() * np.random.default_rng(1).standard_normal(u.size)
+        record = cr.Record(DT * np.arange(u.size), u, y)
+        found = cr.impulse_from_io(record)
+        assert found.method.startswith("OKID") == okid
+        truth = plant.markov(found.n_samples)
+        assert np.abs(found.markov - truth).max() < 0.1 * np.abs(truth).max()
+        holes = np.where(np.arange(u.size) % 301 == 300, np.nan, y)
+        gaps = cr.Record(record.time, u, holes, missing="keep")
+        # what is simulated needs every sample: no choice without one
+        assert not cr.impulse_from_io(gaps).method.startswith("OKID")
+
+
+def test_the_window_grows_until_the_response_has_died_away():
+    u = random_levels(5, 1500, 3)
+    slow = driven(u, core=ct.tf([1.0], [6.0, 1.0]), delay=3)
+    quick = driven(u, core=ct.tf([1.0], [0.5, 1.0]), delay=3)
+    assert cr.impulse_from_io(quick, method="regularized").n_samples == 100
+    grown = cr.impulse_from_io(slow, method="regularized")
+    assert grown.n_samples > 100
+    assert "not_died_away" not in codes(grown)
+    assert "not_died_away" in codes(cr.impulse_from_io(slow, 60, method="regularized"))
+
+
+# --- channels
+
+
+def test_delays_of_channels_move_to_where_the_responses_begin():
+    core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT)
+    plant = cr.DelayedStateSpace(core, 6)
+    u = random_levels(6, 800, 1)
+    y = plant.simulate(u) + 0.1 * np.random.default_rng(2).standard_normal(u.size)
+    found = cr.fit_channels(cr.Record(DT * np.arange(u.size), u, y), 1)
+    assert found.delay == 6
+    assert found.delay_free.poles()[0] == pytest.approx(0.9, abs=0.03)
+
+
+def test_an_output_of_noise_is_named_and_the_other_one_is_fitted():
+    rng = np.random.default_rng(0)
+    u = random_levels(7, 300, 2)
+    good = cr.delayed_ss(LAG, delay=3, dt=DT).simulate(u) + 0.02 * rng.standard_normal(u.size)
+    record = cr.Record(DT * np.arange(u.size), u, np.stack([good, rng.standard_normal(u.size)]))
+    fit = cr.fit_channels(record, 1, delays=[[3], [3]], feedthrough=False).fit
+    silent = [flag.message for flag in fit.flags if flag.code == "no_response"]
+    assert len(silent) == 1
+    assert silent[0].startswith("output 1")
+
+
+# --- the order of a scan
+
+
+def test_an_order_that_only_follows_the_noise_is_not_suggested():
+    for plant, order in ((rigs.R1, 1), (rigs.R2, 2)):
+        record = rigs.step_record(plant, noise=1e-3, seed=4, before=1500, after=1500)
+        impulse = cr.impulse_from_step(cr.unit_step(record))
+        scan = cr.scan_orders(impulse, 5, max_delay=60)
+        assert scan.order == order
+
+
+def test_without_known_noise_the_least_order_of_nearly_the_least_misfit_is_suggested():
+    markov = cr.delayed_ss(rigs.R2, delay=12, dt=4 * rigs.TS).markov(400)
+    noisy = markov + 1e-4 * np.abs(markov).max() * np.random.default_rng(0).standard_normal(400)
+    scan = cr.scan_orders(cr.ImpulseResponse(noisy, 4 * rigs.TS), 4, max_delay=30)
+    assert scan.order == 2
+    least = scan.iae.min(axis=1)
+    assert least[1] <= 1.1 * least.min()
+    assert least[0] > 1.1 * least.min()
