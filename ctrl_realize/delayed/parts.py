@@ -9,16 +9,14 @@ import control as ct
 import numpy as np
 
 from ..checks import system_names
-from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, IntArray, read_only
 from .chains import Matrices, augment, chain_labels
+from .deferred import DeferredMatrices
 from .polynomials import warn_of_a_transfer_function
 
-MAX_STATES = 20_000
-"""The augmented A is dense, as python-control needs it: 20 000 states are 3 GB."""
 
-
-class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+class CoreAndDelays(DeferredMatrices):
     """What a system with dead time is made of.
 
     ``A, B, C, D`` and the names of the states follow from core and delays. The matrices are dense,
@@ -28,8 +26,6 @@ class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     _core: ct.StateSpace
     input_delays: tuple[int, ...]
     output_delays: tuple[int, ...]
-    _augmented: Matrices | None
-    _state_names: dict[str, int] | None
 
     @property
     def state_index(self) -> dict[str, int]:
@@ -48,60 +44,22 @@ class CoreAndDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     def state_index(self, names: dict[str, int] | None) -> None:
         self._state_names = names
 
-    def _matrices(self) -> Matrices:
-        if self._augmented is None:
-            core = self._core
-            if self.nstates > MAX_STATES:
-                raise DelayRangeError(
-                    f"matrices of {self.nstates} states, all but {core.nstates} of them for the "
-                    f"delay, have {8 * self.nstates**2 // 10**9} GB; they are made up to "
-                    f"{MAX_STATES} states. sys(z), sys.step, sys.simulate and sys.markov need no "
-                    "matrices; cr.design.to_discrete(*cr.design.to_continuous(sys), dt) gives a "
-                    "system with a longer sample time"
-                )
-            made = augment((core.A, core.B, core.C, core.D), self.input_delays, self.output_delays)
-            for M in made:
-                M.flags.writeable = False
-            self._augmented = made
-        return self._augmented
+    def _make_matrices(self) -> Matrices:
+        core = self._core
+        return augment((core.A, core.B, core.C, core.D), self.input_delays, self.output_delays)
 
-    def _next_state(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
-        A, B, _, _ = self._matrices()
-        return np.asarray(A @ np.atleast_1d(x) + B @ np.atleast_1d(u))
-
-    def _output(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
-        _, _, C, D = self._matrices()
-        return np.asarray(C @ np.atleast_1d(x) + D @ np.atleast_1d(u))
+    def _without_matrices(self) -> str:
+        return (
+            "sys(z), sys.step, sys.simulate and sys.markov need no matrices; "
+            "cr.design.to_discrete(*cr.design.to_continuous(sys), dt) gives a system with a "
+            "longer sample time"
+        )
 
     @property
     def A(self) -> FloatArray:
         """Dynamics matrix of ``[core; chains]``, read-only."""
         warn_of_a_transfer_function(self.nstates - self._core.nstates)
         return self._matrices()[0]
-
-    @property
-    def B(self) -> FloatArray:
-        """Input matrix, read-only."""
-        return self._matrices()[1]
-
-    @property
-    def C(self) -> FloatArray:
-        """Output matrix, read-only."""
-        return self._matrices()[2]
-
-    @property
-    def D(self) -> FloatArray:
-        """Direct term, read-only."""
-        return self._matrices()[3]
-
-    def __setattr__(self, attribute: str, value: Any) -> None:
-        # Core and chain would fall out of step, and python-control's `append` is known to do it.
-        if attribute in ("A", "B", "C", "D", "dt") and self.__dict__.get("_locked", False):
-            raise AttributeError(
-                f"{attribute} of a DelayedStateSpace is fixed; build a new one with delayed_ss, "
-                "or take a plain copy with ct.ss(sys)"
-            )
-        super().__setattr__(attribute, value)
 
     @property
     def delay_free(self) -> ct.StateSpace:

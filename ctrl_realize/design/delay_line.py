@@ -9,21 +9,22 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..delayed import DelayedStateSpace
+from ..delayed.deferred import DeferredMatrices
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.line_sums import CHUNK, LineSum
 from ..numerics.state_space import frequency_response, schur_form
-from ..results import as_asked, html_card
+from ..results import as_asked, html_card, text_card
 from ..wording import in_time
 
-CHUNK = 2048
-"""Frequencies that are evaluated together; bounds the memory of the powers z^-1 ... z^-d."""
+Pulses = tuple[FloatArray, FloatArray, FloatArray]
+"""A (n, n), B (n, 1) and C (rows, n) of a pulse response."""
 
 
-class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+class DelayLineController(DeferredMatrices):
     """Discrete controller with a line of its own past outputs; a `control.StateSpace`.
 
     States ``[x; u[k-1] ... u[k-d]]``; with v the line::
@@ -32,6 +33,7 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         u[k]   = C x + D e + h v
 
     The frequency response is computed from this structure, so it stays exact and fast at any d.
+    The matrices of all states are made when somebody asks for them, up to 20 000 states.
 
     Parameters
     ----------
@@ -43,6 +45,14 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
     inputs, outputs : str
     notes : dict
         What the designing function wants to keep with the controller: read-only attributes.
+    pulses : tuple of ndarray, optional
+        ``(A_p, B_p, C_p)`` where column i of ``[E; h]`` is ``C_p A_p^(i-1) B_p`` for all but the
+        last, as predictions give: long lines are then evaluated in closed form.
+
+    Raises
+    ------
+    DelayRangeError
+        Where A, B, C or D of more than 20 000 states are asked for.
 
     Attributes
     ----------
@@ -75,7 +85,28 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         inputs: str = "e",
         outputs: str = "u",
         notes: dict[str, Any] | None = None,
+        pulses: Pulses | None = None,
     ) -> None:
+        n, d = E.shape
+        self._begin(
+            [f"x[{i}]" for i in range(n)],
+            n + d,
+            float(dt),
+            name=name,
+            inputs=[inputs],
+            outputs=[outputs],
+        )
+        self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
+        self._pulses = None if pulses is None else tuple(read_only(M) for M in pulses)
+        self._form = schur_form(self._parts[0])
+        self._taps = LineSum(np.vstack([E, h]), pulses)
+        self.line_length = d
+        self.inner_poles: ComplexArray = np.diag(self._form[0]).copy()
+        self.notes: dict[str, Any] = dict(notes or {})
+        self._locked = True
+
+    def _make_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        A, B, C, D, E, h = self._parts
         n, d = E.shape
         full_A = np.zeros((n + d, n + d))
         full_A[:n, :n], full_A[:n, n:] = A, E
@@ -84,26 +115,20 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         if d:
             full_A[n, :n], full_A[n, n:], full_B[n] = C[0], h[0], D[0]
             full_A[np.arange(n + 1, n + d), np.arange(n, n + d - 1)] = 1.0
-        super().__init__(
-            full_A,
-            full_B,
-            full_C,
-            D,
-            float(dt),
-            name=name,
-            inputs=[inputs],
-            outputs=[outputs],
-            states=[f"x[{i}]" for i in range(n)] + [f"{outputs}[k-{i}]" for i in range(1, d + 1)],
-            remove_useless_states=False,
+        return full_A, full_B, full_C, D.copy()
+
+    def _name_states(self) -> list[str]:
+        (out,) = self.output_labels
+        past = [f"{out}[k-{i}]" for i in range(1, self.line_length + 1)]
+        return [f"x[{i}]" for i in range(self._parts[0].shape[0])] + past
+
+    def _without_matrices(self) -> str:
+        return (
+            "The controller's frequency response, design.margins, design.performance and "
+            "design.delay_robustness need no matrices, given plant and controller one by one. "
+            "cr.design.to_discrete(*cr.design.to_continuous(plant), dt=...) samples the plant "
+            "more slowly, for a controller with a shorter line"
         )
-        for M in (self.A, self.B, self.C, self.D):
-            M.flags.writeable = False
-        self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
-        self._form = schur_form(self._parts[0])
-        self._taps = _low_rank(np.vstack([E, h]))
-        self.line_length = d
-        self.inner_poles: ComplexArray = np.diag(self._form[0]).copy()
-        self.notes: dict[str, Any] = dict(notes or {})
 
     def __getattr__(self, attribute: str) -> Any:
         notes = self.__dict__.get("notes", {})
@@ -132,7 +157,7 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
     def __str__(self) -> str:
         return self._line()
 
-    def _repr_html_(self) -> str:
+    def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         largest = float(np.abs(self.inner_poles).max(initial=0.0))
         rows = [
             ("signals", f"{self.input_labels[0]} → {self.output_labels[0]}"),
@@ -143,7 +168,20 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
             ),
             ("sample time", in_time(self.dt, 6)),
         ]
-        return html_card(f"Controller {self.name} with a delay line", rows)
+        check = self.notes.get("check")
+        if check is not None:
+            rows += check.rows()
+        flags = [str(flag) for flag in getattr(check, "flags", ())]
+        return f"Controller {self.name} with a delay line", rows, flags
+
+    def report(self) -> str:
+        """Tell what the controller is made of, and what its loop does, as plain text."""
+        title, rows, flags = self._card()
+        return text_card(title, rows, flags=flags)
+
+    def _repr_html_(self) -> str:
+        title, rows, flags = self._card()
+        return html_card(title, rows, flags=flags)
 
     def _repr_markdown_(self) -> None:
         return None
@@ -159,6 +197,7 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
                 self.input_labels[0],
                 self.output_labels[0],
                 self.notes,
+                self._pulses,
             ),
         )
 
@@ -176,14 +215,13 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         """
         A, B, C, D, _, _ = self._parts
         n = A.shape[0]
-        mix, rows_of_line = self._taps
         forward = np.empty(z.size, dtype=np.complex128)
         back = np.empty(z.size, dtype=np.complex128)
         eye = np.eye(n)
         for start in range(0, z.size, CHUNK):
             part = slice(start, start + CHUNK)
             points = z[part]
-            line = mix @ _in_powers(rows_of_line, 1 / points)
+            line = self._taps(points)
             # At an inner pole (z = 1 with a PI) both paths are infinite.
             with np.errstate(divide="ignore", invalid="ignore"):
                 rows = frequency_response(
@@ -203,24 +241,6 @@ class DelayLineController(ct.StateSpace):  # type: ignore[misc]  # control is un
         return np.asarray(out[None, None, :], dtype=np.complex128)
 
 
-def _low_rank(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Write rows = mix @ few; all rows of a predictor come from one or two taps of its line."""
-    if rows.size == 0:
-        return np.zeros((rows.shape[0], 0)), np.zeros((0, rows.shape[1]))
-    U, s, V = np.linalg.svd(rows, full_matrices=False)
-    rank = int(np.sum(s > 1e-15 * s[0])) if s[0] > 0 else 0
-    return U[:, :rank] * s[:rank], V[:rank]
-
-
-def _in_powers(rows: FloatArray, x: ComplexArray) -> ComplexArray:
-    """Sum rows[:, i] x^(i+1) by Horner's rule, shape (rows, K)."""
-    total = np.zeros((rows.shape[0], x.size), dtype=np.complex128)
-    for column in rows.T[::-1]:
-        total += column[:, None]
-        total *= x
-    return total
-
-
 def _rebuild(
     kind: type[DelayLineController],
     parts: tuple[FloatArray, ...],
@@ -229,6 +249,8 @@ def _rebuild(
     inputs: str,
     outputs: str,
     notes: dict[str, Any],
+    pulses: Pulses | None,
 ) -> DelayLineController:
     A, B, C, D, E, h = parts
-    return kind(A, B, C, D, E, h, dt, name=name, inputs=inputs, outputs=outputs, notes=notes)
+    labels = {"inputs": inputs, "outputs": outputs}
+    return kind(A, B, C, D, E, h, dt, name=name, notes=notes, pulses=pulses, **labels)

@@ -10,12 +10,16 @@ from numpy.typing import ArrayLike
 
 from ..delayed import DelayedStateSpace
 from ..delayed.chains import augment
+from ..errors import DelayRangeError
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
 from ..results import Result
 from ..wording import in_numbers
-from .riccati import riccati, weight_matrix
+from .riccati import has_states, riccati, weight_matrix
 from .siso import delayed_system
+
+MOST_APART = 2000
+"""Samples by which outputs may differ in delay; the solver then holds 500 MB."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,6 +94,15 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     -------
     KalmanPredictor
 
+    Raises
+    ------
+    UnsuitableSystemError
+        A core that these covariances cannot observe, or one without states.
+    DelayRangeError
+        Delays of outputs that differ by more than 2000 samples.
+    DataError, OptionError
+        Covariances of the wrong shape, or not symmetric.
+
     Examples
     --------
     >>> import control as ct
@@ -100,10 +113,16 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     """
     plant = delayed_system(system, "kalman_predictor", siso=False)
     core = plant.delay_free
+    has_states(core, "kalman_predictor")
     weight = weight_matrix(QN, core.nstates, "QN", "core state(s)")
     price = weight_matrix(RN, core.noutputs, "RN", "output(s)")
     common = min(plant.output_delays)
     own = tuple(q - common for q in plant.output_delays)
+    if sum(own) > MOST_APART:
+        raise DelayRangeError(
+            f"the delays of the outputs differ by {sum(own)} samples together; a Riccati equation "
+            f"takes them up to {MOST_APART}. Sample the system more slowly, or use one output"
+        )
     A, C = _with_outputs(core, own)
     noise = np.zeros_like(A)
     noise[: core.nstates, : core.nstates] = weight

@@ -10,8 +10,11 @@ import warnings
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..delayed import DelayedStateSpace
 from ..errors import ModelWarning, UnsuitableSystemError
+from ..numerics.arrays import ComplexArray
 from ..results import Flag, Result
 from ..wording import in_time, interval_in_time
 from .delay_robustness import DelayRobustness, over_interval
@@ -113,7 +116,8 @@ def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck
     if interval is None or not found.stable:
         return LoopCheck(found)
     robust = over_interval(plant, loop, found, interval, TRIED)
-    return LoopCheck(found, robust, () if robust.stable else (_unstable_inside(robust),))
+    flags = () if robust.stable else (_unstable_inside(robust),)
+    return LoopCheck(found, robust, flags=flags)
 
 
 def _unstable_inside(found: DelayRobustness) -> Flag:
@@ -143,10 +147,18 @@ def refuse_unstable(check: LoopCheck, what: str, advice: str) -> None:
     ------
     UnsuitableSystemError
     """
-    if check.stable:
-        return
-    poles = check.margins.unstable_poles
-    state = f"has {poles} unstable pole(s)" if poles else "is on the border of stability"
+    if not check.stable:
+        _refuse(check.margins.unstable_poles, what, advice)
+
+
+def refuse_poles(poles: ComplexArray, what: str, advice: str) -> None:
+    """Refuse a loop of several channels by its poles; see `refuse_unstable`."""
+    if np.any(np.abs(poles) >= 1):
+        _refuse(int(np.sum(np.abs(poles) > 1)), what, advice)
+
+
+def _refuse(count: int, what: str, advice: str) -> None:
+    state = f"has {count} unstable pole(s)" if count else "is on the border of stability"
     raise UnsuitableSystemError(
         f"{what} is unstable on the model that it was designed for: the closed loop {state}. "
         f"{advice}"

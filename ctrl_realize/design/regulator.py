@@ -9,22 +9,32 @@ delays the optimum is still a law on the core and what is under way, see
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..delayed import DelayedStateSpace
-from ..errors import OptionError
+from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics import state_space
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
 from ..numerics.delayed_regulator import line_gain
 from ..results import Result
 from ..wording import in_numbers
-from .riccati import riccati, weight_matrix
+from .delay_line import DelayLineController
+from .loop_check import LoopCheck, loop_check, refuse_poles, refuse_unstable, warn_of
+from .riccati import has_states, riccati, weight_matrix
 from .siso import delayed_system
+
+MOST_MEMORY = 2e9
+"""Bytes for the laws of inputs that act after different delays."""
+TOO_LONG = (
+    "An unstable core is not predicted over so long a dead time in double precision; sample it "
+    "more slowly, or shorten the dead time"
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,6 +61,10 @@ class PredictorLQR(Result):
     delay : int, or tuple of int where the inputs differ
         In samples.
     dt : float
+    check : LoopCheck or None
+        Of the loop that the gain closes, broken at the plant's input, with the states measured,
+        on the system itself and over its interval of dead times. None for several inputs, whose
+        loop is known by its `poles` only.
 
     Examples
     --------
@@ -68,6 +82,7 @@ class PredictorLQR(Result):
     cost: FloatArray
     delay: int | tuple[int, ...]
     dt: float
+    check: LoopCheck | None = None
 
     def _title(self) -> str:
         return "LQR through the dead time"
@@ -81,7 +96,11 @@ class PredictorLQR(Result):
             ("delay", f"{samples} samples ({seconds} s)"),
             ("gain on the core", in_numbers(self.core_gain)),
             ("slowest closed-loop pole", f"|z| = {largest:.4g}"),
+            *(self.check.rows() if self.check is not None else []),
         ]
+
+    def _notes(self) -> list[str]:
+        return [str(flag) for flag in self.check.flags] if self.check is not None else []
 
     def __repr__(self) -> str:
         n = self.core_gain.shape[1]
@@ -112,11 +131,19 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     Raises
     ------
     UnsuitableSystemError
-        A core that these weights cannot stabilize.
+        A core that these weights cannot stabilize, or one without states; a core so unstable that
+        double precision cannot predict it over the dead time.
+    DelayRangeError
+        Different delays of inputs, so long that the recursion does not fit into memory.
     DataError
         Weights of the wrong shape.
     OptionError
         Weights that are not symmetric, or an R that couples inputs of different delays.
+
+    Warns
+    -----
+    ModelWarning
+        The loop is unstable for some dead time within the interval that the system carries.
 
     Notes
     -----
@@ -144,20 +171,41 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     >>> cr.design.predictor_lqr(both, 1.0, np.eye(2))
     <PredictorLQR order 1, delay (0, 4), gain (2, 5)>
     """
+    found = regulator(system, Q, R)
+    plant = delayed_system(system, "predictor_lqr", siso=False)
+    if plant.ninputs > 1:
+        refuse_poles(found.poles, "the regulator", TOO_LONG)
+        return found
+    check = loop_check(*_state_loop(plant, found))
+    refuse_unstable(check, "the regulator", TOO_LONG)
+    warn_of(check, "a larger R makes it slower and more robust")
+    return replace(found, check=check)
+
+
+def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
+    """Solve for the gain, see `predictor_lqr`, without a look at the loop."""
     plant = delayed_system(system, "predictor_lqr", siso=False)
     delays = tuple(plant.input_delays)
     core = plant.delay_free
+    has_states(core, "predictor_lqr")
     A, B = np.asarray(core.A, dtype=np.float64), np.asarray(core.B, dtype=np.float64)
     weight = weight_matrix(Q, core.nstates, "Q", "core state(s)")
     price = weight_matrix(R, core.ninputs, "R", "input(s)")
     _check_coupling(price, delays)
+    _check_memory(core.nstates + sum(delays), delays)
     gain, cost, poles = riccati(ct.dlqr, A, B, weight, price, "Q and R")
     shared = len(set(delays)) == 1
-    lines = (
-        _predicted(A, B, gain, delays[0])
-        if shared
-        else line_gain(A, B, (weight, price), (gain, cost), delays)
-    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        lines = (
+            _predicted(A, B, gain, delays[0])
+            if shared
+            else line_gain(A, B, (weight, price), (gain, cost), delays)
+        )
+    if not np.all(np.isfinite(lines)):
+        raise UnsuitableSystemError(
+            f"the core is unstable, and grows beyond all numbers within the delay of {max(delays)} "
+            "samples: no controller can stabilize it through so long a dead time"
+        )
     # What is on its way to an output has left the core: no input can change it any more.
     passed = np.zeros((gain.shape[0], sum(plant.output_delays)))
     return PredictorLQR(
@@ -168,6 +216,33 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
         delay=delays[0] if shared else delays,
         dt=float(plant.dt),
     )
+
+
+def _state_loop(
+    plant: DelayedStateSpace, found: PredictorLQR
+) -> tuple[DelayedStateSpace, DelayLineController]:
+    """Loop of one input: the core's states, weighted by the gain, and the line of past inputs."""
+    core, d, dt = plant.delay_free, plant.input_delays[0], float(plant.dt)
+    n = core.nstates
+    on_state, line = found.gain[:, :n], found.gain[:, n : n + d]
+    A, B = np.asarray(core.A, dtype=np.float64), np.asarray(core.B, dtype=np.float64)
+    seen = ct.StateSpace(A, B, on_state, 0, dt, remove_useless_states=False)
+    nothing = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.ones((1, 1))
+    controller = DelayLineController(
+        *nothing, np.zeros((0, d)), -line, dt, name="lqr", pulses=(A, B, -found.core_gain)
+    )
+    return DelayedStateSpace(seen, d, fit=plant.fit), controller
+
+
+def _check_memory(states: int, delays: tuple[int, ...]) -> None:
+    steps = max(delays) - min(delays)
+    size = 8 * steps * states * len(delays)
+    if size > MOST_MEMORY:
+        raise DelayRangeError(
+            f"the delays of the inputs differ by up to {steps} samples, and the regulator of all "
+            f"of them takes {size / 1e9:.3g} GB; {MOST_MEMORY / 1e9:g} GB are the most. Sample the "
+            "system more slowly, cr.design.to_discrete(core, dead_time, dt), or use one input"
+        )
 
 
 def _check_coupling(price: FloatArray, delays: tuple[int, ...]) -> None:

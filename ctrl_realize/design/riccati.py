@@ -24,6 +24,16 @@ def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray
     return weight
 
 
+def has_states(core: ct.StateSpace, purpose: str) -> None:
+    """Refuse a static core, which has no state to regulate or to estimate."""
+    if core.nstates == 0:
+        raise UnsuitableSystemError(
+            f"{purpose} needs a core with states; this plant is a static gain behind its dead time"
+            ". design.pid(rule='optimal') or design.smith_predictor with an integral controller "
+            "work on it"
+        )
+
+
 def riccati(
     solver: Any, A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, weights: str
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import control as ct
@@ -10,12 +9,12 @@ import numpy as np
 
 from ..checks import positive
 from ..delayed import DelayedStateSpace
-from ..errors import ModelWarning, OptionError, UnsuitableSystemError
+from ..errors import OptionError, UnsuitableSystemError
 from ..numerics import state_space
 from ..numerics.arrays import FloatArray
 from ..numerics.modes import Part, split_modes
 from .delay_line import DelayLineController
-from .delay_robustness import delay_robustness
+from .loop_check import loop_check, refuse_unstable, warn_of
 from .predictor_filter import predictor_filter, removed_part
 from .siso import delayed_system, same_rate
 
@@ -57,9 +56,9 @@ def smith_predictor(
     -------
     DelayLineController
         A `control.StateSpace` from error to plant input. Its attributes tell what it is made of:
-        ``model``, ``primary``, ``filter_time``, ``removed_poles``, and ``robustness``, a
-        `DelayRobustness` over the identified interval of the dead time (None if the system does
-        not carry one).
+        ``model``, ``primary``, ``filter_time``, ``removed_poles``, ``check``, a `LoopCheck` of
+        the loop on `system` itself, and ``robustness``, its `DelayRobustness` at the ends of the
+        identified interval of the dead time (None if the system does not carry one).
 
     Warns
     -----
@@ -72,7 +71,7 @@ def smith_predictor(
     UnsuitableSystemError
         An unstable core: its modes would be hidden inside the predictor and grow there. An
         integrating core without `filter_time`, for the same reason. A continuous, improper or
-        multi-channel system.
+        multi-channel system. A controller that makes the loop unstable on `system` itself.
     OptionError
         A filter that is no filter.
 
@@ -117,31 +116,35 @@ def smith_predictor(
         np.asarray(core.C),
         lambda z: bool(np.any(np.abs(z - drop) < 1e-9 * (1 + abs(z)))),
     )
-    predictor = _assemble(plant, primary, removed, kept, _filter(seconds, plant, slow, integrating))
-    parts = (*predictor, plant.dt)
+    A, B, C, D, E, h, pulses = _assemble(
+        plant, primary, removed, kept, _filter(seconds, plant, slow, integrating)
+    )
     notes = {
         "model": plant,
         "primary": DelayedStateSpace(primary, 0, name=primary.name),
         "filter_time": seconds,
         "removed_poles": drop,
-        "robustness": None,
     }
-    labels = {"inputs": "e", "outputs": plant.input_labels[0]}
-    made = DelayLineController(*parts, name=name, notes=notes, **labels)
-    if getattr(plant.fit, "dead_time_interval", None) is None or d == 0:
-        return made
-    checked = delay_robustness(plant, made)
-    if not checked.stable:
-        low, high = checked.dead_time_interval
-        warnings.warn(
-            ModelWarning(
-                f"the loop is unstable for some dead time in {low:.4g}...{high:.4g} s, the "
-                f"interval that the identification gave (stable from {checked.stable_from:.4g} to "
-                f"{checked.stable_to:.4g} s); give a longer filter_time or a slower controller"
-            ),
-            stacklevel=2,
+
+    def made(**more: Any) -> DelayLineController:
+        return DelayLineController(
+            *(A, B, C, D, E, h, float(plant.dt)),
+            name=name,
+            inputs="e",
+            outputs=plant.input_labels[0],
+            notes={**notes, **more},
+            pulses=pulses,
         )
-    return DelayLineController(*parts, name=name, notes={**notes, "robustness": checked}, **labels)
+
+    check = loop_check(plant, made())
+    refuse_unstable(
+        check,
+        "the Smith predictor",
+        "Its closed loop is that of core and controller alone: give a controller whose loop with "
+        "system.delay_free is stable (design.margins(system.delay_free, controller))",
+    )
+    warn_of(check, "give a longer filter_time or a slower controller", stacklevel=3)
+    return made(check=check, robustness=check.robustness)
 
 
 def _refuse_unstable(poles: FloatArray) -> None:
@@ -185,8 +188,11 @@ def _assemble(
     removed: Part,
     kept: Part,
     filter_: tuple[FloatArray, FloatArray, FloatArray, float],
-) -> tuple[FloatArray, ...]:
-    """Matrices of u = C v, v = F (e + y_d) - y_0, with states [x_c; x_d; x_F] and the line."""
+) -> tuple[Any, ...]:
+    """Matrices of u = C v, v = F (e + y_d) - y_0, with states [x_c; x_d; x_F] and the line.
+
+    Last the pulse response that all but the last column of the line are made of.
+    """
     core, d = plant.delay_free, int(plant.delay)
     Ac, Bc, Cc, Dc = (
         np.asarray(M, dtype=np.float64) for M in (primary.A, primary.B, primary.C, primary.D)
@@ -196,7 +202,7 @@ def _assemble(
     nc, nk, nf = Ac.shape[0], Ak.shape[0], Af.shape[0]
     if d == 0:
         # Nothing to predict, and with F = 1 nothing to filter: the controller itself.
-        return Ac, Bc, Cc, Dc, np.zeros((nc, 0)), np.zeros((1, 0))
+        return Ac, Bc, Cc, Dc, np.zeros((nc, 0)), np.zeros((1, 0)), None
     taps = state_space.markov(core.A, core.B, core.C, core.D, d + 1)[0, 0]
     direct = float(core.D[0, 0])
     # Rows over [x_c, x_d, x_F], the line and e.
@@ -227,4 +233,7 @@ def _assemble(
         A[nc + nk :, nc + nk :] = Af
         E[nc + nk :, -1] = Bf[:, 0] * direct + removed_part(filter_, removed)[:, 0]
         B[nc + nk :] = Bf
-    return A, B, out[0], out[2], E, out[1]
+    # The line holds -taps alone, through the controller's B and D.
+    mix = -np.vstack([Bc, np.zeros((nk + nf, 1)), Dc]) / solve
+    core_A, core_B, core_C = (np.asarray(M, np.float64) for M in (core.A, core.B, core.C))
+    return A, B, out[0], out[2], E, out[1], (core_A, core_B, mix @ core_C)

@@ -127,3 +127,59 @@ def test_the_best_of_a_comparison_is_stable_over_the_interval():
     none = cr.design.compare_pid(unsure, ["simc"], ["PI"])
     with pytest.raises(OptionError, match="1 are unstable within the interval"):
         none.best(max_sensitivity=5)
+
+
+def output_weight(plant):
+    return plant.delay_free.C.T @ plant.delay_free.C
+
+
+DESIGNS = {
+    "smith_predictor": lambda plant: cr.design.smith_predictor(
+        plant, cr.design.PIDController(3.0, 0.08, dt=0.001)
+    ),
+    "predictor_lqr": lambda plant: cr.design.predictor_lqr(plant, output_weight(plant), 0.001),
+    "lqg": lambda plant: cr.design.lqg(plant, output_weight(plant), 0.001, 1.0, 0.01),
+}
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_every_design_function_says_what_the_interval_of_the_dead_time_does(design):
+    made = DESIGNS[design](quick())
+    assert made.check.stable
+    assert made.check.robustness is None
+    assert "on its own model" in made.report()
+    limit = 0.029 + made.check.margins.delay_margin
+    sure = quick().replace(fit=FitWithInterval((0.0289, 0.0291)))
+    assert DESIGNS[design](sure).check.stable_within_interval
+    unsure = quick().replace(fit=FitWithInterval((0.0289, limit + 0.002)))
+    with pytest.warns(ModelWarning, match="unstable for some dead time") as warned:
+        made = DESIGNS[design](unsure)
+    assert warned[0].filename == __file__
+    assert made.check.stable_within_interval is False
+    assert "UNSTABLE somewhere" in made.report()
+
+
+def test_the_loop_of_a_state_feedback_ends_where_brute_force_says():
+    """The core's state is measured, the delay of the plant is not the one that was expected."""
+    plant = quick()
+    law = cr.design.predictor_lqr(plant, output_weight(plant), 0.001)
+    core, d, gain = plant.delay_free, plant.delay, law.gain[0]
+    limit = d + int(np.ceil(law.check.margins.delay_margin_samples)) - 1
+
+    def radius(delay):
+        n = 1 + max(delay, d)
+        A = np.diag(np.ones(n - 2), -1) if n > 2 else np.zeros((n - 1, n - 1))
+        full = np.zeros((n, n))
+        full[0, 0] = core.A[0, 0]
+        full[0, delay] = core.B[0, 0]
+        full[1:, 1:] = A
+        full[1, : d + 1] = -gain
+        return np.abs(np.linalg.eigvals(full)).max()
+
+    assert radius(d) < 1
+    assert radius(limit) < 1 < radius(limit + 1)
+
+
+def test_a_smith_predictor_of_a_loop_that_is_unstable_is_refused():
+    with pytest.raises(UnsuitableSystemError, match="core and controller alone"):
+        cr.design.smith_predictor(quick(), cr.design.PIDController(-3.0, 0.08, dt=0.001))
