@@ -100,17 +100,6 @@ def test_a_disk_that_is_full_while_rows_are_kept_loses_no_result(files, tmp_path
     assert len(store) == 0
 
 
-def test_results_that_cannot_be_written_leave_the_rows(files, tmp_path, capsys, monkeypatch):
-    def full(*_, **__):
-        raise OSError(errno.ENOSPC, "No space left on device", "report.html")
-
-    monkeypatch.setattr("ctrl_realize.cli.results.report.write_campaign", full)
-    assert main(["identify", *files, "-o", str(tmp_path / "out"), *FAST]) == 2
-    assert capsys.readouterr().err == "ctrl-realize: report.html: No space left on device\n"
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"rows"}
-    assert len(list((tmp_path / "out" / "rows").iterdir())) == COUNT
-
-
 def test_records_kept_apart_stay_when_the_next_is_interrupted(files, tmp_path, monkeypatch):
     from ctrl_realize.cli import identify_command
 

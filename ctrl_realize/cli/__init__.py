@@ -2,58 +2,11 @@
 
 from __future__ import annotations
 
-import functools
+import signal
 import sys
-import warnings
+import threading
 from collections.abc import Sequence
-from typing import Any
-
-import typer
-from threadpoolctl import threadpool_limits
-from typer.main import get_command
-
-from ..errors import CtrlRealizeError
-from .compare_command import compare
-from .demo_command import demo
-from .identify_command import identify
-from .terminal import EXIT_CODES, complain, one_line, plain_warning
-
-INTERRUPTED = 130
-
-app = typer.Typer(
-    name="ctrl-realize",
-    help="Models with dead time from measured responses, as python-control state-space systems.",
-    epilog=EXIT_CODES,
-    add_completion=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command(epilog=EXIT_CODES)(identify)
-app.command(epilog=EXIT_CODES)(compare)
-app.command(epilog=EXIT_CODES)(demo)
-
-
-def _version(asked: bool) -> None:
-    if asked:
-        from importlib import metadata
-
-        typer.echo(f"ctrl-realize {metadata.version('ctrl-realize')}")
-        raise typer.Exit
-
-
-@app.callback()
-def _common(
-    version: bool = typer.Option(
-        False, "--version", callback=_version, is_eager=True, help="Say the version and stop."
-    ),
-) -> None:
-    """Models with dead time from measured responses, as python-control state-space systems."""
-
-
-@functools.cache
-def _command() -> Any:
-    """Build the commands once, also where a program calls `main` again and again."""
-    return get_command(app)
+from types import FrameType
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -68,29 +21,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         0: done. 1: done, but some records or the report failed. 2: wrong usage or unusable input;
-        nothing was written. 130: interrupted.
+        nothing was written. 3: a defect of this program, with its traceback. 130: interrupted.
+        143: terminated by the system.
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
-    command = _command()
-    # Our matrices are small: on a busy machine BLAS threads that wait for each other cost ten
-    # times what they save. Processes are what --jobs is for.
-    with threadpool_limits(limits=1), warnings.catch_warnings():
-        warnings.showwarning = plain_warning
-        try:
-            code = command.main(words, prog_name="ctrl-realize", standalone_mode=False)
-        except (KeyboardInterrupt, typer.Abort):
-            code = INTERRUPTED
-        except BrokenPipeError:
-            return 1
-        except (CtrlRealizeError, OSError) as error:
-            complain(one_line(error))
-            return 2
-        except Exception as error:
-            # Typer's errors of usage: which package they come from depends on its version.
-            if not hasattr(error, "format_message"):
-                raise
-            complain(one_line(error.format_message()) + " (see --help)")
-            return 2
-    if code == INTERRUPTED:  # typer tells of it by an exception or by the code
-        complain("interrupted; what was not finished is not written")
-    return code if isinstance(code, int) else 0
+    stopped = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stopped.append(number)
+        raise KeyboardInterrupt
+
+    # Loading takes a second or more. An interruption in compiled code that is being loaded comes
+    # out as any error, or as none.
+    ours = (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
+    try:
+        if ours:
+            signal.signal(signal.SIGINT, stop)
+        from .commands import run
+    except BaseException:
+        if not stopped:
+            raise
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+    if stopped:
+        sys.stderr.write("ctrl-realize: interrupted\n")
+        return 130
+    return run(words)

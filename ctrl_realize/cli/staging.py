@@ -82,6 +82,7 @@ def kept_rows(output: Path) -> Iterator[CampaignStore]:
     try:
         yield store
     except KeyboardInterrupt:
+        store.forget_attempts()
         if len(store):
             complain(
                 f"{len(store)} finished records are kept in {printable(str(store.folder))}; the "
@@ -104,6 +105,7 @@ def refuse_a_file(output: Path) -> None:
 
 def _remove_rows(store: CampaignStore, made: Sequence[Path]) -> None:
     """Remove the rows of a store, and of the folders made for it those that are empty."""
+    store.forget_attempts()
     for path in store.folder.glob("row-*.json"):
         path.unlink(missing_ok=True)
     for folder in (store.folder, *made):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
@@ -10,18 +11,29 @@ import typer
 
 EXIT_CODES = (
     "Exit codes: 0 done; 1 done, but some records or the report failed; 2 wrong usage or unusable "
-    "input, nothing written; 130 interrupted."
+    "input, nothing written; 3 a defect of the program; 130 interrupted; 143 terminated."
 )
 
 
 def say(text: str = "") -> None:
-    """Write to stdout."""
-    typer.echo(text)
+    """Write to stdout; a reader that has gone (``| head``) costs nothing but its reading."""
+    _write(text, to_stderr=False)
 
 
 def complain(text: str) -> None:
     """Write one line to stderr."""
-    typer.echo(f"ctrl-realize: {text}", err=True)
+    _write(f"ctrl-realize: {text}", to_stderr=True)
+
+
+def _write(text: str, *, to_stderr: bool) -> None:
+    try:
+        typer.echo(text, err=to_stderr)
+    except BrokenPipeError:
+        # what is in the buffer, and all that follows, goes nowhere
+        stream = sys.stderr if to_stderr else sys.stdout
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 def one_line(problem: object) -> str:

@@ -6,6 +6,7 @@ import functools
 import hashlib
 import warnings
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from importlib import metadata
 from typing import Any, Protocol
@@ -120,6 +121,16 @@ class RowStore(Protocol):
         """Keep a row; return it as `load` will."""
         ...
 
+    def attempt(self, key: str) -> AbstractContextManager[None]:
+        """Note that a record is being identified, as long as the block lasts.
+
+        Raises
+        ------
+        DataError
+            The process has died over it before, so often that it is not tried again.
+        """
+        ...
+
 
 def identify_row(
     source: RecordSource,
@@ -129,7 +140,7 @@ def identify_row(
     store: RowStore | None,
 ) -> CampaignRow:
     """Identify one record; what stops it becomes the row's error."""
-    row = CampaignRow(spelled_out(_source_name(source, position)))
+    row = CampaignRow(source_name(source, position))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -144,7 +155,8 @@ def identify_row(
             kept = store.load(key) if store is not None else None
             if kept is not None:
                 return replace(kept, name=row.name)
-            row = _with_model(row, identify(record, method=method, **options))
+            with store.attempt(key) if store is not None else nullcontext():
+                row = _with_model(row, identify(record, method=method, **options))
         except Exception as error:
             # Whatever it is, also in a function of the caller's that reads files, the other
             # records go on. It is cheap and may be mended by then: tried again on resuming.
@@ -230,11 +242,11 @@ def _gain(system: DelayedStateSpace) -> float:
     return complex(system(1.0, warn_infinite=False)).real
 
 
-def _source_name(source: RecordSource, position: int) -> str:
-    if isinstance(source, Record):
-        return source.name or f"record {position}"
+def source_name(source: RecordSource, position: int) -> str:
+    """Name a record before it is read: by the first argument of the function that reads it."""
     arguments = getattr(source, "args", ())
-    return str(arguments[0]) if arguments else f"record {position}"
+    known = source.name if isinstance(source, Record) else str(arguments[0]) if arguments else ""
+    return spelled_out(known) or f"record {position}"
 
 
 def _amplitude(record: Record) -> float:

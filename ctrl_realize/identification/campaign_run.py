@@ -11,7 +11,8 @@ from ..checks import one_of
 from ..errors import DataError, OptionError
 from ..signals import Record
 from .campaign import Campaign
-from .campaign_row import CampaignRow, RecordSource, RowStore, identify_row
+from .campaign_row import CampaignRow, RecordSource, RowStore
+from .campaign_workers import identified
 from .identify import METHODS, Method, identify
 
 
@@ -33,7 +34,8 @@ def identify_campaign(
         record is identified, so that files are read by the workers, one at a time, and a file
         that cannot be read is a row with its error.
     n_jobs : int, optional
-        Processes to use (joblib; -1 for all cores). The result does not depend on it. Inside
+        Processes to use (joblib; -1 for all cores). The result does not depend on it. A record
+        whose process is killed by the system, twice, is a row that says so. Inside
         joblib's ``parallel_config(backend="dask")`` the work goes to a Dask cluster.
     method : {"output_error", "scan", "paper"}, optional
     progress : bool, optional
@@ -67,8 +69,6 @@ def identify_campaign(
     >>> campaign.delays
     array([53., 55., 59.])
     """
-    from joblib import Parallel, delayed  # not needed by who identifies one record
-
     one_of(method, "method", METHODS)
     _check_options(options)
     if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or not 0 < abs(n_jobs) <= 10_000:
@@ -84,12 +84,10 @@ def identify_campaign(
                 f"records[{position}] is a {type(source).__name__}; needed is a Record, or a "
                 "function that returns one (functools.partial(read_record, path))"
             )
-    tasks = (
-        delayed(identify_row)(source, position, method, options, store)
-        for position, source in enumerate(sources)
-    )
-    rows = Parallel(n_jobs=n_jobs, return_as="generator")(tasks)
-    return Campaign(tuple(_with_bar(rows, len(sources), progress)), tuple(sources), method, options)
+    found = identified(sources, n_jobs, method, options, store)
+    rows = dict(_with_bar(found, len(sources), progress))
+    in_order = tuple(rows[position] for position in range(len(sources)))
+    return Campaign(in_order, tuple(sources), method, options)
 
 
 def _check_options(options: dict[str, Any]) -> None:
@@ -100,8 +98,8 @@ def _check_options(options: dict[str, Any]) -> None:
 
 
 def _with_bar(
-    rows: Iterable[CampaignRow], total: int, progress: bool | None
-) -> Iterator[CampaignRow]:
+    rows: Iterable[tuple[int, CampaignRow]], total: int, progress: bool | None
+) -> Iterator[tuple[int, CampaignRow]]:
     with warnings.catch_warnings():
         # In a notebook without ipywidgets tqdm warns, and falls back to text by itself.
         warnings.filterwarnings("ignore", message="IProgress not found")

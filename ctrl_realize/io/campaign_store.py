@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileFormatError, OptionError
+from ..errors import DataError, FileFormatError, OptionError
 from ..identification.campaign_row import CampaignRow, versions
 from ..identification.packed_model import PackedModel
 from ..results import Flag
@@ -21,6 +23,9 @@ FORMAT = "ctrl_realize campaign row"
 SCHEMA = 3
 _NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain")
 
+MOST_TRIES = 2
+"""Times that a process may die over a record."""
+
 
 class CampaignStore:
     """Folder that keeps the result of each record of a campaign as it is finished.
@@ -29,7 +34,8 @@ class CampaignStore:
     samples, of the settings and of the versions of this package, NumPy and SciPy, and holding that
     of its own content; processes and machines that share the folder can write to it at once. What
     another version has made, or a file that is damaged, is not taken: the record is identified
-    anew. Only this package's files are ever read, and none is deleted.
+    anew. Only this package's files are ever read, and no row is deleted. A record over which the
+    process was killed twice is not tried again: its row says so.
 
     Parameters
     ----------
@@ -100,6 +106,46 @@ class CampaignStore:
         content["sha256"] = _checksum(content)
         write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
         return _row_from(content, key)
+
+    @contextmanager
+    def attempt(self, key: str) -> Iterator[None]:
+        """Note that the record with this key is being identified, as long as the block lasts.
+
+        A process that is killed in the block leaves the note, so that a record which exhausts the
+        memory is not tried for ever.
+
+        Raises
+        ------
+        DataError
+            The process has died twice over this record.
+        """
+        path = self.folder / f"tried-{key}.txt"
+        count = _count(path)
+        if count >= MOST_TRIES:
+            raise DataError(
+                f"the process was killed {count} times while it identified this record (most often "
+                f"the memory is exhausted); remove {path} to try again"
+            )
+        with suppress(OSError):  # a full disk costs the note, not the result
+            write_text(path, f"{count + 1}\n")
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                path.unlink()
+
+    def forget_attempts(self) -> None:
+        """Remove the notes of records under way: a caller who stops a run has killed nobody."""
+        for path in self.folder.glob("tried-*.txt"):
+            path.unlink(missing_ok=True)
+
+
+def _count(path: Path) -> int:
+    """Number in a note; none in one that is damaged or not there."""
+    try:
+        return int(usable_file(path, 100).read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return 0
 
 
 def _row_from(content: Any, key: str) -> CampaignRow:

@@ -149,14 +149,16 @@ def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are those of POSIX")
-def test_a_pipe_in_the_place_of_a_row_is_not_waited_for(records, tmp_path):
+def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records, tmp_path):
     store = cr.CampaignStore(tmp_path)
     first = cr.identify_campaign(records[:1], method="paper", store=store)
     (path,) = tmp_path.glob("row-*.json")
     path.unlink()
     os.mkfifo(path)
-    assert_same_results(first, cr.identify_campaign(records[:1], method="paper", store=store))
-    assert path.is_file()
+    again = cr.identify_campaign(records[:1], method="paper", store=store)
+    assert again.delays == first.delays
+    assert "is not replaced" in again.rows[0].warnings[-1]
+    assert path.is_fifo()
 
 
 def test_a_file_is_no_store(tmp_path):

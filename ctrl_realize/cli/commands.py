@@ -1,0 +1,92 @@
+"""The commands put together, and how each of their ends becomes an exit code."""
+
+from __future__ import annotations
+
+import functools
+import traceback
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+from threadpoolctl import threadpool_limits
+from typer.main import get_command
+
+from ..errors import CtrlRealizeError
+from .compare_command import compare
+from .demo_command import demo
+from .identify_command import identify
+from .stopping import INTERRUPTED, stopped_by_signals
+from .terminal import EXIT_CODES, complain, one_line, plain_warning
+
+app = typer.Typer(
+    name="ctrl-realize",
+    help="Models with dead time from measured responses, as python-control state-space systems.",
+    epilog=EXIT_CODES,
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command(epilog=EXIT_CODES)(identify)
+app.command(epilog=EXIT_CODES)(compare)
+app.command(epilog=EXIT_CODES)(demo)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib import metadata
+
+        typer.echo(f"ctrl-realize {metadata.version('ctrl-realize')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Say the version and stop."
+    ),
+) -> None:
+    """Models with dead time from measured responses, as python-control state-space systems."""
+
+
+DEFECT = 3
+
+
+@functools.cache
+def _command() -> Any:
+    """Build the commands once, also where a program calls `main` again and again."""
+    return get_command(app)
+
+
+def run(words: Sequence[str]) -> int:
+    """Run a command and return its exit code."""
+    command = _command()
+    # Our matrices are small: on a busy machine BLAS threads that wait for each other cost ten
+    # times what they save. Processes are what --jobs is for.
+    with threadpool_limits(limits=1), warnings.catch_warnings(), stopped_by_signals() as ending:
+        warnings.showwarning = plain_warning
+        try:
+            code = command.main(list(words), prog_name="ctrl-realize", standalone_mode=False)
+        except (KeyboardInterrupt, typer.Abort):
+            code = INTERRUPTED
+        except BrokenPipeError:
+            return 1
+        except (CtrlRealizeError, OSError) as error:
+            complain(one_line(error))
+            return 2
+        except MemoryError as error:
+            complain(f"the memory is exhausted: {one_line(error) or 'no more is given'}")
+            return 2
+        except Exception as error:
+            # Typer's errors of usage: which package they come from depends on its version.
+            if not hasattr(error, "format_message"):
+                complain("".join(traceback.format_exception(error)))
+                complain("this is a defect of the program; please report it with the lines above")
+                return DEFECT
+            complain(one_line(error.format_message()) + " (see --help)")
+            return 2
+    if code == INTERRUPTED:  # typer tells of it by an exception or by the code
+        code = ending.code or INTERRUPTED
+        how = "interrupted" if code == INTERRUPTED else "terminated"
+        complain(f"{how}; what was not finished is not written")
+    return code if isinstance(code, int) else 0
