@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 
 import control as ct
@@ -10,6 +11,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.report.verdict import campaign_verdict
+from tests.rigs import R1, step_record
 
 PLANT = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=0.001)
 INTEGRATING = cr.delayed_ss(ct.tf([1], [1, 0]), dead_time=0.1, dt=0.01)
@@ -46,6 +48,62 @@ CASES = {
     ).check(cr.design.pid(PLANT)),
     "a proportional controller": lambda: cr.design.PIDController(2.0),
 }
+
+
+IMPULSE = cr.ImpulseResponse(PLANT.markov(300), PLANT.dt)
+STEP = step_record(R1, noise=1e-3, before=150, after=400)
+OMEGA = np.geomspace(0.5, 60, 30)
+FRF = cr.MeasuredFRF(PLANT(np.exp(1j * OMEGA * PLANT.dt)), OMEGA / 2 / np.pi)
+
+
+def driven():
+    u = np.random.default_rng(1).standard_normal(400)
+    y = PLANT.simulate(u) + 1e-3 * np.random.default_rng(2).standard_normal(400)
+    return cr.Record(0.001 * np.arange(400), u, y)
+
+
+def one_lag(record):
+    return cr.fit_delay(record, structures=[(1, 1)])
+
+
+RESULTS = {
+    "a fit of lags": lambda: one_lag(STEP).fit,
+    "a fit of several records": lambda: one_lag([STEP, STEP]).fit,
+    "a realization": lambda: cr.realize(IMPULSE, 1, delay=30).fit,
+    "a scan of delays": lambda: cr.estimate_delay(IMPULSE, 1, max_delay=60).fit,
+    "a scan of orders": lambda: cr.scan_orders(IMPULSE, 2, max_delay=60),
+    "a fit of channels": lambda: cr.fit_channels(driven(), 1, delays=[[30]]).fit,
+    "an impulse response": lambda: cr.impulse_from_io(driven(), 60, method="least_squares"),
+    "a frequency response": lambda: FRF,
+    "a fit of it": lambda: cr.fit_frf(FRF, order=1).fit,
+    "a comparison": lambda: cr.compare_frf(PLANT, FRF),
+    "margins": lambda: cr.design.margins(PLANT, cr.design.pid(PLANT)),
+    "a check of residuals": lambda: cr.check_residuals(PLANT, driven()),
+    "a check of the delay": lambda: cr.check_delay(frf=FRF),
+    "a bootstrap": lambda: cr.bootstrap(STEP, one_lag, repeats=3),
+    "a record": lambda: STEP,
+    "a step response": lambda: cr.unit_step(STEP),
+    "a system": lambda: PLANT,
+}
+
+
+@pytest.mark.parametrize("case", RESULTS)
+def test_a_result_says_itself_in_a_line_and_with_units_in_a_report_and_comes_back(case):
+    result = RESULTS[case]()
+    line = repr(result)
+    assert "\n" not in line
+    assert not re.search(r"\b(nan|inf)\b", line)
+    twin = pickle.loads(pickle.dumps(result))
+    assert repr(twin) == line
+    if hasattr(result, "report"):
+        report = result.report()
+        assert twin.report() == report
+        title, *rows = report.splitlines()
+        assert title.strip()
+        assert rows
+        # a name and its value apart, a choice, or a flag
+        assert all(re.match(r"  ([-!] |\S.*\S  +\S| +\S)", row) for row in rows), report
+        assert not re.search(r"\b(nan|inf)\b", report)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -100,7 +100,7 @@ DEFECTS = (
     _d("hum", "a sine in the rest is not seen", "while n >= 64 and len(found) < most:",
        "while False:", "noise", KERNELS),
     _d("rounding as noise", "an undithered output has no noise at all",
-       "floor = quantum / np.sqrt(12)", "floor = 0.0", "noise quant", KERNELS),
+       "floor = quantum / np.sqrt(12)", "floor = 0.0", "noise quant step_ delay_fit.py", KERNELS),
     # --- edges and onset
     _d("edge late", "the step is put on the last sample at rest",
        "first = int(resting[-1]) + 1 if resting.size else 0",
@@ -113,68 +113,68 @@ DEFECTS = (
        "threshold: float = 3.84", "threshold: float = 1.0", "profile interval", KERNELS),
     _d("std of the interval", "twice the standard deviation",
        "interval = low, high, (last - first) / 3.92", "interval = low, high, (last - first) / 1.96",
-       "likelihood interval", FITS),
+       "likelihood interval decisions joint_fit delay_fit", FITS),
     _d("plausible structures", "structures that the data do not rule out leave the interval",
-       "PLAUSIBLE = 10.0", "PLAUSIBLE = 0.01", "structure likelihood delay_fit", FITS),
+       "PLAUSIBLE = 10.0", "PLAUSIBLE = 0.01", "structure likelihood decisions delay_fit", FITS),
     _d("least charge", "structures with needless zeros widen the interval of short records",
-       "more = max(LEAST_CHARGE - whole.penalty, 0.0)", "more = 0.0", "likelihood", FITS),
+       "more = max(LEAST_CHARGE - whole.penalty, 0.0)", "more = 0.0", "likelihood decisions delay_fit any_input", FITS),
     _d("open beginning", "a zero that imitates a smooth onset leaves the interval narrow",
        "open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0",
-       "open_start = False", "likelihood delay_fit", FITS),
+       "open_start = False", "likelihood delay_fit flags", FITS),
     _d("chain like a flow", "a long chain of lags forgets that a flow looks the same",
        "if like_flow := _like_a_flow(choice, flows):", "if like_flow := False:",
-       "likelihood flow many_lags", FITS),
+       "likelihood flow many_lags flags", FITS),
     _d("endless chain", "chains that get better with every lag still have a firm delay",
        "if endless := still_improving(tanks):", "if endless := False:",
-       "likelihood many_lags", FITS),
+       "likelihood many_lags flags", FITS),
     _d("views narrow", "where no model is adequate the interval leaves out the latest view",
        "low, high = float(delays[1]), float(delays[-1])",
-       "low, high = float(delays[1]), float(delays[-2])", "output_error delay_fit", FITS),
+       "low, high = float(delays[1]), float(delays[-2])", "output_error decisions delay_fit", FITS),
     _d("records that differ", "jitter from record to record does not widen the interval",
-       "if repeats.p_value >= 0.01:", "if True:", "averaging several", FITS),
+       "if repeats.p_value >= 0.01:", "if True:", "averaging several decisions", FITS),
     # --- choices of the fit
     _d("coloured noise ignored", "noise is never made white", "if adequate and whiten:",
-       "if False:", "output_error coloured", FITS),
+       "if False:", "output_error coloured decisions", FITS),
     _d("every model adequate", "a residual with structure passes for noise",
-       "if whole.misfit <= ADEQUATE * data.colour:", "if True:", "output_error delay_fit", FITS),
+       "if whole.misfit <= ADEQUATE * data.colour:", "if True:", "output_error delay_fit decisions", FITS),
     _d("needless zeros", "zeros and poles cost nothing more",
        "NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0",
-       "NEEDLESS_ZERO, NEEDLESS_POLE = 0.0, 0.0", "structure delay_choice", FITS),
+       "NEEDLESS_ZERO, NEEDLESS_POLE = 0.0, 0.0", "structure delay_choice decisions delay_fit", FITS),
     _d("no chains", "equal lags are never taken for a chain",
        "if better is not None and better.criterion < level:", "if False:",
-       "delay_choice many_lags", FITS),
+       "delay_choice many_lags flags", FITS),
     _d("no flows", "axial dispersion never takes the place of lags",
-       "if flow is None or flow.criterion >= lags.level:", "if True:", "delay_choice flow", FITS),
+       "if flow is None or flow.criterion >= lags.level:", "if True:", "delay_choice flow flags", FITS),
     _d("unlike noise", "what the noise cannot explain is made white all the same",
        "if colour > _UNLIKE**2:", "if False:", "coloured_fit coloured", FITS),
     _d("steps from anything", "an input that never holds a level is taken for steps",
-       "_HOLDS = 0.2", "_HOLDS = 1e3", "delay_fit_steps any_input", FITS),
+       "_HOLDS = 0.2", "_HOLDS = 1e3", "delay_fit_steps any_input decisions", FITS),
     # --- flags
     _d("delay at its bound", "a delay at max_delay is not flagged",
-       "if fit.high < 0.98 * fit.latest:", "if True:", "fit_flags delay_fit", FITS),
+       "if fit.high < 0.98 * fit.latest:", "if True:", "flags delay_fit", FITS),
     _d("no delay at all", "that no dead time fits as well is not flagged",
-       "if fit.low > _SAMPLES_BESIDE_NOTHING * dt:", "if True:", "fit_flags delay_fit", FITS),
+       "if fit.low > _SAMPLES_BESIDE_NOTHING * dt:", "if True:", "flags delay_fit", FITS),
     _d("not settled", "a record that ends early is not flagged", "if slowest < 2.0:", "if False:",
-       "fit_flags delay_fit", FITS),
+       "flags delay_fit", FITS),
     _d("integrator", "an integrating plant is not flagged", "if slowest < INTEGRATOR:", "if False:",
-       "fit_flags delay_fit", FITS),
+       "flags delay_fit", FITS),
     _d("outliers", "samples far off the model are not flagged",
-       "elif fit.adequate and wild > 0.002:", "elif False:", "fit_flags delay_fit", FITS),
+       "elif fit.adequate and wild > 0.002:", "elif False:", "flags delay_fit", FITS),
     # --- choices of the method
     _d("modes never asked", "a plant that rings keeps its lags, whatever they leave",
-       "if stepped or known is not None:", "if True:", "identify mode_choice", FITS),
+       "if stepped or known is not None:", "if True:", "identify mode_choice decisions", FITS),
     _d("modes for nothing", "any gain of the criterion replaces lags by modes",
-       "if gain > CLEAR and not late:", "if not late:", "mode_choice identify", FITS),
+       "if gain > CLEAR and not late:", "if not late:", "mode_choice identify decisions", FITS),
     _d("never OKID", "a lightly damped plant is not given to OKID",
-       "CLEARLY = 0.5", "CLEARLY = 0.0", "pulse_choice pulse from_io", FITS),
+       "CLEARLY = 0.5", "CLEARLY = 0.0", "pulse_choice pulse from_io decisions", FITS),
     _d("response cut off", "the length of a response does not grow with what is left at its end",
-       "if length is not None or not tail or count == most:", "if True:", "from_io", FITS),
+       "if length is not None or not tail or count == most:", "if True:", "from_io decisions", FITS),
     _d("delays of channels", "delays of several channels stay where the search begins",
-       "if better.bic >= best.bic:", "if True:", "channel_search channel_fit", FITS),
+       "if better.bic >= best.bic:", "if True:", "channel_search channel_fit decisions", FITS),
     _d("silent output", "an output of pure noise is not flagged",
-       "gain < count * np.log(found.counts)", "gain < 0", "channel_search channel_fit", FITS),
+       "gain < count * np.log(found.counts)", "gain < 0", "channel_search channel_fit decisions", FITS),
     _d("order by the noise", "orders that only follow the noise are suggested", "ABOVE_NOISE = 1.3",
-       "ABOVE_NOISE = 0.0", "order", FITS),
+       "ABOVE_NOISE = 0.0", "order decisions", FITS),
     # --- correlation, frequency responses
     _d("cross-correlation", "lags have the wrong sign",
        "product = np.fft.rfft(x, n=points) * np.conj(np.fft.rfft(y, n=points))",
@@ -215,6 +215,7 @@ def main() -> int:
     parser.add_argument("words", nargs="*", help="words of names; none: all defects")
     parser.add_argument("--tree", type=Path, default=ROOT, help="the project to be spoilt")
     parser.add_argument("--write", type=Path, help="file for the results, as JSON; resumed")
+    parser.add_argument("--named", action="store_true", help="only files whose names fit a defect")
     parser.add_argument("--list", action="store_true", help="only say what is wrong in each")
     asked = parser.parse_args()
     chosen = [d for d in DEFECTS if not asked.words or any(w in d.name for w in asked.words)]
@@ -228,7 +229,7 @@ def main() -> int:
     for defect in chosen:
         if defect.name in done:
             continue
-        done[defect.name] = result = _tried(defect, asked.tree.resolve())
+        done[defect.name] = result = _tried(defect, asked.tree.resolve(), asked.named)
         print(f"{defect.name:28} {result['result']:10} {result['seconds']:5} s  {result['by']}")
         sys.stdout.flush()
         if asked.write is not None:
@@ -238,7 +239,7 @@ def main() -> int:
     return 0
 
 
-def _tried(defect: Defect, tree: Path) -> dict[str, str | int]:
+def _tried(defect: Defect, tree: Path, named: bool) -> dict[str, str | int]:
     """Run the tests on a spoilt copy: found, not found, no end, or no such text."""
     begun = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
@@ -259,7 +260,7 @@ def _tried(defect: Defect, tree: Path) -> dict[str, str | int]:
             if any(word in path.name for word in words)
         ]
         rest = [str(copy / "tests" / name) for name in folders if (copy / "tests" / name).exists()]
-        for paths in (first, rest):
+        for paths in (first,) if named else (first, rest):
             if result == "not found" and paths:
                 result, by = _run(paths, copy)
     return {"result": result, "seconds": round(time.monotonic() - begun), "by": by}

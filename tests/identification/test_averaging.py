@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 from scipy.special import chdtrc
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError
 from ctrl_realize.identification.averaging import (
     MeanStep,
     aligned_steps,
@@ -45,36 +44,10 @@ K = np.arange(200)
 SHAPE = 1 - np.exp(-K / 20)
 
 
-def test_records_of_different_sample_times_are_refused_by_name():
-    slow = records([SHAPE], dt=0.02, names=["slow"])
-    with pytest.raises(DataError, match=r"'slow' has dt=0.02 s, the first has 0.01 s"):
-        aligned_steps(records([SHAPE]) + slow)
-    # clocks that differ by rounding are the same clock
-    assert len(aligned_steps(records([SHAPE]) + records([SHAPE], dt=0.01 * (1 + 1e-9)))) == 2
-
-
-def test_the_mean_covers_what_all_records_have():
-    long, short = records([SHAPE], before=80)[0], records([SHAPE[:150]], before=30)[0]
-    mean = mean_step(aligned_steps((long, short)))
-    assert (mean.edge, mean.dt) == (30, pytest.approx(0.01))
-    assert_allclose(mean.output, np.r_[np.zeros(30), SHAPE[:150]], atol=1e-14)
-    assert_allclose(mean.input, np.r_[np.zeros(30), np.ones(150)], atol=1e-14)
-    assert (mean.used, mean.left_out) == ((0, 1), ())
-
-
 def test_records_count_by_the_square_of_their_amplitude():
     # noise per unit of input falls with the amplitude
     mean = mean_step(steps([SHAPE, 1.2 * SHAPE], [1.0, -3.0]))
     assert_allclose(mean.output[mean.edge :], (1 + 9 * 1.2) / 10 * SHAPE, atol=1e-14)
-
-
-def test_two_of_twenty_go_at_each_end():
-    # squares, since of equally spaced values the mean is the same with one at each end
-    shapes = [SHAPE + 1e-4 * i**2 for i in range(20)]
-    mean = mean_step(steps(shapes), skip=())
-    assert mean.left_out == ()
-    left = 1e-4 * np.mean(np.arange(2, 18) ** 2)
-    assert_allclose(mean.output[mean.edge :] - SHAPE, left, atol=1e-12)
 
 
 def test_a_record_apart_from_four_others_is_left_out():
@@ -154,21 +127,6 @@ def test_what_a_record_has_for_itself_moves_its_delay_no_more_than_noise_does():
     found = repeatability(aligned_steps(tuple(moved)), mean, model, 37 * TS, own)
     assert_allclose(found.delays, plain.delays, atol=1e-3 * TS)
     assert_allclose(found.errors, plain.errors, rtol=1e-3)
-
-
-def test_delays_that_grow_with_the_amplitude_are_a_trend():
-    amplitudes = [4.0, 8.0, 12.0, 16.0, -20.0]
-    delays = [37 + 0.5 * abs(a) for a in amplitudes]
-    made = simulated(delays, amplitudes, noise=1e-3)
-    mean = mean_step(made)
-    found = repeatability(made, mean, model_of(mean, 43.0), 43 * TS, LEVEL)
-    assert found.trend / TS == pytest.approx(0.5, abs=0.05)
-    # straight line, weighted, widened by what the line leaves
-    weight, size = found.errors**-2, np.abs(np.array(amplitudes))
-    spread = np.sum(weight * (size - np.sum(weight * size) / weight.sum()) ** 2)
-    line = np.polynomial.Polynomial.fit(size, found.delays, 1, w=1 / found.errors)
-    inflation = max(np.sum(weight * (found.delays - line(size)) ** 2) / 3, 1)
-    assert found.trend_error == pytest.approx(np.sqrt(inflation / spread), rel=1e-9)
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import control as ct
 import numpy as np
-import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError
 from ctrl_realize.identification.bootstrap import (
     Bootstrap,
 )
 
 DT = 0.5
-N = 200
-TIME = DT * np.arange(N)
 
 
 def model(pole=0.5, delay=1, gain=2.0, fit=None):
@@ -51,31 +47,4 @@ def test_phases_are_taken_within_half_a_turn_of_the_first_model():
 # how the noise is drawn
 
 
-def record(output, n=N, **labels):
-    u = np.where(np.arange(n) < 20, 5.0, 6.0)
-    return cr.Record(TIME[:n], u, output, **labels)
-
-
 # one identification after the other
-
-
-NOISY = [
-    record(np.random.default_rng(k).standard_normal(N), name=f"r{k}", input_labels=["i"])
-    for k in range(5)
-]
-
-
-def test_failed_draws_are_counted_and_two_models_are_needed():
-    left = [model(), None, model(), None, model()]
-
-    def estimator(records):
-        system = left.pop(0)
-        if system is None:
-            raise DataError("no")
-        return system
-
-    result = cr.bootstrap(NOISY[0], estimator, repeats=4)
-    assert (len(result.systems), result.failed) == (2, 2)
-    left.extend([model(), None, model(), None])
-    with pytest.raises(DataError, match="for 2 of 3 draws"):
-        cr.bootstrap(NOISY[0], estimator, repeats=3)

@@ -61,17 +61,6 @@ def test_another_record_is_predicted_to_its_noise(model):
     assert check.independent
 
 
-def test_units_of_channels_change_the_gains_alone():
-    # realized as they are, the second output would have no state of its own
-    first, inputs, outputs = record(), np.array([1e3, 1.0]), np.array([1.0, 1e-6])
-    other = cr.Record(first.time, first.input * inputs[:, None], first.output * outputs[:, None])
-    back = inputs / outputs[:, None]
-    scaled = cr.fit_channels(other, 3).markov(60) * back[:, :, None]
-    expected = cr.fit_channels(first, 3).markov(60)
-    # a fit ends where a step gains less than 0.01 of log likelihood, 0.1 standard deviations
-    assert_allclose(scaled, expected, rtol=0, atol=1e-3 * np.abs(expected).max())
-
-
 def test_several_records_and_missing_outputs_are_used():
     first, second = record(2, 300), record(3, 300)
     y = second.output + 40.0
@@ -84,13 +73,6 @@ def test_several_records_and_missing_outputs_are_used():
     assert np.abs(found.markov(80) - truth).max() < 0.04 * np.abs(truth).max()
 
 
-def test_one_channel_is_a_case_of_several():
-    plant = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT), 12)
-    found = cr.fit_channels(record(plant=plant))
-    assert (found.fit.order, found.delay) == (1, 12)
-    assert found.markov(5).shape == (5,)
-
-
 def test_a_direct_term_is_found_or_asked_for():
     core = ct.ss(CORE.A, CORE.B, CORE.C, [[2.0, 0.0], [0.0, 0.0]], DT)
     assert cr.fit_channels(record(plant=cr.DelayedStateSpace(core, 0)), 3).fit.direct
@@ -100,11 +82,6 @@ def test_a_direct_term_is_found_or_asked_for():
     assert np.any(with_term.delay_free.D)
     assert not without.fit.direct
     assert not np.any(without.delay_free.D)
-
-
-def test_delays_that_are_given_stay():
-    found = cr.fit_channels(record(), 4, delays=[[2, 4], [9, 11]])
-    assert (found.input_delays, found.output_delays) == ((2, 4), (0, 7))
 
 
 def test_a_record_from_rest_with_one_step_at_its_start_is_enough():

@@ -70,17 +70,6 @@ def test_delays_that_no_split_explains_take_the_fewest_states(delays, structure)
     assert core.nstates >= fit.states - 1
 
 
-def test_fields_of_the_fit_add_up():
-    for delays in ([[3, 20], [5, 20]], [[3, 4], [9, 10]]):
-        fit = cr.realize_channels(separate(np.array(delays)), 4, dt=DT).fit
-        total = np.add.outer(fit.output_delays, fit.input_delays) + fit.rest
-        assert np.array_equal(fit.delays, delays)
-        assert np.array_equal(total, delays)
-        assert fit.misfit.max() < 1e-9
-        assert "samples" in fit.report()
-        assert np.array_equal(pickle.loads(pickle.dumps(fit)).rest, fit.rest)
-
-
 def test_other_units_change_no_delay_and_no_pole():
     data = separate(np.array([[3, 4], [9, 10]]))
     units = np.array([1e3, 1e-2])[:, None, None] * np.array([5.0, 0.1])[:, None]
@@ -88,24 +77,6 @@ def test_other_units_change_no_delay_and_no_pole():
     assert np.array_equal(plain.delay, other.delay)
     for unit in (1e-9, 1e9):
         assert np.array_equal(cr.channel_delays(unit * data, dt=DT), [[3, 4], [9, 10]])
-
-
-def test_noise_of_other_channels_hides_no_response():
-    data = separate([[3], [5], [7]])
-    data[2] *= 0.01
-    # five standard deviations of their noise are 25 times the largest value of the third
-    data[:2] += 0.05 * np.random.default_rng(1).standard_normal(data[:2].shape)
-    assert cr.channel_delays(data, dt=DT)[2, 0] == 7
-
-
-def test_the_longest_delay_leaves_three_samples():
-    pulse = np.concatenate([np.zeros(48), [1.0, 0.5]])
-    sys = cr.realize_channels(pulse, 1, delays=[[47]], dt=DT)
-    assert sys.delay == 47
-    # three numbers and three parameters, but for rounding
-    assert_allclose(sys.markov(50), pulse, rtol=0, atol=1e-14)
-    with pytest.raises(DelayRangeError, match="48"):
-        cr.realize_channels(pulse, 1, delays=[[48]], dt=DT)
 
 
 @pytest.mark.parametrize("structure", ["rows", "columns"])

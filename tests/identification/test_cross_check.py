@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError
 from ctrl_realize.identification.delay_check import DelayCheck, DelayView, common_dead_time
 from tests.rigs import R1, R2, step_record
 
@@ -113,35 +112,6 @@ def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
     assert check.rely_on is None
     assert "every view is in doubt" in check.report()
     assert repr(check).endswith("that are in doubt>")
-
-
-def test_a_shift_of_the_record_is_a_shift_of_the_views_and_a_scale_is_none(both):
-    record = operating_record()
-    other = cr.Record(record.time, 7 * record.input, -0.01 * record.output)
-    scaled = cr.check_delay(other)
-    for ours, theirs in zip(both.views[:3], scaled.views, strict=True):
-        assert theirs.value == pytest.approx(ours.value, abs=0.02 * DT)
-        assert theirs.method == ours.method
-    later = cr.check_delay(operating_record(delay=32.4))
-    assert later.agree
-    # The noise meets other samples of the response: within the intervals, not to the digit.
-    fit = next(v for v in later.views if v.method == "output error")
-    assert fit.value - both.views[0].value == pytest.approx(20 * DT, abs=fit.high - fit.low)
-
-
-def test_unusable_data_are_refused():
-    with pytest.raises(DataError, match="neither"):
-        cr.check_delay()
-    with pytest.raises(OptionError, match="max_delay"):
-        cr.check_delay(operating_record(), max_delay=-1)
-    with pytest.raises(OptionError, match="order"):
-        cr.check_delay(operating_record(), order=0)
-    two = cr.Record(DT * np.arange(50), np.ones((2, 50)), np.ones(50))
-    with pytest.raises(DataError, match="several channels"):
-        cr.check_delay(two)
-    flat = cr.Record(DT * np.arange(50), np.ones(50), np.ones(50))
-    with pytest.raises(DataError, match="no method found a delay"):
-        cr.check_delay(flat)
 
 
 @pytest.mark.parametrize(("plant", "low", "high"), [("hairdryer", 2, 3), ("gas_furnace", 2, 3)])

@@ -45,15 +45,6 @@ def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(valve
     assert fit.onset > fit.dead_time
 
 
-def test_the_model_is_a_sampled_system_whose_response_is_the_fit(valve):
-    fit, record = valve.fit, valve.fit.records[0]
-    response = valve.simulate(record.input - record.input[0])
-    assert_allclose(response + fit.fitted[0], fit.fitted, rtol=0, atol=1e-10 * 16)
-    assert valve.delay == 37  # 36.4 samples: exact with feedthrough and one sample more
-    assert valve.dt == TS
-    assert_allclose(valve.dcgain(), fit.gain, rtol=1e-8)
-
-
 def test_kung_realizes_the_fitted_response_as_the_fitted_model(valve):
     markov = valve.markov(600)
     again = cr.realize(cr.ImpulseResponse(markov, TS), 3, delay=valve.delay)
@@ -197,28 +188,6 @@ def test_the_standard_error_knows_that_neighbours_are_rounded_alike():
     assert np.sum(np.square(scores)) < 55.8
 
 
-def test_a_slew_limit_is_called_a_misfit():
-    clean = rigs.step_record(noise=0.0).output
-    limited = np.empty_like(clean)
-    limited[0] = clean[0]
-    for k in range(1, clean.size):
-        limited[k] = limited[k - 1] + np.clip(clean[k] - limited[k - 1], -48 * TS, 48 * TS)
-    record = rigs.step_record(noise=0.0)
-    noise = 0.016 * np.random.default_rng(0).standard_normal(clean.size)
-    fit = cr.fit_delay(changed(record, limited + noise)).fit
-    assert not fit.at_noise_level
-    assert "structured_misfit" in codes(fit)
-    assert len(fit.views) == 6
-
-
-@pytest.mark.parametrize("plant", [rigs.R1, rigs.R3])
-def test_no_delay_is_said_to_be_no_delay(plant):
-    fit = cr.fit_delay(rigs.step_record(plant, delay=0.0, noise=0.001)).fit
-    assert "no_delay_resolved" in codes(fit)
-    assert fit.interval[0] == 0
-    assert fit.delay < 1
-
-
 def test_a_lag_of_a_tenth_of_a_sample_leaves_its_sample_open_and_one_of_two_samples_does_not():
     k = np.arange(-100, 400)
     noise = 0.001 * np.random.default_rng(0).standard_normal(k.size)
@@ -230,23 +199,6 @@ def test_a_lag_of_a_tenth_of_a_sample_leaves_its_sample_open_and_one_of_two_samp
         intervals.append(fit.delay_interval)
     assert intervals[0][1] == pytest.approx(26.0, abs=0.01)
     assert intervals[1][1] < 25.5
-
-
-def test_a_delay_beyond_max_delay_is_flagged_and_found_without_the_limit():
-    record = rigs.step_record(delay=130.0, noise=0.001)
-    limited = cr.fit_delay(record, max_delay=100).fit
-    assert "delay_at_bound" in codes(limited)
-    assert limited.delay <= 100
-    free = cr.fit_delay(record).fit
-    assert "delay_at_bound" not in codes(free)
-    assert free.delay == pytest.approx(130, abs=0.5)
-
-
-def test_a_truncated_record_is_fitted_and_flagged():
-    record = rigs.step_record(noise=0.001, after=160)
-    fit = cr.fit_delay(record).fit
-    assert covers(fit, 37)
-    assert "not_settled" in codes(fit)
 
 
 def test_an_inverse_response_is_found_with_its_zero():

@@ -77,13 +77,6 @@ def test_colour_that_only_the_response_has_is_a_misfit():
     assert "generalised" not in fit.report()
 
 
-def test_a_short_rest_tells_no_colour():
-    data, _ = record(3, ringing, 0.005)
-    start = data.time[BEFORE - 60]
-    fit = cr.fit_delay(data.between(start, np.inf)).fit
-    assert "generalised" not in fit.report()
-
-
 def test_records_fitted_together_know_the_noise_of_their_mean():
     rng = np.random.default_rng(11)
     k = np.arange(N)

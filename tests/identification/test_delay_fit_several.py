@@ -44,23 +44,6 @@ def test_records_that_differ_by_noise_alone_are_not_called_different(sixteen):
     assert not codes(sixteen) & {"records_differ", "amplitude_trend", "outlying_records"}
 
 
-def test_trigger_jitter_is_seen_and_widens_the_interval():
-    jitter = np.random.default_rng(1).normal(scale=1.5, size=10)
-    fit = cr.fit_delay([record(k, delay=37 + jitter[k]) for k in range(10)]).fit
-    assert "records_differ" in codes(fit)
-    found = fit.repeatability.delays / TS
-    # every record's delay is found to its own error, a tenth of a sample
-    np.testing.assert_allclose(found - found.mean(), jitter - jitter.mean(), atol=0.5)
-    assert fit.std_given_structure / TS > 0.8 * jitter.std(ddof=1) / np.sqrt(10)
-
-
-def test_an_outlying_record_is_named_and_left_out():
-    records = [record(k) for k in range(6)] + [record(6, delay=60.0, name="stuck")]
-    fit = cr.fit_delay(records).fit
-    assert fit.repeatability.outlying == ("stuck",)
-    assert abs(fit.delay - 37) < 1
-
-
 def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
     records = [
         record(10 * k + a, delay=36 + a / 8, amplitude=float(a))

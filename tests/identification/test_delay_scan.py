@@ -111,26 +111,6 @@ def test_strictly_proper_candidates_have_no_direct_term():
     )
 
 
-def test_channels_share_one_delay():
-    rng = np.random.default_rng(2)
-    system = modal(rng, 3, 2, 2)
-    pulse = np.concatenate([np.zeros((2, 2, 11)), markov(*system, 200)], axis=2)
-    pulse += 1e-4 * rng.standard_normal(pulse.shape)
-    sys = cr.estimate_delay(pulse, 3, max_delay=20, samples=120, dt=0.01)
-    assert sys.delay == 11
-    window = pulse[:, :, :141]
-    model = sys.fit.candidates[11].markov(141)
-    assert np.abs(window - model).sum() == pytest.approx(sys.fit.iae[11], rel=1e-12)
-
-
-def test_default_samples_cover_the_settling_and_no_more():
-    sys = cr.estimate_delay(valve_pulse("zero-phase", n=6000), 3, max_delay=100, dt=TS)
-    # R3 settles to 2 % after 266 samples (R3: 2.2 Hz) and the delay
-    assert 3 * 300 < sys.fit.samples < 3 * 500
-    short = cr.estimate_delay(valve_pulse("zero-phase", n=300), 3, max_delay=100, dt=TS)
-    assert short.fit.samples == 199
-
-
 # -- what the scan says about itself ---------------------------------------------------------
 
 
@@ -212,13 +192,6 @@ def test_unusable_choices_are_refused(order, kwargs, error, match):
 def test_degenerate_data_name_their_rank(pulse, order, rank):
     with pytest.raises(OrderError, match=f"rank {rank}"):
         cr.estimate_delay(pulse, order, max_delay=20, dt=1.0)
-
-
-def test_a_single_spike_is_a_delay():
-    pulse = np.eye(300)[12]
-    sys = cr.estimate_delay(pulse, 1, max_delay=40, dt=1.0)
-    assert sys.delay == 11  # eleven samples and one state
-    assert_allclose(sys.markov(300), pulse, atol=1e-15)
 
 
 def test_padded_candidates_are_the_padded_realizations():

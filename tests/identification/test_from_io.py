@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.errors import DataError
 from tests.rigs import DT, TWO_STATES
 
 METHODS = [
@@ -143,20 +143,6 @@ def test_what_needs_every_sample_says_that_some_are_missing(work):
         work(cr.Record(record().time, record().input, y, missing="keep"))
 
 
-def test_a_start_at_rest_uses_every_sample():
-    n = 60
-    u = np.zeros(n)
-    u[5:] = np.random.default_rng(0).normal(size=n - 5)
-    y = TWO_STATES.simulate(u)
-    one = cr.Record(DT * np.arange(n), u + 3.0, y + 8.0)
-    with pytest.raises(DataError, match="start='rest'"):
-        cr.impulse_from_io(one, 40, method="least_squares")
-    g = cr.impulse_from_io(one, 40, method="least_squares", start="rest")
-    assert g.rows == n
-    # what lies beyond the window, 0.8^35 = 4e-4 of the response, ends up in the estimate
-    assert_allclose(g.markov, TWO_STATES.markov(40), rtol=0, atol=5e-3)
-
-
 @pytest.mark.parametrize("options", METHODS)
 @pytest.mark.parametrize(
     ("name", "u"),
@@ -183,23 +169,6 @@ def test_an_output_that_does_not_follow_is_flagged(options):
     assert flagged >= 18  # a test at 1 %, with room for two alarms
 
 
-@pytest.mark.parametrize(
-    ("change", "error", "match"),
-    [
-        ({"length": 1}, OptionError, "length"),
-        ({"length": 700}, DataError, "complete past"),
-        ({"method": "magic"}, OptionError, "'okid'"),
-        ({"kernel": "RBF"}, OptionError, "'SS'"),
-        ({"start": "0"}, OptionError, "'rest'"),
-        ({"arx_order": 4}, OptionError, "okid"),
-        ({"method": "okid", "arx_order": 400}, DataError, "complete past"),
-    ],
-)
-def test_unusable_choices_are_refused(change, error, match):
-    with pytest.raises(error, match=match):
-        cr.impulse_from_io(record(), **{"length": 40, **change})
-
-
 @pytest.mark.parametrize("kernel", ["auto", "TC", "DC", "SS"])
 def test_the_errors_of_a_regularized_response_hold_the_truth_also_where_it_dies_away(kernel):
     # two lags of 0.8 and 4 Hz behind ten samples; the smooth prior alone held 22 % of the tail
@@ -215,31 +184,6 @@ def test_the_errors_of_a_regularized_response_hold_the_truth_also_where_it_dies_
         held.append(np.abs(found.markov - plant.markov(160)) <= 1.96 * found.std)
     # of three records: every part of the response, not only most of it
     assert np.mean(held, axis=0).reshape(8, 20).mean(axis=1).min() > 0.85
-
-
-RINGING = cr.DelayedStateSpace(
-    ct.ss([[1.96, -0.992], [1.0, 0.0]], [[1.0], [0.0]], [[0.1, 0.05]], [[0.0]], DT), 3
-)  # decays to 1/e in 250 samples
-
-
-def test_a_plant_that_rings_for_longer_than_the_window_is_estimated_by_okid():
-    one = record(plant=RINGING, n=800, noise=0.3)
-    g = cr.impulse_from_io(one)
-    assert g.method.startswith("OKID")
-    assert "unseen" in g.choices[0]
-    truth = RINGING.markov(g.n_samples)
-    # 3.5 % of the largest Markov parameter; regularized it is 40 %
-    assert np.abs(g.markov - truth).max() < 0.1 * np.abs(truth).max()
-    smooth = cr.impulse_from_io(one, g.n_samples, method="regularized", kernel="TC").markov
-    assert np.abs(smooth - truth).max() > 0.2 * np.abs(truth).max()
-
-
-def test_a_plant_that_settles_is_regularized_and_the_window_grows_until_it_has():
-    assert "kernel" in cr.impulse_from_io(record()).method
-    slow = cr.DelayedStateSpace(ct.ss([[0.98]], [[1.0]], [[0.02]], [[0.0]], DT), 5)
-    g = cr.impulse_from_io(record(plant=slow, n=2400))
-    assert g.n_samples == 200
-    assert g.flags == ()
 
 
 @pytest.mark.parametrize("options", METHODS)

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize import paper
-from ctrl_realize.errors import DataError, DelayRangeError, NoStepError, OptionError
+from ctrl_realize.errors import DelayRangeError, NoStepError, OptionError
 from ctrl_realize.identification import identify as identify_module
 from tests.rigs import R3, TS, step_record
 
@@ -63,24 +63,6 @@ def test_a_scan_returns_the_model_with_names_choices_and_every_step(method):
     assert pickle.loads(pickle.dumps(sys)).fit.delay == sys.fit.delay
 
 
-def test_the_scan_finds_gain_and_delay_of_a_quiet_record():
-    sys = cr.identify(step_record(noise=2e-4, seed=2), method="scan")
-    assert sys.delay_free.nstates == 3
-    # paper.md 4.1: .3 +- .66 samples with 50 Hz; the automatic cut-off of 28 Hz is as good.
-    assert abs(sys.delay - 37) <= 4
-    assert_allclose(np.real(sys.dcgain()), 1.0, atol=5e-3)
-
-
-def test_a_later_step_is_a_later_response_not_a_longer_delay():
-    record = step_record(noise=1e-3)
-    late = cr.Record(
-        record.time[:-100],
-        record.input[100:],
-        record.output[100:],
-    )
-    assert cr.identify(late, method="scan").delay == cr.identify(record, method="scan").delay
-
-
 @pytest.mark.parametrize(
     ("options", "error", "match"),
     [
@@ -101,12 +83,6 @@ def test_unusable_choices_are_refused(options, error, match):
         cr.identify(step_record(), **options)
 
 
-def test_a_record_without_step_is_refused_by_the_scan():
-    t = TS * np.arange(500)
-    with pytest.raises(NoStepError, match="no step"):
-        cr.identify(cr.Record(t, np.ones(500), t), method="scan")
-
-
 @pytest.mark.parametrize("method", ["output_error", "scan", "paper"])
 def test_a_step_at_the_last_sample_is_refused_by_every_method(method):
     t = TS * np.arange(2000)
@@ -115,19 +91,3 @@ def test_a_step_at_the_last_sample_is_refused_by_every_method(method):
     noise = np.random.default_rng(0).standard_normal(2000)
     with pytest.raises(NoStepError, match="nothing was recorded after it"):
         cr.identify(cr.Record(t, u, noise), method=method)
-
-
-def test_records_of_several_channels_go_to_their_own_fit():
-    core = ct.ss([[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1)
-    plant = cr.DelayedStateSpace(core, (2, 5))
-    u = np.random.default_rng(0).choice([-1.0, 1.0], (2, 400))
-    record = cr.Record(
-        0.1 * np.arange(400), u, plant.simulate(u), name="a.b", input_labels=["heat", "flow"]
-    )
-    found = cr.identify(record, order=2)
-    assert isinstance(found.fit, cr.ChannelFit)
-    assert (found.input_delays, found.input_labels) == ((2, 5), ["heat", "flow"])
-    with pytest.raises(OptionError, match="max_delay: not for records of several channels"):
-        cr.identify(record, max_delay=9)
-    with pytest.raises(DataError):
-        cr.identify(record, method="scan")

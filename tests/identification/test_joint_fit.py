@@ -104,27 +104,6 @@ def test_several_records_find_the_structure_that_made_them():
     assert "records" in sys.fit.report()
 
 
-def test_level_and_drift_of_a_record_change_nothing():
-    records = [operation("prbs", seed, 300, (DELAY, 1.0, 2.0))[0] for seed in range(2)]
-    moved = [
-        cr.Record(r.time, r.input - 40 * i, r.output + 300 * (i - 0.5) - 7 * i * r.time)
-        for i, r in enumerate(records)
-    ]
-    plain, other = (cr.fit_delay(group, structures=[(1, 1)]).fit for group in (records, moved))
-    # iterations end within 1e-4 of the cost: a hundredth of the standard error
-    assert abs(other.delay - plain.delay) < 0.02 * plain.std_given_structure / DT
-    assert other.gain == pytest.approx(plain.gain, abs=1e-4)
-
-
-def test_a_noisy_record_does_no_harm_to_a_good_one():
-    values = (DELAY, 1.0, 2.0)
-    good, _ = operation("prbs", 1, 500, values)
-    alone = cr.fit_delay(good, structures=[(1, 1)]).fit
-    noisy, _ = operation("prbs", 2, 500, values, sigma=0.4)
-    both = cr.fit_delay([good, noisy], structures=[(1, 1)]).fit
-    assert both.std_given_structure < 1.02 * alone.std_given_structure
-
-
 def test_steps_and_random_inputs_go_together():
     values = (DELAY, 1.0, 2.0)
     random, _ = operation("prbs", 1, 400, values)
@@ -135,36 +114,6 @@ def test_steps_and_random_inputs_go_together():
     assert abs(fit.delay - DELAY) < 4 * fit.std_given_structure / DT
     assert fit.repeatability.p_value > 0.01
     assert fit.repeatability.amplitudes.tolist() == [2.0, 2.0]
-
-
-def test_records_of_different_delays_are_told_apart_and_widen_the_interval():
-    delays = np.array([10.0, 12.0, 13.5, 11.0])
-    records = [operation("prbs", i, 400, (d, 1.0, 2.0))[0] for i, d in enumerate(delays)]
-    fit = cr.fit_delay(records, structures=[(1, 1)]).fit
-    assert "records_differ" in {flag.code for flag in fit.flags}
-    # each is found to its own error, a few hundredths of a sample
-    assert_allclose(fit.repeatability.delays / DT, delays, rtol=0, atol=0.3)
-    assert fit.std_given_structure / DT > 0.8 * delays.std(ddof=1) / 2
-
-
-def test_a_record_of_another_delay_or_of_no_plant_is_left_out():
-    values = (DELAY, 1.0, 2.0)
-    good = [operation("prbs", seed, 300, values)[0] for seed in range(4)]
-    late, _ = operation("prbs", 9, 300, (20.0, 1.0, 2.0), name="late")
-    fit = cr.fit_delay([*good, late], structures=[(1, 1)]).fit
-    assert fit.repeatability.outlying == ("late",)
-    assert abs(fit.delay - DELAY) < 4 * fit.std_given_structure / DT
-    noise = 0.02 * np.random.default_rng(3).standard_normal(300)
-    dead = cr.Record(good[0].time, good[0].input, noise, name="cable off")
-    fit = cr.fit_delay([*good, dead], structures=[(1, 1)]).fit
-    assert fit.repeatability.outlying == ("cable off",)
-    assert fit.gain == pytest.approx(1.0, abs=0.02)
-
-
-def test_gains_that_differ_are_an_alarm():
-    records = [operation("prbs", i, 300, (DELAY, k, 2.0))[0] for i, k in enumerate((1.0, 1.3))]
-    fit = cr.fit_delay(records, structures=[(1, 1)]).fit
-    assert "gains_differ" in {flag.code for flag in fit.flags}
 
 
 def test_records_that_do_not_go_together_are_refused():

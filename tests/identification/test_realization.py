@@ -12,7 +12,6 @@ from numpy.testing import assert_allclose
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, DelayRangeError, OptionError, OrderError
 from ctrl_realize.numerics.state_space import markov
-from tests.oracles import dense
 from tests.oracles.plants import modal, valve_pulse
 from tests.rigs import R3, TS, exact_step
 
@@ -62,47 +61,6 @@ def test_markov_parameters_of_a_minimal_system_are_returned(order, seed, delay, 
     sys = cr.realize(pulse[0, 0] if channels == (1, 1) else pulse, order, delay=delay, dt=1.0)
     back = sys.markov(201 + delay).reshape(pulse.shape)
     assert_allclose(back, pulse, rtol=0, atol=1e-12 * np.abs(pulse).max())
-
-
-@given(samples=st.integers(0, 60))
-def test_shifted_data_have_the_delay_shifted_and_the_same_core(samples):
-    pulse = valve_pulse("zero-phase", n=500)
-    one = cr.realize(pulse, 3, delay=30, samples=400, dt=TS)
-    later = cr.realize(np.r_[np.zeros(samples), pulse], 3, delay=30 + samples, samples=400, dt=TS)
-    assert later.delay == one.delay + samples
-    assert np.array_equal(later.delay_free.A, one.delay_free.A)
-    assert np.array_equal(later.delay_free.C, one.delay_free.C)
-
-
-def test_another_time_unit_scales_the_dead_time_and_nothing_else():
-    pulse = valve_pulse("zero-phase", n=500)
-    s, ms = cr.realize(pulse, 3, delay=37, dt=TS), cr.realize(pulse, 3, delay=37, dt=1e3 * TS)
-    assert ms.delay == s.delay
-    assert ms.dead_time == pytest.approx(1e3 * s.dead_time, rel=1e-15)
-    assert np.array_equal(ms.delay_free.A, s.delay_free.A)
-
-
-@pytest.mark.parametrize("hankel", ["square", "padded"])
-@pytest.mark.parametrize("samples", [150, 401])
-def test_fit_says_what_its_docstring_promises(hankel, samples):
-    pulse = valve_pulse("causal")
-    sys = cr.realize(pulse, 3, delay=20, samples=samples, hankel=hankel, dt=TS)
-    fit = sys.fit
-    window = 20 + samples + 1
-    assert fit.iae == pytest.approx(np.abs(pulse[:window] - sys.markov(window)).sum(), rel=1e-12)
-    assert (fit.order, fit.delay, fit.samples, fit.hankel) == (3, 20, samples, hankel)
-    values = fit.leading_singular_values(12)
-    assert values.shape == (12,)
-    assert_allclose(values[:3], fit.singular_values[:3], rtol=1e-10)
-    assert 0.9 * values[3] <= fit.following <= values[3] * (1 + 1e-9)
-    assert (fit.error_bound is None) == (hankel == "square")
-    if hankel == "padded":
-        z = np.exp(1j * np.linspace(0, np.pi, 800))
-        data = np.polyval(pulse[20:window][::-1], 1 / z)
-        assert np.abs(data - sys.delay_free(z)).max() <= fit.error_bound
-        square = dense.hankel(pulse[np.newaxis, np.newaxis, 21:window], samples, samples)
-        tail = np.linalg.svd(square, compute_uv=False)[3:]
-        assert fit.error_bound >= 2 * tail.sum() * (1 - 1e-12)
 
 
 def test_direct_term_within_the_noise_is_left_out():

@@ -16,19 +16,6 @@ K = np.arange(40)
 LAG = np.r_[np.zeros(4), 0.5**K]  # 1 at sample 4, then half of it and half of that
 
 
-def test_samples_beyond_those_asked_for_are_not_seen():
-    wild = LAG.copy()
-    wild[14] = 9.0
-    seen = cr.realize(wild, 1, delay=4, samples=9, dt=DT).fit  # 5 to 13
-    assert seen.samples == 9
-    assert seen.iae < 1e-13
-    assert cr.realize(wild, 1, delay=4, samples=10, dt=DT).fit.iae > 1
-    # what comes before the delay is not modelled
-    early = LAG.copy()
-    early[1] = -2.0
-    assert cr.realize(early, 1, delay=4, dt=DT).fit.iae == pytest.approx(2.0, rel=1e-12)
-
-
 def test_a_padded_matrix_bounds_the_error():
     two = LAG + np.r_[np.zeros(4), 0.1 * 0.2**K]
     fit = cr.realize(two, 1, delay=3, hankel="padded", dt=DT).fit
@@ -41,18 +28,6 @@ def test_a_padded_matrix_bounds_the_error():
     for hankel in ("round", None):
         with pytest.raises(OptionError, match="hankel="):
             cr.realize(LAG, 1, dt=DT, hankel=hankel)
-
-
-def test_channels_keep_their_places():
-    gains = np.array([[1.0, 2.0], [3.0, -1.0], [0.5, 0.25]])
-    pulses = gains[:, :, None] * LAG
-    for direct in (None, False):
-        system = cr.realize(pulses, 2, delay=4, feedthrough=direct, dt=DT)
-        assert system.delay_free.D.shape == (3, 2)
-        expected = pulses.copy()
-        if direct is False:
-            expected[:, :, 4] = 0
-        np.testing.assert_allclose(system.markov(44), expected, atol=1e-13)
 
 
 # the direct term

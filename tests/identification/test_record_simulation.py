@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.errors import DataError, UnsuitableSystemError
 from ctrl_realize.identification.record_simulation import (
     as_delayed,
     simulate_record,
@@ -76,12 +76,3 @@ def test_units_of_the_outputs_do_not_matter():
 def test_systems_that_do_not_fit_the_record_are_refused(system, error, match):
     with pytest.raises(error, match=match):
         as_delayed(system, record(np.ones(9), np.ones(9)))
-
-
-def test_a_start_has_one_of_two_names_and_a_record_no_holes():
-    one = record(np.ones(9), np.arange(9.0))
-    with pytest.raises(OptionError, match="'estimate', 'rest'"):
-        simulate_record(core(), one, "zero")
-    holes = cr.Record(one.time, one.input, np.r_[np.nan, np.ones(8)], missing="keep")
-    with pytest.raises(DataError, match="a simulation needs every sample"):
-        simulate_record(core(), holes, "rest")

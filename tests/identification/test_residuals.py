@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
 from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
 MIMO = cr.DelayedStateSpace(TWO_INPUTS.delay_free, (2, 4), output_delay=(0, 3, 1))
@@ -47,14 +46,6 @@ def test_a_record_cut_out_of_the_middle_of_an_experiment_is_explained_from_its_s
     rest = cr.check_residuals(plant, one, start="rest")
     assert np.all(rest.fit_percent < 99.9)
     assert np.abs(rest.residual).max() > 0.05
-
-
-def test_a_start_at_rest_is_taken_as_rest():
-    n = 300
-    u = np.r_[np.full(20, 2.0), np.random.default_rng(0).normal(size=n - 20)]
-    y = TWO_STATES.simulate(u - 2.0) - 4
-    check = cr.check_residuals(TWO_STATES, cr.Record(DT * np.arange(n), u, y), start="rest")
-    assert_allclose(check.residual, 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("delay", [4, 6])
@@ -127,17 +118,6 @@ def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
         assert np.abs(check.cross[0, 0]).argmax() == 25 + shift
 
 
-def test_the_bound_of_the_cross_correlation_grows_where_both_are_coloured():
-    one = record(n=20_000, colour=0.9, drive=0.9)
-    check = cr.check_residuals(TWO_STATES, one, confidence=0.95)
-    # sum of 0.9^|i| 0.9^|i| is 1.81 / 0.19; both correlations are known to some per cent
-    assert check.cross_bound.shape == (1, 1)
-    white = 1.959964 / np.sqrt(20_000)
-    assert_allclose(check.cross_bound[0, 0], white * np.sqrt(1.81 / 0.19), rtol=0.1)
-    plain = cr.check_residuals(TWO_STATES, record(n=20_000), confidence=0.95)
-    assert_allclose(plain.cross_bound[0, 0], white, rtol=0.05)
-
-
 def test_what_rounding_leaves_says_nothing_about_the_model():
     one = record(noise=0.0)
     for size, whether in ((1e-9, True), (1e-7, False)):
@@ -158,32 +138,6 @@ def test_predictions_fall_from_the_noise_model_to_the_simulation():
     assert_allclose(np.std(one.output - prediction.output), 0.1, rtol=0.06)
     assert prediction.noise_order == (1,)
     assert "1 samples ahead" in prediction.report()
-
-
-def test_several_models_are_compared_on_records_that_they_have_not_seen():
-    others = [record(seed=1), record(plant=TWO_STATES, seed=2, n=700, label="day 2")]
-    table = cr.cross_validate({"true": TWO_STATES, "late": TWO_STATES.replace(delay=9)}, others)
-    assert table.shape == (2, 2)
-    assert (table.loc["true"] > table.loc["late"] + 20).all()
-
-
-@pytest.mark.parametrize(
-    ("system", "options", "error", "match"),
-    [
-        (TWO_STATES, {"lags": 0}, OptionError, "lags"),
-        (TWO_STATES, {"lags": 400}, DataError, "1200 samples"),
-        (TWO_STATES, {"confidence": 1.0}, OptionError, "confidence"),
-        (TWO_STATES, {"start": "zero"}, OptionError, "'rest'"),
-        (MIMO, {}, DataError, "3"),
-        (ct.ss([[1.2]], [[1.0]], [[1.0]], [[0.0]], DT), {}, UnsuitableSystemError, "unstable"),
-        (ct.tf([1.0], [1.0, 1.0]), {}, UnsuitableSystemError, "not discrete"),
-        (ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], 2 * DT), {}, DataError, "sample time"),
-        ("plant", {}, UnsuitableSystemError, "str"),
-    ],
-)
-def test_unusable_choices_are_refused(system, options, error, match):
-    with pytest.raises(error, match=match):
-        cr.check_residuals(system, record(), **options)
 
 
 @pytest.mark.parametrize(

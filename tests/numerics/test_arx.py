@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from ctrl_realize.numerics.arx import (
-    _root,
     arx_equations,
     arx_markov,
     arx_markov_std,
@@ -75,13 +74,3 @@ def test_std_of_the_pulse_response_is_the_scatter_over_many_records():
 )
 def test_a_sine_excites_two_directions_and_a_constant_none(signal, directions):
     assert excited_directions(normal_equations(signal[None], signal[None], 12).gram) == directions
-
-
-@pytest.mark.parametrize("rank", [3, 2, 0])
-def test_a_covariance_has_a_root_of_any_rank_and_unit(rank):
-    parts = np.random.default_rng(0).standard_normal((3, rank)) * [[1e-9], [1.0], [1e9]]
-    covariance = parts @ parts.T
-    size = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
-    root = _root(covariance)
-    # to rounding of numbers of size one, in the units of the outputs
-    assert np.all(np.abs(root @ root.T - covariance) <= 1e-14 * size)

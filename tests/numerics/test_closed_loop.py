@@ -12,7 +12,6 @@ from ctrl_realize.numerics.closed_loop import (
     gain_gaps,
     largest_gain,
     response_on_circle,
-    smallest_on_line,
     step_on_circle,
 )
 
@@ -49,17 +48,6 @@ def bears(shape, distance, gain):
     return np.abs(1 + gain * shape).min() >= distance
 
 
-def test_ranges_of_gain_of_loops_on_the_negative_axis():
-    # |1 - k| < 1/2 between 1/2 and 3/2; |1 - k / 4| < 1/2 between 2 and 6
-    both = np.array([-0.25, -1.0]) + 0j
-    assert gain_gaps(both, 0.5) == [(0.0, 0.5), (1.5, 2.0), (6.0, math.inf)]
-    assert largest_gain(both, 0.5) == (0.5, 1)
-    # overlapping: |1 - 0.8 k| < 1/2 between 5/8 and 15/8
-    low, high = gain_gaps(np.array([-1.0, -0.8]) + 0j, 0.5)
-    assert low == (0.0, 0.5)
-    assert high == pytest.approx((1.875, math.inf))
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_ranges_of_gain_are_those_of_brute_force(seed):
     rng = np.random.default_rng(seed)
@@ -73,21 +61,3 @@ def test_ranges_of_gain_are_those_of_brute_force(seed):
     assert gain == gaps[0][1]
     if math.isfinite(gain):
         assert abs(1 + gain * shape[at]) == pytest.approx(distance)
-
-
-@pytest.mark.parametrize("best", [0.02, 0.7, 3.0, 50.0])
-def test_the_bottom_of_a_valley_is_found(best):
-    asked = []
-
-    def valley(x):
-        asked.append(x)
-        return 5.0 + np.log(x / best) ** 2
-
-    at, value = smallest_on_line(valley, 1e-2, 1e2)
-    # golden sections down to 1e-4 of a logarithm
-    assert np.log(at / best) == pytest.approx(0.0, abs=1e-4)
-    assert value == valley(at) == min(5.0 + np.log(x / best) ** 2 for x in asked)
-    # 16 of a scan 0.614 apart, two sections, and one for each further one of the 1.23 around
-    assert len(asked) - 1 == 16 + 2 + math.ceil(np.log(1.228e4) / np.log((1 + np.sqrt(5)) / 2))
-    assert min(asked) >= 1e-2 * (1 - 1e-12)
-    assert max(asked) <= 1e2 * (1 + 1e-12)

@@ -8,7 +8,6 @@ import pytest
 from ctrl_realize.numerics.crossovers import (
     follow,
     frequency_grid,
-    half_turns,
     negative_axis_crossings,
     smallest_distance,
     unit_crossings,
@@ -28,13 +27,6 @@ def test_a_grid_goes_from_end_to_end_without_gaps():
     assert grid.size == 122 + 200 - 2
 
 
-def test_a_delay_has_sixteen_points_a_turn():
-    delay = 30.0
-    grid = frequency_grid(0.01, 10.0, NONE, delay)
-    assert np.diff(grid).max() * delay <= 2 * np.pi / 16
-    assert grid.size <= 122 + 16 * delay * 10 / (2 * np.pi) + 200
-
-
 def test_a_curve_is_followed_until_it_turns_little_between_points():
     def curve(omega):
         return np.exp(-9j * omega)
@@ -50,33 +42,6 @@ def test_a_curve_is_followed_until_it_turns_little_between_points():
     assert grid.size == 2 * 8 + 1
     assert follow(curve, start, largest_turn=1.4)[0].size == 2 * 2 + 1
     assert np.array_equal(follow(curve, start, largest_turn=2.8)[0], start)
-
-
-def test_a_curve_through_zero_comes_to_an_end():
-    asked = []
-
-    def curve(omega):
-        asked.append(omega.size)
-        return omega - 1 / 3 + 0j
-
-    grid, _ = follow(curve, np.array([0.0, 1.0]))
-    # halved 24 times
-    assert len(asked) == 25
-    assert np.diff(grid).min() == pytest.approx(2.0**-24)
-    # with a point on zero itself there is nothing to divide by
-    with np.errstate(all="raise"):
-        grid, _ = follow(lambda omega: omega + 0j, np.array([-1.0, 0.0, 1.0]))
-    assert 0.0 in grid
-
-
-def test_half_turns_are_counted_from_the_real_axis():
-    turn = np.linspace(0, 3 * np.pi, 40)
-    for start in (1, -1):
-        assert half_turns(start * np.exp(-1j * turn)) == pytest.approx(-3)
-        assert half_turns(2 * start * np.exp(1j * turn)) == pytest.approx(3)
-        # what is missing to the axis counts
-        late = start * np.exp(1j * np.linspace(-0.3, 4, 40))
-        assert half_turns(late) == pytest.approx(4 / np.pi)
 
 
 def grid_for(curve, low, high):

@@ -46,15 +46,6 @@ def test_a_mode_is_the_sum_over_the_moves_that_have_arrived(poles):
     assert not any(one[1, :16].any() for one in found)
 
 
-def test_a_move_that_arrives_with_a_sample_is_seen_by_the_next():
-    static, mode, slope = train([0, 1, 2, 3], [1] * 4, [1.0], [2.0], dt=1.0).modes(
-        np.array([1.0]), np.array([[-0.5 + 0j]])
-    )
-    assert static[0].tolist() == [0, 0, 0, 2]
-    close(mode[0, :, 0], [0, 0, 0, 2 * np.exp(-0.5)])
-    close(slope[0, :, 0], [0, 0, 0, 2 * np.exp(-0.5)])
-
-
 @pytest.mark.parametrize("widest", [2, 40])
 @pytest.mark.parametrize("poles", [POLES, np.array([[-0.4 + 0j, -3.0], [-1.1, -1e-9]])])
 def test_means_over_bins_are_those_of_their_samples(poles, widest):

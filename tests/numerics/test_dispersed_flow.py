@@ -90,11 +90,3 @@ def test_a_lag_behind_a_flow_is_told_from_it():
     problem, scales, like = flow_problem(lag=0.03)
     flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
     assert_allclose([flow.delay, flow.mean, flow.lag], [0.0373, 0.08, 0.03], rtol=0, atol=3e-3)
-
-
-def test_a_known_lag_is_not_the_flow_s():
-    known = KnownFactor(np.array([-1 / 0.03 + 0j]), np.array([1 / 0.03]))
-    problem, scales, like = flow_problem(lag=0.03, known=known)
-    flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
-    assert flow.lag == 0.0
-    assert_allclose([flow.delay, flow.mean, flow.spread], [0.0373, 0.08, 0.6], rtol=0, atol=2e-3)

@@ -55,15 +55,6 @@ def test_neighbouring_edges_bound_each_other():
     assert [(e.start, e.stop) for e in found] == [(0, 110), (50, 180), (110, 260)]
 
 
-def test_the_end_of_a_ramp_bounds_the_edge_after_it():
-    ramp = np.concatenate(
-        [np.zeros(60), np.linspace(0, 10, 12)[1:-1], np.full(60, 10.0), np.zeros(60)]
-    )
-    found = find_edges(ramp, 3, 0.3)
-    assert [(e.index, e.samples) for e in found] == [(60, 11), (130, 1)]
-    assert found[1].start == 70  # last sample of the ramp's edge
-
-
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
 def test_edges_below_the_share_of_the_range_do_not_count(share):
     # heights 1, 3 and 4 of a range of 8
@@ -116,8 +107,3 @@ def test_edges_do_not_depend_on_the_unit(scale, offset, spike, up):
         rtol=1e-9,
         atol=1e-10 * scale,
     )
-
-
-def test_a_change_in_the_last_digits_is_rounding_and_no_edge():
-    assert find_edges(levels((1e6, 50), (1e6 + 1e-5, 50)), 3, 0.5) == []
-    assert len(find_edges(levels((1e6, 50), (1e6 + 1e-2, 50)), 3, 0.5)) == 1

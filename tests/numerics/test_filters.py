@@ -16,13 +16,6 @@ from ctrl_realize.numerics.filters import (
 DT = 1 / 1280
 
 
-@pytest.mark.parametrize("order", [1, 2, 5])
-@pytest.mark.parametrize("cutoff_hz", [10.0, 64.0, 500.0])
-def test_the_cut_off_is_in_hertz(order, cutoff_hz):
-    gain = np.abs(sosfreqz(butterworth(order, cutoff_hz, DT), [0.0, cutoff_hz], fs=1 / DT)[1])
-    assert_allclose(gain, [1, np.sqrt(0.5)], rtol=1e-9)
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 5])
 def test_the_group_delay_is_the_slope_of_the_phase_at_zero(order):
     frequency = 1e-3

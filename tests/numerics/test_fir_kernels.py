@@ -67,12 +67,6 @@ def test_hyper_parameters_are_at_the_top_of_the_marginal_likelihood(data, kernel
         assert evidence(stretch, power) < best + 0.02
 
 
-def test_noise_variance_is_found(data):
-    u, y = data
-    fit = fit_kernel(normal_equations(u[None], y[None], 30), 30, "TC")
-    assert_allclose(np.sqrt(fit.noise_variance), 0.1, rtol=0.1)  # 370 samples: 4 % per sigma
-
-
 @pytest.mark.parametrize("kernel", ["TC", "DC", "SS"])
 def test_the_correlation_of_neighbours_is_that_of_the_printed_kernel(data, kernel):
     u, y = data

@@ -60,17 +60,6 @@ def test_a_model_is_predicted_at_every_sample(window):
     assert window.predict(half, Candidate(ONE, TRUTH, 0.0)) == pytest.approx(0.5 * window.output)
 
 
-def test_on_bins_and_on_samples_the_same_model_is_predicted():
-    # noise is fitted alike, but for what the weights make of it
-    noise = 0.01 * np.random.default_rng(0).standard_normal(SIZE)
-    found = []
-    for window in windows():
-        noisy = window.with_output(window.output + noise)
-        found.append(window.predict(noisy, Candidate(ONE, TRUTH, 0.0)))
-    # three standard errors of two coefficients from a hundred samples
-    assert found[0] == pytest.approx(found[1], abs=0.005)
-
-
 def test_a_free_response_is_predicted_at_every_sample():
     means, _ = windows()
     clock = DT * np.arange(SIZE)
@@ -94,10 +83,6 @@ def test_a_free_response_is_predicted_at_every_sample():
 
 
 # --- what the best of the candidates leaves
-
-
-def noise(size=1000, seed=0):
-    return np.random.default_rng(seed).standard_normal(size)
 
 
 def test_a_model_with_a_given_delay_is_the_best_one_with_it():

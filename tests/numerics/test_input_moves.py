@@ -29,17 +29,6 @@ def test_a_clean_input_is_written_exactly_as_its_moves():
     assert_allclose(size, [2.0, -0.5, -0.5], rtol=0)
 
 
-def test_noise_that_is_no_spike_counts_with_its_mean():
-    # skewed noise: its median is 0.25, its mean 1 / 3
-    skewed = (K >= 100) * (20 + np.minimum(K - 100, 400) / 10) + np.random.default_rng(0).random(
-        N
-    ) ** 2
-    index, size = input_moves(skewed, [(100, 1)], N)
-    level = written(index, size) + np.median(skewed[:100])
-    for start, stop in zip(index, [*index[1:], N], strict=True):
-        assert level[start] == pytest.approx(skewed[start:stop].mean(), rel=1e-12)
-
-
 def test_a_ramp_in_noise_keeps_its_samples():
     ramp = NOISY + np.clip((K - 99) / 4, 0, 1) - (K >= 100)
     index, size = input_moves(ramp, [(100, 4)], N)
@@ -69,12 +58,3 @@ def test_overshoot_on_the_edge_itself_is_followed_with_its_area():
     index, size = input_moves(bouncing, [(100, 1)], N)
     area = np.sum(written(index, size)[100:108] - 1)
     assert area == pytest.approx(0.5, abs=4 * NOISE * (np.sqrt(8) + 8 * 1.25 / 10))
-
-
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
-def test_the_moves_scale_with_the_unit(scale):
-    drooping = NOISY - 0.2 * (K >= 100) * (1 - np.exp(-(K - 100.0) / 150))
-    index, size = input_moves(drooping, [(100, 1)], N)
-    other_index, other_size = input_moves(scale * drooping, [(100, 1)], N)
-    assert_array_equal(other_index, index)
-    assert_allclose(other_size, scale * size, rtol=1e-9, atol=1e-12 * scale)

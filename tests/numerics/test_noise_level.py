@@ -8,10 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from ctrl_realize.numerics.noise_level import (
-    colouring,
     correlation_time,
     hum_frequencies,
-    kept_in_blocks,
     mad_sigma,
     quantisation_step,
     rest_noise,
@@ -110,29 +108,6 @@ def test_the_correlation_time_of_a_lag(pole):
     found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))
     # summed over some ten times its length: known to sqrt(20 time / 60 000), 12 % for the slowest
     assert found == pytest.approx((1 + pole) / (1 - pole), rel=0.2)
-
-
-@pytest.mark.parametrize("over", [1, 3, 10])
-def test_blocks_keep_the_variance_of_slow_means_that_their_means_have(over):
-    noise = lfilter([1], [1, -0.8], white(200_000))
-    length = 9 * over
-    kept = kept_in_blocks(noise, length)
-    means = noise[: noise.size // length * length].reshape(-1, length).mean(axis=1)
-    # over all means; the autocorrelation is summed over some ten times 9 samples: known to 4 %
-    expected = length * means.var() / (noise.var() * correlation_time(noise))
-    assert kept == pytest.approx(expected, rel=0.06)
-
-
-def test_means_tell_colour_at_four_and_at_sixteen_samples():
-    short = np.repeat(white(400), 4)  # means of 4 keep all, 2 times white
-    assert colouring(short, float(short.std())) == pytest.approx(2, rel=0.1)
-    long = np.repeat(white(400), 16)
-    assert colouring(long, float(long.std())) == pytest.approx(4, rel=0.1)
-    # twelve means are needed
-    few = np.repeat(white(40), 4)
-    assert colouring(few[:48], float(few.std())) > 1
-    assert colouring(few[:47], float(few.std())) == 1
-    assert colouring(short, 0.0) == 1
 
 
 def test_lines_are_found_strongest_first_and_not_more_than_asked_for():

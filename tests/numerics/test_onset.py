@@ -19,12 +19,6 @@ def test_the_first_lag_of_the_response_is_seen_through_a_coloured_input(delay, c
     assert seen.peak == delay
 
 
-def test_nothing_is_seen_where_nothing_is():
-    rng = np.random.default_rng(0)
-    seen = [correlation_onset(*rng.normal(size=(2, 500)), 40, 0.99).onset for _ in range(200)]
-    assert np.mean(np.array(seen) >= 0) < 0.03  # 1 % asked for, 200 draws
-
-
 def test_an_input_that_moves_rarely_is_seen_no_earlier_than_its_delay():
     early = 0
     for seed in range(60):
@@ -50,13 +44,3 @@ def test_std_of_the_slope_is_its_scatter():
         [phase_slope(omega, -0.02 * omega + 0.05 * rng.normal(size=80), 0.5) for _ in range(400)]
     )
     assert_allclose(found[:, 0].std(), np.sqrt(np.mean(found[:, 1] ** 2)), rtol=0.12)  # 3.5 %
-
-
-def test_offsets_do_not_matter():
-    rng = np.random.default_rng(3)
-    u = rng.normal(size=2000)
-    y = lfilter([0, 0, 0, 1.0], [1, -0.8], u)
-    plain = correlation_onset(u, y, 40, 0.99)
-    moved = correlation_onset(u + 500, y - 300, 40, 0.99)
-    assert_allclose(moved.rho, plain.rho, atol=1e-9)
-    assert (moved.onset, moved.peak) == (3, 3)

@@ -69,15 +69,3 @@ def test_near_the_optimum_it_is_the_parabola_of_the_standard_error(found):
     # twice the noise, twice the interval
     wide = profile_limits(*delay_profile(problem, candidate, 4 * SIGMA**2, scales))
     assert wide[1] - wide[0] == pytest.approx(2 * (high - low), rel=0.05)
-
-
-def test_an_interval_ends_between_any_two_delays_of_its_grid_and_at_the_grid_where_it_is_open():
-    delay = np.array([1.0, 2.0, 3.0, 4.0])
-    # roots 4, 0, 1, 4 with an edge of 2: half of the way down, a third of the way up
-    assert profile_limits(delay, np.array([16.0, 0.0, 1.0, 16.0]), 4.0) == pytest.approx(
-        (1.5, 3 + 1 / 3)
-    )
-    assert profile_limits(delay, np.array([1.0, 0.0, 1.0, 16.0]), 4.0)[0] == 1.0
-    assert profile_limits(delay, np.array([16.0, 1.0, 0.0, 1.0]), 4.0)[1] == 4.0
-    # one delay alone inside, beside both ends of the grid
-    assert profile_limits(delay[:3], np.array([16.0, 0.0, 16.0]), 4.0) == pytest.approx((1.5, 2.5))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.rest import FEW, MIN_DRIFT_SAMPLES, rest_line
+from ctrl_realize.numerics.rest import rest_line
 
 
 def white(n, seed=0):
@@ -55,20 +55,3 @@ def test_five_standard_errors_decide(pole, seed):
     error = standard_error(noise)
     assert rest_line(7 + noise + 4.99 * error * k, AFTER, None)[1] == 0
     assert rest_line(7 + noise + 5.01 * error * k, AFTER, None)[1] == pytest.approx(5.01 * error)
-
-
-def test_few_samples_tell_no_drift_unless_it_is_asked_for():
-    line = 2 + 0.5 * np.arange(-(MIN_DRIFT_SAMPLES - 1), 0)
-    assert rest_line(line, AFTER, None) == (pytest.approx(line.mean()), 0)
-    assert rest_line(line, AFTER, True) == (pytest.approx(2), pytest.approx(0.5))
-    line = 2 + 0.5 * np.arange(-MIN_DRIFT_SAMPLES, 0)
-    assert rest_line(line, AFTER, None)[1] == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("remove", [None, True, False])
-def test_with_fewer_samples_than_few_those_that_still_rest_are_added(remove):
-    before, after = np.full(FEW - 1, 2.0), np.r_[2.0, 3.0, 2.0, 2.0]
-    assert rest_line(before, after, remove) == (2, 0)
-    # the first sample that has moved ends it, and those behind do not come back
-    assert rest_line(np.full(2, 2.0), np.r_[2.0, 9.0, 2.0, 2.0], remove) == (2, 0)
-    assert rest_line(np.empty(0), np.r_[1.0, 40.0, 50.0, 61.0], remove) == (1, 0)

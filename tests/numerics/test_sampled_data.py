@@ -24,25 +24,6 @@ def two(**changed):
     return SampledData(tuple(inputs), tuple(outputs), **given)
 
 
-def test_what_counts_stands_one_after_the_other():
-    data = two()
-    assert data.counts == [7, 5]
-    assert data.edges.tolist() == [0, 7, 12]
-    assert data.edges.dtype == np.int64
-    problem = data.problem(NOTHING)
-    assert problem.data[:7].tolist() == data.outputs[0][2:].tolist()
-    assert problem.data[7:].tolist() == (data.outputs[1][1:] / 4).tolist()
-    assert problem.root_weight.tolist() == [1.0] * 12
-    assert problem.regressors.shape == (12, 0)
-    assert problem.known is NOTHING
-    assert problem.whitener is None
-    # the drive is that of the whole record, divided by the same scale
-    assert problem.drive.starts == (2, 1)
-    for part, signal, scale in zip(problem.drive.parts, data.inputs, (1.0, 4.0), strict=True):
-        assert part.dt == 0.5
-        assert part.signal.tolist() == (signal / scale).tolist()
-
-
 @pytest.mark.parametrize("unit", [1.0, 1e-6])
 def test_every_record_has_its_own_clock_level_and_drift(unit):
     stretches = two(dt=0.5 * unit).problem(NOTHING).stretches

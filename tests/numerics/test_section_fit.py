@@ -54,12 +54,6 @@ def test_errors_are_those_that_the_cramer_rao_bound_allows():
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.24)
 
 
-def test_the_noise_of_every_output_is_found_and_weighs_it():
-    found = fit_sections([experiment(0, 4000)], near(), direct=False)
-    # 4000 samples: the square root of a variance to 3 x 1.1 %
-    assert_allclose(np.sqrt(found.variance), NOISE, rtol=0.035)
-
-
 def test_samples_that_are_missing_are_left_out():
     data = experiment(0)
     y = data.y.copy()

@@ -7,7 +7,6 @@ import pytest
 
 from ctrl_realize.numerics.delayed_modes import MoveTrain
 from ctrl_realize.numerics.own_terms import Stretches
-from ctrl_realize.numerics.pole_factors import poles_from_parameters
 from ctrl_realize.numerics.separable_fit import (
     Bounds,
     KnownFactor,
@@ -88,14 +87,6 @@ def test_partial_fractions_add_up(known):
 # --- elimination
 
 
-def test_gain_lead_and_level_are_found_at_the_true_delay_and_lag():
-    data = 5.0 + respond(train(), NOTHING, np.array([2.0, 3.0]), TRUTH)
-    state = evaluate(problem(data), JUMP, TRUTH[None])
-    assert state.numerator[0] == pytest.approx([2.0, 3.0])
-    assert state.regression[0] == pytest.approx([5.0])
-    assert state.cost[0] < 1e-20
-
-
 def test_the_residual_is_that_of_weighted_least_squares():
     data, weight = noisy(), np.linspace(0.5, 2.0, SIZE)
     trials = TRUTH + np.array([[0.0, 0.0], [0.7, 0.2], [-1.0, -0.5]])
@@ -170,17 +161,6 @@ def fitted(data, start, bounds=BOX, **settings):
     return x[0], cost[0]
 
 
-def test_a_start_ends_at_the_optimum():
-    x, cost = fitted(noisy(), [5.0, 0.0], tolerance=1e-12)
-    # noise of a hundredth of the gain, ninety samples, of which the first lag tells most
-    assert x == pytest.approx(TRUTH, abs=0.15)
-    around = evaluate(
-        problem(noisy()), ONE, x + 1e-3 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-    )
-    assert cost < around.cost.min()
-    assert cost == evaluate(problem(noisy()), ONE, x[None]).cost[0]
-
-
 def test_a_delay_stays_within_its_bounds():
     for low, high, end in ((0.0, 2.5, 2.5), (4.0, 9.0, 4.0)):
         box = Bounds(np.array([low, BOX.low[1]]), np.array([high, BOX.high[1]]))
@@ -230,8 +210,3 @@ def test_steps_do_not_depend_on_the_unit_of_time():
         # four steps, each a solution of equations of condition 1e3
         assert (theirs + shift) / scale == pytest.approx(ours, rel=1e-9)
         assert same == pytest.approx(cost, rel=1e-9)
-
-
-def test_poles_of_the_answer_are_those_of_its_parameters():
-    x, _ = fitted(noisy(), [3.0, 0.0])
-    assert poles_from_parameters(x[None, 1:])[0][0, 0] == pytest.approx(-np.exp(x[1]))

@@ -54,14 +54,6 @@ def test_units_of_the_states_do_not_change_the_response():
     assert_allclose(scaled, plain, rtol=0, atol=1e-11 * np.abs(plain).max())
 
 
-def test_frequency_response_of_a_defective_matrix_is_right():
-    A = np.array([[0.5, 1.0, 0.0], [0.0, 0.5, 1.0], [0.0, 0.0, 0.5]])
-    B, C, D = np.eye(3)[:, 2:], np.eye(3)[:1], np.zeros((1, 1))
-    z = np.exp(1j * np.linspace(0.1, 3, 7))
-    fast = state_space.frequency_response(state_space.schur_form(A), B, C, D, z)
-    assert_allclose(fast[0, 0], 1 / (z - 0.5) ** 3, rtol=1e-14)
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 64, 65, 66, 129, 500])
 def test_markov_parameters_are_powers_of_a(count):
     A, B, C, D = system(0)
@@ -79,13 +71,6 @@ def test_simulation_equals_the_recursion(seed, samples):
     expected = recursion(A, B, C, D, u, x)
     fast = state_space.simulate(A, B, C, D, u, x)
     assert_allclose(fast, expected, rtol=0, atol=1e-11 * max(1.0, np.abs(expected).max()))
-
-
-def test_a_static_system_has_no_states_to_trip_over():
-    A, B, C, D = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[2.0]])
-    assert_allclose(state_space.markov(A, B, C, D, 3), [[[2.0, 0.0, 0.0]]])
-    assert_allclose(state_space.step_response(A, B, C, D, 3), [[[2.0, 2.0, 2.0]]])
-    assert_allclose(state_space.simulate(A, B, C, D, np.ones((1, 3))), [[2.0, 2.0, 2.0]])
 
 
 def test_a_long_step_keeps_its_digits():
@@ -117,8 +102,3 @@ def test_integrators_are_sampled_exactly():
     step = state_space.step_response(*model, 6)[0, 0]
     assert delay == 2
     assert_allclose(step, 0.5 * np.arange(6) + 0.25, atol=1e-15)
-
-
-@pytest.mark.parametrize(("dead_time", "dt"), [(0.3, 0.1), (0.7, 0.1), (37 * 7.8125e-4, 7.8125e-4)])
-def test_whole_samples_are_seen_as_whole(dead_time, dt):
-    assert sampling.split_dead_time(dead_time, dt) == (round(dead_time / dt), 0.0)

@@ -32,21 +32,6 @@ def test_trimmed_mean_is_that_of_scipy(values):
     assert trimmed_statistics(values, 2).mean == pytest.approx(expected, rel=1e-12, abs=1e-9)
 
 
-@given(samples, st.floats(0.01, 100), st.floats(-50, 50))
-def test_scale_and_shift_move_mean_and_interval_and_scale_the_rest(values, factor, shift):
-    plain, moved = trimmed_statistics(values, 2), trimmed_statistics(factor * values + shift, 2)
-    scale = factor * (1 + np.abs(values).max()) + abs(shift)
-    assert moved.mean == pytest.approx(factor * plain.mean + shift, abs=1e-9 * scale)
-    assert moved.std_error == pytest.approx(factor * plain.std_error, abs=1e-7 * scale)
-
-
-def test_one_wild_value_changes_nothing():
-    values = np.arange(20.0)
-    wild = values.copy()
-    wild[-1] = 1e9
-    assert trimmed_statistics(wild, 2) == trimmed_statistics(values, 2)
-
-
 def test_95_percent_intervals_cover_the_centre_of_heavy_tails():
     rng = np.random.default_rng(3)
     hits = 0

@@ -73,15 +73,6 @@ def test_means_weigh_what_they_hold_and_of_coarsely_rounded_samples_hardly_more(
     assert weight[np.argmax(width)] > 1.8
 
 
-def test_a_rest_that_jumps_between_two_levels_is_coarse_and_a_dithered_one_is_not():
-    k = np.arange(1400)
-    noise = np.random.default_rng(1).standard_normal(k.size)
-    step = -40.0 * np.expm1(-np.clip(k - EDGE - DELAY, 0, None) / LAG)
-    for level, size, coarse in ((0.5, 0.2, True), (0.0, 0.2, True), (0.5, 0.7, False)):
-        y = np.round(level + step + size * noise)
-        assert step_data(y, 1.0 * (k >= EDGE), DT, [(EDGE, 1)]).coarse is coarse
-
-
 def test_regressors_are_a_level_a_drift_that_may_end_and_the_hum():
     made = replace(data(), drift=0.1)
     level, slope = fixed_regressors(made).T
@@ -141,13 +132,3 @@ def test_a_record_that_begins_while_the_plant_moves_has_a_free_response_of_its_o
     np.testing.assert_allclose(means.clock, found.bins.average(DT * np.arange(1400.0)))
     np.testing.assert_array_equal(means.regressors, np.ones((found.bins.first.size, 1)))
     assert window(data(), 1400, KnownFactor()).own is None
-
-
-def test_a_noisy_input_moves_at_its_edge_by_the_step_and_at_no_sample_before():
-    made = data()
-    noisy = made.input + 0.02 * np.random.default_rng(7).standard_normal(1400)
-    found = window(replace(made, input=noisy), 900, KnownFactor())
-    assert found.drive.moves[0] == EDGE * DT
-    # means of at least eight samples
-    assert found.drive.sizes[0] == pytest.approx(1.0, abs=5 * 0.02 / np.sqrt(8))
-    assert found.drive.moves.size < 24

@@ -36,22 +36,6 @@ def test_the_covariance_of_ringing_noise_is_found():
     assert found.size < 1000
 
 
-def test_wild_samples_do_not_colour_the_noise():
-    noise = ringing(4000)
-    wild = noise.copy()
-    wild[::400] += 50 * noise.std()
-    plain = noise_covariance(noise, 4000)[:60]
-    assert noise_covariance(wild, 4000)[:60] == pytest.approx(plain, abs=0.15)
-
-
-def test_white_noise_and_silence_have_no_covariance():
-    white = np.random.default_rng(3).standard_normal(2000)
-    assert list(noise_covariance(white, 2000)) == [1.0]
-    silent = np.zeros(2000)
-    silent[::300] = 1.0
-    assert list(noise_covariance(silent, 2000)) == [1.0]
-
-
 def test_means_over_bins_become_white_exactly():
     covariance = exact_covariance(500)
     bins = response_bins(1600, [600], 640)

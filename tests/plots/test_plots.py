@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-
 import control as ct
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -15,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize import plots
-from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.errors import DataError, OptionError
 from ctrl_realize.plots import style
 from tests import rigs
 
@@ -140,18 +137,6 @@ def test_a_wrong_number_of_axes_is_refused(record):
         plots.record_plot(record, ax=["upper", "lower"])
 
 
-def test_results_draw_themselves(scanned, fitted, campaign, orders, measured):
-    results = [scanned.fit, scanned.fit.realization, fitted.fit, campaign, orders]
-    results.append(cr.compare_frf(fitted, measured))
-    for result in results:
-        assert isinstance(result.plot(ax=Figure()), ct.ControlPlot)
-
-
-def test_signals_are_drawn_by_draw(record, measured):
-    for thing in (record, cr.unit_step(record), cr.ImpulseResponse([0, 1.0, 0.5], 0.1), measured):
-        assert isinstance(plots.draw(thing, ax=Figure()), ct.ControlPlot)
-
-
 def test_what_has_no_picture_is_named():
     with pytest.raises(OptionError, match="no picture of a dict"):
         plots.draw({})
@@ -163,39 +148,12 @@ def test_a_loaded_model_says_why_its_fit_has_no_picture(fitted, tmp_path):
         cr.load_model(tmp_path / "model.json").fit.plot()
 
 
-def test_every_function_of_the_registry_is_public_and_every_class_exists():
-    classes = {
-        name
-        for module in pkgutil.walk_packages(cr.__path__, "ctrl_realize.")
-        if module.name != "ctrl_realize.__main__"
-        for name in vars(importlib.import_module(module.name))
-    }
-    for name, function in plots._DRAWN_BY.items():
-        assert getattr(plots, function.__name__) is function
-        assert name in classes
-
-
 def test_the_delay_plot_shows_the_misfit_and_its_minimum(scanned):
     drawn = plots.delay_plot(scanned, ax=Figure())
     curve = drawn.lines[0, 0][0]
     assert_array_equal(curve.get_ydata(), scanned.fit.iae)
     point = drawn.axes[0, 0].get_lines()[1]
     assert list(point.get_xdata()) == [scanned.fit.delay]
-
-
-@pytest.mark.parametrize("width", [8.0, 3.5])
-def test_the_legend_of_the_delay_plot_hides_no_part_of_its_curve(scanned, width):
-    figure = Figure(figsize=(width, 4.6), layout="constrained")
-    drawn = plots.delay_plot(scanned, ax=figure)
-    figure.draw_without_rendering()
-    legend = drawn.legend[0, 0]
-    assert legend is drawn.axes[0, 0].get_legend()
-    frame = legend.get_window_extent()
-    curve = drawn.lines[0, 0][0]
-    heights = curve.get_transform().transform(curve.get_xydata())[:, 1]
-    assert heights.max() < frame.y0
-    assert frame.x0 > 0
-    assert frame.x1 < figure.bbox.width
 
 
 def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
@@ -231,66 +189,12 @@ def test_measured_and_model_have_the_same_colours_everywhere(record, scanned, me
         assert colours == [style.MEASURED, style.MODEL]
 
 
-def test_keywords_change_the_main_line(scanned):
-    drawn = plots.delay_plot(scanned, ax=Figure(), color="black", linewidth=7)
-    assert drawn.lines[0, 0][0].get_linewidth() == 7
-    with pytest.raises(AttributeError):
-        plots.delay_plot(scanned, ax=Figure(), colourful=True)
-
-
-def test_names_that_look_like_instructions_are_drawn_as_they_are(record, recwarn):
-    name = "$\\frac{1$ _<b>\n\x00"
-    hostile = cr.Record(
-        record.time, record.input, record.output, name=name, input_labels=["_$x"],
-        output_labels=["$y_{"],
-    )  # fmt: skip
-    drawn = plots.record_plot(hostile)
-    drawn.figure.draw_without_rendering()
-    assert drawn.axes[0, 0].get_title(loc="left") == "\\$\\frac{1\\$ _<b>??"
-    assert len(recwarn) == 0
-
-
 def test_a_record_with_missing_samples_is_drawn_with_gaps():
     time = 0.1 * np.arange(40)
     output = np.where((time > 1) & (time < 2), np.nan, time)
     gappy = cr.Record(time, (time > 1) * 1.0, output, missing="keep")
     line = plots.record_plot(gappy, ax=Figure()).lines[0, 0][0]
     assert np.isnan(line.get_ydata()).sum() == np.isnan(output).sum() > 0
-
-
-def test_several_channels_have_a_line_each():
-    time = 0.1 * np.arange(30)
-    two = cr.Record(time, np.ones((2, 30)), np.ones((3, 30)))
-    drawn = plots.record_plot(two, ax=Figure())
-    assert [len(lines) for lines in drawn.lines.ravel()] == [3, 2]
-    assert drawn.legend[0, 0] is not None
-
-
-def test_impulse_responses_of_several_channels_have_axes_each():
-    rng = np.random.default_rng(0)
-    drawn = plots.impulse_plot(cr.ImpulseResponse(rng.standard_normal((2, 3, 20)), 0.1))
-    assert drawn.axes.shape == (2, 3)
-
-
-def test_models_of_other_channels_are_refused(scanned):
-    with pytest.raises(DataError, match="1 x 1 channels"):
-        plots.impulse_plot(cr.ImpulseResponse(np.ones((2, 1, 9)), 0.1), scanned)
-    two = ct.ss(np.eye(2) / 2, np.eye(2), np.eye(2), np.zeros((2, 2)), 0.1)
-    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
-        plots.frf_plot(two)
-
-
-@pytest.mark.parametrize("thing", [3.0, "model", None])
-def test_what_is_no_system_has_no_frequency_response(thing):
-    with pytest.raises(UnsuitableSystemError, match="needed are systems"):
-        plots.frf_plot(thing)
-
-
-def test_a_model_without_scan_has_no_delay_plot(fitted):
-    with pytest.raises(OptionError, match="no delay scan"):
-        plots.delay_plot(fitted)
-    with pytest.raises(OptionError, match="no output-error fit"):
-        plots.fit_plot(cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 3))
 
 
 def test_many_records_are_grouped_by_the_height_of_their_step(valve):
@@ -304,10 +208,6 @@ def test_many_records_are_grouped_by_the_height_of_their_step(valve):
     legend_hides_no_record(many)
 
 
-def test_the_legend_of_a_campaign_hides_no_record(campaign):
-    legend_hides_no_record(campaign)
-
-
 def legend_hides_no_record(campaign):
     axes = plots.campaign_plot(campaign, truth=37).axes[0, 0]
     axes.figure.draw_without_rendering()
@@ -317,13 +217,6 @@ def legend_hides_no_record(campaign):
         if line.get_label().startswith("_"):  # records carry no name in the legend
             ends = line.get_transform().transform(line.get_xydata())
             assert (ends[:, 1] < legend.y0).all()
-
-
-def test_a_second_plot_keeps_the_time_unit_of_the_axes(scanned):
-    axes = Figure().subplots()
-    axes.set_xlabel("time [s]")
-    plots.impulse_plot(scanned.fit.impulse, ax=axes)
-    assert axes.get_lines()[0].get_xdata()[-1] < 1.0
 
 
 def test_the_onset_is_marked_where_the_model_says(record, scanned):
@@ -368,18 +261,6 @@ def test_a_fitted_response_looks_like_a_model():
     measured, fitted = fit.plot().lines[0, 0]
     assert (measured.get_color(), fitted.get_color()) == (plots.style.MEASURED, plots.style.MODEL)
     assert fitted.get_linestyle() != "-"
-
-
-def test_a_model_without_a_name_of_its_own_is_called_model(measured):
-    nameless = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=1e-3)
-    assert nameless.name.startswith("sys[")
-    labels = [t.get_text() for t in plots.frf_plot([measured, nameless]).legend[0, 0].get_texts()]
-    assert labels == [measured.name, "model"]
-
-
-def test_a_model_in_the_place_of_the_record_is_told(record, scanned):
-    with pytest.raises(DataError, match="got a DelayedStateSpace; needed is a Record"):
-        plots.step_plot(scanned, record)
 
 
 def test_what_a_plot_is_not_made_for_is_told_with_what_it_needs(record, scanned):

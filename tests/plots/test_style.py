@@ -5,13 +5,10 @@ from __future__ import annotations
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import ctrl_realize as cr
-from ctrl_realize.errors import OptionError
 from ctrl_realize.plots import style
-from ctrl_realize.plots.names import plain
 
 
 @pytest.fixture(autouse=True)
@@ -45,14 +42,6 @@ def test_the_users_settings_are_back_after_an_error():
     assert dict(mpl.rcParams) == before
 
 
-def test_what_others_switch_inside_stays_switched():
-    # A notebook's backend becomes interactive with the first figure, and must stay so.
-    mpl.rcParams["interactive"] = False
-    with style.context():
-        mpl.rcParams["interactive"] = True
-    assert mpl.rcParams["interactive"]
-
-
 def test_a_figure_of_the_user_after_a_plot_looks_as_before_it(comparison):
     mpl.rcParams.update({"lines.linewidth": 0.7, "axes.labelsize": 5.0})
     comparison.plot()
@@ -81,23 +70,3 @@ def test_a_title_is_put_on_new_figures_only():
 def test_any_plot_can_be_drawn_without_its_title(comparison):
     assert comparison.plot().axes[0, 0].get_title(loc="left") == "Tuning rules on this plant"
     assert comparison.plot(title="").axes[0, 0].get_title(loc="left") == ""
-
-
-def test_a_canvas_is_the_axes_that_were_given():
-    given = Figure().subplots(2, 1)
-    with style.canvas(given, 2) as axes:
-        assert axes == list(given)
-    with pytest.raises(OptionError, match="needs 1"), style.canvas(given):
-        pass
-
-
-@pytest.mark.parametrize("letter", ["W", "\u5b57", "a", "\U0001f600"])
-def test_names_of_wide_letters_are_cut_before_they_take_the_axes(letter):
-    shown = plain(250 * letter, 34)
-    figure = Figure(figsize=(6, 3))
-    text = figure.text(0, 0, shown, fontsize=10)
-    drawn = text.get_window_extent(FigureCanvasAgg(figure).get_renderer())
-    # 34 ordinary letters of 10 points take about 190 points
-    assert drawn.width * 72 / figure.dpi < 230
-    assert shown.endswith("…")
-    assert len(shown) > 15
