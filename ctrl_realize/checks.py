@@ -7,7 +7,10 @@ from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 from typing import Any
 
-from .errors import OptionError
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import DataError, OptionError
 
 MOST = 10**12
 """No count of samples, lags or states is larger."""
@@ -53,6 +56,66 @@ def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
     if number < low or (high is not None and number > high):
         raise OptionError(f"{name}={number}; needed is a whole number {limits}")
     return number
+
+
+def numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Take real numbers and nothing else; masked ones are missing, NaN.
+
+    Raises
+    ------
+    DataError
+        Text, complex values, times, rows of different lengths.
+    """
+    array = _array(values, what)
+    if array.dtype.kind in "mM":
+        raise DataError(
+            f"{what} holds {array.dtype} values; needed are seconds, for instance "
+            "(stamps - stamps[0]) / np.timedelta64(1, 's')"
+        )
+    if array.dtype.kind not in "biuf":
+        raise DataError(
+            f"{what} holds {array.dtype} values; needed are real numbers (a ragged list, text or "
+            "complex values cannot be used)"
+        )
+    return np.asarray(array, dtype=np.float64)
+
+
+def complex_numbers(values: ArrayLike, what: str) -> NDArray[np.complex128]:
+    """Take real or complex numbers and nothing else; masked ones are missing, NaN."""
+    array = _array(values, what)
+    if array.dtype.kind not in "biufc":
+        raise DataError(f"{what} holds {array.dtype} values; needed are complex numbers")
+    return np.asarray(array, dtype=np.complex128)
+
+
+def finite(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Take real numbers that are finite."""
+    array = numbers(values, what)
+    bad = int(np.sum(~np.isfinite(array)))
+    if bad:
+        raise DataError(f"{what} has {bad} non-finite value{'s' if bad > 1 else ''}")
+    return array
+
+
+def _array(values: Any, what: str) -> NDArray[Any]:
+    try:
+        return np.asarray(_unmasked(values))
+    except ValueError as error:
+        raise DataError(f"{what} is no array: its rows have different lengths") from error
+
+
+def _unmasked(given: Any) -> Any:
+    """Put NaN where something is masked, in lists too: below a mask is anything, often 1e20."""
+    if isinstance(given, np.ma.MaskedArray):
+        mask = np.ma.getmaskarray(given)
+        if given.dtype.kind not in "biufc" or not mask.any():
+            return given.data
+        return np.where(mask, np.nan, given.data)
+    if isinstance(given, list | tuple) and any(
+        isinstance(part, list | tuple | np.ma.MaskedArray) for part in given
+    ):
+        return [_unmasked(part) for part in given]
+    return given
 
 
 def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
+from ..checks import numbers
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Result
@@ -76,14 +77,14 @@ class ValveTruth(Result):
     def response(self, omega: FloatArray) -> ComplexArray:
         """Evaluate the frequency response at `omega` in rad/s, dead time included."""
         A, B, C, _ = self.matrices
-        points = 1j * np.asarray(omega, dtype=np.float64)
+        points = 1j * numbers(omega, "omega")
         systems = points.reshape(-1, 1, 1) * np.eye(A.shape[0]) - A
         values = (C @ np.linalg.solve(systems, B.astype(complex)))[:, 0, 0]
         return np.asarray(values.reshape(points.shape) * np.exp(-points * self.dead_time))
 
     def frf(self, frequency_hz: FloatArray) -> MeasuredFRF:
         """Evaluate the frequency response as an FRF object, ready for plots and comparisons."""
-        grid = np.asarray(frequency_hz, dtype=np.float64)
+        grid = numbers(frequency_hz, "frequency_hz")
         return MeasuredFRF(self.response(2 * np.pi * grid), grid, name="truth (simulated)")
 
     def _title(self) -> str:

@@ -126,6 +126,31 @@ def check_core(core: Any) -> None:
             f"the core's dt is {core.dt!r}; needed is a sample time in s "
             "(delayed_ss samples a continuous core)"
         )
+    check_entries(core)
+
+
+def check_entries(system: Any) -> None:
+    """Refuse systems with entries that are not finite.
+
+    Raises
+    ------
+    UnsuitableSystemError
+    """
+    if isinstance(system, DeferredMatrices):
+        return
+    if isinstance(system, ct.StateSpace):
+        entries = [system.A, system.B, system.C, system.D]
+    elif isinstance(system, ct.TransferFunction):
+        entries = [part for all_ in (system.num, system.den) for row in all_ for part in row]
+    elif isinstance(system, ct.FrequencyResponseData):
+        entries = [system.frdata]
+    else:
+        entries = [np.asarray(system)]
+    if not all(np.all(np.isfinite(part)) for part in entries):
+        name = f"the system {system.name!r}" if hasattr(system, "name") else f"the gain {system}"
+        raise UnsuitableSystemError(
+            f"{name} has entries that are not finite; needed are numbers other than NaN and inf"
+        )
 
 
 def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter: str) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import whole
+from ..checks import finite, whole
 from ..errors import DataError
 from ..numerics import state_space
 from ..numerics.arrays import ComplexArray, FloatArray
@@ -80,8 +80,13 @@ class DelayedResponses(CoreAndDelays):
         Returns
         -------
         ndarray, shape (N,) or (outputs, N)
+
+        Raises
+        ------
+        DataError
+            Another number of inputs, or values that are not finite real numbers.
         """
-        given = np.asarray(inputs, dtype=np.float64)
+        given = finite(inputs, "inputs")
         rows = np.atleast_2d(given)
         if rows.ndim != 2 or rows.shape[0] != self.ninputs:
             raise DataError(

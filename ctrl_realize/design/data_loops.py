@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ..checks import whole
+from ..delayed.parts import check_entries
 from ..errors import DataError
 from ..frequency.measured_points import MeasuredPoints, measured_points
 from ..numerics.arrays import ComplexArray, FloatArray
@@ -95,6 +96,7 @@ def data_loop(
     """Make a `DataLoop` of measured or computed responses, with systems on their grid."""
     data = plant if isinstance(plant, ct.FrequencyResponseData) else controller
     other = controller if data is plant else plant
+    check_entries(data)
     points = _above_zero(data)
     _check_points(points)
     omega, values, std, known = points.omega, points.response, points.std, 0.0

@@ -16,6 +16,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..delayed.parts import check_entries
 from ..errors import UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.crossovers import frequency_grid
@@ -134,6 +135,9 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
         Systems with several channels, of mixed time bases, or that are no linear systems.
     """
     systems = [plant] if controller is None else [plant, controller]
+    for system in systems:
+        if isinstance(system, (ct.StateSpace, ct.TransferFunction, int, float, np.number)):
+            check_entries(system)
     bases = {base for base in map(_time_base, systems) if base is not None}
     if len(bases) > 1:
         words = " and ".join(_words(base) for base in sorted(bases))

@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import real
+from ..checks import numbers, real
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.crossovers import follow
@@ -75,7 +75,7 @@ def unwrapped_phase(
     else:
         if omega is None:
             raise OptionError("omega is missing; a system needs the frequencies in rad/s")
-        grid = np.asarray(omega, dtype=np.float64)
+        grid = numbers(omega, "omega")
         if grid.ndim != 1 or np.any(grid < 0) or not np.all(np.isfinite(grid)):
             raise DataError("omega must be a one-dimensional array of frequencies >= 0 in rad/s")
         phase = _of_loop(open_loop(system, dead_time=wait or 0.0), grid)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import finite
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
@@ -59,7 +61,7 @@ class ProcessModel(Result):
 
     def __post_init__(self) -> None:
         numbers = (self.gain, self.lag, self.dead_time, self.second_lag)
-        if not all(np.isfinite(x) for x in numbers) or self.gain == 0:
+        if not all(isinstance(x, Real) and np.isfinite(x) for x in numbers) or self.gain == 0:
             raise OptionError(
                 f"{numbers} (gain, lag, dead_time, second_lag) must be finite, gain not 0"
             )
@@ -87,7 +89,7 @@ class ProcessModel(Result):
 
     def step(self, time: ArrayLike) -> FloatArray:
         """Step response at times in s."""
-        at = np.asarray(time, dtype=np.float64)
+        at = finite(time, "time")
         shape = process_step(
             at, self.lag, self.second_lag, self.dead_time, integrating=self.integrating
         )

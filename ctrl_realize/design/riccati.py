@@ -8,13 +8,14 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import numbers
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray
 
 
 def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray:
     """Return a symmetric weight or covariance of the size that is needed."""
-    weight = np.atleast_2d(np.asarray(given, dtype=np.float64))
+    weight = np.atleast_2d(numbers(given, name))
     if weight.shape != (size, size):
         raise DataError(f"{name} has shape {weight.shape}; there are {size} {of}")
     if not np.all(np.isfinite(weight)):

@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import numbers
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
@@ -293,7 +294,7 @@ def _grid(plant: DelayedStateSpace, omega: ArrayLike | None) -> FloatArray:
             np.clip(1e-3 * slow[slow > 1e-9 * top].min(initial=top), 1e-8 * top, 0.01 * top)
         )
         return np.geomspace(low, 0.999 * top, GRID_POINTS)
-    grid = np.array(omega, dtype=np.float64)
+    grid = numbers(omega, "omega")
     if grid.ndim != 1 or grid.size == 0 or grid[0] <= 0 or np.any(np.diff(grid) <= 0):
         raise DataError("omega must rise and be > 0, in rad/s")
     return grid

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import band
 from ..delayed import DelayedStateSpace
+from ..delayed.parts import check_entries
 from ..errors import OptionError, UnsuitableSystemError
 
 
@@ -42,8 +43,10 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
 def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
     """Convert to state space; an improper transfer function is refused in our words."""
     if isinstance(system, ct.StateSpace):
+        check_entries(system)
         return system
     if isinstance(system, ct.TransferFunction):
+        check_entries(system)
         for row_num, row_den in zip(system.num, system.den, strict=True):
             for num, den in zip(row_num, row_den, strict=True):
                 if np.trim_zeros(num, "f").size > np.trim_zeros(den, "f").size:
@@ -58,6 +61,7 @@ def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
 def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
     """Return a discrete single-channel controller of the sample time `dt` in state space."""
     if isinstance(controller, (int, float)):
+        check_entries(controller)
         return ct.ss([], [], [], float(controller), dt)
     system = proper_ss(controller, purpose)
     if not system.issiso():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import control as ct
 import numpy as np
 
+from ..checks import numbers
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
 from ..wording import in_time, interval_in_time, time_within
@@ -141,7 +142,7 @@ class FRFFit(Result):
 
     def response(self, omega: FloatArray) -> ComplexArray:
         """Evaluate core and dead time at `omega` in rad/s."""
-        points = 1j * np.asarray(omega, dtype=np.float64)
+        points = 1j * numbers(omega, "omega")
         core = np.asarray(self.core(points, squeeze=False))[0, 0]
         return np.asarray(core * np.exp(-points * self.dead_time), dtype=np.complex128)
 

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..checks import real
+from ..checks import numbers, real
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.sines import dominant_frequency
@@ -149,7 +149,7 @@ def _start_frequencies(
     """Give every record a frequency to start from, in rad/s."""
     if frequency_hz is None:
         return _strongest_lines(flat)
-    given = np.asarray(frequency_hz, dtype=np.float64)
+    given = numbers(frequency_hz, "frequency_hz")
     if given.shape != (len(points),) or not np.all(np.isfinite(given)) or np.any(given <= 0):
         raise OptionError(
             f"frequency_hz has shape {given.shape}; needed are {len(points)} frequencies above 0, "

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..checks import whole
+from ..checks import numbers, whole
 from ..delayed import DelayedStateSpace
 from ..errors import CtrlRealizeError, DataError, OptionError
 from ..numerics.arrays import FloatArray
@@ -128,7 +128,7 @@ class Bootstrap(Result):
         return _band(phase - 2 * np.pi * turns, level)
 
     def _response(self, omega: Any) -> Any:
-        z = np.exp(1j * np.asarray(omega, dtype=np.float64) * float(self.system.dt))
+        z = np.exp(1j * numbers(omega, "omega") * float(self.system.dt))
         return np.array([np.ravel(s(z)) for s in self.systems])
 
     def __repr__(self) -> str:

@@ -6,6 +6,7 @@ import control as ct
 import numpy as np
 
 from ..checks import positive, whole
+from ..delayed.parts import check_entries
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 
 LONGEST = 1e12
@@ -43,6 +44,7 @@ def check_start(core: ct.StateSpace) -> None:
         raise UnsuitableSystemError(
             "the model to start from must be discrete, with its sample time"
         )
+    check_entries(core)
     worst = np.abs(core.poles()).max(initial=0.0)
     if worst > 1 + 1e-9:
         raise UnsuitableSystemError(

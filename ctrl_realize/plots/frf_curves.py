@@ -10,6 +10,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import numbers
 from ..errors import DataError, UnsuitableSystemError
 from ..frequency.measured_points import check_single_channel, measured_points
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
@@ -56,7 +57,7 @@ def curves_of(
     if not items:
         raise DataError("no frequency response to draw")
     data = [item for item in items if isinstance(item, ct.FrequencyResponseData)]
-    grid = _grid(items, data) if frequency_hz is None else np.asarray(frequency_hz, dtype=float)
+    grid = _grid(items, data) if frequency_hz is None else numbers(frequency_hz, "frequency_hz")
     delays = [float(np.max(item.dead_time)) for item in items if hasattr(item, "dead_time")]
     delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
     curves = [_curve(item, grid, delay) for item in items]

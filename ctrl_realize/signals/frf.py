@@ -9,14 +9,14 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import positive, real, system_name, system_names
+from ..checks import complex_numbers, numbers, positive, real, system_name, system_names
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.statistics import circle_quantile
 from ..results import as_asked, as_code
 from .frf_algebra import FRFAlgebra
 from .frf_operands import SAME
-from .record_checks import check_size, numbers, unmasked
+from .record_checks import check_size
 
 
 class MeasuredFRF(FRFAlgebra):
@@ -97,7 +97,7 @@ class MeasuredFRF(FRFAlgebra):
         inputs: Any = None,
         outputs: Any = None,
     ) -> None:
-        values = _complex_numbers(response)
+        values = complex_numbers(response, "response")
         grid = numbers(frequency_hz, "frequency_hz")
         if grid.ndim != 1 or grid.size == 0:
             raise DataError(f"frequency_hz has shape {grid.shape}; needed is (K,), K >= 1")
@@ -184,7 +184,7 @@ class MeasuredFRF(FRFAlgebra):
         See `control.FrequencyResponseData.eval`. A frequency may differ from the measured one by
         the rounding of a conversion, as 6.283185307179586 * f and 2 * (f * pi) do.
         """
-        asked = np.asarray(omega, dtype=np.float64)
+        asked = numbers(omega, "omega")
         right = np.clip(np.searchsorted(self.omega, asked), 1, max(self.omega.size - 1, 1))
         near = [self.omega[np.minimum(at, self.omega.size - 1)] for at in (right - 1, right)]
         for own in near:
@@ -312,17 +312,6 @@ def _beside(
     _check_finite(array, what)
     check_size(array.reshape(-1, array.shape[-1]), what)
     return read_only(array[..., order])
-
-
-def _complex_numbers(response: ArrayLike) -> ComplexArray:
-    """Take real or complex numbers and nothing else."""
-    try:
-        array = np.asarray(response)
-    except ValueError as error:
-        raise DataError("response is no array: its rows have different lengths") from error
-    if array.dtype.kind not in "biufc":
-        raise DataError(f"response holds {array.dtype} values; needed are complex numbers")
-    return unmasked(response, np.asarray(array, dtype=np.complex128))
 
 
 def _largest_part(values: ComplexArray) -> FloatArray:

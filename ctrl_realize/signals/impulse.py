@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import sosfreqz
 
-from ..checks import positive
+from ..checks import numbers, positive
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.filters import butterworth, butterworth_group_delay
 from ..numerics.time_axis import EXTREME
-from .record_checks import unmasked
 from .step import StepResponse
 
 Sampling = Literal["step-invariant", "impulse-invariant"]
@@ -51,7 +50,7 @@ class FilterSpec:
 
     def response(self, omega: ArrayLike) -> ComplexArray:
         """Frequency response at `omega` in rad/s; divide a model's by it to take it out."""
-        points = np.atleast_1d(np.asarray(omega, dtype=np.float64)) * self.dt
+        points = np.atleast_1d(numbers(omega, "omega")) * self.dt
         sos = butterworth(self.order, self.cutoff_hz, self.dt)
         response = np.asarray(sosfreqz(sos, worN=points)[1], dtype=np.complex128)
         return (np.abs(response) ** 2).astype(np.complex128) if self.zero_phase else response
@@ -183,14 +182,11 @@ class ImpulseResponse:
 
 
 def _finite(values: ArrayLike, what: str) -> FloatArray:
-    array = np.asarray(values)
-    if array.dtype.kind not in "biuf":
-        raise DataError(f"{what} holds {array.dtype} values; needed are real numbers")
-    numbers = unmasked(values, np.asarray(array, dtype=np.float64))
-    bad = ~np.isfinite(numbers)
+    array = numbers(values, what)
+    bad = ~np.isfinite(array)
     if bad.any():
         raise DataError(
             f"{what} has {int(bad.sum())} non-finite values, the first at index "
-            f"{int(np.flatnonzero(bad.reshape(-1, numbers.shape[-1]).any(axis=0))[0])}"
+            f"{int(np.flatnonzero(bad.reshape(-1, array.shape[-1]).any(axis=0))[0])}"
         )
-    return numbers
+    return array

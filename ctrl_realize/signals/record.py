@@ -9,11 +9,11 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import one_of, spelled_out
+from ..checks import numbers, one_of, spelled_out
 from ..errors import DataError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.time_axis import axis_fault, sample_time
-from .record_checks import check_finite, check_shape, check_size, labelled, numbers
+from .record_checks import check_finite, check_shape, check_size, labelled
 from .resampling import MIN_SAMPLES, resampled
 
 MISSING = ("refuse", "keep")

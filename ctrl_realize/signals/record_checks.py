@@ -3,43 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from ..checks import spelled_out
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.time_axis import EXTREME
-
-Number = TypeVar("Number", np.float64, np.complex128)
-
-
-def numbers(values: ArrayLike, what: str) -> FloatArray:
-    """Take real numbers and nothing else; masked ones are missing, NaN."""
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise DataError(f"{what} is no array: its rows have different lengths") from error
-    if array.dtype.kind in "mM":
-        raise DataError(
-            f"{what} holds {array.dtype} values; needed are seconds, for instance "
-            "(stamps - stamps[0]) / np.timedelta64(1, 's')"
-        )
-    if array.dtype.kind not in "biuf":
-        raise DataError(
-            f"{what} holds {array.dtype} values; needed are real numbers (a ragged list, text or "
-            "complex values cannot be used)"
-        )
-    return unmasked(values, np.asarray(array, dtype=np.float64))
-
-
-def unmasked(given: Any, values: NDArray[Number]) -> NDArray[Number]:
-    """Put NaN where what was given is masked: below a mask is anything, often 1e20."""
-    if not isinstance(given, np.ma.MaskedArray):
-        return values
-    return np.where(np.ma.getmaskarray(given), values.dtype.type(np.nan), values)
 
 
 def check_shape(values: FloatArray, what: str, samples: int) -> None:

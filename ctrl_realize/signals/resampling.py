@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import positive
+from ..checks import numbers, positive, real
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
 from ..numerics.time_axis import axis_fault, sample_time
-from .record_checks import check_finite, check_shape, check_size, numbers
+from .record_checks import check_finite, check_shape, check_size
 
 MIN_SAMPLES = 3
 MAX_DENSER = 100
@@ -19,6 +19,8 @@ def resampled(
     time: ArrayLike, input: ArrayLike, output: ArrayLike, dt: float | None, max_jitter: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Interpolate time, input and output; see `Record.resampled`."""
+    if real(max_jitter, "max_jitter", "in sample steps, >= 0") < 0:
+        raise OptionError(f"max_jitter={max_jitter:g}; needed is >= 0, in sample steps")
     stamps = numbers(time, "time")
     if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
         raise DataError(f"time has shape {stamps.shape}; needed is (N,), N >= {MIN_SAMPLES}")
