@@ -156,6 +156,12 @@ def test_the_names_of_the_core_s_states_are_kept(operation):
     assert S.delay_free.state_labels == ["position", "speed"]
 
 
+def test_the_names_of_the_core_s_states_are_stored_with_the_model(tmp_path):
+    cr.save_model(tmp_path / "model.json", cr.delayed_ss(NAMED, 2))
+    again = cr.load_model(tmp_path / "model.json")
+    assert again.state_labels == ["position", "speed", "u[k-1]", "u[k-2]"]
+
+
 def test_a_product_has_the_names_of_both_cores_where_they_differ():
     S = cr.delayed_ss(NAMED, 1)
     integral = ct.ss(1, 1, 1, 0, TS, states=["sum"])

@@ -184,10 +184,13 @@ def model_from_text(text: str, *, max_states: int | None = None) -> DelayedState
 
 def _model_content(model: DelayedStateSpace) -> dict[str, Any]:
     core = model.delay_free
+    states = core.state_labels
+    named = states != [f"x[{i}]" for i in range(core.nstates)]
     return {
         "name": model.name,
         "inputs": list(model.input_labels),
         "outputs": list(model.output_labels),
+        **({"states": states} if named else {}),
         "order": core.nstates,
         "dt": float(core.dt),
         "input_delays": list(model.input_delays),
@@ -202,6 +205,9 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> De
     order = boolean_free(model, "order", int)
     if order < 0 or not inputs or not outputs:
         raise FileFormatError("the model has no inputs or outputs, or a negative order")
+    states = texts(model, "states") if "states" in model else order
+    if isinstance(states, list) and len(states) != order:
+        raise FileFormatError(f"{len(states)} names for {order} states")
     shapes = {
         "A": (order, order),
         "B": (order, len(inputs)),
@@ -221,7 +227,7 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> De
     if not 0 < dt < float("inf"):
         raise FileFormatError(f"dt={dt} is no sample time")
     return DelayedStateSpace(
-        ct.StateSpace(*matrices, dt, remove_useless_states=False),
+        ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False),
         before,
         output_delay=behind,
         fit=summary_from_json(content.get("fit")),

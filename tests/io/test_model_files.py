@@ -266,6 +266,7 @@ EDITS = {
     "dt beyond doubles": ({"model.dt": 10**400}, "too large"),
     "no inputs": ({"model.inputs": []}, "no inputs or outputs"),
     "inputs of numbers": ({"model.inputs": [1]}, "not text"),
+    "a name too few": ({"model.states": ["x"]}, "1 names for"),
     "a name twice": ({"model.inputs": ["u", "u"]}, "a name twice"),
     "half a character": ({"model.name": "\ud800"}, "'name' is missing"),
     "an endless name": ({"model.name": "x" * 5000}, "'name' is missing"),
