@@ -26,7 +26,7 @@ def controllers() -> dict[str, ct.StateSpace]:
     pid = cr.design.PIDController(0.5, 0.2, dt=TS)
     return {
         "PID": pid,
-        "Smith predictor": cr.design.smith_predictor(plant(5), ct.tf([0.5, -0.45], [1, -1], TS)),
+        "Smith predictor": cr.design.smith_predictor(plant(5), ct.tf([0.5, -0.498], [1, -1], TS)),
         "joined subsystems": ct.interconnect(
             [ct.ss(pid, name="P", inputs="e", outputs="v"), ct.ss(NAMED, name="F", inputs="v")],
             inplist="P.e",
@@ -188,7 +188,7 @@ SHOWN = {
     "system": lambda: cr.delayed_ss(NAMED, 4, name="valve"),
     "controller": lambda: cr.design.PIDController(0.3, dt=TS, name="valve"),
     "predictor": lambda: cr.design.smith_predictor(
-        plant(5), ct.tf([0.5, -0.45], [1, -1], TS), name="valve"
+        plant(5), ct.tf([0.5, -0.498], [1, -1], TS), name="valve"
     ),
     "response": lambda: cr.MeasuredFRF(
         [1.0, 1 / 3], [0.1, 0.2], coherence=[1.0, 0.9], std=[0.1, 0.2], repeats=3, name="valve"
