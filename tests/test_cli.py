@@ -15,10 +15,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.cli import main
-from ctrl_realize.cli.identify_command import unique_names
-from ctrl_realize.cli.inputs import selector
 from ctrl_realize.cli.staging import appearing
-from ctrl_realize.errors import OptionError
 
 FAST = ["--method", "scan", "--order", "3", "--max-delay", "80"]
 
@@ -86,13 +83,6 @@ def test_one_record_gives_model_report_and_figures(folder, first):
     assert direct.fit.report() in said
     assert cr.compare_frf(direct, cr.read_frf(folder / "frf.csv")).report() in said
     assert str(out) in said
-
-
-def test_the_report_tells_how_to_do_it_again(folder, first):
-    text = (first[0] / "report.html").read_text(encoding="utf-8")
-    assert f"ctrl-realize identify {folder / 'step_0.csv'} --output" in text
-    assert "--method scan --order 3 --max-delay 80" in text
-    assert "cr.read_record(" in text
 
 
 def test_several_records_make_a_campaign_and_a_bad_one_is_a_row(folder, tmp_path, capsys):
@@ -251,11 +241,6 @@ def test_help_has_examples_and_exit_codes(command, capsys):
         assert f"ctrl-realize {command[0]} " in said.split("Examples:")[1]
 
 
-def test_no_arguments_at_all_show_the_help(capsys):
-    assert main([]) == 0
-    assert "Commands:" in capsys.readouterr().out
-
-
 def test_a_folder_appears_whole_or_not_at_all(tmp_path):
     def fails(place):
         with appearing(place) as staged:
@@ -282,16 +267,6 @@ def test_an_interruption_is_told_and_leaves_nothing(folder, tmp_path, capsys, mo
         "ctrl-realize: interrupted; what was not finished is not written\n"
     )
     assert list(tmp_path.iterdir()) == []
-
-
-def test_columns_given_as_digits_are_numbers():
-    assert [selector(word) for word in ("2", "=2", "u", "", None)] == [2, "2", "u", None, None]
-
-
-def test_equal_names_are_numbered():
-    assert unique_names(["up", "up", "down"]) == ["up", "up_2", "down"]
-    with pytest.raises(OptionError, match="told apart"):
-        unique_names(["up", "up", "up_2"])
 
 
 def test_the_package_runs_as_a_module():

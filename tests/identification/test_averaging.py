@@ -24,43 +24,6 @@ TS = rigs.TS
 LEVEL = np.ones((1600, 1))
 
 
-def records(shapes, amplitudes=None, before=50, dt=0.01, names=None):
-    """Steps whose responses per unit of input are the given arrays, after a rest."""
-    amplitudes = amplitudes or [2.0] * len(shapes)
-    made = []
-    for i, (shape, height) in enumerate(zip(shapes, amplitudes, strict=True)):
-        output = height * np.concatenate([np.zeros(before), shape])
-        drive = height * (np.arange(output.size) >= before)
-        name = names[i] if names else ""
-        made.append(cr.Record(dt * np.arange(output.size), drive, output, name=name))
-    return tuple(made)
-
-
-def steps(*args, **kwargs):
-    return aligned_steps(records(*args, **kwargs))
-
-
-K = np.arange(200)
-SHAPE = 1 - np.exp(-K / 20)
-
-
-def test_records_count_by_the_square_of_their_amplitude():
-    # noise per unit of input falls with the amplitude
-    mean = mean_step(steps([SHAPE, 1.2 * SHAPE], [1.0, -3.0]))
-    assert_allclose(mean.output[mean.edge :], (1 + 9 * 1.2) / 10 * SHAPE, atol=1e-14)
-
-
-def test_a_record_apart_from_four_others_is_left_out():
-    rng = np.random.default_rng(0)
-    shapes = [SHAPE + 1e-3 * rng.standard_normal(200) for _ in range(5)]
-    shapes[2] = shapes[2] + 0.2 * (K > 50)
-    mean = mean_step(steps(shapes))
-    assert (mean.used, mean.left_out) == ((0, 1, 3, 4), (2,))
-    # of three records nobody can say which is apart
-    few = mean_step(steps(shapes[:3]))
-    assert (few.used, few.left_out) == ((0, 1, 2), ())
-
-
 def simulated(delays, amplitudes, *, noise=0.0, gains=None, names=None):
     gains = gains or [1.0] * len(delays)
     made = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 
-import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -52,15 +51,6 @@ def test_statistics_are_those_of_the_trimmed_delays(campaign):
     kept = np.sort(campaign.delays)[2:-2]
     assert_allclose([summary.mean, summary.variance], [kept.mean(), kept.var(ddof=1)])
     assert campaign.statistics().dropped == 4  # a quarter of eight at each end
-
-
-def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
-    system = campaign.system
-    assert isinstance(system, ct.StateSpace)
-    assert system.delay == round(campaign.statistics().mean)
-    scan = campaign.best.system.fit
-    again = cr.realize(scan.impulse, 3, delay=system.delay, samples=1000, feedthrough=True)
-    assert_array_equal(system.A, again.A)
 
 
 def test_a_bad_record_is_a_row_with_its_error(records):
@@ -126,28 +116,3 @@ def test_table_1_gives_the_papers_37_and_2():
     assert_allclose(summary.variance, 2.104, atol=5e-4)
     assert_allclose(trimmed_statistics(table, 3, ddof=0).variance, 2.042, atol=5e-4)
     assert (round(summary.mean), round(summary.variance)) == (paper.DELAY, 2)
-
-
-def test_the_default_fits_all_records_together():
-    noisy = [
-        named(step_record(noise=5e-3, seed=s, amplitude=a, before=640, after=1300), f"{a:g}_{s}")
-        for a in (4.0, 16.0)
-        for s in range(3)
-    ]
-    campaign = cr.identify_campaign(noisy)
-    low, high = campaign.system.fit.interval
-    assert isinstance(campaign.system.fit, cr.DelayFit)
-    assert low <= 37 * TS <= high
-    # paper.md 4.3: the mean of 40 records at 0.5 % knows the delay to .062 samples where the
-    # structure is right; six know it to .16.
-    if campaign.system.fit.structure == (3, 3):
-        assert abs(campaign.system.fit.delay - 37) < 4 * 0.16
-    assert_allclose(campaign.table()["misfit"], 5e-3, rtol=0.1)
-
-
-def test_records_of_several_channels_are_refused_in_words():
-    u = np.random.default_rng(0).choice([-1.0, 1.0], (2, 200))
-    record = cr.Record(0.1 * np.arange(200), u, u, name="two")
-    (row,) = cr.identify_campaign([record]).rows
-    assert row.error.startswith("DataError")
-    assert "one input and one output" in row.error

@@ -11,7 +11,6 @@ from ctrl_realize.errors import (
     DelayRangeError,
     OptionError,
     OrderError,
-    UnsuitableSystemError,
 )
 
 DT = 0.1
@@ -53,12 +52,6 @@ def test_order_delays_and_direct_term_are_found(model):
     assert np.abs(model.markov(80) - truth).max() < 0.02 * np.abs(truth).max()
     # the size of the noise to 3 x 3 %
     assert_allclose(fit.fit_percent, 100 * (1 - 0.1 / np.sqrt(1.01)), rtol=0, atol=0.9)
-
-
-def test_another_record_is_predicted_to_its_noise(model):
-    check = cr.check_residuals(model, record(1))
-    assert check.white
-    assert check.independent
 
 
 def test_several_records_and_missing_outputs_are_used():
@@ -118,21 +111,6 @@ def test_an_integrator_that_is_not_found_is_told_with_what_finds_it():
     assert_allclose(np.ravel(found.markov(30))[5:], 0.1, rtol=0.05)
 
 
-def test_a_disturbance_that_drifts_is_told():
-    rng = np.random.default_rng(0)
-    first = record(noise=0.0)
-    drift = np.cumsum(rng.standard_normal((2, 600)), axis=1)
-    drifting = cr.Record(first.time, first.input, first.output + 0.5 * drift)
-    (flag,) = (f for f in cr.fit_channels(drifting, 3).fit.flags if f.code == "coloured_residual")
-    assert "np.diff" in str(flag)
-    # of differences, which the advice asks for, the noise is white again
-    u, y = np.diff(drifting.input), np.diff(drifting.output)
-    found = cr.fit_channels(cr.Record(first.time[1:], u, y), 3)
-    assert found.fit.flags == ()
-    truth = PLANT.markov(80)
-    assert np.abs(found.markov(80) - truth).max() < 0.2 * np.abs(truth).max()
-
-
 def test_the_highest_order_that_was_tried_is_not_taken_for_enough():
     codes = {flag.code for flag in cr.fit_channels(record(), [1, 2]).fit.flags}
     assert "highest_order" in codes
@@ -185,16 +163,3 @@ def test_refining_brings_a_rough_model_to_the_fit(model):
     expected = model.markov(60)
     assert_allclose(found.markov(60), expected, rtol=0, atol=2e-3 * np.abs(expected).max())
     assert rough.delay_free.B[0, 0] == 0.5
-
-
-def test_refining_asks_for_a_system_that_fits_the_record():
-    first = record()
-    with pytest.raises(DataError, match="2 inputs and 2 outputs, the system 1 and 1"):
-        cr.refine(cr.delayed_ss(ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT), 0), record())
-    one = cr.Record(first.time, first.input[0], first.output[0])
-    with pytest.raises(UnsuitableSystemError, match="pure gain"):
-        cr.refine(ct.ss([], [], [], [[1.0]], DT), one)
-    with pytest.raises(DataError, match="longer than the delays, 900"):
-        cr.refine(cr.delayed_ss(ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], DT), 900), one)
-    with pytest.raises(UnsuitableSystemError):
-        cr.refine(ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), record())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -43,20 +41,6 @@ def test_the_central_difference_of_the_rest_is_that_of_four_neighbours():
     pre = one.pre
     five = (pre[:-4] - 8 * pre[1:-3] + 8 * pre[3:-1] - pre[4:]) / 12
     assert_allclose(noise[2:-2], five, rtol=0, atol=1e-15)
-
-
-@pytest.mark.parametrize("zero_phase", [True, False])
-def test_zeros_are_before_a_rest_that_is_shorter_than_the_filter_settles(zero_phase):
-    def expected(one, zeros):
-        joint = np.concatenate([np.zeros(zeros), one.pre, one.output])
-        pulses = low_pass(np.diff(joint, prepend=joint[0]), 5, 10.0, DT, zero_phase=zero_phase)
-        return pulses[zeros + one.pre.size :]
-
-    # five periods of 10 Hz are 50 samples
-    for before, zeros in ((20, 200), (54, 0)):
-        one = replace(step(before), pre=step(before).pre + 0.3)
-        found = cr.impulse_from_step(one, cutoff_hz=10.0, zero_phase=zero_phase).markov
-        assert_allclose(found, expected(one, zeros), rtol=0, atol=1e-14)
 
 
 def test_what_is_no_step_response_is_named():

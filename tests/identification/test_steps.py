@@ -93,14 +93,6 @@ def test_an_input_without_step_is_refused(u):
         cr.detect_step(record_of(u))
 
 
-def test_the_unit_step_is_the_exact_step():
-    step = cr.unit_step(step_record(delay=37.0))
-    assert_allclose(step.output, exact_step(R3, step.time - 37 * TS), rtol=0, atol=1e-12)
-    assert_allclose(step.pre, 0.0, atol=1e-12)
-    assert_allclose(step.input, 1.0, atol=1e-12)
-    assert (step.amplitude, step.rest_output) == (16.0, pytest.approx(0.3, abs=1e-12))
-
-
 def test_significant_drift_is_removed_and_noise_is_not_taken_for_drift():
     base = step_record(noise=1e-3, seed=3)
     slope = 0.02 * 16.0  # 2 % of the step per second
@@ -129,13 +121,6 @@ def test_central_difference_samples_the_impulse_response():
     # Fourth order: (w Ts)^4 / 30 of the largest, w = 50 rad/s.
     assert_allclose(g.density[k], density, rtol=0, atol=1e-6 * density.max())
     assert g.sampling == "impulse-invariant"
-
-
-def test_the_gain_survives_filter_and_difference():
-    step = cr.unit_step(step_record(after=6000))
-    for options in ({}, {"zero_phase": False}, {"difference": "central"}, {"cutoff_hz": 50.0}):
-        g = cr.impulse_from_step(step, **options)
-        assert_allclose(g.markov.sum(), 1.0, atol=2e-3)  # the step's tail and the filter's edge
 
 
 def test_causal_filter_delays_by_its_group_delay_and_zero_phase_does_not():
@@ -190,13 +175,3 @@ def test_a_record_that_starts_at_its_step_is_filtered_as_if_it_had_rested(zero_p
     rested, largest = filtered(2000), np.abs(filtered(2000)).max()
     # the filter starts at rest in either case, so that only rounding is left
     assert_allclose(filtered(5), rested, rtol=0, atol=1e-12 * largest)
-
-
-def test_measured_records_have_one_step_where_it_is(shared_data):
-    from ctrl_realize import read_record
-
-    expected = {"dc_motor_tacho/up.csv": (1366, 4.05), "air_duct/45.csv": (480, 4.0)}
-    for name, (index, amplitude) in expected.items():
-        edge = cr.detect_step(read_record(shared_data / name))
-        assert (edge.index, len(edge.edges)) == (index, 1)
-        assert_allclose(edge.amplitude, amplitude, atol=0.01)

@@ -55,13 +55,6 @@ def test_neighbouring_edges_bound_each_other():
     assert [(e.start, e.stop) for e in found] == [(0, 110), (50, 180), (110, 260)]
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-def test_edges_below_the_share_of_the_range_do_not_count(share):
-    # heights 1, 3 and 4 of a range of 8
-    found = find_edges(levels((0, 40), (1, 40), (4, 40), (8, 40)), 3, share)
-    assert [e.amplitude for e in found] == [h for h in (1.0, 3.0, 4.0) if h / 8 >= share]
-
-
 @pytest.mark.parametrize(
     "values",
     [np.full(50, 4.0), np.zeros(50), white(500), 1e6 + 1e-5 * white(50), levels((4, 50))],

@@ -41,14 +41,6 @@ def test_a_clean_straight_rise_begins_where_it_begins(delay, length, gain, up, o
     assert found.span == pytest.approx(gain, rel=1e-6)
 
 
-@pytest.mark.parametrize("edge", [0, 1, 5, 7, 8])
-def test_with_little_before_the_step_its_first_samples_are_the_rest(edge):
-    output = 3 + ramp(20, edge=edge)
-    found = first_motion(output, edge, 1e-9, 0.0, 0.0)
-    assert found.rest == 3
-    assert found.onset == pytest.approx(20, abs=1e-6)
-
-
 @pytest.mark.parametrize("quantum", [0.05, 0.1])
 def test_a_coarse_output_moves_by_more_than_its_rounding(quantum):
     output = quantum * np.round(ramp(25, 200) / quantum)

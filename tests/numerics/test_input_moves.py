@@ -50,11 +50,3 @@ def test_a_drooping_input_is_followed_by_means_that_grow():
     assert written(index, size)[start] == pytest.approx(
         clean[start:stop].mean(), abs=4 * NOISE / np.sqrt(stop - start)
     )
-
-
-def test_overshoot_on_the_edge_itself_is_followed_with_its_area():
-    bouncing = NOISY.copy()
-    bouncing[100] += 0.5
-    index, size = input_moves(bouncing, [(100, 1)], N)
-    area = np.sum(written(index, size)[100:108] - 1)
-    assert area == pytest.approx(0.5, abs=4 * NOISE * (np.sqrt(8) + 8 * 1.25 / 10))

@@ -75,11 +75,3 @@ def test_starts_are_free_responses(order):
     found = motion(sections, np.zeros((3, 9))).starts(sections)[:, kept]
     expected = np.stack([C @ np.linalg.matrix_power(A, k) for k in range(9)], axis=-1)
     assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("coupled", [0.0, 1.0])
-def test_equal_poles_are_no_obstacle(coupled):
-    A, C = np.array([[0.5, coupled], [0.0, 0.5]]), np.array([[1.0, 0.0], [0.5, 1.0]])
-    model = A, np.array([[0.0], [1.0]]), C, np.zeros((2, 1))
-    # half of the digits are lost
-    assert_allclose(markov(*in_sections(*model).matrices(), 20), markov(*model, 20), atol=1e-6)

@@ -161,17 +161,6 @@ def fitted(data, start, bounds=BOX, **settings):
     return x[0], cost[0]
 
 
-def test_a_delay_stays_within_its_bounds():
-    for low, high, end in ((0.0, 2.5, 2.5), (4.0, 9.0, 4.0)):
-        box = Bounds(np.array([low, BOX.low[1]]), np.array([high, BOX.high[1]]))
-        x, cost = fitted(noisy(), [3.0, 0.0], box, tolerance=1e-12)
-        assert x[0] == end
-        # the lag is the best one for it
-        fixed = fitted(noisy(), [end, 0.0], delay_fixed=True, tolerance=1e-12)
-        assert x[1] == pytest.approx(fixed[0][1], abs=1e-5)
-        assert cost == pytest.approx(fixed[1], rel=1e-9)
-
-
 def test_a_delay_that_is_fixed_is_kept_wherever_it_is():
     for delay in (1.0, 3.3, 11.0):
         x, _ = fitted(noisy(), [delay, 0.0], delay_fixed=True, tolerance=1e-12)

@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
 
-from ctrl_realize.numerics.bands import running_median, widest_run
 from ctrl_realize.numerics.spectra import (
     hold_response,
     independent_segments,
@@ -54,18 +53,6 @@ def test_segment_sums_are_those_of_scipys_csd():
     assert sums.count == (1000 - 128) // 64 + 1
 
 
-def test_sums_do_not_depend_on_how_segments_are_blocked():
-    rng = np.random.default_rng(1)
-    u, y = rng.standard_normal((2, 2**18))
-    window = np.ones(2**10)
-    whole = segment_sums(u[None], y[None], window, 2**10)  # 256 segments, block of 512
-    parts = segment_sums(u[None, : 2**17], y[None, : 2**17], window, 2**10) + segment_sums(
-        u[None, 2**17 :], y[None, 2**17 :], window, 2**10
-    )
-    assert_allclose(whole.yu, parts.yu, rtol=1e-9)
-    assert whole.count == parts.count == 256
-
-
 def test_half_overlapped_hann_segments_count_for_19_18_of_their_number():
     # Welch's figure: correlation of neighbours (1/6)^2, so K / (1 + 2/36) for many segments.
     window = signal.get_window("hann", 256)
@@ -89,16 +76,3 @@ def test_period_covariances_are_numpys():
     expected = np.cov(Y, U)
     assert_allclose(stats.cov_yu[3], expected[0, 1], rtol=1e-12)
     assert_allclose([stats.var_y[3], stats.var_u[3]], np.diag(expected).real, rtol=1e-12)
-
-
-def test_single_outliers_neither_end_nor_make_a_band():
-    coherence = np.array([1.0, 1, 0.1, 1, 1, 1, 0, 0, 0, 1, 0, 0])
-    good = running_median(coherence, 5) > 0.5
-    kept = widest_run(good, np.arange(1.0, 13))
-    assert np.flatnonzero(kept).tolist() == [0, 1, 2, 3, 4, 5]
-
-
-def test_widest_run_counts_octaves_and_not_points():
-    frequency = np.array([1.0, 4, 100, 101, 102, 103, 104])
-    good = np.array([1, 1, 0, 1, 1, 1, 1], bool)
-    assert np.flatnonzero(widest_run(good, frequency)).tolist() == [0, 1]

@@ -9,8 +9,6 @@ from scipy.signal import lfilter
 
 from ctrl_realize.numerics.first_motion import first_motion
 from ctrl_realize.numerics.noise_level import (
-    colouring,
-    correlation_time,
     hum_frequencies,
     rest_noise,
     winsorised_sigma,
@@ -80,14 +78,6 @@ def test_without_rest_the_third_differences_tell_the_noise():
     assert rest_noise(response[:0], response, 0.0)[0] == pytest.approx(1.0, rel=0.1)
 
 
-@pytest.mark.parametrize("pole", [0.5, 0.9])
-def test_correlation_time_of_a_first_order_process(pole):
-    process = lfilter([1], [1, -pole], white(40_000))
-    # 1 + 2 (a + a^2 + ...) = (1 + a) / (1 - a)
-    assert correlation_time(process) == pytest.approx((1 + pole) / (1 - pole), rel=0.1)
-    assert colouring(process, float(process.std())) > 1.4
-
-
 def test_hum_is_found_to_a_small_part_of_a_period_over_the_record():
     index = np.arange(3840)
     frequency = 50 / 1280 * 1.0007
@@ -107,13 +97,6 @@ def test_first_motion_is_not_a_spike_and_not_a_glitch():
     assert 60 <= found.crossing <= 64
     assert abs(found.onset - 60) < 1.5
     assert found.sign == 1
-
-
-def test_a_small_step_in_much_noise_moves_in_means():
-    time = rigs.TS * np.arange(-400, 1200)
-    output = rigs.exact_step(rigs.R1, time - 60 * rigs.TS) + 0.4 * white(1600)
-    assert first_motion(output, 400, 0.4, 0.0, 0.0) is not None
-    assert first_motion(0.4 * white(1600), 400, 0.4, 0.0, 0.0) is None
 
 
 def test_profile_limits_are_where_a_parabola_crosses():

@@ -12,7 +12,6 @@ from ctrl_realize.numerics.step_problem import (
     StepData,
     fixed_regressors,
     step_data,
-    step_scales,
     stop_at,
     window,
 )
@@ -38,22 +37,6 @@ def reached(part: float) -> float:
 def test_a_fit_stops_where_a_part_of_the_excursion_is_made(height, part):
     # means over nine samples; near its start the response is too short to stop in
     assert stop_at(data(height=height), part) == pytest.approx(reached(part), abs=5)
-
-
-def test_scales_come_from_the_first_motion_and_the_63_percent_point():
-    made = data()
-    motion = replace(made.motion, onset=40.0, crossing=50)
-    made = replace(made, motion=motion)
-    scales = step_scales(made, 1400, None)
-    assert scales.onset == 20.0
-    assert scales.rise == pytest.approx(DT * LAG, rel=0.1)
-    assert scales.length == DT * 1200
-    assert scales.latest == DT * 52.5  # 5 % later than the crossing
-    assert step_scales(made, 1400, 10.0).latest == 10.0
-    assert step_scales(made, 1400, 100.0).latest == DT * 52.5
-    near = replace(made, motion=replace(motion, onset=0.0, crossing=3))
-    assert step_scales(near, 1400, None).latest == DT * 4
-    assert step_scales(near, 1400, None).onset == DT / 2
 
 
 def weights(made: StepData) -> tuple[np.ndarray, np.ndarray]:
@@ -96,21 +79,6 @@ def test_hum_is_found_at_rest_and_taken_off_before_the_noise_is_measured():
     coarse = np.round((data().output + line) / 0.02) * 0.02
     found = step_data(coarse, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
     assert found.sigma >= 0.02 / np.sqrt(12) * (1 - 1e-9)
-
-
-def test_a_window_drives_its_models_at_every_sample_with_the_record_s_clock():
-    found = window(data(), 900, KnownFactor())
-    assert found.drive.dt == DT
-    assert found.output.size == 900
-    assert (found.problem.drive.dt, found.start) == (DT, EDGE)
-    for drive in (found.drive, found.problem.drive):
-        np.testing.assert_allclose(drive.moves, EDGE * DT)
-        np.testing.assert_allclose(drive.sizes, 1.0)
-    np.testing.assert_array_equal(found.drive.width, np.ones(900, dtype=int))
-    np.testing.assert_allclose(found.drive.first, DT * np.arange(900))
-    assert found.columns.shape == (900, 1)
-    known = KnownFactor(np.array([-3.0 + 0j]), np.array([3.0]))
-    assert window(data(), 900, known).problem.known is known
 
 
 def test_a_record_that_begins_while_the_plant_moves_has_a_free_response_of_its_own():

@@ -16,11 +16,9 @@ from ctrl_realize.numerics.structure_search import (
     Candidate,
     Scales,
     choose,
-    criteria,
     needless_charge,
     parameter_bounds,
     plausible,
-    refine,
     search,
 )
 
@@ -44,15 +42,6 @@ def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
         np.exp(beside_a_zero.low), np.exp([0.25, np.log(1e-5), np.log(1e-3), np.log(0.005)])
     )
     assert_allclose(np.exp(beside_a_zero.high[1:3]), SLOWER_WITH_ZEROS / 0.01)
-
-
-def test_the_criterion_charges_every_parameter_with_the_log_of_the_samples():
-    both = {
-        s: candidate(s.order, s.relative_degree, 50.0) for s in (Structure(2, 2), Structure(3, 1))
-    }
-    found = criteria(both, 2.0, 100.0)
-    assert found[Structure(2, 2)] == pytest.approx(25 + 4 * np.log(100))
-    assert found[Structure(3, 1)] == pytest.approx(25 + 7 * np.log(100))
 
 
 def test_zeros_and_a_fourth_pole_must_be_worth_it():
@@ -100,22 +89,3 @@ def test_a_search_finds_the_lag_and_its_neighbours_cost_no_more():
     assert_allclose(lag.poles, [-1 / 30], rtol=0.01)
     assert found[Structure(2, 1)].cost <= lag.cost * (1 + 1e-9)
     assert found[Structure(2, 1)].cost <= found[Structure(2, 2)].cost * (1 + 1e-9)
-
-
-def test_refining_moves_what_may_win_and_leaves_what_is_hopeless():
-    problem, scales = step_problem()
-    found = search(problem, [Structure(1, 1), Structure(2, 2)], scales)
-    best = found[Structure(1, 1)]
-    off = Candidate(best.structure, best.parameters + np.array([0.3, 0.05]), best.cost)
-    hopeless = Candidate(Structure(2, 2), found[Structure(2, 2)].parameters, 10 * best.cost)
-    again = refine(problem, {Structure(2, 2): hopeless, Structure(1, 1): off}, scales)
-    assert again[Structure(2, 2)] is hopeless
-    assert_allclose(again[Structure(1, 1)].parameters, best.parameters, atol=1e-3)
-    assert again[Structure(1, 1)].cost == pytest.approx(best.cost, rel=1e-4)
-    near = Candidate(Structure(2, 2), hopeless.parameters, best.cost * 1.01)
-    assert (
-        refine(problem, {Structure(2, 2): near, Structure(1, 1): best}, scales)[
-            Structure(2, 2)
-        ].cost
-        < 1.01 * best.cost
-    )

@@ -34,14 +34,6 @@ def test_residual_plot_shows_data_model_and_correlations(record):
         plots.residual_plot(check, output=1)
 
 
-def test_prediction_plot_shows_the_prediction(record):
-    prediction = cr.predict(PLANT, record, 3)
-    drawn = prediction.plot(color="k")
-    assert_allclose(drawn.lines[0, 0][1].get_ydata(), prediction.output)
-    assert drawn.lines[0, 0][1].get_color() == "k"
-    assert "3 ahead" in drawn.axes[0, 0].get_legend().get_texts()[1].get_text()
-
-
 @pytest.mark.parametrize("agree", [True, False])
 def test_delay_check_plot_has_a_bar_for_each_view(agree):
     views = (
@@ -54,23 +46,6 @@ def test_delay_check_plot_has_a_bar_for_each_view(agree):
     names = [label.get_text() for label in drawn.axes[0, 0].get_yticklabels()]
     assert names == ["phase slope\n(FRF)", "output error\n(record)"]
     assert (drawn.axes[0, 0].get_legend() is not None) == agree
-
-
-def test_channels_plot_marks_the_delay_of_every_channel():
-    pulse = 0.8 ** np.arange(60)
-    late = np.array([np.r_[np.zeros(d + 1), pulse][:60] for d in (3, 7)])[:, None]
-    drawn = cr.realize_channels(late, 1, dt=0.1).fit.plot()
-    assert drawn.axes.shape == (2, 1)
-    ends = [axes.get_lines()[-1].get_xdata()[0] for axes in drawn.axes[:, 0]]
-    assert_allclose(ends, [0.3, 0.7])
-
-
-def test_a_fit_of_channels_is_drawn_beside_its_record(record):
-    fit = cr.fit_channels(record, 1).fit
-    drawn = fit.plot()
-    assert_allclose(drawn.lines[0, 0][1].get_ydata(), fit.checks[0].simulated)
-    with pytest.raises(OptionError, match="record=1"):
-        fit.plot(record=1)
 
 
 def test_an_estimate_is_drawn_in_its_band(record):

@@ -142,12 +142,6 @@ def test_what_has_no_picture_is_named():
         plots.draw({})
 
 
-def test_a_loaded_model_says_why_its_fit_has_no_picture(fitted, tmp_path):
-    cr.save_model(tmp_path / "model.json", fitted)
-    with pytest.raises(OptionError, match="keeps the report of a fit and not its curves"):
-        cr.load_model(tmp_path / "model.json").fit.plot()
-
-
 def test_the_delay_plot_shows_the_misfit_and_its_minimum(scanned):
     drawn = plots.delay_plot(scanned, ax=Figure())
     curve = drawn.lines[0, 0][0]
@@ -189,43 +183,6 @@ def test_measured_and_model_have_the_same_colours_everywhere(record, scanned, me
         assert colours == [style.MEASURED, style.MODEL]
 
 
-def test_a_record_with_missing_samples_is_drawn_with_gaps():
-    time = 0.1 * np.arange(40)
-    output = np.where((time > 1) & (time < 2), np.nan, time)
-    gappy = cr.Record(time, (time > 1) * 1.0, output, missing="keep")
-    line = plots.record_plot(gappy, ax=Figure()).lines[0, 0][0]
-    assert np.isnan(line.get_ydata()).sum() == np.isnan(output).sum() > 0
-
-
-def test_many_records_are_grouped_by_the_height_of_their_step(valve):
-    records = [valve.step_record(h, rng=k) for h in (16, 8) for k in range(7)]
-    many = cr.identify_campaign(
-        records, method="scan", order=2, max_delay=40, samples=300, progress=False
-    )
-    axes = plots.campaign_plot(many, ax=Figure()).axes[0, 0]
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["8", "16"]
-    assert axes.get_ylabel() == "delay [samples]"
-    legend_hides_no_record(many)
-
-
-def legend_hides_no_record(campaign):
-    axes = plots.campaign_plot(campaign, truth=37).axes[0, 0]
-    axes.figure.draw_without_rendering()
-    legend = axes.get_legend().get_window_extent()
-    assert axes.get_window_extent().y1 + 1 >= legend.y1  # and not on the title
-    for line in axes.get_lines():
-        if line.get_label().startswith("_"):  # records carry no name in the legend
-            ends = line.get_transform().transform(line.get_xydata())
-            assert (ends[:, 1] < legend.y0).all()
-
-
-def test_the_onset_is_marked_where_the_model_says(record, scanned):
-    axes = plots.onset_plot(record, scanned, ax=Figure()).axes[0, 0]
-    upright = [line for line in axes.get_lines() if len(set(np.ravel(line.get_xdata()))) == 1]
-    marks = [float(np.ravel(line.get_xdata())[0]) for line in upright]
-    assert_allclose(marks, [0.0, 1e3 * scanned.dead_time], rtol=1e-12)
-
-
 def test_records_of_any_input_are_drawn_one_after_the_other_and_steps_as_their_mean():
     rng = np.random.default_rng(0)
     plant = cr.delayed_ss(ct.ss(ct.tf([1], [0.2, 1])), dead_time=0.3, dt=0.05)
@@ -238,20 +195,6 @@ def test_records_of_any_input_are_drawn_one_after_the_other_and_steps_as_their_m
     for records, label in ((moving, "measured"), (steps, "mean of 2 records")):
         drawn = plots.fit_plot(cr.fit_delay(records, structures=[(1, 1)]))
         assert drawn.lines[0, 0][0].get_label() == label
-
-
-def test_the_band_of_a_tracked_delay_encloses_its_line():
-    core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
-    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
-    record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
-    tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
-    axes = plots.track_plot(tracker.run(record)).axes[0, 0]
-    assert axes.get_ylabel() == "dead time [ms]"
-    line = axes.lines[0].get_ydata()
-    assert_allclose(line[-1], 70, atol=5)  # half a sample of 10 ms
-    edges = axes.collections[0].get_paths()[0].vertices[:, 1]
-    assert 0 <= edges.min() <= np.nanmin(line)
-    assert np.nanmax(line) <= edges.max() <= 200  # max_delay
 
 
 def test_a_fitted_response_looks_like_a_model():

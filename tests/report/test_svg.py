@@ -8,10 +8,8 @@ import re
 from xml.etree import ElementTree
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.figure import Figure
 from numpy.testing import assert_array_equal
 
 from ctrl_realize.plots import style
@@ -20,7 +18,6 @@ from ctrl_realize.report.svg import (
     inline_svg,
     laid_out,
     scales,
-    thin_lines,
 )
 
 
@@ -82,10 +79,6 @@ def test_a_figure_says_where_its_axes_are_and_what_they_show():
     assert json.dumps(json.loads(scales(figure))) in html.unescape(inline_svg(figure, "k", "d"))
 
 
-def test_the_same_figure_gives_the_same_text():
-    assert drawn(line, "k", (4, 3), "d") == drawn(line, "k", (4, 3), "d")
-
-
 @given(
     st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=300),
     st.integers(2, 60),
@@ -102,26 +95,3 @@ def test_the_envelope_keeps_ends_and_extremes_and_invents_nothing(values, points
     assert thin_y.min() == y.min()
     assert thin_y.max() == y.max()
     assert thin_x.size <= points + 4  # two of each stretch, and both ends
-
-
-def test_gaps_stay_gaps():
-    y = np.r_[np.zeros(100), np.full(100, np.nan), np.ones(100)]
-    _, thin = envelope(np.arange(300.0), y, 30)
-    assert np.isnan(thin).any()
-
-
-def test_long_lines_are_thinned_and_short_ones_are_not():
-    axes = Figure().subplots()
-    (long,) = axes.plot(np.arange(50_000), np.sin(np.arange(50_000)))
-    (short,) = axes.plot(np.arange(10), np.arange(10))
-    thin_lines(axes.figure, points=1000)
-    assert long.get_xdata().size <= 1004
-    assert short.get_xdata().size == 10
-
-
-def test_glyphs_that_the_font_lacks_do_not_stop_a_figure():
-    def draw(figure):
-        figure.subplots().set_title("阀门 🚀")
-
-    with pytest.MonkeyPatch.context():
-        assert "阀门 🚀" in drawn(draw, "k", (4, 3), "d")
