@@ -32,6 +32,7 @@ def read_delimited(path: Path, options: TextOptions) -> Table:
     """
     layout = sniff(path, options)
     frame = _parse(path, layout)
+    _check_parsed(path, layout, frame)
     cut = _cut_last_line(path, layout)
     if cut and len(frame) > 1:
         warnings.warn(f"{path}: the last line is left out, {cut}", DataWarning, stacklevel=4)
@@ -63,24 +64,27 @@ def _parse(path: Path, layout: TextLayout) -> Any:
         # the default of later versions; before, the last digit could be wrong
         keywords["float_precision"] = "round_trip"
     try:
-        frame = pd.read_csv(
-            path,
-            sep=separator,
-            decimal=layout.decimal,
-            header=None,
-            skiprows=layout.first_line,
-            comment=layout.comment,
-            encoding=layout.encoding,
-            # numbers are ASCII in all encodings here; a wrong letter in a name does no harm
-            encoding_errors="replace",
-            compression=None,
-            skipinitialspace=True,
-            # an empty cell or a "NaN" makes its column text, and is complained about there
-            na_filter=False,
-            **keywords,
-        )
+        with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
+            # Not by skiprows: the parser counts lines in its own way, and would leave out more.
+            file.read(layout.start)
+            frame = pd.read_csv(
+                file,
+                sep=separator,
+                decimal=layout.decimal,
+                header=None,
+                comment=layout.comment,
+                # numbers are ASCII in all encodings here; a wrong letter in a name does no harm
+                skipinitialspace=True,
+                # an empty cell or a "NaN" makes its column text, and is complained about there
+                na_filter=False,
+                **keywords,
+            )
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeError, OverflowError) as error:
         reason = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        # it counts from where we let it begin
+        reason = re.sub(
+            r"\bline (\d+)", lambda found: f"line {int(found[1]) + layout.first_line}", reason
+        )
         raise FileFormatError(f"{path} is not a table: {reason}") from error
     if frame.shape[1] != layout.n_columns:
         raise FileFormatError(
@@ -88,6 +92,26 @@ def _parse(path: Path, layout: TextLayout) -> Any:
             f"{layout.n_columns}; say delimiter=, or skip_rows= if the table starts further down"
         )
     return frame
+
+
+def _check_parsed(path: Path, layout: TextLayout, frame: Any) -> None:
+    """Compare what was parsed with what was seen of the file: no sample is lost without a word."""
+    pattern = NUMBER[layout.decimal]
+    for column, cell in enumerate(layout.first_row[: frame.shape[1]]):
+        parsed = frame.iloc[0, column]
+        same = str(parsed).strip() == cell or not pattern.fullmatch(cell)
+        if not same and not isinstance(parsed, str):
+            same = float(parsed) == float(cell.replace(",", "."))
+        if not same:
+            raise FileFormatError(
+                f"{path}: line {layout.first_line + 1} begins the data, and its cell {cell!r} was "
+                f"read as {str(parsed)[:60]!r}; are its quotes and line ends in order?"
+            )
+    if layout.whole and len(frame) < layout.n_rows:
+        raise FileFormatError(
+            f"{path} has {layout.n_rows} lines of data, of which {len(frame)} were read; are its "
+            "quotes and line ends in order?"
+        )
 
 
 def _is_blank(cells: Any) -> bool:

@@ -226,12 +226,15 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> De
         )
     if not 0 < dt < float("inf"):
         raise FileFormatError(f"dt={dt} is no sample time")
+    name = field(model, "name", str)
+    if any("." in one for one in (name, *inputs, *outputs)):
+        raise FileFormatError("a name has a dot, which names of models have not")
     return DelayedStateSpace(
         ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False),
         before,
         output_delay=behind,
         fit=summary_from_json(content.get("fit")),
-        name=field(model, "name", str),
+        name=name,
         inputs=inputs,
         outputs=outputs,
     )

@@ -87,7 +87,7 @@ def read_record(
         Sample time in s, in place of a time column.
     time_unit : str, optional
         ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``; ``"auto"``: the
-        header's, or s.
+        header's, or s. Of a clock such as ``12:34`` it is the unit of the first number.
     time_format : str, optional
         How dates are written, as for `datetime.strptime`, where they are not ISO 8601.
     delimiter, decimal, encoding, comment : str, optional

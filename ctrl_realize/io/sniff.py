@@ -22,12 +22,11 @@ from pathlib import Path
 
 from ..errors import FileFormatError
 from .checks import MAX_COLUMNS, MAX_NAME, read_head
+from .head_lines import HEAD_BYTES, MAX_HEAD_LINES, head_lines
 from .header import Head, column_names, first_data_row
-from .text_cells import DELIMITERS, FILLED, kind_of, split_line
+from .text_cells import DELIMITERS, FILLED, kind_of, refuse_thousands, split_line
 from .text_options import TextOptions
 
-HEAD_BYTES = 1 << 18
-MAX_HEAD_LINES = 1000
 _SAMPLE_LINES = 60
 """Lines that every pair of delimiter and decimal sign is tried on."""
 
@@ -46,7 +45,9 @@ class TextLayout:
     """How a text table is written.
 
     ``names`` and ``units`` have ``n_columns`` entries; the names are empty without a header.
-    The data begin with physical line ``first_line`` (0-based).
+    The data begin with physical line ``first_line`` (0-based), behind ``start`` characters, and
+    ``first_row`` are the cells of its first line. ``n_rows`` lines of data were seen, all of them
+    where ``whole`` is true.
     """
 
     encoding: str
@@ -57,6 +58,10 @@ class TextLayout:
     n_columns: int
     names: tuple[str, ...]
     units: tuple[str, ...]
+    start: int
+    first_row: tuple[str, ...]
+    n_rows: int
+    whole: bool
 
 
 def sniff(path: Path, options: TextOptions) -> TextLayout:
@@ -69,12 +74,15 @@ def sniff(path: Path, options: TextOptions) -> TextLayout:
     """
     head_bytes = read_head(path, HEAD_BYTES)
     encoding = _encoding(path, head_bytes) if options.encoding == "auto" else options.encoding
-    lines = head_lines(path, head_bytes, encoding)
+    found = head_lines(path, head_bytes, encoding, options.skip_rows)
+    lines = [line.text for line in found]
     comment = _comment(lines) if options.comment == "auto" else options.comment
     rows = [
         index
-        for index in range(min(options.skip_rows, len(lines)), len(lines))
-        if lines[index].strip() and not (comment and lines[index].lstrip().startswith(comment))
+        for index in range(len(lines))
+        if found[index].number >= options.skip_rows
+        and lines[index].strip()
+        and not (comment and lines[index].lstrip().startswith(comment))
     ]
     if not rows:
         raise FileFormatError(f"{path} has no lines of data in its first {len(head_bytes)} bytes")
@@ -87,27 +95,15 @@ def sniff(path: Path, options: TextOptions) -> TextLayout:
     head = Head(path, lines, rows, cells, delimiter, decimal, comment, width)
     first = first_data_row(head, options.header)
     names, units = ([""] * width,) * 2 if options.header is False else column_names(head, first)
-    names = [name[:MAX_NAME] for name in names]
+    names = [re.sub(r"\s*[\r\n]\s*", " ", name)[:MAX_NAME] for name in names]
+    if decimal == "," and options.decimal == "auto":
+        refuse_thousands(path, cells[first:], delimiter)
+    begin = found[rows[first]]
+    whole = len(head_bytes) < HEAD_BYTES and len(lines) < MAX_HEAD_LINES
     return TextLayout(
-        encoding, delimiter, decimal, comment, rows[first], width, tuple(names), tuple(units)
-    )
-
-
-def head_lines(path: Path, head: bytes, encoding: str) -> list[str]:
-    """Complete lines of the first bytes of a file."""
-    try:
-        text = codecs.getincrementaldecoder(encoding)("replace").decode(head)
-    except (UnicodeError, ValueError) as error:
-        raise FileFormatError(f"{path} is not text in {encoding}: {error}") from error
-    lines = re.split(r"\r\n|\n|\r", text)
-    if len(head) == HEAD_BYTES:
-        lines.pop()
-        if not lines:
-            raise FileFormatError(
-                f"the first line of {path} is longer than {HEAD_BYTES} bytes; "
-                "a table with one row per sample is needed"
-            )
-    return lines[:MAX_HEAD_LINES]
+        encoding, delimiter, decimal, comment, begin.number, width, tuple(names), tuple(units),
+        begin.start, tuple(cells[first]), len(rows) - first, whole,
+    )  # fmt: skip
 
 
 def _encoding(path: Path, head: bytes) -> str:

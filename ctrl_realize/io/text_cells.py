@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import csv
 import re
+from pathlib import Path
 from typing import Literal
+
+from ..errors import FileFormatError
 
 DELIMITERS = ("\t", ";", "|", ",", " ")
 NUMBER = {
@@ -13,6 +16,7 @@ NUMBER = {
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
 _TIME = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([ T].*|[.,]\d+)?|\d{1,2}:\d{2}([.,]\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 MISSING = frozenset({"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "?"})
 _NOT_NAMES = MISSING | {"inf", "+inf", "-inf", "infinity", "-infinity"}
 FILLED = ("number", "time")
@@ -31,6 +35,31 @@ def split_line(line: str, delimiter: str) -> list[str]:
         # a stray quote or a cell longer than csv's limit: not a line of numbers anyway
         return line.split(delimiter)
     return [cell.strip() for cell in cells]
+
+
+def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str) -> None:
+    """Refuse a file whose commas may divide thousands as well as mark decimals.
+
+    ``1,234`` is 1.234 where each cell of its column is written with as many decimals, and 1234 in
+    ``"1,234"`` between commas, or beside ``999`` in its column: then nobody can tell. One cell such
+    as ``0,123``, ``12,5`` or ``1234,567`` anywhere settles it: they are decimals.
+    """
+    numbers = [[cell for cell in row if NUMBER[","].fullmatch(cell)] for row in rows]
+    commas = [cell for row in numbers for cell in row if "," in cell]
+    if not commas or not all(_THOUSANDS.fullmatch(cell) for cell in commas):
+        return
+    columns = zip(*(row for row in rows if len(row) == len(rows[0])), strict=True)
+    mixed = any(
+        any("," in cell for cell in column)
+        and any(cell.isdecimal() and len(cell) <= 3 for cell in column)
+        for column in columns
+    )
+    if delimiter == "," or mixed:
+        raise FileFormatError(
+            f"{path}: {commas[0]!r} may be {commas[0].replace(',', '.')} or "
+            f"{commas[0].replace(',', '')}; say decimal=',' if the comma marks decimals, else "
+            "write the numbers without a separator of thousands"
+        )
 
 
 def kind_of(cell: str, decimal: str) -> Literal["number", "time", "missing", "text"]:

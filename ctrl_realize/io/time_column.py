@@ -11,7 +11,7 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from .columns import holds_numbers
 from .tables import Table
-from .units import checked_time_unit, to_seconds
+from .units import checked_time_unit, plain_unit, to_seconds
 
 # from here on neighbouring integers are one double
 _EXACT_INTEGERS = 2**53
@@ -20,6 +20,11 @@ _YEAR_1990, _YEAR_2100 = 6.3e8, 4.1e9
 _TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 # years 2000 to 2060 in days, as Excel and as MATLAB's datenum count them
 _DAY_COUNTS = ((36526.0, 58440.0), (730486.0, 752400.0))
+# 12:34, 12:34.5, 12:34:56 and 12:34:56.789
+_CLOCK = r"(\d{1,3}):(\d{2}(?:\.\d*)?)(?::(\d{2}(?:\.\d*)?))?"
+# seconds in each number of a clock, by the unit of the first
+_FACTORS = {"h": (3600, 60, 1), "min": (60, 1, 0)}
+_FIRST = {"hh:mm": "h", "h:mm": "h", "h:min": "h", "mm:ss": "min", "m:ss": "min", "min:s": "min"}
 _HALF_AN_HOUR = 1 / 48
 
 
@@ -47,7 +52,8 @@ def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None
     if cells.dtype.kind in "mM":
         return _from_stamps(table, index, cells)
     if time_format is not None or not holds_numbers(table, index):
-        return _from_stamps(table, index, _parsed_dates(table, index, time_format))
+        told = table.columns[index].unit if unit == "auto" else unit
+        return _from_stamps(table, index, _parsed_dates(table, index, time_format, told))
     untold = unit == "auto" and not table.columns[index].unit
     if untold:
         _check_epoch(table, index, cells)
@@ -100,14 +106,16 @@ def _from_stamps(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> Floa
     return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
 
 
-def _parsed_dates(table: Table, index: int, time_format: str | None) -> np.ndarray[Any, Any]:
+def _parsed_dates(
+    table: Table, index: int, time_format: str | None, unit: str
+) -> np.ndarray[Any, Any]:
     import pandas as pd
 
     cells = [str(cell).strip() for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
-        if all(re.fullmatch(r"\d{1,3}:\d{2}(:\d{2}(\.\d*)?)?", cell) for cell in cells[:3]):
-            return _parsed_times_of_day(table, index, cells)
+        if all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
+            return _parsed_times_of_day(table, index, cells, unit)
     try:
         stamps = pd.to_datetime(
             pd.Series(cells), format=time_format or "ISO8601", utc=True, errors="coerce"
@@ -125,20 +133,48 @@ def _parsed_dates(table: Table, index: int, time_format: str | None) -> np.ndarr
     return np.asarray(stamps.dt.tz_localize(None).to_numpy())
 
 
-def _parsed_times_of_day(table: Table, index: int, cells: list[str]) -> np.ndarray[Any, Any]:
-    """Times as 12:34 (minutes), 12:34:56 or 12:34:56.789, on one day or over midnights."""
-    import pandas as pd
+def _parsed_times_of_day(
+    table: Table, index: int, cells: list[str], unit: str
+) -> np.ndarray[Any, Any]:
+    """Times as 12:34:56 or 12:34:56.789, on one day or over midnights, or as `unit` says.
 
-    full = [cell if cell.count(":") == 2 else cell + ":00" for cell in cells]
-    spans = pd.to_timedelta(pd.Series(full), errors="coerce")
-    bad = spans.isna().to_numpy()
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise DataError(
-            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is no "
-            "time of day"
+    ``12:34`` may be hours and minutes, or minutes and seconds: the unit is that of the first.
+    """
+    parts = [re.fullmatch(_CLOCK, cell) for cell in cells]
+    for row, part in enumerate(parts):
+        if part is None:
+            raise DataError(
+                f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is "
+                "no time of day"
+            )
+    short = next((row for row, part in enumerate(parts) if part and part[3] is None), None)
+    factors = _FACTORS.get(_FIRST.get(unit, plain_unit(unit)))
+    if short is None:
+        factors = _FACTORS["h"]
+    elif factors is None:
+        raise OptionError(
+            f"{table.path}: {table.title(index)}, {table.place(short)}: {cells[short]!r} may be "
+            "hours and minutes, or minutes and seconds; say time_unit='h' or time_unit='min', the "
+            "unit of its first number"
         )
-    stamps = np.asarray(spans.to_numpy())
-    # a clock that falls back by most of a day has passed midnight
-    days = np.cumsum(np.diff(stamps) < -np.timedelta64(12, "h"))
-    return stamps + np.concatenate([[0], days]) * np.timedelta64(1, "D")
+    elif any(part and part[3] is not None for part in parts):
+        raise DataError(
+            f"{table.path}: {table.title(index)} has times of two numbers and of three, such as "
+            f"{cells[short]!r}"
+        )
+    # in whole nanoseconds, for 0.1 s is no binary fraction
+    stamps = np.array(
+        [
+            sum(
+                round(factor * float(number) * 1e9)
+                for factor, number in zip(factors, part.groups(default="0"), strict=True)
+            )
+            for part in parts
+            if part is not None
+        ],
+        dtype="timedelta64[ns]",
+    )
+    # a clock that falls back by most of a day has passed midnight, or a full hour
+    turn = np.timedelta64(60 * factors[0] if factors[0] == 60 else 86400, "s")
+    turns = np.cumsum(np.diff(stamps) < -turn / 2)
+    return stamps + np.concatenate([[0], turns]) * turn
