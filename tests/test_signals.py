@@ -290,3 +290,8 @@ def test_arrays_of_every_kind_of_number_are_taken_by_value(kind):
     record = cr.Record(np.arange(4, dtype="f2"), values, strided)
     np.testing.assert_array_equal(record.output, [0.0, 1.0, 100.0, 3.0])
     assert record.output.dtype == np.float64
+
+
+def test_density_is_per_second():
+    g = cr.ImpulseResponse([0.0, 1.0, 0.5], 0.1)
+    assert_allclose(g.density, g.markov / 0.1, atol=0)

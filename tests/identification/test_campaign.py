@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 
+import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -116,3 +117,12 @@ def test_table_1_gives_the_papers_37_and_2():
     assert_allclose(summary.variance, 2.104, atol=5e-4)
     assert_allclose(trimmed_statistics(table, 3, ddof=0).variance, 2.042, atol=5e-4)
     assert (round(summary.mean), round(summary.variance)) == (paper.DELAY, 2)
+
+
+def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
+    system = campaign.system
+    assert isinstance(system, ct.StateSpace)
+    assert system.delay == round(campaign.statistics().mean)
+    scan = campaign.best.system.fit
+    again = cr.realize(scan.impulse, 3, delay=system.delay, samples=1000, feedthrough=True)
+    assert_array_equal(system.A, again.A)

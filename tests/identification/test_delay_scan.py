@@ -172,3 +172,12 @@ def test_padded_candidates_are_the_padded_realizations():
         # the tolerance of the pairs of a scan (3e-10), times 300 for poles near the unit circle
         assert_allclose(scan.candidates[d].markov(161), alone.markov(161), rtol=0,
                         atol=1e-7 * np.abs(pulse).max())  # fmt: skip
+
+
+def test_a_causal_filter_is_named_with_its_delay():
+    causal = cr.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
+    fit = cr.estimate_delay(
+        cr.ImpulseResponse(valve_pulse("causal"), TS, filter=causal), 3, max_delay=100
+    ).fit
+    assert "filter_delay" in codes(fit)
+    assert "13.1 samples" in fit.report()

@@ -129,3 +129,11 @@ def test_order_above_the_numerical_rank_is_refused_by_name(n):
 def test_unusable_input_is_refused_with_what_is_needed(pulse, order, kwargs, error, match):
     with pytest.raises(error, match=match):
         cr.realize(pulse, order, **{"dt": 1.0, **kwargs})
+
+
+def test_another_time_unit_scales_the_dead_time_and_nothing_else():
+    pulse = valve_pulse("zero-phase", n=500)
+    s, ms = cr.realize(pulse, 3, delay=37, dt=TS), cr.realize(pulse, 3, delay=37, dt=1e3 * TS)
+    assert ms.delay == s.delay
+    assert ms.dead_time == pytest.approx(1e3 * s.dead_time, rel=1e-15)
+    assert np.array_equal(ms.delay_free.A, s.delay_free.A)
