@@ -13,7 +13,6 @@ from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import mad_sigma
 from ..numerics.output_error_result import OutputErrorFit
-from ..numerics.sampled_data import MOST_SAMPLES
 from ..numerics.sampled_fit import OwnDelay, SampledFit, fit_sampled
 from ..numerics.step_problem import bare_data
 from ..results import Flag
@@ -83,11 +82,11 @@ def _fit(
 
 def _check_moves(record: Record) -> None:
     for name, values in zip(("output", "input"), _signals(record), strict=True):
-        moves = float(np.ptp(values[:MOST_SAMPLES]))
+        moves = float(np.ptp(values))
         if moves < LEAST_MOVE:
             raise DataError(
-                f"the {name} of {named('record', record.name)} moves by {moves:.3g} in its first "
-                f"{MOST_SAMPLES} samples: there is nothing to fit"
+                f"the {name} of {named('record', record.name)} moves by {moves:.3g} in all: there "
+                "is nothing to fit"
             )
 
 
@@ -151,8 +150,9 @@ def _summary(
     """Lay what was fitted out record after record, on one time axis."""
     data = found.data
     times: list[FloatArray] = []
-    for i, start, output in zip(used, data.starts, data.outputs, strict=True):
-        time = records[i].time[start : output.size]
+    parts = zip(used, data.offsets, data.starts, data.outputs, strict=True)
+    for i, offset, start, output in parts:
+        time = records[i].time[offset + start : offset + output.size]
         times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
     measured = [y[start:] for y, start in zip(data.outputs, data.starts, strict=True)]
     signal = [u[start:] for u, start in zip(data.inputs, data.starts, strict=True)]
@@ -164,14 +164,21 @@ def _summary(
 
 
 def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:
-    """Say where only the beginning of long records was used."""
-    taken = [output.size for output in found.data.outputs]
-    if all(records[i].n_samples <= size for i, size in zip(used, taken, strict=True)):
+    """Say where only a stretch of long records was used."""
+    sizes = [output.size for output in found.data.outputs]
+    long = [
+        (records[i].n_samples, size, offset)
+        for i, size, offset in zip(used, sizes, found.data.offsets, strict=True)
+        if records[i].n_samples > size
+    ]
+    if not long:
         return ()
+    whole, size, offset = max(long)
     return (
         Flag(
             "cut",
-            f"of records longer than {max(taken)} samples the first {max(taken)} were fitted; give "
-            "the best part with `between`, or pieces of them as several records",
+            f"{size} samples were fitted, from sample {offset} on, of a record of {whole}"
+            + (f", and so of {len(long) - 1} more" if len(long) > 1 else "")
+            + "; give the best part with `between`, or pieces as several records",
         ),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import control as ct
 import numpy as np
@@ -24,6 +24,7 @@ from .channel_fit_result import fitted_system
 from .channel_search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, experiments
 from .channels import channel_delays, given_delays
 from .from_io import Method, Start, as_group, impulse_from_io
+from .long_records import lively_parts
 from .record_simulation import as_delayed
 
 LEVEL = 0.02
@@ -91,6 +92,9 @@ def fit_channels(
 
     Notes
     -----
+    Of records of more than 100 000 samples together that many are fitted, from where the inputs
+    move (flag "cut").
+
     Noise need not be white for the model to come out right, only for BIC: with noise of long
     memory the order comes out a little high. The delays are whole samples; what does not split
     into delays of inputs and outputs is left to the states.
@@ -119,7 +123,9 @@ def fit_channels(
     group = as_group(records)
     asked = _orders(order)
     _check_signals(group, feedthrough)
-    return from_starts(group, asked, delays, feedthrough).system
+    parts, cut = lively_parts(group)
+    system = from_starts(parts, asked, delays, feedthrough).system
+    return system.replace(fit=replace(system.fit, flags=cut + system.fit.flags)) if cut else system
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,8 +282,9 @@ def refine(
     >>> print(cr.refine(cr.delayed_ss(fast, 3), record).poles().real.max().round(6))
     0.8
     """
-    group = as_group(records)
-    _check_signals(group, feedthrough)
+    whole = as_group(records)
+    _check_signals(whole, feedthrough)
+    group, cut = lively_parts(whole)
     model = as_delayed(system, group[0], stable=False)
     core = model.delay_free
     if core.nstates == 0:
@@ -287,7 +294,9 @@ def refine(
     found = fit_sections(
         experiments(group, shares), in_sections(core.A, core.B, core.C, core.D), direct=direct
     )
-    return fitted_system(Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), ())
+    return fitted_system(
+        Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), cut
+    )
 
 
 def _orders(order: int | Iterable[int] | None) -> tuple[int, ...] | None:
@@ -311,7 +320,11 @@ def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
             )
     for name in ("input", "output"):
         known = [np.atleast_2d(getattr(record, name)) for record in group]
-        size = np.fmax.reduce(np.abs(np.concatenate(known, axis=1)), axis=1)
+        # no copy of a long record: the largest size is that of an end of the range
+        ends = [np.fmax.reduce(x, axis=1) for x in known] + [
+            -np.fmin.reduce(x, axis=1) for x in known
+        ]
+        size = np.fmax.reduce(ends, axis=0)
         if np.any(size < LEAST):
             raise DataError(
                 f"{name} {int(np.argmin(size))} stays below {LEAST:g}; squares of it vanish: "

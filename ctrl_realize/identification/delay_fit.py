@@ -27,7 +27,7 @@ from .delay_fit_result import DelayFit
 from .fit_flags import fit_flags, repeat_flags, same_record_flags
 from .fit_summary import fitted_core, summarise
 from .known_dynamics import known_factor
-from .steps import detect_step
+from .steps import found_step
 
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
@@ -269,7 +269,7 @@ def _edges(record: Record) -> tuple[StepEdge, ...]:
     """Edges of a step experiment; none where the input is anything else."""
     signal = np.ravel(record.input)
     try:
-        edges = detect_step(record).edges
+        edges = found_step(record, most=_MOST_EDGES).edges
     except NoStepError:
         if np.ptp(signal[:-_LAST]) == 0:
             # It moves at the very end, if at all: there is nothing to fit.

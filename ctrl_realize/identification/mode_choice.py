@@ -25,6 +25,7 @@ from ..wording import in_time, interval_in_time
 from .channel_fit import Outcome, from_starts
 from .channel_fit_result import ChannelFit
 from .delay_fit_result import DelayFit
+from .long_records import lively_parts
 from .residuals import check_residuals
 
 LAGS = 25
@@ -51,10 +52,11 @@ def with_modes_judged(
     With `asked`, the structure is what the user wants: its residual is judged, nothing is tried.
     """
     fit: DelayFit = system.fit
+    records, cut = lively_parts(fit.records)
     try:
-        follows, left = _left(system, fit.records)
+        follows, left = _left(system, records)
     except UnsuitableSystemError:  # an unstable model simulates nothing
-        follows, left = [True] * len(fit.records), None
+        follows, left = [True] * len(records), None
     if not any(follows):
         return system
     why = "nothing else could be fitted"
@@ -65,11 +67,11 @@ def with_modes_judged(
         why = "the records are not of one plant, so that no other model was tried"
     else:
         try:
-            found = from_starts(fit.records, most_starts=MOST_STARTS, enough=MOST_SAMPLES)
-            gain = _gain(fit, left, found)
+            found = from_starts(records, most_starts=MOST_STARTS, enough=MOST_SAMPLES)
+            gain = _gain(fit, records, left, found)
             late = max_delay is not None and _delay(found.system) > max_delay
             if gain > CLEAR and not late:
-                return _chosen(found, fit, sum(follows), gain)
+                return _chosen(found, fit, sum(follows), gain, cut)
             why = (
                 f"a model of {found.system.fit.order} states starts after max_delay"
                 if late
@@ -101,22 +103,26 @@ def _delay(system: DelayedStateSpace) -> int:
     return int(system.input_delays[0] + system.output_delays[0])
 
 
-def _gain(fit: DelayFit, left: Residuals | None, found: Outcome) -> float:
+def _gain(
+    fit: DelayFit, records: Sequence[Record], left: Residuals | None, found: Outcome
+) -> float:
     """How much smaller the criterion of the modes is than that of the lags."""
     if left is None:
         return float("inf")
     modes = found.system.fit
     samples = sum(e.size for e in left)
-    starts = len(fit.records)
+    starts = len(records)
     # parameters, dead time, and the initial states
     lags = 2 * fit.order - fit.relative_degree + 2 + starts * fit.order
     other = 2 * modes.order + modes.direct + 1 + starts * modes.order
-    theirs = _left(found.system, fit.records)[1]
+    theirs = _left(found.system, records)[1]
     fewer = (lags - other) * float(np.log(samples))
     return float(coloured_criterion(left)[0] - coloured_criterion(theirs)[0] + fewer)
 
 
-def _chosen(found: Outcome, lags: DelayFit, following: int, gain: float) -> DelayedStateSpace:
+def _chosen(
+    found: Outcome, lags: DelayFit, following: int, gain: float, cut: tuple[Flag, ...]
+) -> DelayedStateSpace:
     """Give the modes their dead time, its interval, and the reasons."""
     system = found.system
     modes: ChannelFit = system.fit
@@ -127,7 +133,7 @@ def _chosen(found: Outcome, lags: DelayFit, following: int, gain: float) -> Dela
     if lags.residual <= HOPELESS * float(modes.noise_std[0]):
         low, high = min(low, lags.interval[0]), max(high, lags.interval[1])
     dead_time = dt * _delay(system)
-    flags = [*modes.flags, *(flag for flag in lags.flags if flag.code in _KEPT)]
+    flags = [*cut, *modes.flags, *(flag for flag in lags.flags if flag.code in _KEPT)]
     if own[0] <= _NOTHING:
         flags.append(
             Flag(

@@ -55,6 +55,16 @@ def detect_step(
     >>> edge.index, edge.rest, edge.amplitude
     (100, 4.0, 16.0)
     """
+    return found_step(record, spike_samples, min_share)
+
+
+def found_step(
+    record: Record,
+    spike_samples: int | None = None,
+    min_share: float = 0.1,
+    most: int | None = None,
+) -> StepEdge:
+    """As `detect_step`, with one edge more than `most` at most: there may be millions."""
     signal = _single(as_record(record).input, "input", record)
     if spike_samples is None:
         spikes = int(np.clip(record.n_samples // 1000, 3, 50))
@@ -65,7 +75,7 @@ def detect_step(
     share = real(min_share, "min_share", "part of the input's range, above 0 and below 1")
     if not 0 < share < 1:
         raise OptionError(f"min_share={share:g}; needed is above 0 and below 1")
-    found = find_edges(signal, spikes, share)
+    found = find_edges(signal, spikes, share, most)
     if not found and np.ptp(signal) == 0:
         raise NoStepError(
             f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the record "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ from .arrays import FloatArray
 
 REST_TOLERANCE = 0.02
 """The input has left its level when it is off by this part of the step (or 5 sigma of noise)."""
+
+_PIECE = 2**20  # samples that are looked at together
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,9 @@ def difference_noise(values: FloatArray) -> float:
     if values.size < 3:
         return 0.0
     steps = np.diff(values)
-    return float(np.median(np.abs(steps - np.median(steps))) / (0.6745 * np.sqrt(2)))
+    steps -= np.median(steps)
+    np.abs(steps, out=steps)
+    return float(np.median(steps, overwrite_input=True) / (0.6745 * np.sqrt(2)))
 
 
 def despike(values: FloatArray, spike_samples: int) -> FloatArray:
@@ -47,7 +52,9 @@ def despike(values: FloatArray, spike_samples: int) -> FloatArray:
     return np.asarray(median_filter(values, size=2 * spike_samples + 1, mode="nearest"))
 
 
-def find_edges(values: FloatArray, spike_samples: int, min_share: float) -> list[Edge]:
+def find_edges(
+    values: FloatArray, spike_samples: int, min_share: float, most: int | None = None
+) -> list[Edge]:
     """Find all edges whose height is at least `min_share` of the signal's range.
 
     Parameters
@@ -58,6 +65,9 @@ def find_edges(values: FloatArray, spike_samples: int, min_share: float) -> list
         Longest spike to ignore, in samples.
     min_share : float
         Smallest edge, as a part of the range of the input without spikes.
+    most : int, optional
+        Look no further than for one edge more than these: an input that moves all the time has
+        millions.
 
     Returns
     -------
@@ -76,23 +86,23 @@ def find_edges(values: FloatArray, spike_samples: int, min_share: float) -> list
         # At the ends a spike cannot be told from a level. Where the rest of the record has a
         # step of its own it is taken for a spike; where not, it is the rest level of a record
         # that starts at its step.
-        inner = clean.copy()
-        inner[:spike_samples] = clean[spike_samples]
-        inner[-spike_samples:] = clean[-spike_samples - 1]
-        inner_span = _significant_range(inner, noise)
+        inner_span = _significant_range(clean[spike_samples:-spike_samples], noise)
         if inner_span > 0.0:
-            clean, span = inner, inner_span
+            span = inner_span
+            clean[:spike_samples] = clean[spike_samples]
+            clean[-spike_samples:] = clean[-spike_samples - 1]
     # An edge of just the share counts, however it is rounded: a ramp is not cut to pieces.
     threshold = max(min_share * span, 5 * noise) * (1 - 1e-9)
     width = spike_samples + 1
     # Level before and after each sample; an edge is where they differ.
-    before, after = _side_medians(clean, width)
-    jump = after - before
+    jump = _jumps(clean, width)
     edges: list[Edge] = []
     for k in _peaks(jump, threshold):
         edge = _measure(clean, jump, k, noise)
         if edge is not None and abs(edge.amplitude) >= threshold:
             edges.append(edge)
+            if most is not None and len(edges) > most:
+                break
     return [
         Edge(
             e.index,
@@ -114,41 +124,72 @@ def _significant_range(values: FloatArray, noise: float) -> float:
     return span
 
 
-def _side_medians(values: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:
-    """Median of the `width` samples before each sample, and of those from it on."""
-    padded = np.concatenate([np.full(width, values[0]), values, np.full(width, values[-1])])
+def _jumps(values: FloatArray, width: int) -> FloatArray:
+    """Median of the `width` samples from each sample on, less that of those before it."""
+    jump = np.empty(values.size)
+    # in pieces, or what is between would take several times the memory of a long record
+    for start in range(0, values.size, _PIECE):
+        stop = min(start + _PIECE, values.size)
+        part = values[max(start - width, 0) : stop + width]
+        padded = np.concatenate(
+            [
+                np.full(max(width - start, 0), values[0]),
+                part,
+                np.full(max(stop + width - values.size, 0), values[-1]),
+            ]
+        )
+        before, after = _side_medians(padded, width)
+        jump[start:stop] = after - before
+    return jump
+
+
+def _side_medians(padded: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:
+    """Medians of `width` samples before each sample and from it on, `width` more on each side."""
     # A window that begins at sample k is centred at k + width // 2.
     low, high = (rank_filter(padded, rank, width) for rank in ((width - 1) // 2, width // 2))
     medians = (0.5 * (low + high) if width % 2 == 0 else low)[width // 2 :]
-    return medians[: values.size], medians[width : width + values.size]
+    count = padded.size - 2 * width
+    return medians[:count], medians[width : width + count]
 
 
-def _peaks(jump: FloatArray, threshold: float) -> list[int]:
+def _peaks(jump: FloatArray, threshold: float) -> Iterator[int]:
     """Positions of the largest jump in each run of jumps of one sign."""
-    found: list[int] = []
-    above = np.abs(jump) >= threshold
-    sign = np.sign(jump)
-    reached = -1
-    for k in np.flatnonzero(above).tolist():
-        if k <= reached:
-            continue
-        end = k
-        while end + 1 < jump.size and above[end + 1] and sign[end + 1] == sign[k]:
-            end += 1
-        run = np.abs(jump[k : end + 1])
-        top = np.flatnonzero(run >= run.max() * (1 - 1e-12))
-        found.append(k + int(top[top.size // 2]))
-        reached = end
-    return found
+    for start in range(0, jump.size, _PIECE):
+        sign = np.sign(jump[start : start + _PIECE])
+        sign[np.abs(jump[start : start + _PIECE]) < threshold] = 0.0
+        bounds = np.flatnonzero(np.diff(sign, prepend=0.0)) + start
+        for first in bounds.tolist():
+            own = np.sign(jump[first])
+            if abs(jump[first]) < threshold or (
+                # the run began in the piece before
+                first == start > 0 and own * jump[first - 1] >= threshold
+            ):
+                continue
+            end = first + 1
+            while end < jump.size and own * jump[end] >= threshold:
+                end += 1
+            run = np.abs(jump[first:end])
+            top = np.flatnonzero(run >= run.max() * (1 - 1e-12))
+            yield first + int(top[top.size // 2])
+
+
+def _quiet_after(jump: FloatArray, limit: float) -> int:
+    """First position with a jump up to a limit; the length where there is none."""
+    start, count = 0, 64
+    while start < jump.size:
+        quiet = np.flatnonzero(np.abs(jump[start : start + count]) <= limit)
+        if quiet.size:
+            return start + int(quiet[0])
+        start, count = start + count, 2 * count
+    return int(jump.size)
 
 
 def _measure(values: FloatArray, jump: FloatArray, k: int, noise: float) -> Edge | None:
     """Find levels, first moved sample and length of the edge whose steepest point is k."""
     # The edge reaches as far as levels before and after differ by more than noise.
-    still = np.abs(jump) <= max(0.02 * abs(jump[k]), 3 * noise)
-    quiet_left, quiet_right = np.flatnonzero(still[:k]), np.flatnonzero(still[k:])
-    low = int(quiet_left[-1]) if quiet_left.size else 0
-    high = k + int(quiet_right[0]) if quiet_right.size else values.size - 1
+    limit = max(0.02 * abs(jump[k]), 3 * noise)
+    low = max(k - 1 - _quiet_after(jump[:k][::-1], limit), 0)
+    high = min(k + _quiet_after(jump[k:], limit), values.size - 1)
     reach = max(20, 2 * (high - low))
     rest = float(np.median(values[max(low - reach, 0) : low + 1]))
     level = float(np.median(values[high : high + reach]))

@@ -9,11 +9,12 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .delayed_modes import SampledInput, SeveralInputs
+from .excitation import lively_start
 from .own_terms import Stretches
 from .separable_fit import KnownFactor, Problem
 
 MOST_SAMPLES = 4000
-"""Longer records are cut: every sample counts, so that time grows with the length."""
+"""Of longer records a stretch is taken: every sample counts, so that time grows with its length."""
 
 MOST_IN_ALL = 12000
 """Samples of all records together; beyond that every record is cut to its share."""
@@ -36,6 +37,8 @@ class SampledData:
         Sample time in s.
     period : float
         Shortest period, in s, of the slow disturbances that are fitted along; infinite: none.
+    offsets : tuple of int
+        Where in its record each of them begins.
     """
 
     inputs: tuple[FloatArray, ...]
@@ -44,6 +47,7 @@ class SampledData:
     scales: tuple[float, ...]
     dt: float
     period: float = np.inf
+    offsets: tuple[int, ...] = ()
 
     @property
     def counts(self) -> list[int]:
@@ -81,18 +85,24 @@ class SampledData:
 
 
 def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) -> SampledData:
-    """Cut long records; the shortest keep all they have."""
+    """Take a stretch of long records, from where the input moves; the shortest keep all."""
     lengths = np.minimum([y.size for y in outputs], MOST_SAMPLES)
     share = MOST_SAMPLES
     while np.minimum(lengths, share).sum() > MOST_IN_ALL:
         share = max(int(0.9 * share), MOST_IN_ALL // len(lengths))
     lengths = np.minimum(lengths, share)
+    offsets = tuple(
+        lively_start(u[None], int(n)) if n < u.size else 0
+        for u, n in zip(inputs, lengths, strict=True)
+    )
+    parts = [slice(first, first + int(n)) for first, n in zip(offsets, lengths, strict=True)]
     return SampledData(
-        tuple(u[:n] - float(np.mean(u[:n])) for u, n in zip(inputs, lengths, strict=True)),
-        tuple(y[:n] for y, n in zip(outputs, lengths, strict=True)),
+        tuple(u[part] - float(np.mean(u[part])) for u, part in zip(inputs, parts, strict=True)),
+        tuple(y[part] for y, part in zip(outputs, parts, strict=True)),
         (0,) * len(lengths),
         (1.0,) * len(lengths),
         dt,
+        offsets=offsets,
     )
 
 

@@ -115,3 +115,15 @@ def test_a_slow_disturbance_does_not_move_the_dead_time(seed):
     fit = cr.fit_delay(random_binary([0.5, 1.25], 0.02, disturbance=0.2, seed=seed)).fit
     assert fit.interval[0] <= 0.8 <= fit.interval[1]
     assert abs(fit.dead_time - 0.8) < 0.1
+
+
+@pytest.mark.parametrize("rest", [4500, 20000])
+def test_an_input_that_rests_for_longer_than_is_fitted_is_fitted_where_it_moves(rest):
+    rng = np.random.default_rng(0)
+    u = np.concatenate([np.zeros(rest), np.repeat(rng.choice([-1.0, 1.0], 250), 10)])
+    y = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
+    y += 0.02 * np.ptp(y) * rng.standard_normal(y.size)
+    fit = cr.fit_delay(cr.Record(DT * np.arange(u.size), 4 + u, y), structures=[(1, 1)]).fit
+    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std / DT
+    # what is shown lies where the input moves
+    assert fit.time[-1] > DT * rest

@@ -100,3 +100,22 @@ def test_edges_do_not_depend_on_the_unit(scale, offset, spike, up):
         rtol=1e-9,
         atol=1e-10 * scale,
     )
+
+
+def test_edges_are_found_anywhere_in_a_long_record():
+    # longer than what is looked at together; edges on, before and after where that ends
+    edges = [1000, 2**20 - 1, 2**20 + 60, 2**21, 2**21 + 5000]
+    signal = np.zeros(2**21 + 6000)
+    for i, edge in enumerate(edges):
+        signal[edge:] = (i + 1) % 2
+    found = find_edges(signal, 5, 0.1)
+    assert [edge.index for edge in found] == edges
+    assert [edge.amplitude for edge in found] == [1.0, -1.0, 1.0, -1.0, 1.0]
+
+
+def test_no_more_edges_are_looked_for_than_are_wanted():
+    signal = np.repeat(np.random.default_rng(0).permutation(np.arange(300) % 2), 20).astype(float)
+    whole = find_edges(signal, 3, 0.1)
+    some = find_edges(signal, 3, 0.1, most=12)
+    assert len(whole) > 100
+    assert [edge.index for edge in some] == [edge.index for edge in whole[:13]]

@@ -1,0 +1,49 @@
+"""What is fitted of very long records: the stretch in which their inputs move."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numerics.excitation import lively_start
+from ..results import Flag
+from ..signals import Record
+
+MOST_SAMPLES = 100_000
+"""Samples of all records together that a model of sections is fitted to. A delay of whole samples
+gains nothing from more of them; memory goes with their number times that of the parameters."""
+
+
+def lively_parts(
+    records: tuple[Record, ...], most: int = MOST_SAMPLES
+) -> tuple[tuple[Record, ...], tuple[Flag, ...]]:
+    """Cut records to `most` samples together; the flag says so. Shorter records stay whole."""
+    lengths = np.array([record.n_samples for record in records])
+    share = most
+    while np.minimum(lengths, share).sum() > most and share > most // len(records):
+        share = max(int(0.9 * share), most // len(records))
+    if lengths.max() <= share:
+        return records, ()
+    starts = [lively_start(np.atleast_2d(record.input), share) for record in records]
+    parts = tuple(_part(*pair, share) for pair in zip(records, starts, strict=True))
+    longest = int(np.argmax(lengths))
+    flag = Flag(
+        "cut",
+        f"{share} samples were fitted, from sample {starts[longest]} on, of a record of "
+        f"{lengths[longest]}; give the best part with `between`",
+    )
+    return parts, (flag,)
+
+
+def _part(record: Record, start: int, count: int) -> Record:
+    if record.n_samples <= count:
+        return record
+    part = slice(start, start + count)
+    return Record(
+        record.time[part],
+        record.input[..., part],
+        record.output[..., part],
+        name=record.name,
+        input_labels=record.input_labels,
+        output_labels=record.output_labels,
+        missing="keep" if record.n_missing else "refuse",
+    )
