@@ -160,11 +160,22 @@ def _summary(
     flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
     joined = bare_data(np.concatenate(measured), np.concatenate(signal), data.dt, fit.residual)
     fit = replace(fit, fitted=np.concatenate(found.fitted))
-    return summarise(fit, joined, np.concatenate(times), records, flags)
+    result = summarise(fit, joined, np.concatenate(times), records, flags)
+    if found.condensed is None:
+        return result
+    sums = found.condensed
+    reason = (
+        f"all {sums.samples} samples, condensed to {sums.data.size} sums of products over "
+        f"{sums.drive.factor.shape[1]} lags (noise made white by {sums.noise_lags} lags of its "
+        "own); time, measured and fitted show a stretch of them"
+    )
+    return replace(result, choices=(reason, *result.choices))
 
 
 def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:
     """Say where only a stretch of long records was used."""
+    if found.condensed is not None:
+        return ()
     sizes = [output.size for output in found.data.outputs]
     long = [
         (records[i].n_samples, size, offset)

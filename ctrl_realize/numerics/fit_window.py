@@ -46,6 +46,8 @@ class Window:
     bins : Bins or None
     own : Stretches or None
         Own terms at every sample, where the problem has them on bins.
+    samples : int or None
+        That the output stands for, where it is none of them itself.
     """
 
     start: int
@@ -55,6 +57,7 @@ class Window:
     columns: FloatArray
     bins: Bins | None
     own: Stretches | None = None
+    samples: int | None = None
 
     def with_output(self, values: FloatArray) -> Problem:
         """Return the problem for other values (N,)."""
@@ -108,7 +111,8 @@ class WindowFit:
     @property
     def independent(self) -> float:
         """Samples after the step that count."""
-        return (self.window.output.size - self.window.start) / self.correlation
+        count = self.window.samples or self.window.output.size - self.window.start
+        return count / self.correlation
 
     @property
     def penalty(self) -> float:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import FloatArray
+from .condensed import MOST_LAGS, Condensed, condensed
 from .delay_choice import chains_of
 from .fit_window import Window, WindowFit, extended, fit_window
 from .likelihood_interval import likelihood_fit
@@ -20,8 +21,8 @@ from .onset import correlation_onset
 from .output_error_result import OutputErrorFit
 from .pole_factors import parameters_from_poles, poles_from_parameters
 from .sampled_data import SampledData, cut
-from .separable_fit import KnownFactor, Problem, Structure, respond
-from .structure_search import Candidate, Scales, search
+from .separable_fit import KnownFactor, Problem, Structure, fit_batch, respond
+from .structure_search import Candidate, Scales, neighbour_starts, parameter_bounds, search
 
 WHITE = 3.0
 """Correlation time of the residual, in samples, up to which a model is taken for right."""
@@ -39,6 +40,9 @@ _SLOW = 10.0  # times delay and lag: periods from there on tell little of the pl
 _SHORTEST = 40.0  # samples in such a period, lest there be as many cosines as samples
 _CALMER = 0.5  # of the variance, colour included, that must be left for them to be fitted along
 _TURNS = 6
+_DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
+_LEAST_LAGS = 30
+_CLEARLY = 4.0  # standard deviations of a chi-square
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +60,8 @@ class SampledFit:
     """Fit of records with any input.
 
     `fitted` has one entry for each record, from its start on. `explained` is how much the input
-    lowers the sum of squares, over the variance of the residual: a chi-square.
+    lowers the sum of squares, over the variance of the residual: a chi-square. Where the records
+    are longer than `data`, `condensed` is what was fitted of them.
     """
 
     fit: OutputErrorFit
@@ -64,6 +69,7 @@ class SampledFit:
     fitted: tuple[FloatArray, ...]
     explained: float
     known: KnownFactor
+    condensed: Condensed | None = None
 
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnDelay:
         """Shift and scale the common model to fit one record best, seen before or not."""
@@ -124,11 +130,18 @@ def fit_sampled(
         calm = _fit(without, factor, tried, scales, huber)
         if calm.variance < _CALMER * whole.variance:
             data, whole = without, calm
+    stretch = whole
+    long = any(y.size > part.size for y, part in zip(outputs, data.outputs, strict=True))
+    sums = _condensed(outputs, inputs, data, stretch, huber) if long else None
+    if sums is not None:
+        whole = _fit_condensed(sums, stretch, factor)
     if structures is None and whole.best.structure.order == ORDERS[-1].order:
         whole = extended(whole, MORE_LAGS)
     chains = chains_of(whole) if structures is None else []
     fit = likelihood_fit(whole, adequate=whole.correlation <= WHITE, chains=chains)
-    if fit.chain:
+    if sums is not None:
+        fit = replace(fit, fitted=_on_stretch(data, fit, factor))
+    elif fit.chain:
         left = correlation_time(whole.window.output - fit.fitted)
         fit = replace(fit, correlation=left, adequate=left <= WHITE)
     # The noise is not known from a rest; correlation is what shows in means over bins.
@@ -138,8 +151,9 @@ def fit_sampled(
         fit,
         data,
         tuple(part * scale for part, scale in zip(parts, data.scales, strict=True)),
-        _explained(whole),
+        _explained(stretch),
         factor,
+        sums,
     )
 
 
@@ -157,6 +171,64 @@ def _fit(
     sigma = _SMALLEST * max(float(np.ptp(problem.data)), whole)
     noise = sigma, max(map(quantisation_step, data.outputs))
     return fit_window(window, structures, scales, noise, huber)
+
+
+def _condensed(
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    data: SampledData,
+    stretch: WindowFit,
+    huber: bool,
+) -> Condensed | None:
+    """All samples of records of which a stretch was fitted, where their response ends in time."""
+    best = stretch.best
+    slowest = float(1.0 / np.abs(best.poles.real).min())
+    lags = (_BEYOND * best.delay + _DIED_AWAY * slowest) / data.dt
+    if not lags <= MOST_LAGS:
+        return None
+    return condensed(
+        [y / scale for y, scale in zip(outputs, data.scales, strict=True)],
+        [u / scale for u, scale in zip(inputs, data.scales, strict=True)],
+        data.dt,
+        max(int(np.ceil(lags)), _LEAST_LAGS),
+        huber=huber,
+    )
+
+
+def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> WindowFit:
+    """Fit all structures to all samples, from where they are on a stretch of them."""
+    m = sums.data.size
+    problem = Problem(sums.data, np.ones(m), sums.drive, np.empty((m, 0)), known)
+    window = Window(0, sums.data, problem, sums.drive, problem.regressors, None)
+    window = replace(window, samples=sums.samples)
+    found: dict[Structure, Candidate] = {}
+    for structure in sorted(stretch.candidates, key=lambda s: (s.order, s.zeros)):
+        starts = [stretch.candidates[structure].parameters]
+        starts += neighbour_starts(structure, stretch.scales, found)
+        parameters, cost = fit_batch(
+            problem, structure, np.array(starts), parameter_bounds(structure, stretch.scales)
+        )
+        best = int(np.argmin(cost))
+        found[structure] = Candidate(structure, parameters[best], float(cost[best]))
+    first = min(found.values(), key=lambda candidate: candidate.cost)
+    freedom = max(m - 2 - first.structure.order - first.structure.zeros, 1)
+    # More than noise leaves: what no structure explains counts as noise of that size.
+    excess = first.cost / freedom / sums.noise**2
+    colour = excess if excess > 1 + _CLEARLY * np.sqrt(2 / freedom) else 1.0
+    fit = WindowFit(
+        window, problem, found, {}, stretch.scales, sums.noise, colour, float(np.sqrt(colour))
+    )
+    return replace(fit, criterion=fit.criteria(found))
+
+
+def _on_stretch(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> FloatArray:
+    """Model at the samples of the stretch, with its own level, drift and initial state."""
+    problem = data.problem(known)
+    parameters = np.concatenate([[fit.delay], parameters_from_poles(fit.poles)])
+    model = respond(problem.drive, known, fit.numerator, parameters)
+    own = problem.own_terms(poles_from_parameters(parameters[None, 1:])[0])
+    rest = (problem.data - model)[None, :, None]
+    return np.asarray(problem.data - own.without(rest)[0, :, 0])
 
 
 def _noise_levels(data: SampledData, whole: WindowFit) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
@@ -66,8 +67,51 @@ def test_an_output_that_does_not_follow_the_input_gets_no_answer():
             cr.fit_delay(cr.Record(good.time, good.input, y))
 
 
-def test_a_long_record_is_cut_and_says_so():
-    fit = cr.fit_delay(cut_from_operation("prbs", R1, seed=0, n=4500), structures=[(1, 1)]).fit
+def bound(plant, u, noise):
+    """Cramer-Rao bound of the dead time, in s, with gain, poles and level unknown."""
+
+    def response(delay, scale):
+        slower = ct.ss(plant)
+        slower = ct.ss(slower.A / scale, slower.B / scale, slower.C, slower.D)
+        return cr.delayed_ss(slower, dead_time=delay, dt=DT).simulate(u)
+
+    h, tau = 1e-3, DELAY * DT
+    columns = [
+        (response(tau + h * DT, 1.0) - response(tau - h * DT, 1.0)) / (2 * h * DT),
+        (response(tau, 1 + h) - response(tau, 1 - h)) / (2 * h),
+        response(tau, 1.0),
+        np.ones(u.size),
+    ]
+    J = np.stack(columns, axis=1)[300:]
+    return noise * float(np.sqrt(np.linalg.inv(J.T @ J)[0, 0]))
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_all_samples_of_a_long_record_count(colour):
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.choice([-1.0, 1.0], 3000), 10)
+    clean = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
+    noise = 0.05 * float(np.std(clean))
+    y = clean + lfilter([1.0], [1.0, -colour], noise * rng.standard_normal(u.size))
+    fit = cr.fit_delay(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
+    # coloured noise leaves no more than white noise of its innovations would, filtered alike
+    white = lfilter([1.0, -colour], [1.0], u)
+    limit = bound(R1, white, noise)
+    assert fit.std == pytest.approx(limit, rel=0.1)
+    assert abs(fit.dead_time - DELAY * DT) < 3.5 * limit
+    assert "cut" not in [flag.code for flag in fit.flags]
+    assert any("condensed" in choice for choice in fit.choices)
+    # what is shown is a stretch
+    assert fit.time.size < 4000
+    assert np.std(fit.measured - fit.fitted) < 1.1 * noise / np.sqrt(1 - colour**2)
+
+
+def test_a_long_record_of_a_slow_plant_is_cut_and_says_so():
+    slow = lag(0.02)  # responses of 5000 samples
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 100), 60)
+    y = cr.delayed_ss(slow, dead_time=DELAY * DT, dt=DT).simulate(u)
+    y += 0.01 * np.random.default_rng(1).standard_normal(u.size)
+    fit = cr.fit_delay(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
     assert fit.time.size < 4000
     assert "cut" in [flag.code for flag in fit.flags]
 
