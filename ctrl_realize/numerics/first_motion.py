@@ -9,6 +9,7 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 from .moving_mean import moving_mean
 
+_PIECE = 2**18  # samples that are looked at together
 _SMOOTHINGS = (1, 8, 64)  # samples; a small step in much noise shows only in means
 
 
@@ -44,16 +45,18 @@ def first_motion(
         Slope before the step, per sample. It is continued for as long as it was seen.
     """
     n = output.size
-    index = np.arange(n) - edge
     if edge >= 8:
-        level = output - drift * np.clip(index, -edge, edge)
+        level = output - drift * _clipped_index(n, edge) if drift else output
         rest = float(np.median(level[max(edge - 200, 0) : edge]))
     else:
         level = output
         rest = float(np.median(output[: edge + 5]))
     moved = level - rest
     end = max(5, (n - edge) // 50)
-    span = max(abs(float(np.median(moved[-end:]))), float(np.percentile(np.abs(moved[edge:]), 80)))
+    size = np.abs(moved[edge:])
+    span = float(np.percentile(size, 80, overwrite_input=True))
+    span = max(abs(float(np.median(moved[-end:]))), span)
+    del size, level  # of a long record every array counts
     single, noise = moved, sigma
     for smoothing in _SMOOTHINGS:
         if smoothing > 1:
@@ -68,7 +71,7 @@ def first_motion(
     lasting = int(_lasting(np.array(crossing), smoothing))
     stretch = moved[edge + crossing : edge + crossing + lasting]
     sign = float(np.sign(np.mean(stretch)))
-    rise = moved * sign
+    rise = np.multiply(moved, sign, out=moved)
     width = max(1, round(0.03 * crossing))
     if width > 1:
         rise = moving_mean(rise, width)
@@ -80,25 +83,37 @@ def first_motion(
     )
 
 
+def _clipped_index(n: int, edge: int) -> FloatArray:
+    """Samples from the edge on, not further from it than the record's start."""
+    index = np.arange(-edge, n - edge, dtype=np.float64)
+    return np.clip(index, -edge, edge, out=index)
+
+
 def _lasting(crossing: IntArray, smoothing: int) -> IntArray:
     """How long an excursion must last: a quarter of the time that it took to come."""
     return np.asarray(np.maximum(3 * smoothing, np.ceil(0.25 * crossing).astype(np.int64)))
 
 
 def _lasting_excursion(moved: FloatArray, threshold: float, smoothing: int) -> int | None:
-    beyond = np.flatnonzero(np.abs(moved) > threshold)
-    if not beyond.size:
+    size = np.abs(moved)
+    over = size > threshold
+    if not over.any():
         return None
     # Sums up to every sample, so that many short excursions cost no more than a few.
-    outside = np.cumsum(np.abs(moved) > 0.6 * threshold)
-    upward = np.cumsum(np.sign(moved), dtype=np.int64)
-    last = np.minimum(beyond + _lasting(beyond, smoothing), moved.size) - 1
-    count = last + 1 - beyond
-    # The first of them is outside, and the sign is not zero there.
-    part = (outside[last] - outside[beyond] + 1) / count
-    balance = np.abs(upward[last] - upward[beyond] + np.sign(moved[beyond])) / count
-    lasting = beyond[(part > 0.8) & (balance > 0.7)]
-    return int(lasting[0]) if lasting.size else None
+    outside = np.cumsum(size > 0.6 * threshold, dtype=np.int32)
+    del size
+    upward = np.cumsum(np.sign(moved).astype(np.int8), dtype=np.int32)
+    for start in range(0, moved.size, _PIECE):
+        beyond = start + np.flatnonzero(over[start : start + _PIECE])
+        last = np.minimum(beyond + _lasting(beyond, smoothing), moved.size) - 1
+        count = last + 1 - beyond
+        # The first of them is outside, and the sign is not zero there.
+        part = (outside[last] - outside[beyond] + 1) / count
+        balance = np.abs(upward[last] - upward[beyond] + np.sign(moved[beyond])) / count
+        lasting = beyond[(part > 0.8) & (balance > 0.7)]
+        if lasting.size:
+            return int(lasting[0])
+    return None
 
 
 def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:

@@ -26,6 +26,7 @@ from .structure_search import (
 
 _HUBER = 1.345
 _PASSES = 2
+_LONG = 2**18
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +72,8 @@ class Window:
             # The samples are the data of the problem, all of weight 1.
             return np.asarray(problem.data - state.residual[0])
         setting = problem.known, state.numerator[0], candidate.parameters
-        model = respond(self.drive, *setting) + self.columns @ state.regression[0]
+        model = respond(self.drive, *setting)
+        model += self.columns @ state.regression[0]
         if self.own is not None:
             weight = problem.root_weight
             terms = problem.own_terms(candidate.poles[None])
@@ -170,16 +172,19 @@ def fit_window(
     for turn in range(passes + 1):
         best = min(candidates.values(), key=lambda c: c.cost)
         error = window.output - window.predict(problem, best)
-        left = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error
+        left = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
         if turn == 1 and not _wild(error):
             break
         if turn < passes:
-            problem = window.with_output(window.output - error + left)
+            left -= error
+            left += window.output
+            problem = window.with_output(left)
+            del error, left  # of a long record every array counts
             candidates = refine(problem, candidates, scales)
     after = left[window.start :]
     lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
     lost += problem.own_count(best.structure.order)
-    level = float(np.sqrt(np.sum(after**2) / max(after.size - lost, 1)))
+    level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
     # Far below the noise the residual is rounding, and its correlation says nothing.
     floor = 0.3 * sigma
     correlation = correlation_time(after) if level > floor else 1.0
@@ -205,8 +210,9 @@ def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
 def _clipped(error: FloatArray, least: float) -> FloatArray:
     """Residuals clipped at 1.345 sigma and scaled up again by the part that was not."""
     limit = _HUBER * max(mad_sigma(error), least)
-    inside = float(np.mean(np.abs(error) <= limit))
-    return np.asarray(np.clip(error, -limit, limit) / max(inside, 0.5))
+    left = np.clip(error, -limit, limit)
+    inside = float(np.mean(left == error))
+    return np.divide(left, max(inside, 0.5), out=left)
 
 
 def _wild(error: FloatArray) -> bool:
@@ -218,5 +224,8 @@ def _ringing(error: FloatArray, dt: float) -> float:
     """Angular frequency that stands out of what a first-order fit leaves over."""
     if error.size < 16:
         return 0.0
-    lines = np.abs(np.fft.rfft(error - error.mean()))
-    return float(2 * np.pi * (int(np.argmax(lines[2:])) + 2) / (error.size * dt))
+    # A length with a large prime factor takes many times the time and memory; a long residual
+    # need not be looked at to its last samples.
+    count = error.size if error.size < _LONG else 2 ** int(np.log2(error.size))
+    lines = np.abs(np.fft.rfft(error[:count] - error.mean()))
+    return float(2 * np.pi * (int(np.argmax(lines[2:])) + 2) / (count * dt))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import FloatArray
+from .hankel import fft_length
 
 _DITHER = 0.6  # noise, rounding included, in quantisation steps, from which means are unbiased
 _MANY = 50  # samples at rest that are enough to tell the noise
@@ -13,6 +14,8 @@ _MOST_OF_A_LINE = 45.0
 """Bound of the energy of a line, in its power in a spectrum behind Hann's window over its samples:
 8 at a frequency of the spectrum, 11 between two of them, and leakage of what is beside it."""
 _BLOCK = 4096  # samples over which a phase is turned on at a time
+_TOGETHER = 2**18  # samples that are looked at together
+_FIRST_LAGS = 2**12
 _FEW = 8  # samples at rest below which the whole record must tell the noise
 
 
@@ -22,15 +25,16 @@ def quantisation_step(values: FloatArray) -> float:
     The step is the smallest difference between two values; it is believed when the other
     differences are multiples of it.
     """
-    levels = np.unique(values)
-    gaps = np.diff(levels)
+    gaps = np.diff(np.unique(values))
     gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)]
     if gaps.size < 4:
         return 0.0
     step = float(gaps.min())
-    multiples = gaps / step
-    whole = np.abs(multiples - np.round(multiples)) < 0.05
-    return step if np.mean(whole) > 0.9 and np.median(multiples) < 50 else 0.0
+    multiples = np.divide(gaps, step, out=gaps)
+    pieces = np.array_split(multiples, -(-multiples.size // _TOGETHER))
+    whole = sum(int(np.sum(np.abs(part - np.round(part)) < 0.05)) for part in pieces)
+    few = float(np.median(multiples, overwrite_input=True)) < 50
+    return step if whole > 0.9 * multiples.size and few else 0.0
 
 
 def is_coarse(sigma: float, quantum: float) -> bool:
@@ -44,7 +48,9 @@ def is_coarse(sigma: float, quantum: float) -> bool:
 
 def mad_sigma(values: FloatArray) -> float:
     """Standard deviation of Gaussian noise from the median absolute deviation."""
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    away = values - np.median(values)
+    np.abs(away, out=away)
+    return 1.4826 * float(np.median(away, overwrite_input=True))
 
 
 def winsorised_sigma(values: FloatArray, quantum: float, lost: int = 0) -> float:
@@ -137,11 +143,28 @@ def _correlation(residual: FloatArray) -> FloatArray:
     energy = float(centred @ centred)
     if n < 8 or energy == 0:
         return np.zeros((0, 2))
-    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    correlation = np.fft.irfft(spectrum)[: n // 2] / energy
-    pairs = correlation[: 2 * (correlation.size // 2)].reshape(-1, 2)
-    negative = np.flatnonzero(pairs.sum(axis=1) <= 0)
-    return np.asarray(pairs[: negative[0]] if negative.size else pairs)
+    # The sum mostly ends after a few lags: of a long record these are looked at first.
+    for lags in (_FIRST_LAGS, n // 2):
+        if lags < n // 8 or lags == n // 2:
+            correlation = _lagged_products(centred, lags) / energy
+            pairs = correlation[: 2 * (correlation.size // 2)].reshape(-1, 2)
+            negative = np.flatnonzero(pairs.sum(axis=1) <= 0)
+            if negative.size:
+                return np.asarray(pairs[: negative[0]])
+    return np.asarray(pairs)
+
+
+def _lagged_products(values: FloatArray, lags: int) -> FloatArray:
+    """Sums of ``values[k] values[k + i]`` for i = 0...lags - 1, piece by piece."""
+    total = np.zeros(lags)
+    size = max(8 * lags, _TOGETHER)
+    for start in range(0, values.size, size):
+        late = values[start : start + size + lags]
+        points = fft_length(late.size + lags)
+        product = np.fft.rfft(late, n=points)
+        product *= np.conj(np.fft.rfft(values[start : start + size], n=points))
+        total += np.fft.irfft(product, n=points)[:lags]
+    return total
 
 
 def colouring(rest: FloatArray, sigma: float) -> float:

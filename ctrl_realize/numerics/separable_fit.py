@@ -187,11 +187,11 @@ def respond(
     poles = np.concatenate([free, known.poles[None]], axis=1)
     residues, gain, _ = partial_fractions(poles, known.numerator, numerator.size)
     amplitudes, level = residues[0] @ numerator, gain[0] @ numerator
-    response = []
+    parts = []
     for piece in drive.pieces():
         static, mode, _ = piece.modes(parameters[:1], poles)
-        response.append((mode[0] @ amplitudes).real + static[0] * level)
-    return np.concatenate(response)
+        parts.append((mode[0] @ amplitudes).real + static[0] * level)
+    return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
 
 def fit_batch(

@@ -112,16 +112,16 @@ def step_data(
     hum: list[float] = []
     colour, quiet, relaxing = 1.0, output, False
     if edge >= 8:
-        index = np.arange(output.size) - edge
-        columns = np.stack([np.ones(output.size), index / edge], axis=1)
-        line = columns[:edge] @ np.linalg.lstsq(columns[:edge], output[:edge], rcond=None)[0]
+        columns = np.stack([np.ones(edge), np.arange(-edge, 0) / edge], axis=1)
+        line = columns @ np.linalg.lstsq(columns, output[:edge], rcond=None)[0]
         hum = hum_frequencies(output[:edge] - line)
         curve = None if hum else relaxation(output, edge)
         if hum:
-            columns = np.concatenate([columns, _hum_columns(output.size, hum)], axis=1)
-            weights = np.linalg.lstsq(columns[:edge], output[:edge], rcond=None)[0]
-            quiet = output - columns[:, 2:] @ weights[2:]
-            line = columns[:edge] @ weights
+            waves = _hum_columns(output.size, hum)
+            columns = np.concatenate([columns, waves[:edge]], axis=1)
+            weights = np.linalg.lstsq(columns, output[:edge], rcond=None)[0]
+            quiet = output - waves @ weights[2:]
+            line = columns @ weights
             sigma, drift = rest_noise(quiet[:edge], quiet, 0.0)
             sigma = max(sigma, quantum / np.sqrt(12))
         elif curve is not None:
@@ -181,7 +181,7 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
         known,
         own[0],
     )
-    single = np.ones(stop, dtype=np.int64)
+    single = np.broadcast_to(np.int64(1), stop)  # no memory for ones
     drive = MoveTrain(_at(np.arange(stop), data.dt), single, data.dt, moves, size)
     return Window(data.edge, data.output[:stop], problem, drive, columns, bins, own[1])
 
@@ -215,6 +215,8 @@ def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
 def fixed_regressors(data: StepData) -> FloatArray:
     """Offset, drift if there is one, and hum, shape (N, q)."""
     n = data.output.size
+    if not data.drift and not data.hum:
+        return np.broadcast_to(1.0, (n, 1))  # no memory for ones
     columns = [np.ones((n, 1))]
     if data.drift:
         index = np.arange(n) - data.edge
