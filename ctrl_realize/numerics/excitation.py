@@ -43,7 +43,7 @@ def lively_start(inputs: FloatArray, count: int) -> int:
     moved = together if together.max() > 0 else moves.max(axis=0)
     if moved.max() == 0:
         return samples - count  # it moves at the very end, if at all
-    return hop * int(np.argmax(moved >= _ENOUGH * moved.max()))
+    return int(hop * np.argmax(moved >= _ENOUGH * moved.max()))
 
 
 def _block_sums(rows: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:

@@ -97,7 +97,7 @@ def test_all_samples_of_a_long_record_count(colour):
     # coloured noise leaves no more than white noise of its innovations would, filtered alike
     white = lfilter([1.0, -colour], [1.0], u)
     limit = bound(R1, white, noise)
-    assert fit.std == pytest.approx(limit, rel=0.1)
+    assert fit.std_given_structure == pytest.approx(limit, rel=0.1)
     assert abs(fit.dead_time - DELAY * DT) < 3.5 * limit
     assert "cut" not in [flag.code for flag in fit.flags]
     assert any("condensed" in choice for choice in fit.choices)
@@ -168,6 +168,6 @@ def test_an_input_that_rests_for_longer_than_is_fitted_is_fitted_where_it_moves(
     y = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     y += 0.02 * np.ptp(y) * rng.standard_normal(y.size)
     fit = cr.fit_delay(cr.Record(DT * np.arange(u.size), 4 + u, y), structures=[(1, 1)]).fit
-    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std / DT
+    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std_given_structure / DT
     # what is shown lies where the input moves
     assert fit.time[-1] > DT * rest
