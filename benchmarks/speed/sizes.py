@@ -11,7 +11,7 @@ import ctrl_realize as cr
 from ctrl_realize.numerics.hankel import hankel_matrix
 
 from .measure import Line, cpu_seconds, once, peak_megabytes, seconds
-from .rigs import channels, long_pulse
+from .rigs import LONG_RECORDS, channels, long_pulse, long_record
 
 LENGTHS = (10_000, 31_623, 100_000, 316_228, 1_000_000)
 
@@ -46,6 +46,24 @@ def lines(*, full: bool) -> Iterator[Line]:
     for order in (3, 10):
         yield long_line(order)
     yield mimo_line(full=full)
+    for kind in LONG_RECORDS:
+        yield record_line(kind, 10_000_000 if full else 1_000_000)
+
+
+def record_line(kind: str, samples: int) -> Line:
+    """A record of one input and output: time of `identify`, and memory beside the record."""
+    data = long_record(kind, samples)
+    spent = once(lambda: cr.identify(data))
+    megabytes = peak_megabytes(
+        "import ctrl_realize as cr\nfrom benchmarks.speed.rigs import long_record\n"
+        f"data = long_record({kind!r}, {samples})\ncr.identify(long_record({kind!r}, 3000))",
+        "cr.identify(data)",
+    )
+    ratio = megabytes * 1e6 / (3 * data.time.nbytes)
+    return Line(
+        f"identify, {kind}, {samples:.0e} samples: {ratio:.1f} x the record's memory beside it",
+        seconds(spent), "", None, "60 s, 2 x at 1e7", "", "no peer fits the dead time in one go",
+    )  # fmt: skip
 
 
 def long_line(order: int) -> Line:

@@ -163,7 +163,7 @@ def _noise_and_pulse(
 
 def _free_pulse(y: FloatArray, u: FloatArray, lags: int, *, huber: bool) -> FloatArray:
     """Free pulse response, by least squares, and as many of Huber's steps as outliers need."""
-    pulse = np.zeros(0)
+    pulse: FloatArray = np.zeros(0)
     for _ in range(_TURNS if huber else 1):
         pulled = y
         if pulse.size:
@@ -172,8 +172,9 @@ def _free_pulse(y: FloatArray, u: FloatArray, lags: int, *, huber: bool) -> Floa
         sums = normal_equations(u[None], pulled[None], lags)
         # what the input does not excite stays small
         ridge = _RIDGE * float(np.trace(sums.gram)) / lags
-        pulse = np.linalg.solve(sums.gram + ridge * np.eye(lags), sums.cross[:, 0])
-    return np.asarray(pulse)
+        found = np.linalg.solve(sums.gram + ridge * np.eye(lags), sums.cross[:, 0])
+        pulse = np.asarray(found, dtype=np.float64)
+    return pulse
 
 
 def _pieces(

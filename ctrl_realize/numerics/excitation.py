@@ -42,7 +42,7 @@ def lively_start(inputs: FloatArray, count: int) -> int:
     together = moves.min(axis=0)
     moved = together if together.max() > 0 else moves.max(axis=0)
     if moved.max() == 0:
-        return samples - count  # it moves at the very end, if at all
+        return int(samples - count)  # it moves at the very end, if at all
     return int(hop * np.argmax(moved >= _ENOUGH * moved.max()))
 
 
