@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import control as ct
 import numpy as np
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.identification.from_step import impulse_from_step
@@ -65,3 +66,24 @@ def channels(p: int, m: int, n: int, order: int, noise: float) -> np.ndarray:
         A[i, i + 1], A[i + 1, i] = -size * np.sin(angle), size * np.sin(angle)
     B, C = rng.standard_normal((order, m)), rng.standard_normal((p, order))
     return markov(A, B, C, np.zeros((p, m)), n + 1) + noise * rng.standard_normal((p, m, n + 1))
+
+
+LONG_RECORDS = ("one step", "five steps", "binary noise", "binary noise after a rest")
+
+
+def long_record(kind: str, samples: int) -> cr.Record:
+    """A lag of 20 samples behind 12.37, noise of 5 %, and one of `LONG_RECORDS` as input."""
+    rng = np.random.default_rng(1)
+    if kind == "one step":
+        u = np.repeat([0.0, 1.0], [samples // 10, samples - samples // 10])
+    elif kind == "five steps":
+        u = np.repeat([0.0, 1.0, 0.3, 1.2, -0.5], -(-samples // 5))[:samples]
+    else:
+        u = np.repeat(rng.choice([-1.0, 1.0], -(-samples // 20)), 20)[:samples]
+        if kind == "binary noise after a rest":
+            u[: samples // 10] = 0.0
+    # 0.01 s: the lag behind a hold, the fraction of the sample included
+    pole, part = np.exp(-1 / 20), np.exp(-0.63 / 20)
+    pulse = np.concatenate([np.zeros(13), [1 - part, part - pole]])
+    y = lfilter(pulse, [1.0, -pole], u - u[0]) + u[0] + 0.05 * rng.standard_normal(samples)
+    return cr.Record(0.01 * np.arange(samples), u, y)
