@@ -146,7 +146,11 @@ def test_errors_are_one_line_and_leave_nothing(folder, tmp_path, capsys, argumen
 def test_other_files_of_an_existing_folder_stay_and_old_results_are_replaced(folder, tmp_path):
     (tmp_path / "mine.txt").write_text("keep", encoding="utf-8")
     (tmp_path / "report.html").write_text("old", encoding="utf-8")
-    assert main(["identify", str(folder / "step_0.csv"), "-o", str(tmp_path), *FAST]) == 0
+    words = ["identify", str(folder / "step_0.csv"), "-o", str(tmp_path), *FAST]
+    assert main(words) == 2  # whose report that is, nobody knows
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == "old"
+    assert main([*words, "--overwrite"]) == 0
+    assert main(words) == 0  # its own results
     assert (tmp_path / "mine.txt").read_text(encoding="utf-8") == "keep"
     assert (tmp_path / "report.html").read_text(encoding="utf-8") != "old"
     assert not [one for one in tmp_path.parent.iterdir() if one.name.endswith(".tmp")]
@@ -182,6 +186,7 @@ def test_a_model_is_compared_with_a_measured_frf(folder, first, tmp_path, capsys
     assert comparison.report() in said
     assert files_in(tmp_path / "frf") == {
         "frf_comparison.csv", "report.html", "figures/frf.png", "figures/frf_error.png",
+        "manifest.json",
     }  # fmt: skip
     assert main(["compare", model, frf]) == 0
     assert "written" not in capsys.readouterr().out
@@ -209,7 +214,8 @@ def test_the_same_call_gives_the_same_files(folder, first, tmp_path):
     words = [str(folder / "step_0.csv"), "-o", str(out), "--frf", str(folder / "frf.csv"), *FAST]
     assert main(["identify", *words]) == 0
     assert files_in(out) == files_in(first[0])
-    for name in files_in(out) - {"report.html"}:  # the report tells the folder
+    # the report tells the folder, the manifest the time
+    for name in files_in(out) - {"report.html", "manifest.json"}:
         assert (out / name).read_bytes() == (first[0] / name).read_bytes(), name
 
 

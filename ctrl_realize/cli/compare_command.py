@@ -13,6 +13,7 @@ from ..io import load_model, read_frf
 from ..io.csv_files import write_csv
 from ..report import write_comparison
 from .inputs import check_files, typed_call
+from .manifest import Run
 from .results import told_if_it_fails
 from .staging import appearing
 from .terminal import printable, say
@@ -46,6 +47,9 @@ def compare(
     frequency_unit: Annotated[str | None, _OPTION(help="Hz, kHz, MHz or rad/s.")] = None,
     magnitude_unit: Annotated[str | None, _OPTION(help="abs or dB.")] = None,
     phase_unit: Annotated[str | None, _OPTION(help="deg or rad.")] = None,
+    overwrite: Annotated[
+        bool, _OPTION("--overwrite", help="Replace the results of another run in the folder.")
+    ] = False,
 ) -> int:
     """Compare a model with a measured frequency response.
 
@@ -67,7 +71,7 @@ def compare(
     chosen = {key: value for key, value in options.items() if value is not None or key == "hold"}
     comparison = compare_frf(system, measured, **chosen)
     if output is not None:
-        words = [str(model), str(frf), "--output", str(output)]
+        words = [str(model), str(frf)]
         if min_coherence is not None:
             words += ["--min-coherence", f"{min_coherence:g}"]
         if band is not None:
@@ -76,7 +80,9 @@ def compare(
             words += ["--hold", hold.value]
         for name, unit in units.items():
             words += [f"--{name.replace('_', '-')}", unit]
-        with appearing(output) as folder:
+        run = Run(typed_call("compare", words), (model, frf), overwrite)
+        words += ["--output", str(output)]
+        with appearing(output, run) as folder:
             write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
             with told_if_it_fails(folder, "the comparison") as written:
                 write_comparison(

@@ -10,6 +10,8 @@ import typer
 from .demo_files import write_demo_files
 from .demo_run import run_demo
 from .demo_tables import outcome_table, table_1
+from .inputs import typed_call
+from .manifest import Run
 from .staging import appearing
 from .terminal import printable, say
 
@@ -20,6 +22,9 @@ def demo(
     output: Annotated[Path, _OPTION("--output", "-o", help="Folder for the results.")],
     seed: Annotated[int, _OPTION(min=0, help="Seed of everything random.")] = 1,
     jobs: Annotated[int, _OPTION(help="Processes; -1: all cores.")] = 1,
+    overwrite: Annotated[
+        bool, _OPTION("--overwrite", help="Replace the results of another run in the folder.")
+    ] = False,
 ) -> int:
     """Do the paper from end to end, on simulated data.
 
@@ -33,7 +38,8 @@ def demo(
       ctrl-realize demo -o demo
       ctrl-realize demo -o demo --seed 7 --jobs 2
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    with appearing(output) as folder:
+    run = Run(typed_call("demo", ["--seed", str(seed)]), overwrite=overwrite)
+    with appearing(output, run) as folder:
         result = run_demo(seed, jobs)
         names = write_demo_files(folder, result)
     say("All data are simulated; nothing here is measured.\n")

@@ -15,7 +15,8 @@ from ..identification.campaign_run import identify_campaign
 from ..identification.identify import identify as identify_record
 from ..io import read_frf
 from ..signals import MeasuredFRF
-from .inputs import Reading, check_files, python_keywords, reading, typed_call
+from .inputs import Reading, calls_again, check_files, reading, typed_call, words_again
+from .manifest import Run, refuse_other_results
 from .results import campaign_table, write_campaign_files, write_record_files
 from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say
@@ -73,6 +74,9 @@ def identify(
     jobs: Annotated[
         int | None, _OPTION(help="Processes; -1: all cores. Default: all from 12 records on.")
     ] = None,
+    overwrite: Annotated[
+        bool, _OPTION("--overwrite", help="Replace the results of another run in the folder.")
+    ] = False,
 ) -> int:
     """Identify a model with dead time from one record, or from many of one plant.
 
@@ -88,7 +92,8 @@ def identify(
       ctrl-realize identify log.txt -o out --time 0 --input current --response position
       ctrl-realize identify step.csv -o out --frf frf.csv
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    check_files([*files, *([frf] if frf else [])])
+    given = [*files, *([frf] if frf else [])]
+    check_files(given)
     options = {"order": order, "max_delay": max_delay}
     settings = {"method": method.value, **{k: v for k, v in options.items() if v is not None}}
     how = reading(
@@ -103,13 +108,16 @@ def identify(
         resample=resample,
     )
     measured = None if frf is None else read_frf(frf)
-    words = _words(files, output, settings, how, frf, separate)
-    calls = _calls(files, settings, how, words)
+    words = words_again(files, settings, how, frf, separate)
+    run = Run(typed_call("identify", words), tuple(given), overwrite)
+    words += ["--output", str(output)]
+    calls = calls_again(files, settings, how, words)
     if separate and len(files) > 1:
-        return _each_alone(files, output, settings, how, measured, words)
+        return _each_alone(files, output, settings, how, measured, words, run)
+    refuse_other_results(output, run)
     if len(files) > 1:
-        return _many(files, output, settings, how, measured, calls, jobs)
-    with appearing(output) as folder:
+        return _many(files, output, settings, how, measured, calls, jobs, run)
+    with appearing(output, run) as folder:
         reported = _one(files[0], folder, settings, how, measured, calls)
     _say_what_is_written(output, ["model.json"], reported)
     return 0 if reported else 1
@@ -152,6 +160,7 @@ def _many(
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
     jobs: int | None,
+    run: Run,
 ) -> int:
     n_jobs = jobs if jobs is not None else -1 if len(files) >= _MANY else 1
     sources = [how.source(file) for file in files]
@@ -159,7 +168,7 @@ def _many(
         campaign = identify_campaign(sources, n_jobs=n_jobs, store=store, **settings)
         _refuse_useless(campaign)
         comparison = None if frf is None else compare_frf(campaign.system, frf)
-        with appearing(output) as folder:
+        with appearing(output, run) as folder:
             reported = write_campaign_files(
                 folder, campaign, files,
                 frf=frf, comparison=comparison, settings=settings, calls=calls,
@@ -196,17 +205,20 @@ def _each_alone(
     how: Reading,
     frf: MeasuredFRF | None,
     words: list[str],
+    run: Run,
 ) -> int:
     """Identify each file into a folder of its own; failures do not stop the rest."""
     refuse_a_file(output)
     failed = 0
     names = unique_names([folder_name(file) for file in files])
+    for name in names:
+        refuse_other_results(output / name, run)
     for file, name in progress(zip(files, names, strict=True), len(files), "identify"):
         try:
             # each appears as it is finished, so that an interruption loses no other
-            with appearing(output / name) as folder:
-                if not _one(file, folder, settings, how, frf, _calls([file], settings, how, words)):
-                    failed += 1
+            with appearing(output / name, run) as folder:
+                calls = calls_again([file], settings, how, words)
+                failed += not _one(file, folder, settings, how, frf, calls)
         except (CtrlRealizeError, OSError) as error:
             failed += 1
             complain(f"{printable(str(file))}: {one_line(error)}")
@@ -232,53 +244,3 @@ def unique_names(names: list[str]) -> list[str]:
     if len(set(out)) != len(out):
         raise OptionError(f"the files have names that cannot be told apart: {', '.join(names)}")
     return out
-
-
-def _words(
-    files: list[Path],
-    output: Path,
-    settings: dict[str, Any],
-    how: Reading,
-    frf: Path | None,
-    separate: bool,
-) -> list[str]:
-    """Write down the command line that does the same again."""
-    words = [*map(str, files), "--output", str(output)]
-    for name, value in settings.items():
-        words += [f"--{name.replace('_', '-')}", str(value)]
-    if frf is not None:
-        words += ["--frf", str(frf)]
-    if separate:
-        words.append("--separate")
-    for name, value in how.keywords.items():
-        # --output is the folder, so the output column has another name here
-        option = "--response" if name == "output" else f"--{name.replace('_', '-')}"
-        if value is True:
-            words.append(option)
-        else:
-            words += [option, "tab" if value == "\t" else str(value)]
-    return words
-
-
-def _calls(
-    files: list[Path], settings: dict[str, Any], how: Reading, words: list[str]
-) -> list[tuple[str, str]]:
-    """Write down how to do it again, in a terminal and in Python."""
-    keywords = python_keywords(how.keywords)
-    chosen = python_keywords(settings)
-    if len(files) == 1:
-        python = (
-            "import ctrl_realize as cr\n"
-            f"record = cr.read_record({str(files[0])!r}{keywords})\n"
-            f"sys = cr.identify(record{chosen})"
-        )
-    else:
-        names = ",\n    ".join(repr(str(file)) for file in files)
-        python = (
-            "import ctrl_realize as cr\n"
-            f"files = [\n    {names},\n]\n"
-            f"records = [cr.read_record(file{keywords}) for file in files]\n"
-            f"campaign = cr.identify_campaign(records{chosen})\n"
-            "sys = campaign.system"
-        )
-    return [("In a terminal", typed_call("identify", words)), ("In Python", python)]

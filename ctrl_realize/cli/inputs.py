@@ -84,3 +84,52 @@ def typed_call(command: str, words: Sequence[str]) -> str:
 def python_keywords(keywords: dict[str, Any]) -> str:
     """Write keyword arguments as Python text."""
     return "".join(f", {name}={value!r}" for name, value in keywords.items())
+
+
+def words_again(
+    files: list[Path],
+    settings: dict[str, Any],
+    how: Reading,
+    frf: Path | None,
+    separate: bool,
+) -> list[str]:
+    """Write down the command line that does the same again, apart from the folder."""
+    words = [*map(str, files)]
+    for name, value in settings.items():
+        words += [f"--{name.replace('_', '-')}", str(value)]
+    if frf is not None:
+        words += ["--frf", str(frf)]
+    if separate:
+        words.append("--separate")
+    for name, value in how.keywords.items():
+        # --output is the folder, so the output column has another name here
+        option = "--response" if name == "output" else f"--{name.replace('_', '-')}"
+        if value is True:
+            words.append(option)
+        else:
+            words += [option, "tab" if value == "\t" else str(value)]
+    return words
+
+
+def calls_again(
+    files: list[Path], settings: dict[str, Any], how: Reading, words: list[str]
+) -> list[tuple[str, str]]:
+    """Write down how to do it again, in a terminal and in Python."""
+    keywords = python_keywords(how.keywords)
+    chosen = python_keywords(settings)
+    if len(files) == 1:
+        python = (
+            "import ctrl_realize as cr\n"
+            f"record = cr.read_record({str(files[0])!r}{keywords})\n"
+            f"sys = cr.identify(record{chosen})"
+        )
+    else:
+        names = ",\n    ".join(repr(str(file)) for file in files)
+        python = (
+            "import ctrl_realize as cr\n"
+            f"files = [\n    {names},\n]\n"
+            f"records = [cr.read_record(file{keywords}) for file in files]\n"
+            f"campaign = cr.identify_campaign(records{chosen})\n"
+            "sys = campaign.system"
+        )
+    return [("In a terminal", typed_call("identify", words)), ("In Python", python)]

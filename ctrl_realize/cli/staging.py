@@ -12,6 +12,8 @@ from pathlib import Path
 from ..errors import CtrlRealizeError, OptionError
 from ..io import CampaignStore
 from ..io.atomic import refuse_irregular
+from .manifest import NAME as MANIFEST
+from .manifest import Run, refuse_other_results, result_files, write_manifest
 from .terminal import complain, printable
 
 ROWS = "rows"
@@ -19,21 +21,23 @@ ROWS = "rows"
 
 
 @contextmanager
-def appearing(folder: Path) -> Iterator[Path]:
+def appearing(folder: Path, run: Run | None = None) -> Iterator[Path]:
     """Give a temporary folder whose files move into `folder` when the block ends well.
 
-    If `folder` is there already, files of the same names are replaced and others stay, and
-    nothing outside it is touched: it may be on a disk of its own. If the block raises, nothing in
-    `folder` has changed.
+    If `folder` is there already, the results of an earlier run are replaced and other files stay,
+    and nothing outside it is touched: it may be on a disk of its own. If the block raises, nothing
+    in `folder` has changed.
 
     Parameters
     ----------
     folder : pathlib.Path
+    run : Run, optional
+        The run whose results they are; a manifest beside them says so.
 
     Raises
     ------
     OptionError
-        `folder` is a file.
+        `folder` is a file, or holds the results of another run.
     OSError
         It cannot be made or written.
 
@@ -50,6 +54,8 @@ def appearing(folder: Path) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(folder))
     refuse_a_file(folder)
+    if run is not None:
+        refuse_other_results(folder, run)
     made = _missing_parents(target.parent)
     target.parent.mkdir(parents=True, exist_ok=True)
     place = target if target.exists() else target.parent
@@ -57,8 +63,10 @@ def appearing(folder: Path) -> Iterator[Path]:
     staged.mkdir()
     try:
         yield staged
+        if run is not None:
+            write_manifest(staged, run)
         if target.exists():
-            _move_into(staged, target)
+            _move_into(staged, target, result_files(target) if run is not None else [])
         else:
             staged.rename(target)
     except BaseException:
@@ -122,15 +130,22 @@ def _remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _move_into(staged: Path, target: Path) -> None:
+def _move_into(staged: Path, target: Path, old: Sequence[Path]) -> None:
+    """Move new results into a folder, in place of the old ones."""
     for path in staged.rglob("*"):
         if path.is_file():
             refuse_irregular(target / path.relative_to(staged))
+    # Without a manifest, if this is cut off, results are taken for those of another run.
+    for path in (target / MANIFEST, *old):
+        if path.is_file() or path.is_symlink():
+            path.unlink()
+    for folder in {path.parent for path in old} - {target}:
+        _remove_if_empty(folder)
     for path in sorted(staged.rglob("*")):
         place = target / path.relative_to(staged)
         if path.is_dir():
             place.mkdir(exist_ok=True)
-    for path in sorted(staged.rglob("*")):
+    for path in sorted(staged.rglob("*"), key=lambda one: (one.name == MANIFEST, one)):
         if path.is_file():
             os.replace(path, target / path.relative_to(staged))
     shutil.rmtree(staged)

@@ -16,8 +16,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import ctrl_realize as cr
-from ctrl_realize import cli
-from ctrl_realize.cli import main
+from ctrl_realize.cli import commands, main
 from ctrl_realize.report import sketches
 from tests.fuzz.draws import any_bytes, any_text, generator, some, sometimes
 from tests.fuzz.lane import ends, fuzz, good_end
@@ -62,7 +61,7 @@ def run(arguments: list[str], *, figures: str = "drawn") -> tuple[int, str]:
         stack.enter_context(contextlib.redirect_stderr(complaints))
         stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
         # looking for libraries of threads takes 3 ms: most of what `main` does with odd words
-        stack.enter_context(patch.object(cli, "threadpool_limits", _one_thread))
+        stack.enter_context(patch.object(commands, "threadpool_limits", _one_thread))
         if figures != "drawn":
             instead = _without_ink if figures == "laid out" else _empty
             stack.enter_context(patch.object(sketches, "laid_out", instead))
