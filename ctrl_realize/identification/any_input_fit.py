@@ -185,11 +185,11 @@ def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) 
     if not long:
         return ()
     whole, size, offset = max(long)
+    others = f", and so of {len(long) - 1} more" if len(long) > 1 else ""
     return (
         Flag(
             "cut",
-            f"{size} samples were fitted, from sample {offset} on, of a record of {whole}"
-            + (f", and so of {len(long) - 1} more" if len(long) > 1 else "")
-            + "; give the best part with `between`, or pieces as several records",
+            f"{size} samples were fitted, from sample {offset} on, of a record of {whole}{others}; "
+            "give the best part with `between`, or pieces as several records",
         ),
     )
