@@ -22,6 +22,7 @@ RAISED_BY = {
     "impulses": "realize",
     "loop_check": "design.pid",
     "margins": "design.margins",
+    "long_records": "fit_channels",
     "mode_choice": "identify",
     "pulse_regression": "impulse_from_io",
     "realization": "realize",
