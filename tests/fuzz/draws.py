@@ -49,6 +49,26 @@ def any_text(rng: Random, longest: int) -> str:
     )
 
 
+UNITS = (
+    "°C", "µl/s", "Ω", "m³", "%", "$", "\\1", "\\g<0>", "{}", "kg·m²", "−", "‰", "mm:ss", "é", "",
+)  # fmt: skip
+
+
+def any_name(rng: Random) -> str:
+    """Draw the name of a signal: a tag with dots, a unit in brackets, any printable signs."""
+    kind = rng.randrange(4)
+    if kind == 0:
+        name = f"FIC{rng.randint(1, 999)}.{rng.choice(('OP', 'PV', 'SP'))}"
+    elif kind == 1:
+        name = rng.choice(PLAIN_SIGNS) * rng.randint(1, 3) + "x"
+    else:
+        signs = (chr(rng.choice((rng.randrange(0x250), rng.randrange(0x11000)))) for _ in range(9))
+        name = "".join(sign for sign in signs if sign.isprintable())
+    opening, closing = rng.choice(("[]", "()", "{}", "<>", "//", "  "))
+    unit = f" {opening}{rng.choice(UNITS)}{closing}" if rng.randrange(2) else ""
+    return f"n{name}{unit}.".strip()
+
+
 def any_bytes(rng: Random, longest: int) -> bytes:
     """Draw bytes of any value."""
     count = rng.randint(0, longest)

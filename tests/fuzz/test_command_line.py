@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import io
 import shutil
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from matplotlib.figure import Figure
 import ctrl_realize as cr
 from ctrl_realize.cli import commands, main
 from ctrl_realize.report import sketches
-from tests.fuzz.draws import any_bytes, any_text, generator, some, sometimes
+from tests.fuzz.draws import any_bytes, any_name, any_text, generator, some, sometimes
 from tests.fuzz.lane import ends, fuzz, good_end
 from tests.fuzz.test_text_files import any_table, frf_table, mutated
 
@@ -47,6 +48,7 @@ OPTIONS = [
     lambda rng: ("--frf", rng.choice(["record.csv", "nothing.csv", "."])),
     lambda rng: ("--resample",),
     lambda rng: ("--separate",),
+    lambda rng: ("--overwrite",),
 ]
 
 
@@ -86,6 +88,7 @@ def check(code: int, complaints: str, output: Path) -> None:
     ends[f"exit code {code}"] += 1
     assert code in (0, 1, 2)
     assert "Traceback" not in complaints
+    assert "the report could not be written" not in complaints
     if code == 2:
         assert complaints.strip()
         assert len(complaints) < 5000
@@ -114,7 +117,10 @@ def step_table(rng) -> bytes:
     rows = [f"{t / 10:g},{float(t >= 10):g},{v:.6f}" for t, v in zip(k, y, strict=True)]
     if sometimes(rng, 3):
         rows[rng.randrange(n)] = any_text(rng, 8)
-    return "\n".join(["t,u,y", *rows]).encode()
+    header = io.StringIO()
+    names = ["u", "y"] if rng.randrange(2) else [any_name(rng), any_name(rng) + "2"]
+    csv.writer(header, lineterminator="").writerow(["t", *names])
+    return "\n".join([header.getvalue(), *rows]).encode()
 
 
 @fuzz(40)
@@ -126,6 +132,8 @@ def test_identify_ends_in_an_exit_code_and_one_complaint(rng, folder):
     arguments = [word for option in some(rng, rng.choice(OPTIONS), 3) for word in option]
     with contextlib.chdir(folder), good_end(seconds=60) as codes:
         method = [] if "--method" in arguments else ["--method", "scan"]
+        if "--input" not in arguments and rng.randrange(2):
+            method += ["--input", "1", "--response", "2"]
         codes.append(
             run(["identify", "record.csv", "-o", "out", *method, *arguments], figures=figures)
         )

@@ -38,6 +38,22 @@ def test_any_record_is_fitted_or_refused(rng):
         check_fit(model)
 
 
+@fuzz(4)
+def test_records_of_gains_that_differ_are_fitted_together_or_refused(rng):
+    noise, n = generator(rng), rng.randint(80, 160)
+    records = []
+    for _ in range(rng.randint(2, 4)):
+        t, u, y = np.arange(n), (np.arange(n) >= 30) * rng.uniform(-4, 4), np.zeros(n)
+        for k in range(6, n):
+            y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 6]
+        y = y * rng.choice([1.0, 0.5, 0.25, -1.0, 1e-6]) + 0.01 * noise.standard_normal(n)
+        records.append((0.1 * t, u, y))
+    with good_end(seconds=60) as models:
+        models.append(cr.identify([cr.Record(*arrays) for arrays in records], order=1))
+    for model in models:
+        check_fit(model)
+
+
 @fuzz(10)
 def test_any_handful_of_samples_is_fitted_or_refused(rng):
     n, noise = rng.randint(3, 40), generator(rng)

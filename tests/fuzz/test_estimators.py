@@ -105,6 +105,31 @@ def test_an_exact_response_is_found_exactly(rng):
     np.testing.assert_allclose(model.markov(n), g, atol=1e-8 * np.abs(g).max())
 
 
+def any_plant(rng, u):
+    """Answer to an input that comes after the delay: of a lag, or of what no model here can be."""
+    kind = rng.choice(["lag"] * 6 + ["chain", "gain", "slope", "stiction", "limit", "wrong way"])
+    n, pole, gain, chain = u.size, 0.8, np.ones(u.size), 1
+    if kind == "chain":
+        chain = rng.randint(6, 20)  # more lags than are tried
+    elif kind == "gain":
+        gain = 1 + rng.uniform(-1, 1) * np.arange(n) / n  # wanders during the record
+    elif kind == "slope":
+        pole = rng.choice([1.0, 1.02])  # integrates, or runs off
+    elif kind == "stiction":
+        u = np.round(2 * u) / 2 * (np.abs(np.diff(u, prepend=0.0)) > 0.2)
+    y = gain * u
+    for _ in range(chain):
+        moved = np.zeros(n)
+        for k in range(1, n):
+            moved[k] = pole * moved[k - 1] + (0.2 if pole < 1 else 0.01) * y[k]
+        y = moved
+    if kind == "limit":
+        y = np.clip(y, -0.3, 0.5)
+    if kind == "wrong way":
+        y = y - 0.5 * np.diff(y, prepend=0.0) * 8
+    return y
+
+
 def any_experiment(rng, random_one_in=3):
     """A step record or a random one, short and noisy, of any scale, with bad samples."""
     n = rng.randint(3, rng.choice([40, 120, 260])) if rng.randrange(2) else rng.randint(100, 200)
@@ -115,9 +140,7 @@ def any_experiment(rng, random_one_in=3):
     if sometimes(rng, random_one_in):
         u = noise.choice([-1.0, 1.0], n)
     delay = rng.randint(0, 20)
-    y = np.zeros(n)
-    for k in range(1, n):
-        y[k] = 0.8 * y[k - 1] + 0.2 * (u[k - delay - 1] if k > delay else 0.0)
+    y = any_plant(rng, np.concatenate([np.zeros(delay + 1), u])[:n])
     y = y + rng.choice([0.0, 1e-6, 0.01, 1.0]) * noise.standard_normal(n)
     scale = rng.choice([1.0, -3.0, 1e-12, 1e12, 1e-60, 1e60, 0.0])
     y = y * scale + rng.choice([0.0, 5.0, 1e6])

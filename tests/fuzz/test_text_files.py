@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.io import read_frf, read_record
-from tests.fuzz.draws import any_bytes, any_float, any_text, chosen, of, sometimes
+from ctrl_realize.plots.names import plain, wrapped
+from ctrl_realize.report.svg import inline_svg, laid_out
+from tests.fuzz.draws import any_bytes, any_float, any_name, any_text, chosen, of, sometimes
 from tests.fuzz.lane import fuzz, good_end
 
 KINDS = [
@@ -152,6 +157,48 @@ def read_and_check(file, content: bytes) -> None:
 @fuzz(150)
 def test_any_table_is_read_or_refused(rng, file):
     read_and_check(file, any_table(rng))
+
+
+BREAKS = ["\n", "\r\n", "\r", "\r\r\n"]
+
+
+@fuzz(60)
+def test_names_come_back_and_no_sample_is_lost_whatever_the_lines_end_in(rng, file):
+    count, delimiter, end = rng.randint(3, 12), rng.choice(",;\t"), rng.choice(BREAKS)
+    names = [any_name(rng), any_name(rng) + "2"]
+    broken = [name.replace(" ", rng.choice([" ", "\n", " \r\n "])) for name in names]
+    buffer = io.StringIO()
+    writer = csv.writer(
+        buffer, delimiter=delimiter, lineterminator=end, quoting=csv.QUOTE_NONNUMERIC
+    )
+    writer.writerow(["time_s", *broken])
+    blank = [end * rng.randrange(3) for _ in range(3)]
+    rows = [delimiter.join([f"{k / 8}", f"{k % 2}", f"{k}.25"]) + end for k in range(count)]
+    text = blank[0] + buffer.getvalue() + blank[1] + "".join(rows) + blank[2]
+    file.write_bytes(text.encode())
+    with good_end() as records:
+        records.append(read_record(file, input=1, output=2))
+    (record,) = records
+    assert record.n_samples == count
+    assert record.output.tolist() == [k + 0.25 for k in range(count)]
+    labels = [" ".join(label.split()) for label in record.input_labels + record.output_labels]
+    assert labels == [" ".join(name.split()) for name in names]
+
+
+@fuzz(15)
+def test_any_name_is_shown_in_a_figure_as_it_is_written(rng):
+    name = any_name(rng)
+
+    def draw(figure):
+        figure.text(0, 0, plain(name))
+        figure.text(0, 0.5, wrapped(name, rng.randint(3, 80)))
+
+    with good_end() as drawn:
+        drawn.append(inline_svg(laid_out(draw, (3, 2)), "k", name))
+    svg = drawn[0]
+    shown = plain(name).replace(r"\$", "$")
+    texts = [text for text in ElementTree.fromstring(svg).itertext() if text.strip()]
+    assert " ".join(texts[0].split()) == " ".join(shown.split())
 
 
 @fuzz(100)
