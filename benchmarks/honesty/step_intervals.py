@@ -180,7 +180,7 @@ def tracked(kind: str, plant: str, noise: float, seed: int) -> Seen:
         return Seen("tracked", kind, plant, noise, seed, {}, {"untold": 1.0})
     near = (told.gain_ratio - 1.96 * told.gain_std, told.gain_ratio + 1.96 * told.gain_std)
     covered = {
-        "DelayTracker: interval": inside(told.interval, delay),
+        "DelayTracker: interval": inside(told.delay_interval, delay),
         "DelayTracker: gain -+ 1.96 std": inside(near, 1.0),
     }
     return Seen("tracked", kind, plant, noise, seed, covered, {"untold": 0.0})

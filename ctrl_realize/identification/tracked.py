@@ -17,7 +17,7 @@ class TrackedDelay(Result):
     """What the samples of the forgetting window say at one moment.
 
     ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
-    ``interval`` (samples) where `tells` is true. Where it is false, `reason` says what is
+    ``interval`` to half a sample where `tells` is true. Where it is false, `reason` says what is
     missing and the numbers are the best guess without any claim.
 
     Attributes
@@ -28,9 +28,15 @@ class TrackedDelay(Result):
         Best delay in samples.
     dead_time : float
         Best dead time in s.
-    interval : tuple of int
-        Delays that hold 95 % of the probability, and the way that the delay has gone within the
-        last memory: the estimate is behind a moving delay by about that.
+    interval : tuple of float
+        In s: dead times that hold 95 % of the probability, and the way that the delay has gone
+        within the last memory: the estimate is behind a moving delay by about that.
+    delay_interval : tuple of int
+        The same in samples.
+    lost : bool
+        The residual is much louder than the model's: the delay lies outside the candidates, the
+        dynamics have changed by more than is followed, or something else acts on the output.
+        `DelayTracker.reset` starts anew.
     gain_ratio, gain_std : float
         Gain relative to the starting model, and its standard deviation.
     speed_ratios : tuple of float
@@ -51,26 +57,38 @@ class TrackedDelay(Result):
     >>> for sample in zip(u, cr.DelayedStateSpace(core, 7).simulate(u)):
     ...     tracker.update(*sample)
     >>> now = tracker.estimate()
-    >>> print(now.delay, now.interval, round(now.gain_ratio, 3))
-    7 (6, 7) 0.996
+    >>> print(now.delay, now.delay_interval, now.interval, round(now.gain_ratio, 3))
+    7 (6, 7) (0.06, 0.07) 0.996
     """
 
     time: float
     delay: int
     dead_time: float
-    interval: tuple[int, int]
+    delay_interval: tuple[int, int]
     gain_ratio: float
     gain_std: float
     speed_ratios: tuple[float, ...]
     noise_std: float
     tells: bool
+    dt: float
     reason: str = ""
+    lost: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval of the dead time in s."""
+        return self.delay_interval[0] * self.dt, self.delay_interval[1] * self.dt
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float] | None:
+        """The same as `interval`; None where nothing is claimed."""
+        return self.interval if self.tells else None
 
     def _title(self) -> str:
         return f"Tracked delay at {self.time:.6g} s"
 
     def _rows(self) -> list[tuple[str, str]]:
-        low, high = self.interval
+        low, high = self.delay_interval
         return [
             ("delay", f"{self.delay} samples ({low} to {high}), {in_time(self.dead_time, 4)}"),
             ("gain", f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g} of the starting model's"),
@@ -81,7 +99,7 @@ class TrackedDelay(Result):
 
     def __repr__(self) -> str:
         told = "" if self.tells else f", cannot tell: {self.reason}"
-        return f"<TrackedDelay {self.delay} {self.interval} at {self.time:.6g} s{told}>"
+        return f"<TrackedDelay {self.delay} {self.delay_interval} at {self.time:.6g} s{told}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +116,13 @@ class DelayTrack(Result):
     dead_time : ndarray, shape (K,)
         In s, interpolated between samples.
     low, high : ndarray, shape (K,)
-        95 % interval in samples.
+        Ends of the 95 % interval in s; `delay_low` and `delay_high` are the same in samples.
     gain_ratio : ndarray, shape (K,)
         Gain over that of the starting model.
     tells : ndarray of bool, shape (K,)
         Whether the samples within the memory tell a delay.
+    lost : ndarray of bool, shape (K,)
+        Where the residual was much louder than the model's, see `TrackedDelay`.
     dt : float
         Sample time in s.
 
@@ -126,7 +146,18 @@ class DelayTrack(Result):
     high: FloatArray
     gain_ratio: FloatArray
     tells: BoolArray
+    lost: BoolArray
     dt: float
+
+    @property
+    def delay_low(self) -> FloatArray:
+        """Lower end of the interval in samples."""
+        return self.low / self.dt
+
+    @property
+    def delay_high(self) -> FloatArray:
+        """Upper end of the interval in samples."""
+        return self.high / self.dt
 
     @property
     def delay(self) -> FloatArray:
@@ -139,6 +170,8 @@ class DelayTrack(Result):
     def _rows(self) -> list[tuple[str, str]]:
         told = np.flatnonzero(self.tells)
         share = f"{told.size} of {self.time.size} moments"
+        if self.lost.any():
+            share += f", the track lost at {int(self.lost.sum())}"
         if told.size == 0:
             return [("told", share)]
         first, last = told[0], told[-1]
@@ -166,5 +199,6 @@ def track_of(course: Sequence[TrackedDelay], dt: float) -> DelayTrack:
         high=along(moment.interval[1] for moment in course),
         gain_ratio=along(moment.gain_ratio for moment in course),
         tells=locked(np.array([moment.tells for moment in course])),
+        lost=locked(np.array([moment.lost for moment in course])),
         dt=dt,
     )

@@ -36,6 +36,18 @@ def check_memory(memory: float, dt: float, max_delay: int) -> float:
     return span
 
 
+def model_noise(model: ct.StateSpace, given: float | None) -> float:
+    """Return the noise that a model leaves: as given, as its `fit` has it, or 0 where unknown."""
+    if given is not None:
+        return positive(given, "noise_std", "standard deviation of the output's noise")
+    fit = getattr(model, "fit", None)
+    for name in ("residual", "noise_std"):
+        found = np.ravel(getattr(fit, name, np.nan))
+        if found.size == 1 and np.isreal(found[0]) and np.isfinite(found[0]):
+            return float(found[0])
+    return 0.0
+
+
 def check_start(core: ct.StateSpace) -> None:
     """Refuse a model that cannot be followed by simulation."""
     if not isinstance(core, ct.StateSpace) or not core.issiso():

@@ -44,7 +44,8 @@ class Solution:
     """Best candidate of a bank, and how sure it is.
 
     ``theta`` holds the gain, then gain times the `moves` of the poles; `delay` is in samples and
-    `place` the same with its fraction. `sees_reply` is false where the output does not follow
+    `place` the same with its fraction. `reply_std` is the size of what the input explains;
+    `sees_reply` is false where the output does not follow
     the input; `reason` says why the data cannot tell the delay, and is empty when they can.
     """
 
@@ -57,6 +58,7 @@ class Solution:
     move_std: FloatArray
     speed_ratios: tuple[float, ...]
     variance: float
+    reply_std: float
     sees_reply: bool
     reason: str
 
@@ -111,6 +113,7 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
             float(np.exp(now.moved[i] + np.clip(moves[i], -SHOWN_MOVE, SHOWN_MOVE))) for i in speeds
         ),
         variance=variance,
+        reply_std=float(np.sqrt(max(found.power - found.misfit[best], 0.0) / bank.weight)),
         sees_reply=not unseen,
         reason=unseen or open_still or _too_far(moves[speeds]),
     )

@@ -17,7 +17,7 @@ ON_CIRCLE = 1e-9
 """A pole that has moved this close to the unit circle has no damping left."""
 
 
-def pole_directions(poles: FloatArray, dt: float) -> list[Direction]:
+def pole_directions(poles: FloatArray | ComplexArray, dt: float) -> list[Direction]:
     """Name the ways in which stable poles can move: (what, pole, change of the pole per unit).
 
     A real pole has its ``"speed"`` (relative change of its time constant's inverse); a pair has

@@ -48,10 +48,10 @@ def track_plot(
     with style.canvas(ax, 2, title=title, size=(8.0, 5.2), heights=(2.0, 1.0)) as axes:
         factor, unit = time_unit(float(np.max(np.abs(track.time))), axes[1])
         time = factor * track.time
-        scale, name = wording.time_unit(float(np.nanmax(track.high)) * track.dt)
+        scale, name = wording.time_unit(float(np.nanmax(track.high)))
         looks = {"color": style.MODEL, "label": "dead time", **kwargs}
         axes[0].fill_between(
-            time, scale * track.low * track.dt, scale * track.high * track.dt, where=told,
+            time, scale * track.low, scale * track.high, where=told,
             color=style.BAND, alpha=0.3, linewidth=0, label="95 % interval",
         )  # fmt: skip
         upper = list(axes[0].plot(time, np.where(told, scale * track.dead_time, np.nan), **looks))

@@ -42,7 +42,7 @@ def test_a_dead_time_that_wears_from_37_to_60_samples_is_followed(dynamics, erro
     then = np.interp(track.time - 2.5, record.time, truth)
     assert np.sqrt(np.mean((track.delay - then)[told] ** 2)) < error
     now = np.interp(track.time, record.time, truth)
-    inside = (track.low - 0.5 <= now) & (now <= track.high + 0.5)
+    inside = (track.delay_low - 0.5 <= now) & (now <= track.delay_high + 0.5)
     # not when the wear sets in: the samples of the memory do not know of it yet
     assert np.mean(inside[told]) > 0.85
     assert abs(track.delay[-1] - 60) < 0.6
@@ -55,7 +55,7 @@ def test_a_delay_at_rest_is_known_as_well_as_weighted_samples_can_tell_it():
         bank = tracker(dynamics=False)
         bank.run(record)
         last = bank.estimate()
-        assert last.interval[0] <= 37 <= last.interval[1]
+        assert last.delay_interval[0] <= 37 <= last.delay_interval[1]
         errors.append(last.dead_time / TS - 37)
         # bound of any linear estimate from samples of these weights: delay, gain and offset free
         k, moved = np.arange(record.n_samples), record.input - record.input[0]
@@ -95,7 +95,7 @@ def test_a_model_that_is_off_is_renewed_until_poles_and_delay_are_right():
     assert abs(ratios[1] - 8.0 / 7.0) < 0.05
     assert abs(last.delay - 50) <= 1
     now = np.interp(track.time, record.time, truth)
-    inside = (track.low - 0.5 <= now) & (now <= track.high + 0.5)
+    inside = (track.delay_low - 0.5 <= now) & (now <= track.delay_high + 0.5)
     assert np.mean(inside[track.tells]) > 0.9
     pulse = cr.delayed_ss(R3, delay=0, dt=TS).markov(1000)
     found = cr.DelayedStateSpace(bank.model.delay_free).markov(1000)
@@ -217,3 +217,103 @@ def test_samples_that_are_no_numbers_and_records_that_do_not_fit_are_refused():
     short = cr.Record(TS * np.arange(5), np.ones(5), np.ones(5))
     with pytest.raises(DataError, match="5 samples"):
         bank.run(short)
+
+
+def operated(plant, *, seconds, seed, noise=0.005, walk=0.0):
+    """Simulate any plant of the bench's sample time; `walk` is per sample, part of the span."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(int(seconds / TS))
+    u = 4 + 4 * np.repeat(rng.integers(0, 5, k.size // 512 + 1), 512)[: k.size]
+    noisy = noise * rng.standard_normal(k.size) + walk * np.cumsum(rng.standard_normal(k.size))
+    return cr.Record(k * TS, u, plant.simulate(u - u[0]) + 16 * noisy)
+
+
+def wrong(track, delay):
+    """Moments at which an interval is told that does not hold the delay."""
+    held = (track.delay_low - 0.5 <= delay) & (delay <= track.delay_high + 0.5)
+    return int(np.sum(track.tells & ~held))
+
+
+@pytest.mark.parametrize(("delay", "seed"), [(100, 0), (120, 1)])
+def test_slower_poles_do_not_stand_in_for_a_delay_beyond_the_candidates(delay, seed):
+    record = operated(cr.delayed_ss(R3, delay=delay, dt=TS), seconds=20, seed=seed)
+    bank = tracker()
+    track = bank.run(record)
+    assert wrong(track, delay) == 0
+    assert not bank.estimate().tells
+
+
+def test_a_track_that_is_lost_is_said_and_found_again_after_a_reset():
+    """All poles of the plant become half as fast at once."""
+    slow = cr.delayed_ss(lag(1.1) * pair(4.0, 0.7), delay=37, dt=TS)
+    before = operated(cr.delayed_ss(R3, delay=37, dt=TS), seconds=8, seed=0)
+    after = operated(slow, seconds=20, seed=1)
+    bank = tracker()
+    assert not bank.run(before).lost[-1]
+    assert bank.estimate().tells
+    track = bank.run(after)
+    assert wrong(track, 37) == 0
+    assert track.lost.any()
+    assert "the track lost at" in track.report()
+    bank = pickle.loads(pickle.dumps(bank))
+    # A second look at the plant gives a new model, here with poles 10 % off.
+    bank.reset(cr.delayed_ss(lag(1.0) * pair(4.4, 0.7), delay=0, dt=TS))
+    assert bank.estimate().reason == "no samples yet"
+    found = bank.run(operated(slow, seconds=15, seed=2))
+    assert wrong(found, 37) == 0
+    assert bank.estimate().tells
+    assert abs(bank.estimate().delay - 37) <= 2
+    with pytest.raises(UnsuitableSystemError, match="sample time"):
+        bank.reset(cr.delayed_ss(R3, delay=0, dt=2 * TS))
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_residual_much_louder_than_the_models_stops_it_from_telling(known):
+    """From 8 s on the output takes in a wave that the input does not explain."""
+    record = operated(cr.delayed_ss(R3, delay=37, dt=TS), seconds=16, seed=0)
+    loud = tracker(dynamics=False, noise_std=0.08 if known else None)
+    wave = 5 * 0.08 * 2**0.5 * np.sin(2 * np.pi * 0.7 * record.time) * (record.time > 8)
+    track = loud.run(cr.Record(record.time, record.input, record.output + wave))
+    assert np.all(track.tells[(track.time > 4) & (track.time < 8)])
+    last = loud.estimate()
+    assert (last.tells, last.lost) == (False, True)
+    assert "the track is lost" in last.report()
+    with pytest.raises(OptionError, match="noise_std"):
+        tracker(noise_std=-1.0)
+
+
+def test_the_noise_of_a_fitted_model_is_known():
+    plant = cr.delayed_ss(R3, delay=37, dt=TS)
+    first = tracker(dynamics=False)
+    first.run(operated(plant, seconds=6, seed=0))
+    louder = operated(plant, seconds=6, seed=1, noise=0.02)  # four times
+    known = cr.DelayTracker(first.model, max_delay=90, memory=2.5, dynamics=False)
+    known.run(louder)
+    assert known.estimate().lost
+    assert "4" in known.estimate().reason
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_dead_time_under_a_random_walk_is_followed_behind_a_high_pass(seed):
+    plant = cr.delayed_ss(R3, delay=45, dt=TS)
+    record = operated(plant, seconds=15, seed=seed, walk=0.0005)
+    passed = tracker(dynamics=False, drift_time=0.1)
+    track = passed.run(record)
+    late = track.time > 5
+    assert np.mean(track.tells[late]) > 0.9
+    assert wrong(track, 45) <= 0.1 * np.sum(track.tells)
+    assert abs(passed.estimate().delay - 45) <= 3
+
+
+def test_intervals_are_in_seconds_and_in_samples():
+    record, _ = worn_valve(seconds=6, last=37.0)
+    bank = tracker(dynamics=False)
+    track = bank.run(record)
+    told = bank.estimate()
+    assert told.interval == tuple(TS * d for d in told.delay_interval)
+    assert told.dead_time_interval == told.interval
+    assert told.interval[0] - TS / 2 <= told.dead_time <= told.interval[1] + TS / 2
+    np.testing.assert_allclose(track.low, TS * track.delay_low)
+    np.testing.assert_allclose(track.high, TS * track.delay_high)
+    # A model that is used for a controller brings its interval along.
+    assert cr.design.pid(bank.model).check.stable_within_interval is not None
