@@ -393,7 +393,8 @@ class DelayTracker:
         noise = self._noise_std or self._least
         if moved and not np.isfinite(noise) and self._well_sampled:
             noise = self._residual.noise_std
-        limit = LOUD_AFTER_MOVES if moved else LOUD
+        # What the tracker has seen itself may have been a quiet hour.
+        limit = LOUD_AFTER_MOVES if moved and noise != self._least else LOUD
         if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
             return ""
         return (
