@@ -16,6 +16,7 @@ from tests.oracles.dense import step_response
 DT = 7.8125e-4
 FOPDT = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=2.0)
 SOPDT = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=2.0, second_lag=3.0)
+SLOW = cr.design.ProcessModel(gain=2.0, lag=100.0, dead_time=1.0)
 IPDT = cr.design.ProcessModel(gain=0.5, lag=0.0, dead_time=2.0, integrating=True)
 
 
@@ -24,6 +25,7 @@ IPDT = cr.design.ProcessModel(gain=0.5, lag=0.0, dead_time=2.0, integrating=True
     [  # by hand from the published formulas, K = 2, T = 10, L = 2 (K' = 0.5, L = 2)
         (FOPDT, "simc", "P", (1.25, np.inf, 0)),
         (FOPDT, "simc", "PI", (1.25, 10, 0)),
+        (SLOW, "simc", "PI", (25, 8, 0)),  # 4 (tau_c + theta) (Skogestad 2003)
         (SOPDT, "simc", "PID", (1.25 * 1.3, 13, 3 / 1.3)),
         (IPDT, "simc", "PI", (0.5, 16, 0)),
         (FOPDT, "lambda", "PI", (10 / (2 * 12), 10, 0)),
