@@ -114,5 +114,5 @@ def test_a_clean_stream_is_followed_to_its_delay(rng):
     told = tracker.estimate()
     if told.tells:
         ends["tells"] += 1
-        assert told.interval[0] <= delay <= told.interval[1]
+        assert told.delay_interval[0] <= delay <= told.delay_interval[1]
         assert abs(told.delay - delay) <= (0 if at_rest else 1)
