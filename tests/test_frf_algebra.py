@@ -33,6 +33,7 @@ def bare(values=PLANT, std=STD) -> cr.MeasuredFRF:
 ALONE = {
     "-H": (lambda H: -H, lambda h: -h),
     "3 H": (lambda H: 3 * H, lambda h: 3 * h),
+    "NumPy number * H": (lambda H: np.float64(3) * H, lambda h: 3 * h),
     "H / 2j": (lambda H: H / 2j, lambda h: h / 2j),
     "H * discrete": (lambda H: H * CONTROLLER, lambda h: h * K),
     "discrete * H": (lambda H: CONTROLLER * H, lambda h: h * K),
