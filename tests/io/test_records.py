@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
+import re
 import warnings
 
 import numpy as np
@@ -364,7 +367,9 @@ def test_rows_and_header_can_be_overruled(tmp_path):
 
 
 def test_a_missing_file_is_a_file_not_found_error(tmp_path):
-    with pytest.raises(MissingFileError, match=r"no\.csv' cannot be read: No such file"):
+    # in the language of the user
+    said = re.escape(os.strerror(errno.ENOENT))
+    with pytest.raises(MissingFileError, match=rf"no\.csv' cannot be read: {said}"):
         read_record(tmp_path / "no.csv")
     with pytest.raises(FileNotFoundError):
         read_record("no\0.csv")
