@@ -71,7 +71,7 @@ def test_any_stream_is_followed_or_refused_sample_by_sample(rng):
     assert repr(tracker)
     if told.tells:
         ends["tells"] += 1
-        low, high = told.interval
+        low, high = told.delay_interval
         assert low <= told.delay <= high
         assert np.isfinite([told.dead_time, told.gain_ratio, told.gain_std]).all()
         # a constant input says nothing of the delay
