@@ -59,6 +59,7 @@ TABLES = {
     "performance": ("docs/performance_table.md", "python -m benchmarks.speed"),
     "accuracy": ("docs/accuracy_table.md", "python -m benchmarks.accuracy"),
     "honesty": ("docs/honesty_table.md", "python -m benchmarks.honesty"),
+    "worlds": ("docs/worlds_table.md", "python -m benchmarks.worlds"),
     "campaign": (
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",

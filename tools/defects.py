@@ -158,7 +158,7 @@ DEFECTS = (
        "if fit.high < 0.98 * fit.latest:", "if True:", "flags delay_fit", FITS),
     _d("no delay at all", "that no dead time fits as well is not flagged",
        "if fit.low > _SAMPLES_BESIDE_NOTHING * dt:", "if True:", "flags delay_fit", FITS),
-    _d("not settled", "a record that ends early is not flagged", "if slowest < 2.0:", "if False:",
+    _d("not settled", "a record that ends early is not flagged", "if not unseen.size:", "if True:",
        "flags delay_fit", FITS),
     _d("integrator", "an integrating plant is not flagged", "if slowest < INTEGRATOR:", "if False:",
        "flags delay_fit", FITS),

@@ -13,7 +13,14 @@ from joblib import Parallel, delayed
 
 import ctrl_realize as cr
 
-from . import driven_intervals, flag_other_cases, flag_step_cases, single, step_intervals
+from . import (
+    driven_intervals,
+    flag_other_cases,
+    flag_record_cases,
+    flag_step_cases,
+    single,
+    step_intervals,
+)
 from .flag_case import FlagCase
 from .trial import Seen, Trial, quietly
 from .worlds import KINDS, MORE_WRONG, NOISES, WRONG
@@ -21,7 +28,11 @@ from .worlds import KINDS, MORE_WRONG, NOISES, WRONG
 Task = tuple[str, str, str, float, int]
 """Study, kind of noise, plant, noise level, seed; of a flag its world, and which side it is."""
 
-FLAG_CASES: list[FlagCase] = flag_step_cases.CASES + flag_other_cases.CASES
+FLAG_CASES: list[FlagCase] = [
+    *flag_step_cases.CASES,
+    *flag_other_cases.CASES,
+    *flag_record_cases.CASES,
+]
 
 
 @dataclass(frozen=True)

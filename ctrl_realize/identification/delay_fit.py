@@ -27,6 +27,7 @@ from .delay_fit_result import DelayFit
 from .fit_flags import fit_flags, repeat_flags, same_record_flags
 from .fit_summary import fitted_core, summarise
 from .known_dynamics import known_factor
+from .model_checks import checked
 from .steps import found_step
 
 Loss = Literal["huber", "least_squares"]
@@ -148,6 +149,7 @@ def fit_delay(
         result = replace(result, flags=result.flags + same_record_flags(several))
     else:
         result, fit = _fit_one(several[0], limit, settings)
+    result = checked(result, alone=known is None)
     core = fitted_core(fit, result.poles)
     if include_known and known is not None:
         core = ct.ss(known) * core

@@ -9,6 +9,23 @@ from ..results import Flag, Result
 from ..signals import Record
 from ..wording import in_time, interval_in_time, number_within, poles_in_words, time_within
 
+_TOTAL_IN_DOUBT = frozenset(
+    {
+        "not_settled",
+        "integrating",
+        "gain_open",
+        "cancelled_pair",
+        "structured_misfit",
+        "input_in_residual",
+        "feedback",
+        "not_linear",
+        "time_varying",
+        "output_at_limit",
+        "earlier_input",
+    }
+)
+"""Flags after which not even the total delay is firm."""
+
 
 @dataclass(frozen=True)
 class StructureRow:
@@ -35,7 +52,8 @@ class DelayFit(Result):
     ``total_delay == dead_time + sum of the model's lags - sum of its leads``. The total is
     firm in every model; how it splits into dead time and lags is not, and `interval` says how
     far. The model is ``gain exp(-s dead_time)`` times a transfer function of unit gain with
-    `poles` and `zeros`.
+    `poles` and `zeros`. What is firm is so where the record shows the response to its end, of one
+    linear plant in open loop: flags say where it does not.
 
     Attributes
     ----------
@@ -168,11 +186,13 @@ class DelayFit(Result):
         low, high = self.interval
         wait = time_within(self.dead_time, low, high)
         samples = number_within(self.delay, *self.delay_interval)
+        doubted = any(flag.code in _TOTAL_IN_DOUBT for flag in self.flags)
+        parts = "dead time and lags" + ("" if doubted else ": firm")
         rows = [
             ("dead time", f"{wait} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
             *([("first motion", in_time(self.onset, 4))] if self.onset == self.onset else []),
-            ("total delay", f"{in_time(self.total_delay, 5)} (dead time and lags: firm)"),
+            ("total delay", f"{in_time(self.total_delay, 5)} ({parts})"),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", poles_in_words(self.poles)),
             ("gain", f"{self.gain:.6g}"),

@@ -13,6 +13,7 @@ from ..results import Flag
 from ..signals import Record
 from ..wording import in_time, interval_in_time
 from .delay_fit_result import Repeatability
+from .model_flags import cancelled_pair, open_gain, slow_modes
 
 _SAMPLES_BESIDE_NOTHING = 0.5
 _BEYOND = 20.0  # ranges: no overshoot goes as far
@@ -25,7 +26,6 @@ def fit_flags(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> t
     found = [
         *model_flags(fit, data.dt, length, max_delay),
         _misfit(fit),
-        _disagreement(data.dt, fit),
         *_disturbances(data, fit),
     ]
     return tuple(flag for flag in found if flag is not None)
@@ -35,7 +35,7 @@ def sampled_flags(
     fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
 ) -> tuple[Flag, ...]:
     """List the flags of a fit of a record whose input is no step."""
-    found = [*model_flags(fit, dt, length, max_delay), _disagreement(dt, fit)]
+    found = model_flags(fit, dt, length, max_delay)
     if not fit.adequate:
         found.append(
             Flag(
@@ -99,13 +99,17 @@ def model_flags(
     fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
 ) -> list[Flag | None]:
     """List what the model itself shows."""
+    extrapolated = slow_modes(fit, length), open_gain(fit)
+    firm = "" if any(extrapolated) else "; only the total delay is firm"
     return [
         _bound(dt, fit, max_delay),
         _nothing(dt, fit),
-        _many_lags(fit),
+        _many_lags(fit, firm),
         _dispersed(fit),
-        _open_start(fit),
-        _slow(fit, length),
+        _open_start(fit, firm),
+        *extrapolated,
+        cancelled_pair(fit),
+        _disagreement(dt, fit, firm),
         _inverse(fit),
     ]
 
@@ -136,7 +140,7 @@ def _misfit(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _disagreement(dt: float, fit: OutputErrorFit) -> Flag | None:
+def _disagreement(dt: float, fit: OutputErrorFit, firm: str) -> Flag | None:
     if fit.views:
         width = fit.high - fit.low
         if width <= 0.3 * max(fit.delay, dt):
@@ -151,7 +155,7 @@ def _disagreement(dt: float, fit: OutputErrorFit) -> Flag | None:
         "structures_disagree",
         f"the chosen structure puts the dead time in {interval_in_time(low, high)}, others "
         f"that the data cannot rule out in {interval_in_time(fit.low, fit.high)}: dead time and "
-        "fast lags look alike; only the total delay is firm",
+        f"fast lags look alike{firm}",
     )
 
 
@@ -167,19 +171,19 @@ def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _many_lags(fit: OutputErrorFit) -> Flag | None:
+def _many_lags(fit: OutputErrorFit, firm: str) -> Flag | None:
     if fit.like_flow and not fit.endless:
         return Flag(
             "many_lags",
             f"the model is a {fit.chain}: a flow that disperses looks the same and begins "
-            f"{in_time(flow_lead(fit.poles))} earlier; only the total delay is firm",
+            f"{in_time(flow_lead(fit.poles))} earlier{firm}",
         )
     if not fit.endless:
         return None
     return Flag(
         "many_lags",
         "chains of lags fit the better the longer they are, up to the longest that was tried: any "
-        "part of the dead time may be more of such lags; only the total delay is firm",
+        f"part of the dead time may be more of such lags{firm}",
     )
 
 
@@ -206,36 +210,15 @@ def _dispersed(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _open_start(fit: OutputErrorFit) -> Flag | None:
+def _open_start(fit: OutputErrorFit, firm: str) -> Flag | None:
     if not fit.open_start:
         return None
     return Flag(
         "onset_open",
         "the best model has a zero, which imitates a smooth beginning: how much of the time up to "
-        f"the first motion is dead time is open, {interval_in_time(fit.low, fit.high)}; only the "
-        "total delay is firm",
+        f"the first motion is dead time is open, {interval_in_time(fit.low, fit.high)}"
+        f"{firm}",
     )
-
-
-INTEGRATOR = 5e-3
-"""Poles slower than this, times the length of the record, cannot be told from integrators."""
-
-
-def _slow(fit: OutputErrorFit, length: float) -> Flag | None:
-    slowest = float(np.abs(fit.poles).min()) * length
-    if slowest < INTEGRATOR:
-        return Flag(
-            "integrating",
-            "the output goes on with a constant slope: a pole is taken as an integrator, the "
-            "total delay is that of the other lags",
-        )
-    if slowest < 2.0:
-        return Flag(
-            "not_settled",
-            f"the record ends {slowest:.2g} of the slowest time constant after the step: gain "
-            "and slowest lag are extrapolated",
-        )
-    return None
 
 
 def _inverse(fit: OutputErrorFit) -> Flag | None:

@@ -13,7 +13,7 @@ from ..results import Flag
 from ..signals import Record
 from ..wording import interval_in_time
 from .delay_fit_result import DelayFit, StructureRow
-from .fit_flags import INTEGRATOR
+from .model_flags import INTEGRATOR
 
 
 def summarise(

@@ -26,6 +26,7 @@ from .channel_fit import Outcome, from_starts
 from .channel_fit_result import ChannelFit
 from .delay_fit_result import DelayFit
 from .long_records import lively_parts
+from .model_checks import Shown, against_one_model
 from .residuals import check_residuals
 
 LAGS = 25
@@ -36,7 +37,17 @@ MOST_STARTS = 3
 """Estimates of the impulse response that the modes start from at most."""
 HOPELESS = 2.0
 """How much more lags may leave than modes for their interval to count."""
-_KEPT = ("records_differ", "gains_differ", "amplitude_trend", "same_records")
+_KEPT = (
+    "records_differ",
+    "gains_differ",
+    "amplitude_trend",
+    "same_records",
+    "feedback",
+    "cancelled_pair",
+    "held_output",
+    "output_at_limit",
+)
+"""Flags of the record, whatever model is chosen."""
 _FAR_APART = 0.5  # width of an interval, in dead times, from which models disagree
 _NOTHING = 0.5  # samples
 _ROUNDING = 1e-12
@@ -134,6 +145,10 @@ def _chosen(
         low, high = min(low, lags.interval[0]), max(high, lags.interval[1])
     dead_time = dt * _delay(system)
     flags = [*cut, *modes.flags, *(flag for flag in lags.flags if flag.code in _KEPT)]
+    if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
+        check = modes.checks[0]
+        signals = check.record.output, check.simulated, check.record.input
+        flags += against_one_model(Shown(*map(np.ravel, signals)), _delay(system))
     if own[0] <= _NOTHING:
         flags.append(
             Flag(

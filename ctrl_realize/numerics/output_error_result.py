@@ -33,6 +33,7 @@ class StructureFit:
     low: float
     high: float
     poles: ComplexArray
+    gain: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,10 @@ def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[Struct
         state = evaluate(whole.problem, s, candidate.parameters[None])
         total = candidate.delay + lag_sum(candidate.poles, state.numerator[0])
         excess = whole.criterion[s] - best
-        lines.append(StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles))
+        gain = float(np.real(state.numerator[0, 0] / np.prod(-candidate.poles)))
+        lines.append(
+            StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles, gain)
+        )
     return tuple(sorted(lines, key=lambda line: line.excess))
 
 

@@ -24,6 +24,8 @@ RAISED_BY = {
     "margins": "design.margins",
     "long_records": "fit_channels",
     "mode_choice": "identify",
+    "model_checks": "fit_delay",
+    "model_flags": "fit_delay",
     "pulse_regression": "impulse_from_io",
     "realization": "realize",
     "residuals": "check_residuals",

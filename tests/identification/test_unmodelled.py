@@ -1,0 +1,75 @@
+"""Worlds that no rule was made for: a wrong answer carries a flag that concerns it.
+
+One record of a family each, beside those of test_flags; `benchmarks.worlds` counts all of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from benchmarks.worlds import described, driven, loops, sensors, steps
+from benchmarks.worlds.judge import DELAY, GAIN, judged
+
+FAMILIES = {
+    steps.ends_while_rising: "not_settled",
+    steps.still_coming_to_rest: "earlier_input",
+    sensors.dead_band_of_a_historian: "held_output",
+    driven.insensitive: "not_linear",
+    driven.telegrams: "held_output",
+    loops.relay_with_load: "feedback",
+    loops.unstable: "feedback",
+}
+
+
+@pytest.mark.parametrize("world", FAMILIES, ids=lambda world: world.__name__)
+def test_what_the_model_does_not_describe_is_told(world):
+    seen = judged(world, 0)
+    assert FAMILIES[world] in seen.flags
+    assert not seen.silent
+
+
+def test_what_the_model_describes_is_not_doubted():
+    seen = judged(described.two_lags, 1)
+    assert not set(seen.flags) & (DELAY | GAIN)
+    assert not seen.missed
+
+
+def rising(seconds, *, damping=None):
+    """A step record of 0.2 s of rest, 0.1 s of delay, and `seconds` of response."""
+    t = 0.01 * np.arange(int(100 * (0.3 + seconds)))
+    after = np.clip(t - 0.3, 0, None)
+    y = 1 - np.exp(-2 * after)
+    if damping is not None:
+        w = 2 * np.pi * 4
+        y = 1 - np.exp(-damping * w * after) * np.cos(w * after)
+    u = np.where(t < 0.2, 0.0, 1.0)
+    noise = 0.004 * np.random.default_rng(2).standard_normal(t.size)
+    return cr.Record(t, u, y + noise)
+
+
+def flags(record):
+    return {flag.code for flag in cr.fit_delay(record).fit.flags}
+
+
+def test_a_lag_counts_as_settled_after_three_time_constants():
+    assert "not_settled" in flags(rising(1.2))  # 2.4 time constants
+    assert "not_settled" not in flags(rising(2.2))
+
+
+def test_a_pair_that_rings_on_for_many_periods_has_shown_its_gain():
+    assert "not_settled" not in flags(rising(2.0, damping=0.02))
+
+
+def test_a_total_delay_is_called_firm_where_it_is():
+    assert "firm" in cr.fit_delay(rising(2.2)).fit.report()
+    assert "firm" not in cr.fit_delay(rising(1.0)).fit.report().replace("neither is firm", "")
+
+
+def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
+    case = sensors.analyser(np.random.default_rng([1, 7]))
+    fit = cr.fit_delay(case.records).fit
+    low, high = fit.interval
+    assert low <= fit.dead_time <= high
+    assert low <= case.dead_time
