@@ -26,7 +26,7 @@ from .channel_fit import Outcome, from_starts
 from .channel_fit_result import ChannelFit
 from .delay_fit_result import DelayFit
 from .long_records import lively_parts
-from .model_checks import Shown, against_one_model
+from .model_checks import Shown, against_one_model, nonlinear_flags
 from .residuals import check_residuals
 
 LAGS = 25
@@ -148,7 +148,10 @@ def _chosen(
     if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
         check = modes.checks[0]
         signals = check.record.output, check.simulated, check.record.input
-        flags += against_one_model(Shown(*map(np.ravel, signals)), _delay(system))
+        shown, total = Shown(*map(np.ravel, signals)), _total_delay(system)
+        flags += against_one_model(shown, _delay(system))
+        if total is not None and all(flag.code != "not_linear" for flag in flags):
+            flags += nonlinear_flags(shown, _delay(system), total / dt)
     if own[0] <= _NOTHING:
         flags.append(
             Flag(

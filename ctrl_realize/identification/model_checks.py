@@ -33,6 +33,8 @@ _DELAYS_APART = 0.05
 (and no less than a sample); as a part of the common one."""
 _EXPLAINED = 0.05
 """Part of the residual that products of inputs must explain to be worth a flag."""
+_REACHED = 1.5
+"""Total delays over which products of inputs must reach, lest they make up for what is cut off."""
 _TWO_SIDED = 1.96
 _OFF = 0.2
 """Relative difference of gains or total delays that is worth a flag."""
@@ -82,6 +84,8 @@ def checked(fit: DelayFit, *, alone: bool = True) -> DelayFit:
         # Parts of one step are not several responses.
         if not loop and not (stepped and _moves(shown.drive) < 2):
             flags += against_one_model(shown, fit.delay)
+            if not stepped and all(flag.code != "not_linear" for flag in flags):
+                flags += nonlinear_flags(shown, fit.delay, fit.total_delay / fit.dt)
     known = [flag for flag in flags if flag.code not in codes]
     return replace(fit, interval=(low, high), flags=(*fit.flags, *known))
 
@@ -192,14 +196,21 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
                     f"by {what}, {told}: the plant is not linear; what is reported is a mean",
                 )
             )
-            return tuple(flags)
-    return (*flags, *nonlinear_flags(shown, delay))
+            break
+    return tuple(flags)
 
 
-def nonlinear_flags(shown: Shown, delay: float) -> tuple[Flag, ...]:
-    """Tell whether products of past inputs predict the output; `delay` in samples."""
+def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...]:
+    """Tell whether products of past inputs predict the output.
+
+    Not of step records, where such products are but other functions of the time since the step,
+    nor where the regression does not reach over the response; `delay` and `total` in samples.
+    """
     output, drive = shown.output[:_REGRESSED], shown.drive[:_REGRESSED]
     past = min(2 * _past(output.size, delay), output.size // 5)
+    # Of a total delay beyond a tenth of the record flags of its own tell.
+    if past < _REACHED * min(total, output.size / 10):
+        return ()
     chance, part = nonlinear_chance(output, drive, past)
     if chance >= RARE or part < _EXPLAINED:
         return ()

@@ -73,3 +73,9 @@ def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
     low, high = fit.interval
     assert low <= fit.dead_time <= high
     assert low <= case.dead_time
+
+
+@pytest.mark.parametrize("amplitude", [16, 2.0])
+def test_a_linear_valve_is_not_called_nonlinear_by_few_steps(amplitude):
+    record = cr.bench.valve().step_record(amplitude, rng=5)
+    assert not flags(record) & {"not_linear", "time_varying"}
