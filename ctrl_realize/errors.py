@@ -66,6 +66,10 @@ class ModelWarning(CtrlRealizeWarning):
     """The model has a property that one should know before using it."""
 
 
+class UnresolvedWarning(ModelWarning):
+    """The record behind a model does not resolve something that a design relies on."""
+
+
 def warn_caller(message: str, category: type[Warning]) -> None:
     """Warn at the line that called this toolbox, directly or through python-control.
 

@@ -214,6 +214,16 @@ def compared(highest: float) -> Run:
     return run
 
 
+def off(gain: float) -> Run:
+    """Compare R3 with a response of more gain."""
+
+    def run(seed: int) -> Codes:
+        frf = frf_of(gain * rigs.R3, seed, _noise(seed), band=(0.1, 40.0))
+        return codes(cr.compare_frf(cr.delayed_ss(rigs.R3, delay=37, dt=rigs.TS), frf))
+
+    return run
+
+
 DRIVEN = "two lags, random levels, white noise 0.1 to 2 %"
 FRF = "R2, 0.1 to 40 Hz, noise 0.1 to 2 %"
 
@@ -307,6 +317,8 @@ CASES: list[FlagCase] = [
            lambda s: pulse_from(_r2(s, _noise(s), band=(0.1, 60.0), points=150), 0.008, 12)),
     FlagCase("compare_frf", "beyond_nyquist", "points to 1000 Hz, Nyquist 640 Hz", compared(1000.0),
              "points to 100 Hz", compared(100.0)),
+    FlagCase("compare_frf", "frf_differs", "gain 10 % more", off(1.1), "the plant's own", off(1.0)),
+    FlagCase("compare_frf", "frf_disagrees", "gain 50 % more", off(1.5), "10 % more", off(1.1)),
     FlagCase("margins", "unstable", "gain 1.02 to 2 times the critical one",
              scaled_loop(1.02, 2.0), "gain 0.2 to 0.98 of it", scaled_loop(0.2, 0.98)),
     FlagCase("margins", "marginal", "gain within 1e-9 of the critical one",

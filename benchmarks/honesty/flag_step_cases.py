@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import control as ct
 import numpy as np
@@ -166,6 +167,40 @@ def together(seed: int, **what: object) -> Codes:
     return codes(cr.fit_delay(repeats(seed, **what)).fit)
 
 
+def unlike(
+    seed: int, *, gains: tuple[float, ...] = (1, 1, 1), lags: tuple[float, ...] = (1, 1, 1)
+) -> list[cr.Record]:
+    """Three records of steps of R1 with other gains and time constants."""
+    t, records = _clock(37.0), []
+    for i, (gain, lag) in enumerate(zip(gains, lags, strict=True)):
+        rng = np.random.default_rng([seed, 24, i])
+        y = gain * rigs.exact_step(rigs.R1, t / lag)
+        noise = _noise(seed, LOW) * rng.standard_normal(t.size)
+        k = np.arange(t.size)
+        records.append(cr.Record(k * DT, 1.0 * (k >= BEFORE), y + noise, name=f"r{i}"))
+    return records
+
+
+def unlike_fit(seed: int, **what: tuple[float, ...]) -> Codes:
+    return codes(cr.fit_delay(unlike(seed, **what), structures=[(1, 1)]).fit)
+
+
+def unlike_campaign(seed: int, **what: tuple[float, ...]) -> Codes:
+    return codes(cr.identify_campaign(unlike(seed, **what), structures=[(1, 1)]))
+
+
+def washed_out(seed: int) -> Codes:
+    """A response that dies away again: its gain is nothing."""
+    t = np.maximum(_clock(37.0), 0.0)
+    return shaped(np.exp(-2 * np.pi * 2.0 * t) - np.exp(-2 * np.pi * 8.0 * t), seed, _noise(seed))
+
+
+def forced(seed: int, plant: str) -> Codes:
+    """One lag, asked for."""
+    case = step_case("white", plant, _noise(seed, LOW), seed)
+    return fit(case.record, structures=[(1, 1)])
+
+
 def scan(record: cr.Record, order: int | None = None, **options: object) -> Codes:
     return codes(cr.identify(record, method="scan", order=order, **options).fit)
 
@@ -323,6 +358,19 @@ CASES: list[FlagCase] = [
     _several("outlying_records", "one record of six 25 samples late", strange=True),
     _several("records_differ", "delays scatter by 2 samples", scatter=2.0),
     _several("amplitude_trend", "delay 3 samples longer at half the height", trend=3.0),
+    *(
+        FlagCase(f"{result}, three records", code, due, partial(run, **what),
+                 "three records alike, white noise 0.1 and 0.5 %", run)
+        for result, run in (("fit_delay", unlike_fit), ("identify_campaign", unlike_campaign))
+        for code, due, what in (
+            ("gains_differ", "gains of 0.95, 1 and 1.05", {"gains": (0.95, 1.0, 1.05)}),
+            ("no_common_gain", "gains of 1, 0.5 and 0.25", {"gains": (1.0, 0.5, 0.25)}),
+            ("lags_differ", "lags of 0.8, 1 and 1.2", {"lags": (0.8, 1.0, 1.2)}),
+        )
+    ),
+    FlagCase("fit_delay", "apparent_dead_time", "one lag asked for of R2",
+             partial(forced, plant="R2"), "one lag asked for of R1", partial(forced, plant="R1")),
+    _fit("gain_not_resolved", "a response that dies away again", washed_out),
     _scan("delay_at_bound", "max_delay=20, delay 30 to 45", lambda s: scan(plain(s), max_delay=20),
           ANY, plain_scan),
     _scan("no_delay_resolved", "no delay, noise 1 and 2 %", lambda s: scan(undelayed(s)), ANY,

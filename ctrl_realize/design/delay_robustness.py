@@ -16,6 +16,7 @@ from ..wording import in_time, interval_in_time
 from .loops import Loop, open_loop
 from .margin_result import Margins
 from .margins import loop_margins
+from .resolved import warn_unresolved
 from .siso import delayed_system, held_fraction, interval_of_dead_time
 
 if TYPE_CHECKING:
@@ -171,6 +172,7 @@ def delay_robustness(
     <DelayRobustness stable in 0.08...0.12 s>
     """
     plant = delayed_system(system, "robustness to the dead time")
+    warn_unresolved(plant)
     interval = interval_of_dead_time(plant, dead_time_interval)
     if interval is None:
         raise OptionError(

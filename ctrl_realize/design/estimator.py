@@ -15,6 +15,7 @@ from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
 from ..results import Result
 from ..wording import in_numbers
+from .resolved import warn_unresolved
 from .riccati import has_states, riccati, weight_matrix
 from .siso import delayed_system
 
@@ -112,6 +113,7 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     [[0.5377]]
     """
     plant = delayed_system(system, "kalman_predictor", siso=False)
+    warn_unresolved(plant)
     core = plant.delay_free
     has_states(core, "kalman_predictor")
     weight = weight_matrix(QN, core.nstates, "QN", "core state(s)")

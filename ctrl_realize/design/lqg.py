@@ -18,6 +18,7 @@ from .delay_line import DelayLineController
 from .estimator import kalman_predictor
 from .loop_check import loop_check, refuse_poles, refuse_unstable, warn_of
 from .regulator import TOO_LONG, regulator
+from .resolved import check_sign, warn_unresolved
 from .riccati import has_states
 from .siso import delayed_system
 
@@ -79,6 +80,8 @@ def lqg(
     <Margins stable: gain 2.323, phase 44.23 deg, modulus 0.5479, delay 0.138 s>
     """
     plant = delayed_system(system, "lqg", siso=False)
+    check_sign(plant, "lqg")
+    warn_unresolved(plant)
     core = plant.delay_free
     has_states(core, "lqg")
     law = regulator(plant, Q, R)

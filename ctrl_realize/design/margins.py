@@ -24,6 +24,7 @@ from .data_loops import DataLoop, data_loop
 from .loops import Loop, open_loop
 from .margin_intervals import margin_intervals
 from .margin_result import Margins
+from .resolved import warn_unresolved
 
 Curve = Callable[[FloatArray], ComplexArray]
 """Response of a loop at frequencies in rad/s."""
@@ -112,6 +113,7 @@ def margins(
             f"dead_time={wait:g} s with a discrete loop; put the delay into the plant "
             "(delayed_ss, or .replace(delay=...))"
         )
+    warn_unresolved(loop)
     return loop_margins(exact)
 
 

@@ -17,6 +17,7 @@ from ..numerics.closed_loop import damped_circle, step_on_circle
 from ..wording import in_time
 from .loops import open_loop
 from .margins import margins
+from .resolved import warn_unresolved
 
 LONGEST = 2**19
 """Most samples of a response."""
@@ -141,6 +142,7 @@ def performance(
     inf
     """
     guess = None if total_time is None else positive(total_time, "total_time", "time in s")
+    warn_unresolved(plant)
     loop = loop_time(plant, controller)
     setpoint, load, settled = settled_responses(plant, controller, guess or loop)
     if not settled:

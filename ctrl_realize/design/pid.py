@@ -19,6 +19,7 @@ from .pid_rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
 from .process_model import ProcessModel
 from .reduction import METHODS as REDUCTIONS
 from .reduction import reduce_fopdt, reduce_sopdt
+from .resolved import check_sign, warn_unresolved
 from .siso import delayed_system
 
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
@@ -214,6 +215,8 @@ def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, f
         # A continuous controller is tuned on a plant sampled so finely that it does not matter.
         return system.system(system.total_time / FINE), 0.0
     plant = delayed_system(system, "a PID controller")
+    check_sign(plant, "a PID controller")
+    warn_unresolved(plant)
     if dt is not None:
         raise OptionError(
             f"dt={dt:g} is for process models; the controller of a system takes its sample time, "

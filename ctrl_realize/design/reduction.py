@@ -19,6 +19,7 @@ from ..numerics.modes import split_modes
 from ..numerics.process_step import process_step
 from .conversions import ContinuousModel, to_continuous, to_discrete
 from .process_model import ProcessModel
+from .resolved import warn_unresolved
 from .siso import delayed_system, held_fraction, proper_ss
 
 METHODS = ("optimal", "half_rule")
@@ -142,6 +143,7 @@ def _both_forms(
             step = wait / max(1, round(wait / model.dt)) if wait else model.dt
             model = ContinuousModel(core, wait, step)
         return model, to_discrete(model)
+    warn_unresolved(system)
     return None, delayed_system(system, "a reduction")
 
 

@@ -26,6 +26,7 @@ from ..results import Result
 from ..wording import in_numbers
 from .delay_line import DelayLineController
 from .loop_check import LoopCheck, loop_check, refuse_poles, refuse_unstable, warn_of
+from .resolved import check_sign, warn_unresolved
 from .riccati import has_states, riccati, weight_matrix
 from .siso import delayed_system
 
@@ -185,6 +186,8 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
 def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     """Solve for the gain, see `predictor_lqr`, without a look at the loop."""
     plant = delayed_system(system, "predictor_lqr", siso=False)
+    check_sign(plant, "predictor_lqr")
+    warn_unresolved(plant)
     delays = tuple(plant.input_delays)
     core = plant.delay_free
     has_states(core, "predictor_lqr")

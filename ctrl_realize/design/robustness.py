@@ -19,6 +19,7 @@ from ..results import Result
 from .loops import open_loop
 from .margin_result import Margins
 from .margins import margins
+from .resolved import warn_unresolved
 from .siso import delayed_system, held_fraction, interval_of_dead_time
 
 GRID_POINTS = 400
@@ -196,6 +197,7 @@ def uncertainty_bound(
     if nominal is None:
         raise OptionError("no systems and no nominal one; give nominal and dead_time_interval")
     plant = delayed_system(nominal, "an uncertainty bound")
+    warn_unresolved(plant)
     interval = interval_of_dead_time(plant, dead_time_interval)
     if not models and interval is None:
         raise OptionError(

@@ -16,6 +16,7 @@ from ..numerics.modes import Part, split_modes
 from .delay_line import DelayLineController
 from .loop_check import loop_check, refuse_unstable, warn_of
 from .predictor_filter import predictor_filter, removed_part
+from .resolved import check_sign, warn_unresolved
 from .siso import delayed_system, same_rate
 
 ON_CIRCLE = 1e-9
@@ -94,6 +95,8 @@ def smith_predictor(
     <Margins stable: gain 2.387, phase 64.42 deg, modulus 0.5772, delay 0.1622 s>
     """
     plant = delayed_system(system, "a Smith predictor")
+    check_sign(plant, "a Smith predictor")
+    warn_unresolved(plant)
     primary = same_rate(controller, plant.dt, "a Smith predictor")
     core, d = plant.delay_free, int(plant.delay)
     poles = np.asarray(core.poles())

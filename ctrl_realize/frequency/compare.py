@@ -16,6 +16,7 @@ from ..numerics.blas_threads import single_threaded
 from ..numerics.spectra import hold_response, unwrapped_phase
 from ..results import Flag
 from .comparison import FRFComparison, decibels, hertz
+from .disagreement import disagreement
 from .held import same_time, sampled_every
 from .measured_points import MeasuredPoints, check_single_channel, measured_points
 from .trusted_band import trusted_points
@@ -122,7 +123,7 @@ def compare_frf(
     model_phase = unwrapped_phase(model, omega, delay)
     error = _unwrapped_error(ratio, int(np.argmax(good)))
     trusted_hz = points.frequency_hz[good]
-    return FRFComparison(
+    found = FRFComparison(
         frequency_hz=read_only(points.frequency_hz),
         measured=locked(points.response),
         model=locked(model),
@@ -140,6 +141,8 @@ def compare_frf(
         name=f"{_own_name(system, 'model')} and {_own_name(frf, 'measured')}",
         flags=flags,
     )
+    off = disagreement(found)
+    return found if off is None else replace(found, flags=(off, *found.flags))
 
 
 def _without_hold(points: MeasuredPoints, dt: float) -> MeasuredPoints:

@@ -7,21 +7,23 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.noise_level import mad_sigma
 from ..numerics.output_error_result import OutputErrorFit
-from ..numerics.sampled_fit import OwnDelay, SampledFit, fit_sampled
+from ..numerics.own_response import OwnResponse
+from ..numerics.sampled_fit import SampledFit, fit_sampled
 from ..numerics.step_problem import bare_data
 from ..results import Flag
 from ..signals import Record
 from ..wording import named
 from .averaging import common_sample_time, compared, delay_outliers, widened
-from .delay_fit_result import DelayFit, Repeatability
-from .fit_flags import repeat_flags, sampled_flags
-from .fit_summary import summarise
+from .delay_fit_result import DelayFit
+from .fit_flags import sampled_flags
+from .fit_summary import summarise, with_repeats
+from .repeat_flags import repeat_flags
+from .repeatability import Repeatability
 
 FOLLOWS = 36.0
 """Least chi-square of the response to the input: six standard deviations. White noise that has
@@ -54,9 +56,9 @@ def fit_any_input(
             break
         used = tuple(i for i in used if i not in apart)
     fit = widened(found.fit, repeats, used)
-    flags = repeat_flags(repeats) + _gain_flags(own, used)
+    flags = repeat_flags(repeats)
     result = _summary(found, fit, records, used, limit, flags)
-    return replace(result, repeatability=repeats), fit
+    return with_repeats(result, repeats), fit
 
 
 def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
@@ -97,45 +99,23 @@ def _named(records: tuple[Record, ...]) -> str:
 
 
 def _repeatability(
-    own: list[OwnDelay], records: tuple[Record, ...], used: tuple[int, ...], delay: float
+    own: list[OwnResponse], records: tuple[Record, ...], used: tuple[int, ...], delay: float
 ) -> Repeatability:
     return compared(
         tuple(record.name or f"record {i}" for i, record in enumerate(records)),
         np.array([float(np.ptp(record.input)) for record in records]),
-        (
-            np.array([one.shift for one in own]),
-            np.array([one.error for one in own]),
-            np.array([one.gain for one in own]),
-        ),
+        own,
         used,
         delay,
     )
 
 
-def _gain_outliers(own: list[OwnDelay], used: tuple[int, ...]) -> tuple[int, ...]:
+def _gain_outliers(own: list[OwnResponse], used: tuple[int, ...]) -> tuple[int, ...]:
     """Positions of records whose gain lies apart from the others': another plant, or none."""
     gains = np.array([own[i].gain for i in used])
     centre, scatter = float(np.median(gains)), mad_sigma(gains)
     return tuple(
         i for i in used if abs(own[i].gain - centre) > _APART * max(scatter, own[i].gain_error)
-    )
-
-
-def _gain_flags(own: list[OwnDelay], used: tuple[int, ...]) -> tuple[Flag, ...]:
-    """Say so where the gains of the records differ by more than their noise."""
-    gains, errors = (np.array([getattr(own[i], k) for i in used]) for k in ("gain", "gain_error"))
-    weight = errors**-2
-    statistic = float(np.sum(weight * (gains - np.sum(weight * gains) / np.sum(weight)) ** 2))
-    chance = float(chdtrc(max(gains.size - 1, 1), statistic))
-    if chance >= 0.01:
-        return ()
-    return (
-        Flag(
-            "gains_differ",
-            f"the gain differs from record to record by more than its noise, {gains.min():.3g} to "
-            f"{gains.max():.3g} times the common one (chi-square {statistic:.3g}, p = "
-            f"{chance:.2g}): the plant is not linear, or not the same",
-        ),
     )
 
 

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
-from ..numerics.noise_level import correlation_time, mad_sigma
+from ..numerics.noise_level import mad_sigma
 from ..numerics.output_error_result import OutputErrorFit
+from ..numerics.own_response import OwnResponse, homogeneity, own_step_response
 from ..signals import Record, StepResponse
 from ..wording import named
-from .delay_fit_result import Repeatability
+from .repeatability import Repeatability
 from .steps import unit_step
 
 _TRIM = 0.1
 _SAME_AMPLITUDE = 0.03
 _APART = 5.0  # robust standard deviations from the others
-_MOST_LAGS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,13 +123,15 @@ def repeatability(
     own : ndarray, shape (N, q)
         What every record has for itself beside a drift: a level, hum, a free response.
     """
-    shifts, errors, gains = np.array(
-        [_shift(step, mean, model, own) for step in steps], dtype=np.float64
-    ).T
+    found = []
+    for step in steps:
+        n = min(step.n_samples, mean.output.size - mean.edge)
+        output = np.concatenate([step.pre[step.pre.size - mean.edge :], step.output[:n]])
+        found.append(own_step_response(output, model, mean.edge + delay / mean.dt, own, mean.dt))
     return compared(
         tuple(step.name or f"record {i}" for i, step in enumerate(steps)),
         np.array([step.amplitude for step in steps]),
-        (shifts, errors, gains),
+        found,
         mean.used,
         delay,
     )
@@ -138,29 +140,30 @@ def repeatability(
 def compared(
     names: tuple[str, ...],
     amplitudes: FloatArray,
-    own: tuple[FloatArray, FloatArray, FloatArray],
+    own: Sequence[OwnResponse],
     used: tuple[int, ...],
     delay: float,
 ) -> Repeatability:
-    """Say how much the delays of several records differ, beyond the noise inside each.
+    """Say how much several records differ, beyond the noise inside each.
 
     Parameters
     ----------
     names : tuple of str
     amplitudes : ndarray, shape (R,)
-    own : tuple of three ndarray, shape (R,)
-        Shift of every record against the common model and its standard error, in s, and gain.
+    own : sequence of OwnResponse
+        Every record against the common model.
     used : tuple of int
         Positions of the records that count.
     delay : float
         Dead time of the common model, in s.
     """
-    shifts, errors, gains = own
+    shifts, errors = (np.array([getattr(one, k) for one in own]) for k in ("shift", "error"))
+    gains, gain_errors, lags, lag_errors, followed = (
+        np.array([getattr(one, name) for one in own], dtype=np.float64)
+        for name in ("gain", "gain_error", "lag", "lag_error", "followed")
+    )
     kept = np.array(used)
-    weight = errors[kept] ** -2
-    centre = float(np.sum(weight * shifts[kept]) / np.sum(weight))
-    statistic = float(np.sum(weight * (shifts[kept] - centre) ** 2))
-    freedom = max(kept.size - 1, 1)
+    chi_square, p_value = homogeneity(shifts[kept], errors[kept])
     trend, trend_error = _trend(np.abs(amplitudes[kept]), shifts[kept], errors[kept])
     return Repeatability(
         names=names,
@@ -168,8 +171,14 @@ def compared(
         delays=delay + shifts,
         errors=errors,
         gains=gains,
-        chi_square=statistic,
-        p_value=float(chdtrc(freedom, statistic)),
+        gain_errors=gain_errors,
+        lags=lags,
+        lag_errors=lag_errors,
+        fit_percent=followed,
+        chi_square=chi_square,
+        p_value=p_value,
+        gain_test=homogeneity(gains[kept], gain_errors[kept]),
+        lag_test=homogeneity(np.log(lags[kept]), lag_errors[kept]),
         trend=trend,
         trend_error=trend_error,
         outlying=tuple(name for i, name in enumerate(names) if i not in used),
@@ -224,32 +233,6 @@ def _far_from_the_rest(outputs: FloatArray) -> list[int]:
     size = np.log(np.maximum(distance, 1e-300))
     scale = max(mad_sigma(size), 0.15)
     return [int(i) for i in np.flatnonzero(size - np.median(size) > _APART * scale)]
-
-
-def _shift(
-    step: StepResponse, mean: MeanStep, model: FloatArray, own: FloatArray
-) -> tuple[float, float, float]:
-    """Delay of a record against the model, its standard error (s), and its relative gain."""
-    n = min(step.n_samples, mean.output.size - mean.edge)
-    y = np.concatenate([step.pre[step.pre.size - mean.edge :], step.output[:n]])
-    index = np.arange(y.size, dtype=np.float64)
-    slope = np.gradient(model[: y.size])
-    line = index / index.size  # drifts of the records may cancel in their mean
-    shift, error, gain = 0.0, np.inf, 1.0
-    for _ in range(_MOST_LAGS):
-        shape = np.interp(index - shift, index, model[: y.size])
-        steep = np.interp(index - shift, index, slope)
-        columns = np.column_stack([shape, -steep, line, own[: y.size]])
-        solution = np.linalg.lstsq(columns, y, rcond=None)[0]
-        left = y - columns @ solution
-        gain = float(solution[0]) or 1.0
-        move = float(solution[1]) / gain
-        shift += float(np.clip(move, -0.2 * mean.edge - 20, 0.2 * mean.edge + 20))
-        variance = float(left @ left) / max(y.size - columns.shape[1], 1) * correlation_time(left)
-        error = float(np.sqrt(variance * np.linalg.pinv(columns.T @ columns)[1, 1])) / abs(gain)
-        if abs(move) < 1e-3:
-            break
-    return shift * mean.dt, max(error, 1e-12) * mean.dt, gain
 
 
 def _trend(amplitudes: FloatArray, shifts: FloatArray, errors: FloatArray) -> tuple[float, float]:

@@ -169,7 +169,7 @@ class Campaign(Result):
         -------
         pandas.DataFrame
             Index ``record``; columns ``amplitude``, ``delay`` [samples], ``dead_time``, ``low``,
-            ``high`` [s], ``order``, ``misfit``, ``flags`` and ``error``.
+            ``high`` [s], ``gain``, ``gain_std``, ``order``, ``misfit``, ``flags`` and ``error``.
         """
         import pandas as pd
 
@@ -181,6 +181,8 @@ class Campaign(Result):
                 "dead_time": row.dead_time,
                 "low": row.interval[0],
                 "high": row.interval[1],
+                "gain": row.gain,
+                "gain_std": row.gain_std,
                 "order": np.nan if row.order is None else row.order,
                 "misfit": row.misfit,
                 "flags": ", ".join(flag.code for flag in row.flags),

@@ -6,8 +6,11 @@ from collections import Counter
 
 import numpy as np
 
+from ..numerics.own_response import homogeneity
 from ..results import Flag
+from ..wording import in_time
 from .campaign_row import CampaignRow
+from .repeat_flags import BY_CHANCE, NO_COMMON_GAIN, SAME
 
 Rows = tuple[CampaignRow, ...]
 
@@ -16,8 +19,77 @@ _SAME_HEIGHT = 1e-6  # part of the step by which heights may differ and be one
 
 def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[Flag, ...]:
     """List the flags of a campaign: of all its rows, of those identified, and of those not."""
-    found = (_failed(rows, failed), _same_records(good), _amplitude_trend(good, method))
+    found = (
+        _failed(rows, failed),
+        *_different_gains(good),
+        *_different_times(good),
+        _same_records(good),
+        _amplitude_trend(good, method),
+    )
     return tuple(flag for flag in found if flag is not None)
+
+
+def _different_gains(rows: Rows) -> list[Flag]:
+    """Test whether one gain holds for all records, by chi-square where their errors are known."""
+    gains, errors = (np.array([getattr(row, k) for row in rows]) for k in ("gain", "gain_std"))
+    known = np.isfinite(gains)
+    gains, errors = gains[known], errors[known]
+    if gains.size < 2 or not np.median(gains):
+        return []
+    ratios = gains / float(np.median(gains))
+    apart = float(np.max(np.abs(ratios - 1)))
+    statistic, chance = homogeneity(gains, errors)
+    differ = chance < BY_CHANCE and apart > SAME
+    told = f"chi-square {statistic:.3g}, p = {chance:.2g}"
+    if not np.isfinite(errors).any():
+        # A scan knows no error of its gain; what noise leaves of it is a few percent.
+        differ, told = apart > NO_COMMON_GAIN, "no error of them is known"
+    if not differ:
+        return []
+    flags = [
+        Flag(
+            "gains_differ",
+            f"the gain differs from record to record, {gains.min():.3g} to {gains.max():.3g} "
+            f"({told}): the plant is not linear, or not the same",
+        )
+    ]
+    if apart > NO_COMMON_GAIN:
+        flags.insert(
+            0,
+            Flag(
+                "no_common_gain",
+                f"no one gain follows all records: they have {gains.min():.3g} to "
+                f"{gains.max():.3g}; identify those of one operating point by themselves",
+            ),
+        )
+    return flags
+
+
+def _different_times(rows: Rows) -> list[Flag]:
+    """Test dead times, and dead times with lags, by chi-square about their weighted means."""
+    flags = []
+    for code, what, name, ends in (
+        ("records_differ", "dead time", "dead_time", "interval"),
+        ("lags_differ", "total delay (dead time and lags)", "total_delay", "total_delay_interval"),
+    ):
+        values = np.array([getattr(row, name) for row in rows])
+        low, high = np.array([getattr(row, ends) for row in rows]).reshape(-1, 2).T
+        with np.errstate(invalid="ignore"):
+            errors = (high - low) / 3.92
+        # The flat set of a scan claims no level, and is no standard error.
+        errors[~(errors > 0) | ~np.isfinite([row.gain_std for row in rows])] = np.inf
+        statistic, chance = homogeneity(values, errors)
+        if chance < BY_CHANCE:
+            flags.append(
+                Flag(
+                    code,
+                    f"the {what} differs from record to record by more than the intervals allow, "
+                    f"{in_time(values.min())} to {in_time(values.max())} (chi-square "
+                    f"{statistic:.3g}, p = {chance:.2g}): trigger jitter, friction, or a plant "
+                    "that is not linear or not the same",
+                )
+            )
+    return flags
 
 
 def _failed(rows: Rows, failed: Rows) -> Flag | None:

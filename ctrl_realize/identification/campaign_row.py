@@ -51,8 +51,13 @@ class CampaignRow:
         Interval of the dead time in s.
     misfit : float
         Misfit of the model for a unit step, so that records can be compared.
-    gain : float
-        Gain of the model at zero frequency.
+    gain, gain_std : float
+        Gain of the model at zero frequency, and its standard error if its structure is the
+        plant's; NaN where the method knows none.
+    total_delay : float
+        Dead time and lags of the model in s, NaN where the method tells none.
+    total_delay_interval : tuple of float
+        95 % interval of the total delay, in s.
     model : PackedModel or None
         Core, delays and names of the model.
     error : str or None
@@ -80,6 +85,9 @@ class CampaignRow:
     interval: tuple[float, float] = (float("nan"), float("nan"))
     misfit: float = float("nan")
     gain: float = float("nan")
+    gain_std: float = float("nan")
+    total_delay: float = float("nan")
+    total_delay_interval: tuple[float, float] = (float("nan"), float("nan"))
     model: PackedModel | None = field(default=None, repr=False)
     error: str | None = None
     flags: tuple[Flag, ...] = ()
@@ -225,6 +233,9 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
         interval=(float(low), float(high)),
         misfit=_scaled_misfit(fit, row.amplitude),
         gain=_gain(system),
+        gain_std=float(getattr(fit, "gain_std_given_structure", np.nan)),
+        total_delay=float(_or_nan(getattr(fit, "total_delay", None))),
+        total_delay_interval=getattr(fit, "total_delay_interval", (np.nan, np.nan)),
         model=PackedModel.of(system),
         flags=tuple(fit.flags),
     )
@@ -235,6 +246,10 @@ def _scaled_misfit(fit: DelayFit | DelayScan, amplitude: float) -> float:
     if isinstance(fit, DelayScan):
         return fit.misfit
     return fit.residual / (abs(amplitude) if np.isfinite(amplitude) else 1.0)
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
 def _gain(system: DelayedStateSpace) -> float:

@@ -24,10 +24,11 @@ from ..wording import named
 from .any_input_fit import LEAST_MOVE, fit_any_input
 from .averaging import aligned_steps, delay_outliers, mean_step, repeatability, widened
 from .delay_fit_result import DelayFit
-from .fit_flags import fit_flags, repeat_flags, same_record_flags
-from .fit_summary import fitted_core, summarise
+from .fit_flags import fit_flags
+from .fit_summary import fitted_core, summarise, with_repeats
 from .known_dynamics import known_factor
 from .model_checks import checked
+from .repeat_flags import repeat_flags, same_record_flags
 from .steps import found_step
 
 Loss = Literal["huber", "least_squares"]
@@ -205,7 +206,7 @@ def _fit_mean(
     flags = fit_flags(data, fit, limit) + repeat_flags(repeats)
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
     result = summarise(fit, data, time, records, flags)
-    return replace(result, repeatability=repeats), fit
+    return with_repeats(result, repeats), fit
 
 
 def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:

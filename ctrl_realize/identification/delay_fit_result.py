@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
 from ..signals import Record
-from ..wording import in_time, interval_in_time, number_within, poles_in_words, time_within
+from ..wording import (
+    in_time,
+    interval_in_time,
+    number_within,
+    numbers_alike,
+    poles_in_words,
+    time_within,
+)
+from .repeatability import Repeatability
+
+_FIRM = 0.1  # part of a total delay up to which an interval on either side makes it firm
 
 _TOTAL_IN_DOUBT = frozenset(
     {
@@ -50,10 +62,11 @@ class DelayFit(Result):
 
     ``interval[0] <= dead_time <= interval[1]`` and
     ``total_delay == dead_time + sum of the model's lags - sum of its leads``. The total is
-    firm in every model; how it splits into dead time and lags is not, and `interval` says how
-    far. The model is ``gain exp(-s dead_time)`` times a transfer function of unit gain with
-    `poles` and `zeros`. What is firm is so where the record shows the response to its end, of one
-    linear plant in open loop: flags say where it does not.
+    mostly known better than how it splits into dead time and lags; `total_delay_interval` and
+    `interval` say how far. The model is ``gain exp(-s dead_time)`` times a transfer function of
+    unit gain with `poles` and `zeros`. What is called firm is so where the
+    record shows the response to its end, of one linear plant in open loop: flags say where it does
+    not.
 
     Attributes
     ----------
@@ -71,12 +84,21 @@ class DelayFit(Result):
         First motion of the output after the input has moved, in s (NaN when it is no step).
     total_delay : float
         Delay at zero frequency in s; integrators are left out.
+    total_delay_interval : tuple of float
+        95 % interval of the total delay in s, if the residual is noise; without end where the
+        record does not resolve it. Called firm where it reaches a tenth of it to either side.
     order, relative_degree : int
         Of the model that was chosen.
     poles, zeros : ndarray of complex
         Of the continuous model, in rad/s.
     gain : float
         Of the model at zero frequency; of one with an integrator, the slope per second.
+    gain_std_given_structure : float
+        Standard error of the gain if the chosen structure is the plant's.
+    gain_interval : tuple of float
+        95 % interval of the gain: of the structures that the data cannot rule out, if the residual
+        is noise; of the records too, where their gains differ. Without end where the record is
+        shorter than the slowest time constant and does not resolve the gain.
     at_noise_level : bool
         The residual is as small as the noise before the step.
     misfit : float
@@ -100,6 +122,9 @@ class DelayFit(Result):
         Delay of every record by itself, where there are several.
     dt : float
         Sample time in s.
+    better : StructureRow or None
+        Where structures were asked for, and are ruled out: the structure that does it, `excess`
+        below them. The dead time is then an apparent one, with the lags that the model lacks in it.
     choices : tuple of str
         What was chosen, and why.
     flags : tuple of Flag
@@ -145,6 +170,10 @@ class DelayFit(Result):
     repeatability: Repeatability | None = None
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = field(default=())
+    gain_std_given_structure: float = float("nan")
+    gain_interval: tuple[float, float] = (float("nan"), float("nan"))
+    total_delay_interval: tuple[float, float] = (float("nan"), float("nan"))
+    better: StructureRow | None = None
 
     @property
     def delay(self) -> float:
@@ -164,6 +193,8 @@ class DelayFit(Result):
     @property
     def interval_label(self) -> str:
         """What `interval` is: a confidence interval only where one model leaves only noise."""
+        if self.better is not None:
+            return "95 % interval, were the structure right"
         return "95 % interval" if self.at_noise_level else "interval spanned by the views"
 
     @property
@@ -179,23 +210,37 @@ class DelayFit(Result):
             f"relative degree {self.relative_degree}, residual {level}>"
         )
 
+    def _kind(self) -> str:
+        return "dead time" if self.better is None else "apparent dead time"
+
+    def _total_in_words(self) -> str:
+        low, high = self.total_delay_interval
+        if high == np.inf:
+            return "not resolved: the record ends long before the slowest time constant"
+        if np.isnan(high):
+            return f"{in_time(self.total_delay, 5)} (dead time and lags)"
+        doubted = any(flag.code in _TOTAL_IN_DOUBT for flag in self.flags)
+        if not doubted and is_firm(self.total_delay, self.total_delay_interval):
+            said = time_within(self.total_delay, low, high)
+            return f"{said} (dead time and lags: firm, {interval_in_time(low, high)})"
+        said = time_within(self.total_delay, low, high)
+        return f"{said} (dead time and lags: {interval_in_time(low, high)})"
+
     def _title(self) -> str:
-        return f"Output-error fit: dead time {time_within(self.dead_time, *self.interval)}"
+        return f"Output-error fit: {self._kind()} {time_within(self.dead_time, *self.interval)}"
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
         wait = time_within(self.dead_time, low, high)
         samples = number_within(self.delay, *self.delay_interval)
-        doubted = any(flag.code in _TOTAL_IN_DOUBT for flag in self.flags)
-        parts = "dead time and lags" + ("" if doubted else ": firm")
         rows = [
-            ("dead time", f"{wait} = {samples} samples"),
+            (self._kind(), f"{wait} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
             *([("first motion", in_time(self.onset, 4))] if self.onset == self.onset else []),
-            ("total delay", f"{in_time(self.total_delay, 5)} ({parts})"),
+            ("total delay", self._total_in_words()),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", poles_in_words(self.poles)),
-            ("gain", f"{self.gain:.6g}"),
+            ("gain", gain_in_words(self.gain, self.gain_interval)),
             ("residual", f"{self.residual:.3g}, noise {self.noise:.3g} (misfit {self.misfit:.3g})"),
         ]
         rows += [(f"view: {name}", in_time(value, 4)) for name, value in self.views.items()]
@@ -204,53 +249,21 @@ class DelayFit(Result):
         return rows
 
 
-@dataclass(frozen=True, eq=False)
-class Repeatability:
-    """How much records of one plant differ, beyond the noise inside each.
+def is_firm(value: float, interval: tuple[float, float]) -> bool:
+    """Whether an interval reaches a tenth of the estimate to either side at most."""
+    low, high = interval
+    return bool(max(high - value, value - low) <= _FIRM * abs(value))
 
-    ``chi_square`` is the sum over the records of ((delay - weighted mean) / standard error)^2
-    and `p_value` the chance of a larger one when records differ by noise alone.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the records.
-    amplitudes : ndarray, shape (R,)
-        Height of the step of each, or how far its input goes from lowest to highest.
-    delays, errors : ndarray, shape (R,)
-        Delay of each against the common model, and its standard error from the noise, in s.
-    gains : ndarray, shape (R,)
-        Gain of each, over the common one.
-    trend, trend_error : float
-        Slope of the delays over the amplitudes, in s per unit of input.
-    outlying : tuple of str
-        Records that lie apart from the rest; they are not in the mean.
-    """
-
-    names: tuple[str, ...]
-    amplitudes: FloatArray
-    delays: FloatArray
-    errors: FloatArray
-    gains: FloatArray
-    chi_square: float
-    p_value: float
-    trend: float
-    trend_error: float
-    outlying: tuple[str, ...]
-
-    def rows(self) -> list[tuple[str, str]]:
-        """List the numbers for a report."""
-        scatter = float(self.delays.std(ddof=1)) if self.delays.size > 1 else 0.0
-        rows = [
-            ("records", f"{len(self.names)}, {len(self.outlying)} of them left out"),
-            ("scatter of delays", f"{in_time(scatter)} between records"),
-            (
-                "chi-square",
-                f"{self.chi_square:.3g} for {len(self.names) - 1} (p = {self.p_value:.2g})",
-            ),
-        ]
-        if self.trend_error > 0:
-            rows.append(
-                ("trend over amplitude", f"{self.trend:.2g} +- {self.trend_error:.2g} s per unit")
-            )
-        return rows
+def gain_in_words(gain: float, interval: tuple[float, float]) -> str:
+    """Write a gain with its interval, and say so where it is not resolved."""
+    low, high = interval
+    if np.isfinite(low) != np.isfinite(high):
+        said = f"at least {low:.3g}" if np.isfinite(low) else f"at most {high:.3g}"
+        return f"{said}: more is extrapolated (the model has {gain:.4g})"
+    if np.isinf(low):
+        return f"not resolved by this record (the model has {gain:.4g})"
+    if np.isnan(low):
+        return f"{gain:.6g}"
+    number, *ends = numbers_alike((gain, low, high), low, high)
+    return f"{number} ({ends[0]} to {ends[1]})"

@@ -10,9 +10,8 @@ from ..numerics.output_error_result import OutputErrorFit
 from ..numerics.profile_interval import profile_limits
 from ..numerics.step_problem import StepData
 from ..results import Flag
-from ..signals import Record
-from ..wording import in_time, interval_in_time
-from .delay_fit_result import Repeatability
+from ..wording import in_time, interval_in_time, time_within
+from .delay_fit_result import is_firm
 from .model_flags import cancelled_pair, open_gain, slow_modes
 
 _SAMPLES_BESIDE_NOTHING = 0.5
@@ -47,61 +46,14 @@ def sampled_flags(
     return tuple(flag for flag in found if flag is not None)
 
 
-def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
-    """List what several records say about each other."""
-    flags = []
-    if result.outlying:
-        flags.append(
-            Flag("outlying_records", "left out of the mean: " + ", ".join(result.outlying))
-        )
-    if result.p_value < 0.01:
-        flags.append(
-            Flag(
-                "records_differ",
-                f"delays differ from record to record by more than their noise (chi-square "
-                f"{result.chi_square:.3g}, p = {result.p_value:.2g}): trigger jitter, friction "
-                "or a changing plant; the interval is widened by that",
-            )
-        )
-    if result.trend_error > 0 and abs(result.trend) > 3 * result.trend_error:
-        flags.append(
-            Flag(
-                "amplitude_trend",
-                f"the delay changes with the amplitude ({result.trend:.2g} +- "
-                f"{result.trend_error:.2g} s per unit): the plant is not linear",
-            )
-        )
-    return tuple(flags)
-
-
-def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:
-    """Find records whose outputs agree in every digit, which noise never lets happen."""
-    first: dict[bytes, int] = {}
-    again = []
-    for i, record in enumerate(records, 1):
-        values = record.output.tobytes()
-        if values in first:
-            again.append(f"the {i}. is the {first[values]}.")
-        first.setdefault(values, i)
-    if not again:
-        return ()
-    more = f" and {len(again) - 3} more" if len(again) > 3 else ""
-    return (
-        Flag(
-            "same_records",
-            f"{len(again)} of {len(records)} records are others over again ({', '.join(again[:3])}"
-            f"{more}): the standard error counts their noise as independent",
-        ),
-    )
-
-
 def model_flags(
     fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
 ) -> list[Flag | None]:
     """List what the model itself shows."""
     extrapolated = slow_modes(fit, length), open_gain(fit)
-    firm = "" if any(extrapolated) else "; only the total delay is firm"
+    firm = "" if any(extrapolated) else _only_total(fit)
     return [
+        _apparent(fit),
         _bound(dt, fit, max_delay),
         _nothing(dt, fit),
         _many_lags(fit, firm),
@@ -110,8 +62,26 @@ def model_flags(
         *extrapolated,
         cancelled_pair(fit),
         _disagreement(dt, fit, firm),
+        _gain(fit, length),
         _inverse(fit),
     ]
+
+
+def _apparent(fit: OutputErrorFit) -> Flag | None:
+    """Say so where structures were asked for and another one rules them out."""
+    if fit.better is None:
+        return None
+    other = fit.better
+    return Flag(
+        "apparent_dead_time",
+        f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was asked "
+        f"for and is ruled out: {time_within(fit.delay, fit.low, fit.high)} is an apparent dead "
+        "time, with lags of the plant in it or left out of it, and its interval holds only if the "
+        f"structure is right; order {other.structure.order}, relative degree "
+        f"{other.structure.relative_degree} puts it at "
+        f"{time_within(other.delay, other.low, other.high)} "
+        f"({interval_in_time(other.low, other.high)})",
+    )
 
 
 def _bound(dt: float, fit: OutputErrorFit, max_delay: float | None) -> Flag | None:
@@ -219,6 +189,31 @@ def _open_start(fit: OutputErrorFit, firm: str) -> Flag | None:
         f"the first motion is dead time is open, {interval_in_time(fit.low, fit.high)}"
         f"{firm}",
     )
+
+
+def _gain(fit: OutputErrorFit, length: float) -> Flag | None:
+    """Say so where the record does not tell the sign of the gain."""
+    low, high = fit.gain_ends
+    if fit.static is None or not low <= 0 <= high:
+        return None
+    if fit.static.resolved:
+        why = f"95 % of it lie in {low:.3g} to {high:.3g}"
+    else:
+        why = (
+            f"its slowest time constant is {in_time(float(1 / np.abs(fit.poles).min()))} in a "
+            f"record of {in_time(length)}, and the standard error {fit.static.gain_std:.3g}"
+        )
+    return Flag(
+        "gain_not_resolved",
+        f"the record does not resolve the gain, nor its sign: the model has {fit.static.gain:.4g}, "
+        f"but {why}. A longer record, or larger moves of the input, would tell",
+    )
+
+
+def _only_total(fit: OutputErrorFit) -> str:
+    """Say that the total delay is firm, where it is."""
+    firm = fit.static is None or is_firm(fit.static.total, fit.total_ends)
+    return "; only the total delay is firm" if firm else ""
 
 
 def _inverse(fit: OutputErrorFit) -> Flag | None:

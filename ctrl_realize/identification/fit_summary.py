@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import control as ct
 import numpy as np
 
 from ..numerics.arrays import ComplexArray, FloatArray, locked
 from ..numerics.lag_chains import lag_sum
-from ..numerics.output_error_result import OutputErrorFit
+from ..numerics.output_error_result import Better, OutputErrorFit
+from ..numerics.static_gain import INTEGRATOR
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from ..signals import Record
 from ..wording import interval_in_time
 from .delay_fit_result import DelayFit, StructureRow
-from .model_flags import INTEGRATOR
+from .repeat_flags import BY_CHANCE
+from .repeatability import Repeatability
 
 
 def summarise(
@@ -65,7 +69,27 @@ def summarise(
         records=records,
         choices=_choices(fit),
         flags=flags,
+        gain_std_given_structure=np.nan if fit.static is None else fit.static.gain_std,
+        gain_interval=fit.gain_ends,
+        total_delay_interval=fit.total_ends,
+        better=None if fit.better is None else _row_of(fit.better),
     )
+
+
+def _row_of(better: Better) -> StructureRow:
+    n, r = better.structure.order, better.structure.relative_degree
+    ends = better.low, better.high
+    return StructureRow(n, r, better.delay, better.total, -better.excess, ends)
+
+
+def with_repeats(result: DelayFit, repeats: Repeatability) -> DelayFit:
+    """Say how the records differ; the interval of the gain holds theirs where they do."""
+    low, high = result.gain_interval
+    kept = [name not in repeats.outlying for name in repeats.names]
+    if repeats.gain_test[1] < BY_CHANCE:
+        own = result.gain * repeats.gains[kept]
+        low, high = min(low, *own), max(high, *own)
+    return replace(result, repeatability=repeats, gain_interval=(float(low), float(high)))
 
 
 def fitted_core(fit: OutputErrorFit, poles: ComplexArray) -> ct.StateSpace:

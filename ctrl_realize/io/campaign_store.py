@@ -21,7 +21,8 @@ from .model_files import MAX_MODEL_BYTES, model_from_text, model_to_text
 
 FORMAT = "ctrl_realize campaign row"
 SCHEMA = 3
-_NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain")
+_INTERVALS = ("interval", "total_delay_interval")
+_NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain", "gain_std", "total_delay")
 
 MOST_TRIES = 2
 """Times that a process may die over a record."""
@@ -98,7 +99,7 @@ class CampaignStore:
             "name": row.name,
             # Infinity and NaN have no place in JSON; their text has.
             "numbers": {name: repr(float(getattr(row, name))) for name in _NUMBERS},
-            "interval": [repr(float(end)) for end in row.interval],
+            **{name: [repr(float(end)) for end in getattr(row, name)] for name in _INTERVALS},
             "flags": [[flag.code, flag.message] for flag in row.flags],
             "warnings": list(row.warnings),
             "model": json.loads(model_to_text(system)),
@@ -162,7 +163,10 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         for name, text in field(content, "numbers", dict).items()
         if name in _NUMBERS
     }
-    low, high = (float(text) for text in field(content, "interval", list))
+    intervals: dict[str, Any] = {}
+    for name in _INTERVALS:
+        low, high = (float(text) for text in field(content, name, list))
+        intervals[name] = (low, high)
     system = model_from_text(json.dumps(field(content, "model", dict)))
     flags = tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list))
     if system.fit is not None and system.fit.flags == flags:
@@ -170,7 +174,7 @@ def _row_from(content: Any, key: str) -> CampaignRow:
     return CampaignRow(
         name=field(content, "name", str),
         **numbers,
-        interval=(low, high),
+        **intervals,
         model=PackedModel.of(system),
         flags=flags,
         warnings=tuple(str(text) for text in field(content, "warnings", list)),

@@ -16,7 +16,8 @@ from .json_content import MAX_TEXT, field
 
 _KEPT = (
     "delay", "order", "dead_time", "dead_time_interval", "std_given_structure", "interval",
-    "delay_interval", "total_delay", "onset", "method",
+    "delay_interval", "total_delay", "total_delay_interval", "gain", "gain_interval",
+    "gain_std_given_structure", "onset", "method",
 )  # fmt: skip
 _MAX_ROWS = 200
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from .noise_level import correlation_time, is_coarse, mad_sigma
 from .own_terms import Stretches
 from .response_bins import Bins
 from .separable_fit import Problem, Structure, evaluate, fit_batch, respond
+from .static_gain import StaticGain, static_gain
 from .structure_search import (
+    PLAUSIBLE,
     Candidate,
     Scales,
     choose,
@@ -121,10 +124,30 @@ class WindowFit:
         """What the criterion charges for a parameter: log of the independent samples."""
         return parameter_charge(self.independent)
 
-    @property
+    @cached_property
     def best(self) -> Candidate:
         """Fit of the chosen structure."""
-        return self.candidates[choose(self.criterion)]
+        return self.best_of(self.criterion)
+
+    def best_of(self, criterion: dict[Structure, float]) -> Candidate:
+        """Fit of the structure that is chosen among some.
+
+        One with a pole slower than the record, or an integrator, whose gain is not significant is
+        left for the best one without that is not ruled out: what wanders slowly is no response.
+        """
+        first = choose(criterion)
+        limit = criterion[first] + PLAUSIBLE
+        left = {s: value for s, value in criterion.items() if value <= limit}
+        while left:
+            structure = choose(left)
+            if self.static(self.candidates[structure]).resolved:
+                return self.candidates[structure]
+            del left[structure]
+        return self.candidates[first]
+
+    def static(self, candidate: Candidate) -> StaticGain:
+        """Gain and total delay of a candidate, with their errors."""
+        return static_gain(self.problem, candidate, self.variance, self.scales.length)
 
     def criteria(self, candidates: dict[Structure, Candidate]) -> dict[Structure, float]:
         """Information criterion of other candidates on the same data."""

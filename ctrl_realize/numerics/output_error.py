@@ -29,6 +29,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .better_structure import better_structure
 from .coloured_fit import in_coloured_noise
 from .delay_choice import chains_of, flows_of
 from .fit_window import WindowFit, fit_window
@@ -40,7 +41,6 @@ from .structure_search import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
     Candidate,
-    choose,
     needless_charge,
 )
 
@@ -92,10 +92,21 @@ def fit_output_error(
         )
     whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
     adequate = _is_noise(data, whole)
+    plain = whole
     if adequate and whiten:
         whole = in_coloured_noise(whole, data)
     if structures is not None:
         found = likelihood_fit(whole, adequate=adequate)
+        found = replace(
+            found,
+            better=better_structure(
+                plain,
+                plain.best,
+                lambda: _fit_until(
+                    data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber
+                ),
+            ),
+        )
     elif adequate:
         assert data.motion is not None
         onset = data.motion.onset * data.dt
@@ -105,7 +116,7 @@ def fit_output_error(
         )
     else:
         simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
-        chosen = whole.candidates[choose(simple)]
+        chosen = whole.best_of(simple)
         found = _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
     return replace(found, relaxing=data.relaxing)
 

@@ -13,7 +13,8 @@ from .fit_window import WindowFit
 from .lag_chains import lag_sum
 from .profile_interval import delay_profile, profile_limits
 from .separable_fit import Structure, evaluate
-from .structure_search import Candidate
+from .static_gain import StaticGain, averaged_ends
+from .structure_search import Candidate, needless_charge
 
 Profile: TypeAlias = tuple[FloatArray, FloatArray]
 """Delays, and the misfit at each; see `delay_profile`."""
@@ -36,6 +37,21 @@ class StructureFit:
     gain: float = float("nan")
 
 
+@dataclass(frozen=True)
+class Better:
+    """A structure that rules out the one that was asked for: its delay and 95 % interval in s.
+
+    `excess` is by how much its information criterion is smaller.
+    """
+
+    structure: Structure
+    delay: float
+    total: float
+    low: float
+    high: float
+    excess: float
+
+
 @dataclass(frozen=True, eq=False)
 class OutputErrorFit:
     """Delay and model of one record; see the rule in `output_error`.
@@ -50,7 +66,9 @@ class OutputErrorFit:
     are not ruled out; with `follows_flow` the delay is that of the best of them, and the lags
     behind it follow it. `beside` names what is not in the table of structures and not ruled out,
     with its interval. `std` is that of the chosen structure. `whitened`: coloured noise was made
-    white, by what it is at rest.
+    white, by what it is at rest. `static` is the gain of the model,
+    `alike` those of the other structures that are not ruled out and resolve one, each with its
+    evidence over the model's. `better` is a structure that rules out those that were asked for.
     """
 
     delay: float
@@ -78,6 +96,30 @@ class OutputErrorFit:
     beside: tuple[tuple[str, float, float], ...] = ()
     follows_flow: bool = False
     whitened: bool = False
+    static: StaticGain | None = None
+    alike: tuple[tuple[StaticGain, float], ...] = ()
+    better: Better | None = None
+
+    @property
+    def gain_ends(self) -> tuple[float, float]:
+        """95 % interval of the gain: of what was chosen and of structures that are not ruled out.
+
+        Without end where the record does not resolve it.
+        """
+        if self.static is None or not self.static.resolved:
+            return (-np.inf, np.inf) if self.static is None else self.static.ends
+        return averaged_ends(
+            [(one.gain, one.gain_std, weight) for one, weight in ((self.static, 1.0), *self.alike)]
+        )
+
+    @property
+    def total_ends(self) -> tuple[float, float]:
+        """95 % interval of the total delay, in s, as that of the gain."""
+        if self.static is None or not self.static.resolved:
+            return self.low, np.inf
+        every = ((self.static, 1.0), *self.alike)
+        low, high = averaged_ends([(one.total, one.total_std, weight) for one, weight in every])
+        return max(low, 0.0), high
 
 
 def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
@@ -116,6 +158,14 @@ def assembled(
     state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
     low, high, std = interval
+    static = whole.static(chosen)
+    charged = {s: whole.criterion[s] + needless_charge(s) for s in profiles}
+    least = charged.get(chosen.structure, np.inf)
+    alike = [
+        (whole.static(whole.candidates[s]), float(np.exp(-max(value - least, 0.0) / 2)))
+        for s, value in charged.items()
+        if s != chosen.structure
+    ]
     return OutputErrorFit(
         delay=chosen.delay,
         low=low,
@@ -134,4 +184,6 @@ def assembled(
         profile=profile,
         latest=whole.scales.latest,
         whitened=whole.colour is not None,
+        static=static,
+        alike=tuple((other, weight) for other, weight in alike if other.resolved),
     )

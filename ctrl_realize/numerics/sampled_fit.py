@@ -8,17 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from .arrays import FloatArray
+from .better_structure import better_structure
 from .condensed import MOST_LAGS, Condensed, condensed
+from .correlation import fit_percent
 from .delay_choice import chains_of
 from .fit_window import Window, WindowFit, extended, fit_window
 from .likelihood_interval import likelihood_fit
 from .noise_level import correlation_time, quantisation_step, winsorised_sigma
 from .onset import correlation_onset
 from .output_error_result import OutputErrorFit
+from .own_response import OwnResponse
 from .pole_factors import parameters_from_poles, poles_from_parameters
 from .sampled_data import SampledData, cut
 from .separable_fit import KnownFactor, Problem, Structure, fit_batch, respond
@@ -43,16 +47,8 @@ _TURNS = 6
 _DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
 _LEAST_LAGS = 30
 _CLEARLY = 4.0  # standard deviations of a chi-square
-
-
-@dataclass(frozen=True, eq=False)
-class OwnDelay:
-    """One record against the common model: shift in s, ratio of gains, and standard errors."""
-
-    shift: float
-    error: float
-    gain: float
-    gain_error: float
+_STRETCH = 0.01  # of the time constants, for a slope
+_FARTHEST = 2.0  # logarithm of a stretch that is extrapolated from it
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +67,7 @@ class SampledFit:
     known: KnownFactor
     condensed: Condensed | None = None
 
-    def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnDelay:
+    def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
         """Shift and scale the common model to fit one record best, seen before or not."""
         one = cut([output], [signal], self.data.dt)
         start = min(max(self.data.starts), output.size // 2)
@@ -139,6 +135,10 @@ def fit_sampled(
         whole = extended(whole, MORE_LAGS)
     chains = chains_of(whole) if structures is None else []
     fit = likelihood_fit(whole, adequate=whole.correlation <= WHITE, chains=chains)
+    if structures is not None:
+        # On the stretch also where all samples were fitted: what is ruled out there is so at all.
+        every = partial(_fit, data, factor, ORDERS, scales, huber)
+        fit = replace(fit, better=better_structure(stretch, stretch.best, every))
     if sums is not None:
         fit = replace(fit, fitted=_on_stretch(data, fit, factor))
     elif fit.chain:
@@ -280,36 +280,55 @@ def _first_order(
     return min(tries, key=lambda candidate: candidate.cost)
 
 
-def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> OwnDelay:
+def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> OwnResponse:
     """Gauss-Newton steps for gain and delay, everything else of the model being common."""
     problem = data.problem(known)
-    pole_parameters = parameters_from_poles(fit.poles)
-    poles, _ = poles_from_parameters(pole_parameters[None])
     assert problem.stretches is not None
-    own = problem.own_terms(poles)
+    own = problem.own_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
+    target = own.without(problem.data[None, :, None])[0, :, 0]
+    lost = problem.own_count(fit.poles.size)
+    h = 0.25 * data.dt
 
-    def response(delay: float) -> FloatArray:
-        parameters = np.concatenate([[max(delay, 0.0)], pole_parameters])
-        return respond(problem.drive, known, fit.numerator, parameters)
+    def response(delay: float, stretch: float = 1.0) -> FloatArray:
+        # The core in a slower time: poles over the stretch, and its gain as before.
+        parameters = np.concatenate([[max(delay, 0.0)], parameters_from_poles(fit.poles / stretch)])
+        powers = np.arange(fit.numerator.size) - float(fit.poles.size)
+        return respond(problem.drive, known, fit.numerator * stretch**powers, parameters)
+
+    def regression(columns: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        moved = own.without(np.stack(columns, axis=1)[None])[0]
+        solution = np.linalg.lstsq(moved, target, rcond=None)[0]
+        left = target - moved @ solution
+        freedom = max(left.size - moved.shape[1] - lost, 1)
+        variance = float(left @ left) / freedom * correlation_time(left)
+        spread = np.diag(np.linalg.pinv(moved.T @ moved))
+        return solution, np.sqrt(variance * np.maximum(spread, 0.0))
 
     shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
-    target = own.without(problem.data[None, :, None])[0, :, 0]
-    h = 0.25 * data.dt
     for _ in range(_TURNS):
         at = max(fit.delay + shift, h)
         slope = (response(at + h) - response(at - h)) / (2 * h)
-        columns = own.without(np.stack([response(at), slope], axis=1)[None])[0]
-        solution = np.linalg.lstsq(columns, target, rcond=None)[0]
-        left = target - columns @ solution
-        gain = float(solution[0])
+        solution, errors = regression([response(at), slope])
+        gain, gain_error = float(solution[0]), float(errors[0])
         size = gain or 1.0
         move = float(solution[1]) / size
-        freedom = max(left.size - 2 - problem.own_count(poles.shape[1]), 1)
-        variance = float(left @ left) / freedom * correlation_time(left)
-        spread = np.linalg.pinv(columns.T @ columns)
-        gain_error = float(np.sqrt(variance * spread[0, 0]))
-        error = float(np.sqrt(variance * spread[1, 1])) / abs(size)
+        error = float(errors[1]) / abs(size)
         shift = at - fit.delay + float(np.clip(move, -20 * data.dt, 20 * data.dt))
         if abs(move) < 1e-3 * data.dt:
             break
-    return OwnDelay(shift, max(error, 1e-12 * data.dt), gain, max(gain_error, 1e-12))
+    # Small stretches: the slope of the response by the log of the time constants.
+    turn = (response(at, 1 + _STRETCH) - response(at, 1 - _STRETCH)) / (2 * _STRETCH)
+    solution, errors = regression([response(at), slope, turn])
+    size = float(solution[0]) or 1.0
+    lag = float(np.exp(np.clip(solution[2] / size, -_FARTHEST, _FARTHEST)))
+    forced = own.without(response(fit.delay)[None, :, None])[0, :, 0]
+    followed = fit_percent(target[None], forced[None])
+    return OwnResponse(
+        shift,
+        max(error, 1e-12 * data.dt),
+        gain,
+        max(gain_error, 1e-12),
+        lag,
+        max(float(errors[2]) / abs(size), 1e-12),
+        float(followed[0]),
+    )

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..identification.delay_fit_result import DelayFit
+from ..identification.steps import unit_step
 from ..wording import interval_in_time, time_within
 from . import style
 from .names import plain, wrapped
@@ -20,6 +21,7 @@ from .scales import time_unit
 _RULED_OUT = 10.0
 """Structures with a larger excess are not drawn."""
 _MOST_STRUCTURES = 8
+_MOST_RECORDS = 40  # drawn behind their mean
 
 
 def fit_plot(
@@ -30,6 +32,8 @@ def fit_plot(
     **kwargs: Any,
 ) -> ct.ControlPlot:
     """Draw the fitted record, the model, what is left, and where the dead time can be.
+
+    Of several step records the mean is drawn, with each of them behind it.
 
     Parameters
     ----------
@@ -144,6 +148,8 @@ def _data_and_model(
     label = f"mean of {len(result.records)} records" if _averaged(result) else "measured"
     data = list(upper.plot(time, result.measured, color=style.MEASURED, lw=1.5, label=label))
     data += upper.plot(time, result.fitted, **looks)
+    if _averaged(result):
+        data += _each_record(upper, result, factor)
     left = result.measured - result.fitted
     lower.axhspan(
         -2 * result.noise, 2 * result.noise, color=style.NOISE, alpha=0.3, linewidth=0,
@@ -160,6 +166,21 @@ def _data_and_model(
     lower.set_ylabel("residual")
     lower.legend(loc="upper right", fontsize=10)
     return [data, rest]
+
+
+def _each_record(axes: Axes, result: DelayFit, factor: float) -> list[Line2D]:
+    """Draw every record behind their mean, each per unit of its own step."""
+    lines: list[Line2D] = []
+    every = max(1, -(-len(result.records) // _MOST_RECORDS))
+    for record in result.records[::every]:
+        step = unit_step(record, remove_drift=False)
+        time = factor * step.dt * np.arange(-step.pre.size, step.n_samples)
+        values = np.concatenate([step.pre, step.output])
+        lines += axes.plot(
+            time, values, color=style.MEASURED, linewidth=0.6, alpha=0.35, zorder=1,
+            label=None if lines else f"{len(result.records)} records",
+        )  # fmt: skip
+    return lines
 
 
 def _first_motion(result: DelayFit) -> int:

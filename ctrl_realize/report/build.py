@@ -194,7 +194,7 @@ def write_campaign(
         path,
         title=title,
         subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
-        verdict=campaign_verdict(campaign),
+        verdict=campaign_verdict(campaign, () if comparison is None else comparison.flags),
         sketches=[*sketches, *more_sketches],
         tables=[
             campaign_table(campaign),

@@ -10,13 +10,20 @@ import numpy as np
 
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
+from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign import Campaign
+from ..identification.delay_fit_result import gain_in_words
 from ..identification.delay_scan_result import DelayScan
 from ..plots.dead_times import estimate_of, interval_of
 from ..results import Flag
 from ..wording import in_time, interval_in_time, number_within, poles_in_words, time_within
 
-SEVERE = frozenset(
+_CONTRADICTED = "frf_disagrees"
+
+WRONG_MODEL = frozenset({_CONTRADICTED, "no_common_gain", "gain_not_resolved"})
+"""Flags after which the model should not be used as it stands, first in the list of reasons."""
+
+WRONG_DELAY = frozenset(
     {
         "delay_at_bound",
         "no_delay_resolved",
@@ -33,9 +40,6 @@ SCANNED = (
 )
 """What any scan leaves open, however good the record."""
 
-CLOSE, FAR = 0.05, 0.2
-"""Relative errors (rms, in the trusted band) under which a model is close, over which it is off."""
-
 INTEGRATING = "none: it integrates"
 
 _REAL, _AT_ONE = 1e-12, 1e-9
@@ -48,6 +52,8 @@ _JUDGEMENTS: dict[Level, str] = {
     "caution": "Use it with care: read the remarks below.",
     "poor": "Do not trust the dead time as it stands: read why below.",
 }
+_WRONG_MODEL = "Do not trust the model as it stands: read why below."
+_CONTRADICTION = "The measured frequency response contradicts this model: read where below."
 
 
 @dataclass(frozen=True)
@@ -85,18 +91,17 @@ def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Ve
     >>> print(verdict.level, "-", verdict.judgement)
     caution - Use it with care: read the remarks below.
     """
-    flags = (*_flags_of(system), *more_flags)
-    level = _level(flags)
+    flags = (*more_flags, *_flags_of(system))
     return Verdict(
-        level, headline_of(system), facts_of(system), _reasons(flags), _JUDGEMENTS[level]
+        _level(flags), headline_of(system), facts_of(system), _reasons(flags), _judged(flags)
     )
 
 
-def campaign_verdict(campaign: Campaign) -> Verdict:
-    """Judge a campaign by its final model, its own flags and how many records carry flags."""
+def campaign_verdict(campaign: Campaign, more_flags: Sequence[Flag] = ()) -> Verdict:
+    """Judge a campaign by its final model, its own flags and `more_flags`, as of an FRF."""
     system = campaign.system
     own = tuple(campaign.flags)
-    flags = (*own, *_flags_of(system))
+    flags = (*more_flags, *own, *_flags_of(system))
     summary = campaign.statistics()
     scatter = "unknown: one record has none"
     if np.isfinite(summary.variance):
@@ -110,9 +115,9 @@ def campaign_verdict(campaign: Campaign) -> Verdict:
         ("scatter (std)", scatter),
         *facts_of(system),
     ]
-    level = _level(flags)
-    judgement = _JUDGEMENTS[level]
-    return Verdict(level, headline_of(system), tuple(facts), _reasons(flags), judgement)
+    return Verdict(
+        _level(flags), headline_of(system), tuple(facts), _reasons(flags), _judged(flags)
+    )
 
 
 def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> Verdict:
@@ -143,11 +148,14 @@ def headline_of(system: DelayedStateSpace) -> str:
     if interval is not None:
         said = time_within(wait, *interval)
         samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
-    sentence = f"Dead time {said} ({samples} samples of {in_time(system.dt, 6)})"
+    kind = "Dead time" if getattr(system.fit, "better", None) is None else "Apparent dead time"
+    sentence = f"{kind} {said} ({samples} samples of {in_time(system.dt, 6)})"
     if interval is not None:
         sentence += f", {interval_name(system)} {interval_in_time(*interval)}"
     order = system.delay_free.nstates
     gain = _gain(system)
+    if not _gain_is_resolved(system):
+        return f"{sentence}; behind it a model of order {order}, whose gain is not resolved."
     behind = "an integrating model" if gain == INTEGRATING else f"a model of gain {gain} and"
     return f"{sentence}; behind it {behind} of order {order}."
 
@@ -176,9 +184,9 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
         if attribute == "total_delay" and _gain(system) == INTEGRATING:
             continue
         if isinstance(value, float) and np.isfinite(value):
-            facts.append((label, in_time(value, 4)))
+            facts.append((label, _with_interval(system, attribute, value)))
     facts.append(("order without the delay", str(system.delay_free.nstates)))
-    facts.append(("gain", _gain(system)))
+    facts.append(("gain", _gain_with_interval(system)))
     facts.append(("poles", poles_of(system)))
     facts.append(("sample time", in_time(system.dt, 6)))
     return tuple(facts)
@@ -202,19 +210,55 @@ def _gain(system: DelayedStateSpace) -> str:
     return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
 
 
+def _gain_is_resolved(system: DelayedStateSpace) -> bool:
+    return not any(_code(flag) == "gain_not_resolved" for flag in _flags_of(system))
+
+
+def _gain_with_interval(system: DelayedStateSpace) -> str:
+    gain = _gain(system)
+    interval = getattr(system.fit, "gain_interval", None)
+    if interval is None or gain == INTEGRATING:
+        return gain
+    return gain_in_words(float(np.real(np.ravel(system.delay_free.dcgain())[0])), interval)
+
+
+def _with_interval(system: DelayedStateSpace, attribute: str, value: float) -> str:
+    low, high = getattr(system.fit, f"{attribute}_interval", (np.nan, np.nan))
+    if high == np.inf:
+        return "not resolved by this record"
+    if np.isnan(high):
+        return in_time(value, 4)
+    return f"{time_within(value, low, high)} ({interval_in_time(low, high)})"
+
+
 def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
     flags: tuple[Flag, ...] = tuple(getattr(system.fit, "flags", ()))
     return (*flags, SCANNED) if isinstance(system.fit, DelayScan) else flags
 
 
 def _level(flags: Sequence[Any]) -> Level:
-    if any(getattr(flag, "code", "") in SEVERE for flag in flags):
+    if any(_code(flag) in WRONG_MODEL | WRONG_DELAY for flag in flags):
         return "poor"
     return "caution" if flags else "good"
 
 
+def _judged(flags: Sequence[Any]) -> str:
+    codes = {_code(flag) for flag in flags}
+    if _CONTRADICTED in codes:
+        return _CONTRADICTION
+    return _WRONG_MODEL if codes & WRONG_MODEL else _JUDGEMENTS[_level(flags)]
+
+
 def _reasons(flags: Sequence[Any]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(_sentence(str(flag)) for flag in flags))
+    """List what was flagged, the worst first."""
+    worst = (_CONTRADICTED, *sorted(WRONG_MODEL), *sorted(WRONG_DELAY))
+    rank = {code: place for place, code in reversed(list(enumerate(worst)))}
+    ordered = sorted(flags, key=lambda flag: rank.get(_code(flag), len(worst)))
+    return tuple(dict.fromkeys(_sentence(str(flag)) for flag in ordered))
+
+
+def _code(flag: Any) -> str:
+    return str(getattr(flag, "code", ""))
 
 
 def _sentence(text: str) -> str:

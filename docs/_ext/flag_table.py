@@ -14,6 +14,7 @@ RAISED_BY = {
     "compare": "compare_frf",
     "cross_check": "check_delay",
     "data_loops": "design.margins",
+    "disagreement": "compare_frf",
     "fit_flags": "fit_delay",
     "from_frf": "impulse_from_frf",
     "from_io": "impulse_from_io",
@@ -28,6 +29,7 @@ RAISED_BY = {
     "model_flags": "fit_delay",
     "pulse_regression": "impulse_from_io",
     "realization": "realize",
+    "repeat_flags": "fit_delay",
     "residuals": "check_residuals",
     "scan_curve": "estimate_delay",
 }

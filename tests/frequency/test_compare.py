@@ -129,7 +129,7 @@ def test_points_beyond_nyquist_are_left_out_and_said():
     slow = ct.sample_system(ct.ss(PLANT), 0.02, "zoh")
     comparison = cr.compare_frf(slow, measured())
     assert comparison.frequency_hz.max() < 25
-    assert comparison.flags[0].code == "beyond_nyquist"
+    assert "beyond_nyquist" in [flag.code for flag in comparison.flags]
     assert "25 Hz" in comparison.report()
 
 

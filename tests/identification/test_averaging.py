@@ -17,7 +17,7 @@ from ctrl_realize.identification.averaging import (
     repeatability,
     widened,
 )
-from ctrl_realize.identification.delay_fit_result import Repeatability
+from ctrl_realize.identification.repeatability import Repeatability
 from tests import rigs
 
 TS = rigs.TS

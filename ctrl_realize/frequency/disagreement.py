@@ -1,0 +1,54 @@
+"""Say so where a measured frequency response contradicts a model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numerics.bands import running_median, widest_run
+from ..results import Flag
+from .comparison import FRFComparison, hertz
+
+CLOSE, FAR = 0.05, 0.2
+"""Relative errors (rms, in the trusted band) under which a model is close, over which it is off."""
+
+_SMOOTHED_POINTS = 3  # one bad point of a response is no disagreement over a band
+
+
+def disagreement(comparison: FRFComparison) -> Flag | None:
+    """Flag of a model whose error, beyond the measurement's own noise, is not small.
+
+    ``"frf_differs"`` from 5 % on (rms in the trusted band), ``"frf_disagrees"`` from 20 % on.
+    """
+    error, noise = comparison.rms_relative_error, comparison.relative_noise or 0.0
+    beyond = float(np.sqrt(max(error**2 - noise**2, 0.0)))
+    if beyond < CLOSE:
+        return None
+    said = f"{100 * error:.3g} % (rms) off the measured frequency response, {_worst(comparison)}"
+    if beyond < FAR:
+        return Flag("frf_differs", f"the model is {said}")
+    return Flag(
+        "frf_disagrees",
+        f"the measured frequency response contradicts the model, which is {said}: another "
+        "operating point or direction, a nonlinear plant, or a model that is wrong. Compare both "
+        "where the controller works before one is designed",
+    )
+
+
+def _worst(comparison: FRFComparison) -> str:
+    """Tell where it is off: the widest band in which it is so by more than the limit."""
+    inside = comparison.trusted
+    hz, error = comparison.frequency_hz[inside], comparison.relative_error[inside]
+    worst = int(np.argmax(error))
+    at = f"{100 * error[worst]:.3g} % at {hertz(hz[worst])}"
+    limit = FAR if np.sqrt(np.mean(error**2)) >= FAR else CLOSE
+    off = running_median(error, _SMOOTHED_POINTS) > limit
+    if not off.any():
+        return f"most of all {at}"
+    band = hz[widest_run(off, hz)]
+    decibels, degrees = (
+        values[inside][worst] for values in (comparison.gain_error_db, comparison.phase_error_deg)
+    )
+    return (
+        f"by more than {100 * limit:.0f} % from {hertz(band[0])} to {hertz(band[-1])}, most of "
+        f"all {at} ({decibels:+.1f} dB, {degrees:+.0f} deg)"
+    )

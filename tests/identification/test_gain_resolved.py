@@ -1,0 +1,140 @@
+"""A gain and a total delay are stated as well as the record tells them, and designs heed it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize import report
+from ctrl_realize.errors import UnresolvedWarning, UnsuitableSystemError
+
+GAIN, LAG, DELAY, REST = 5.0, 12.0, 4.0, 150.0
+
+
+def step(seconds, *, lag=LAG, noise=0.05, seed=0, order=1):
+    t = np.arange(REST + seconds)
+    u = np.where(t < REST, 0.0, 1.0)
+    x = np.maximum(t - REST - DELAY, 0) / lag
+    y = GAIN * (-np.expm1(-x) if order == 1 else 1 - (1 + x) * np.exp(-x))
+    return cr.Record(t, u, y + noise * np.random.default_rng(seed).standard_normal(t.size))
+
+
+def wandering(seed, n=300):
+    """A plant of gain -3 whose output wanders as much as it responds."""
+    rng = np.random.default_rng(seed)
+    u = np.convolve(rng.standard_normal(n + 40), 0.9 ** np.arange(40))[40 : n + 40]
+    core = cr.design.ProcessModel(gain=-3.0, lag=4.0, dead_time=3.0).system(1.0).delay_free
+    y = cr.delayed_ss(core, 3).simulate(u)
+    y = y + 0.25 * np.cumsum(rng.standard_normal(n)) + 0.3 * rng.standard_normal(n)
+    return cr.Record(np.arange(n) * 1.0, u, y)
+
+
+def codes(system):
+    return {flag.code for flag in system.fit.flags}
+
+
+def test_errors_of_gain_and_total_delay_are_those_of_the_noise():
+    fits = [cr.fit_delay(step(120, seed=s), structures=[(1, 1)]).fit for s in range(40)]
+    gains = np.array([fit.gain for fit in fits])
+    # 40 values tell a standard deviation to 11 %
+    claimed = np.mean([fit.gain_std_given_structure for fit in fits])
+    assert claimed == pytest.approx(gains.std(ddof=1), rel=0.35)
+    held = [fit.gain_interval[0] <= GAIN <= fit.gain_interval[1] for fit in fits]
+    assert np.mean(held) >= 0.85
+    within = [fit.total_delay_interval for fit in fits]
+    assert np.mean([low <= LAG + DELAY <= high for low, high in within]) >= 0.85
+
+
+def test_what_is_known_is_called_firm():
+    fit = cr.identify(step(120, seed=5)).fit
+    low, high = fit.total_delay_interval
+    assert low <= LAG + DELAY <= high < 1.1 * low
+    assert "firm" in dict(fit._rows())["total delay"]
+
+
+def test_a_gain_far_beyond_the_record_is_not_stated_as_known():
+    system = cr.identify(step(100, lag=300.0, noise=0.1))
+    fit = system.fit
+    low, high = fit.gain_interval
+    assert low <= GAIN <= high
+    assert high - low > 0.5 * GAIN
+    assert "firm" not in dict(fit._rows())["total delay"]
+    with pytest.warns(UnresolvedWarning, match="gain"):
+        cr.design.margins(system, 0.01)
+
+
+@pytest.fixture(scope="module")
+def unknown():
+    """A response that dies away again: its gain is nothing."""
+    t = np.arange(330.0)
+    u = np.where(t < 30, 0.0, 1.0)
+    x = np.maximum(t - 34, 0)
+    y = np.exp(-x / 40) - np.exp(-x / 8)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(t.size)
+    return cr.identify(cr.Record(t, u, y + noise))
+
+
+def test_a_gain_whose_sign_is_not_told_is_called_so(unknown):
+    assert "gain_not_resolved" in codes(unknown)
+    low, high = unknown.fit.gain_interval
+    assert low < 0 < high
+    verdict = report.verdict_of(unknown)
+    assert verdict.level == "poor"
+    assert "not resolved" in verdict.headline
+    assert "resolve the gain" in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        cr.design.pid,
+        cr.design.compare_pid,
+        lambda plant: cr.design.smith_predictor(plant, 0.1),
+        lambda plant: cr.design.predictor_lqr(plant, 1.0, 1.0),
+        lambda plant: cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0),
+    ],
+)
+def test_no_controller_is_designed_for_a_gain_of_unknown_sign(unknown, design):
+    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
+        design(unknown)
+
+
+def test_an_analysis_of_such_a_model_warns(unknown):
+    with pytest.warns(UnresolvedWarning, match="the gain and its sign"):
+        cr.design.margins(unknown, 0.01)
+
+
+@pytest.mark.parametrize("seed", [3, 5, 22])
+def test_a_gain_is_told_beside_an_output_that_wanders(seed):
+    fit = cr.identify(wandering(seed)).fit
+    assert fit.gain == pytest.approx(-3.0, abs=0.5)
+    assert fit.gain_interval[1] < 0
+
+
+def test_a_level_tank_has_a_slope_that_is_known():
+    t = np.arange(400.0)
+    u = np.where(t < 100, 0.0, 1.0)
+    y = 0.01 * np.maximum(t - 110, 0)
+    noise = 0.02 * np.random.default_rng(0).standard_normal(400)
+    system = cr.identify(cr.Record(t, u, y + noise))
+    low, high = system.fit.gain_interval
+    assert low <= 0.01 <= high < 0.011
+    assert "gain_not_resolved" not in codes(system)
+
+
+def test_the_gas_furnace_has_the_gain_of_box_and_jenkins(shared_data):
+    record = cr.read_record(shared_data / "gas_furnace" / "record.csv")
+    system = cr.identify(record)
+    low, high = system.fit.gain_interval
+    # (0.53 + 0.37 + 0.51) / (1 - 0.57) = 3.28, negative
+    assert low <= -3.28 <= high < 0
+    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
+        cr.design.pid(cr.identify(record, structures=[(2, 1)]))
+
+
+def test_a_saved_model_still_says_what_is_not_resolved(unknown, tmp_path):
+    cr.save_model(tmp_path / "model.json", unknown)
+    again = cr.load_model(tmp_path / "model.json")
+    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
+        cr.design.pid(again)
