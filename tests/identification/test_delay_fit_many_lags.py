@@ -135,3 +135,11 @@ def test_structures_that_are_given_are_believed():
     fit = cr.fit_delay(dispersion_record(0.005, mean=0.08), structures=[(3, 2)]).fit
     assert "onset_open" not in {flag.code for flag in fit.flags}
     assert fit.interval[1] - fit.interval[0] < 5 * TS
+
+
+def test_a_chain_of_seven_lags_in_noise_may_be_a_flow_that_begins_half_of_its_lags_earlier():
+    noisy, quiet = (cr.fit_delay(chain_record(7, 20.0, noise)).fit for noise in (0.01, 0.002))
+    for fit, told in ((noisy, True), (quiet, False)):
+        lead = 0.5 * np.sum(1 / np.abs(fit.poles)) / fit.dt
+        assert ("many_lags" in {flag.code for flag in fit.flags}) == told
+        assert (fit.interval[0] / fit.dt <= fit.delay - lead + 1e-6) == told
