@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import control as ct
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError, OrderError
+from ctrl_realize.identification.order_choice import suggest_order
+from ctrl_realize.identification.scan_surface import scan_surface
 from tests.oracles import dense
 from tests.oracles.plants import valve_pulse
-from tests.rigs import TS
+from tests.rigs import R2, TS, step_record
 
 
 @pytest.mark.parametrize("kind", ["clean", "zero-phase", "unfiltered"])
@@ -93,3 +97,12 @@ def test_table_holds_one_row_for_each_order():
 def test_unusable_orders_are_refused(orders, error, match):
     with pytest.raises(error, match=match):
         cr.scan_orders(valve_pulse("clean"), orders, max_delay=50, dt=TS)
+
+
+def test_orders_whose_last_singular_value_is_within_the_noise_are_not_suggested():
+    impulse = cr.impulse_from_step(cr.unit_step(step_record(R2, noise=0.01, before=800, after=800)))
+    scan = scan_surface(impulse, (1, 2, 3, 4), 60, None, None, "square", None)
+    # misfits that fall by half with every order: what stands out of the noise alone decides
+    halved = replace(scan, iae=np.outer(0.5 ** np.arange(4), np.ones(61)))
+    for above, order in (([9, 1.2, 1.2, 1.2], 1), ([9, 1.4, 1.2, 1.2], 2), ([9, 9, 9, 1.4], 4)):
+        assert suggest_order(halved, scan.noise_floor * np.array(above)) == order
