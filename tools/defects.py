@@ -180,7 +180,7 @@ DEFECTS = (
        "gain < count * np.log(found.counts)", "gain < 0",
        "channel_search channel_fit decisions", FITS),
     _d("order by the noise", "orders that only follow the noise are suggested", "ABOVE_NOISE = 1.3",
-       "ABOVE_NOISE = 0.0", "order flags", FITS),
+       "ABOVE_NOISE = 0.0", "order", FITS),
     # --- correlation, frequency responses
     _d("cross-correlation", "lags have the wrong sign",
        "product = np.fft.rfft(x, n=points) * np.conj(np.fft.rfft(y, n=points))",
