@@ -1,7 +1,6 @@
 """A flag is raised in a world in which it is due, and in the world beside it is not.
 
-The worlds are those of the honesty benchmark, which counts how often; here one seed is looked at,
-of which it is known that the flag has to be there. Flags of frequency responses and loops are
+The worlds are those of the honesty benchmark, which counts how often. Flags of frequency responses and loops are
 tested beside them.
 """
 
@@ -12,9 +11,6 @@ import pytest
 from benchmarks.honesty import runs
 
 RESULTS = ("fit_delay", "estimate_delay", "realize", "identify_campaign", "bootstrap")
-SEEDS = {("fit_delay", "views_disagree"): 1, ("fit_delay, moving input", "integrating"): 1}
-"""Where the first record of a world does not show what it should."""
-
 CASES = {}
 for case in runs.FLAG_CASES:
     if case.result.startswith(RESULTS):
@@ -24,7 +20,8 @@ QUIET = {(case.result, case.not_due): case for case in CASES.values()}
 
 @pytest.mark.parametrize("key", CASES, ids=": ".join)
 def test_a_flag_is_raised_where_it_is_due(key):
-    assert key[1] in CASES[key].raising(SEEDS.get(key, 0)), CASES[key].due
+    # a flag that is rarely due in its world is in one of eight records
+    assert any(key[1] in CASES[key].raising(seed) for seed in range(8)), CASES[key].due
 
 
 @pytest.mark.parametrize("key", QUIET, ids=": ".join)
