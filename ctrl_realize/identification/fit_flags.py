@@ -7,7 +7,7 @@ import numpy as np
 from ..numerics.arrays import FloatArray
 from ..numerics.likelihood_interval import flow_lead
 from ..numerics.output_error_result import OutputErrorFit
-from ..numerics.profile_interval import profile_limits
+from ..numerics.profile_ends import profile_limits
 from ..numerics.step_problem import StepData
 from ..results import Flag
 from ..wording import in_time, interval_in_time, time_within

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .arrays import FloatArray
+from .compared_fits import converged
 from .fit_window import WindowFit
 from .noise_level import correlation_time, mad_sigma
 from .separable_fit import Problem, Structure, evaluate, fit_batch
@@ -20,6 +21,7 @@ _ENOUGH = 100_000  # of a kind, where there are more
 _TIMES = 8  # correlation times, that tell its colour
 _WILD = 5.0  # standard deviations at which samples are cut
 _NEAR = np.arange(-6, 6.5, 0.5)  # samples from the delay of before, where it starts again
+_ENDS = 4  # of these starts that are followed to the bottom
 _UNLIKE = 3.0
 """Root mean square of the whitened residual, in that of the noise, from which on the response holds
 something that the noise does not: plain least squares are safer."""
@@ -48,6 +50,7 @@ def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
         return whole
     problem = replace(plain, whitener=whitener(bins, covariance))
     candidates = _fitted_again(whole, problem)
+    candidates = converged(problem, candidates, whole.scales, whole.sigma**2, whole.independent)
     refit = replace(whole, problem=problem, candidates=candidates, colour=1.0)
     chosen = candidates[choose(refit.criteria(candidates))]
     lost = 1 + chosen.structure.order + chosen.structure.zeros + whole.window.columns.shape[1]
@@ -66,8 +69,11 @@ def _fitted_again(whole: WindowFit, problem: Problem) -> dict[Structure, Candida
         starts += neighbour_starts(structure, whole.scales, found)
         bounds = parameter_bounds(structure, whole.scales)
         parameters, cost = fit_batch(problem, structure, np.array(starts), bounds)
-        best = int(np.argmin(cost))
-        found[structure] = Candidate(structure, parameters[best], float(cost[best]))
+        order = np.argsort(cost)
+        best = order[0]
+        found[structure] = Candidate(
+            structure, parameters[best], float(cost[best]), parameters[order[1:_ENDS]], True
+        )
     return found
 
 

@@ -30,6 +30,7 @@ Modes: TypeAlias = tuple[FloatArray, ComplexArray, ComplexArray]
 """H (B, m), E (B, m, J) and T (B, m, J)."""
 
 
+_TOGETHER = 1e-9  # samples by which a move and a sample may be apart and be at one time
 _PIECE = 2**16  # samples of a response that are found at a time, which bounds the memory
 
 
@@ -123,7 +124,10 @@ class MoveTrain:
 
     def _arrived(self, since: FloatArray) -> IntArray:
         """Count the moves that have arrived at delayed times (B, m)."""
-        return np.searchsorted(self.moves, since, side="left").astype(np.int64)
+        # With a delay of whole samples rounding must not decide what has arrived.
+        return np.searchsorted(self.moves + _TOGETHER * self.dt, since, side="left").astype(
+            np.int64
+        )
 
     def _carried(self, rates: FloatArray | ComplexArray) -> tuple[FloatArray, Any, Any]:
         """Sum the moves up to each arrival, decayed to that time; entry 0 is before the first."""
@@ -169,7 +173,7 @@ class SampledInput:
         slope = np.zeros_like(mode)
         for b in range(tau.size):
             # A move at sample l is first seen at the first sample after l + tau/dt.
-            whole = int(np.ceil(tau[b] / self.dt - 1e-9))
+            whole = int(np.ceil(tau[b] / self.dt - _TOGETHER))
             if whole >= n:
                 continue
             rest = max(whole * self.dt - tau[b], 0.0)

@@ -23,6 +23,7 @@ from .arrays import FloatArray
 from .delayed_modes import MoveTrain
 from .flow_modes import flow_modes
 from .lag_chains import time_moments
+from .profile_ends import solve_ends
 from .separable_fit import Problem, partial_fractions
 from .structure_search import PLAUSIBLE, Candidate, Scales
 
@@ -36,6 +37,7 @@ _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 _FOLLOWED, _EVALUATIONS = 3, 40  # starts that are improved, and how far
 _SAME = 0.1  # variances by which two ends are one
 _HOPELESS = 300.0  # above what is to be beaten, after the first of them
+_REACH = 3 * PLAUSIBLE  # excess up to which a flow is followed to its minimum
 _SMALL = 1e-5  # step of the numerical derivatives
 _PROFILE = np.array([0.7, 1.2, 1.7, 2.3, 3.2])  # standard errors from the optimum
 
@@ -132,6 +134,12 @@ def _followed(
             best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
         if again or best.excess > _HOPELESS:
             break
+    if best is not None and best.excess <= _REACH:
+        # What may be compared with a limit has converged.
+        x = fit.improved(fit.parameters(best), converged=True)
+        cost = fit.cost(x)
+        criterion = cost / variance + fit.count * penalty + _CHARGE
+        best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
     return [] if best is None else [best]
 
 
@@ -143,7 +151,7 @@ def flow_profile(
     fit = _FlowFit(problem, problem.drive, scales, flow.lag > 0)
     best = fit.parameters(flow)
     low, high = (float(bound[0]) for bound in fit.bounds)
-    found = {float(best[0]): flow.cost}
+    found = {float(best[0]): best}
     error = fit.delay_error(best, variance)
     for side in (-1, 1):
         x = best
@@ -151,10 +159,19 @@ def flow_profile(
             at = float(np.clip(best[0] + side * distance * error, low, high))
             if at in found:
                 break
-            x = fit.improved(np.append(at, x[1:]), fixed_delay=True)
-            found[at] = fit.cost(x)
-    delay = np.array(sorted(found))
-    cost = np.array([found[at] for at in delay])
+            x = found[at] = fit.improved(np.append(at, x[1:]), True, True)
+    costs = {at: fit.cost(x) for at, x in found.items()}
+    least = min(costs.values())
+
+    def excess(at: float) -> float:
+        near = min(found, key=lambda other: abs(other - at))
+        found[at] = fit.improved(np.append(at, found[near][1:]), True, True)
+        costs[at] = fit.cost(found[at])
+        return (costs[at] - least) / variance
+
+    solve_ends(excess, {at: (cost - least) / variance for at, cost in costs.items()})
+    delay = np.array(sorted(costs))
+    cost = np.array([costs[at] for at in delay])
     return delay * scales.rise, (cost - cost.min()) / variance
 
 
@@ -219,8 +236,10 @@ class _FlowFit:
                     logs = np.log([residence / rise, spread, *[lag / rise] * self.lagging])
                     yield np.clip(np.append(part * delay / rise, logs), low, high)
 
-    def improved(self, start: FloatArray, fixed_delay: bool = False) -> FloatArray:
-        """Follow a start to its minimum, the delay fixed or not."""
+    def improved(
+        self, start: FloatArray, fixed_delay: bool = False, converged: bool = False
+    ) -> FloatArray:
+        """Follow a start towards its minimum, or down to it, the delay fixed or not."""
         kept = start[:1] if fixed_delay else start[:0]
         low, high = (bound[kept.size :] for bound in self.bounds)
         inside = 1e-9 * (high - low)
@@ -233,7 +252,9 @@ class _FlowFit:
             np.clip(start[kept.size :], low + inside, high - inside),
             bounds=(low, high),
             x_scale="jac",
-            ftol=1e-4,
+            jac="3-point" if converged else "2-point",
+            ftol=1e-13 if converged else 1e-4,
+            xtol=1e-10 if converged else 1e-8,
             max_nfev=_EVALUATIONS,
         )
         return np.concatenate([kept, found.x])

@@ -9,11 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from .arrays import FloatArray
+from .compared_fits import converged, on_new_data, settled
 from .delayed_modes import HeldInput
 from .noise_level import correlation_time, is_coarse, mad_sigma
 from .own_terms import Stretches
 from .response_bins import Bins
-from .separable_fit import Problem, Structure, evaluate, fit_batch, respond
+from .separable_fit import Problem, Structure, evaluate, respond
 from .static_gain import StaticGain, static_gain
 from .structure_search import (
     PLAUSIBLE,
@@ -21,15 +22,14 @@ from .structure_search import (
     Scales,
     choose,
     criteria,
-    parameter_bounds,
     parameter_charge,
-    refine,
     search,
 )
 
 _HUBER = 1.345
 _PASSES = 2
 _LONG = 2**18
+_CHOICES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,16 +154,6 @@ class WindowFit:
         values = criteria(candidates, self.variance, self.independent)
         return {s: value + self.problem.own_count(s.order) for s, value in values.items()}
 
-    def at_delay(self, candidate: Candidate, delay: float) -> Candidate:
-        """Best model of the same structure with a given delay, in s."""
-        start = candidate.parameters.copy()
-        start[0] = delay
-        bounds = parameter_bounds(candidate.structure, self.scales)
-        parameters, cost = fit_batch(
-            self.problem, candidate.structure, start[None], bounds, delay_fixed=True
-        )
-        return Candidate(candidate.structure, parameters[0], float(cost[0]))
-
 
 def fit_window(
     window: Window,
@@ -193,40 +183,101 @@ def fit_window(
     candidates = search(problem, structures, scales)
     passes = _PASSES if huber else 0
     for turn in range(passes + 1):
-        best = min(candidates.values(), key=lambda c: c.cost)
-        error = window.output - window.predict(problem, best)
-        left = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
-        if turn == 1 and not _wild(error):
+        rest = _left(window, problem, candidates, (sigma, quantum), huber)
+        setting = rest.variance, rest.independent
+        del rest  # of a long record every array counts
+        candidates = converged(problem, candidates, scales, *setting, last=turn > 0 or not huber)
+        rest = _left(window, problem, candidates, (sigma, quantum), huber)
+        if turn == 0 and rest.best.ends is not None:
+            # What moves the data has converged.
+            candidates[rest.best.structure] = settled(problem, rest.best, scales)
+            del rest
+            rest = _left(window, problem, candidates, (sigma, quantum), huber)
+        if turn == passes or (turn == 1 and not rest.wild):
             break
-        if turn < passes:
-            left -= error
-            left += window.output
-            problem = window.with_output(left)
-            del error, left  # of a long record every array counts
-            candidates = refine(problem, candidates, scales)
-    after = left[window.start :]
-    lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
-    lost += problem.own_count(best.structure.order)
-    level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
-    # Far below the noise the residual is rounding, and its correlation says nothing.
-    floor = 0.3 * sigma
-    correlation = correlation_time(after) if level > floor else 1.0
-    level = max(level, floor)
-    criterion = criteria(candidates, level**2 * correlation, after.size / correlation)
+        problem = window.with_output(rest.values)
+        candidates = on_new_data(problem, candidates)
+    criterion = criteria(candidates, rest.variance, rest.independent)
     # One initial value more for a pole fits noise alone by one variance.
     criterion = {s: value + problem.own_count(s.order) for s, value in criterion.items()}
     chosen = candidates[choose(criterion)]
-    freedom = max(problem.data.size - lost, 1)
+    freedom = max(problem.data.size - rest.lost, 1)
     misfit = float(np.sqrt(chosen.cost / freedom)) / sigma
     rounding = quantum / np.sqrt(12) if is_coarse(sigma, quantum) else 0.0
     return WindowFit(
-        window, problem, candidates, criterion, scales, level, correlation, misfit, rounding
-    )
+        window, problem, candidates, criterion, scales, rest.level, rest.correlation, misfit,
+        rounding,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What the best of some candidates leaves of a window: the noise, if it is a good one.
+
+    `values` (N,) are the data that Huber's loss asks for, `wild` tells of outliers; `level` is the
+    standard deviation of what is left, `correlation` its correlation time, `lost` the parameters,
+    `independent` the samples that count.
+    """
+
+    best: Candidate
+    values: FloatArray
+    wild: bool
+    level: float
+    correlation: float
+    lost: int
+    independent: float
+
+    @property
+    def variance(self) -> float:
+        return self.level**2 * self.correlation
+
+
+def _left(
+    window: Window,
+    problem: Problem,
+    candidates: dict[Structure, Candidate],
+    noise: tuple[float, float],
+    huber: bool,
+) -> _Left:
+    """Look at what the structure of the lowest criterion leaves.
+
+    Not at that of the lowest cost: of parameters that fit noise alone many values are as good.
+    The criterion here is that of noise of unknown variance, n log(cost), and the samples that
+    count are those of the choice before.
+    """
+    sigma, quantum = noise
+    independent, chosen = float(window.output.size - window.start), None
+    for _ in range(_CHOICES):
+        value = {
+            s: independent * float(np.log(max(c.cost, 1e-300)))
+            + (s.order + s.zeros + 2) * parameter_charge(independent)
+            + problem.own_count(s.order)
+            for s, c in candidates.items()
+        }
+        best = candidates[choose(value)]
+        if best is chosen:
+            break
+        chosen = best
+        error = window.output - window.predict(problem, best)
+        kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
+        after = kept[window.start :]
+        lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
+        lost += problem.own_count(best.structure.order)
+        level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
+        # Far below the noise the residual is rounding, and its correlation says nothing.
+        floor = 0.3 * sigma
+        correlation = correlation_time(after) if level > floor else 1.0
+        independent = after.size / correlation
+    wild = _wild(error)
+    kept -= error
+    kept += window.output
+    return _Left(chosen, kept, wild, max(level, floor), correlation, lost, independent)
 
 
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
     """Add structures to a fit; noise and data stay those of the structures before."""
     candidates = search(fit.problem, structures, fit.scales, fit.candidates)
+    candidates = converged(fit.problem, candidates, fit.scales, fit.variance, fit.independent)
     return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
 
 

@@ -28,7 +28,9 @@ FREE_IN_A_CHAIN = 2
 
 _DIFFUSION_CHARGE = 8.0  # two lags far apart look like diffusion, and are more common
 _UNEVEN = 0.15  # by which real lags are taken to stray from the law
-_ITERATIONS = 12
+_ITERATIONS = 60
+_CONVERGED = 1e-13  # gain over the cost at which a fit ends, as rounding allows
+_GIVEN_UP = 1e9  # damping
 _SMALL = 1e-4  # step of the numerical derivatives of pole parameters
 _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
 
@@ -223,8 +225,10 @@ def _fit(
         new = float(moved[1] @ moved[1])
         if not new < cost:
             damping *= 10
+            if damping > _GIVEN_UP:
+                break
             continue
-        settled = cost - new < 1e-4 * new
+        settled = cost - new < _CONVERGED * new
         x, cost, damping = trial, new, 0.1 * damping
         parameters, residual, jacobian = moved
         if settled:

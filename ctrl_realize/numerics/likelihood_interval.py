@@ -21,8 +21,8 @@ from .lag_chains import (
     chain_profile,
     still_improving,
 )
-from .output_error_result import OutputErrorFit, Profile, assembled, profile_of
-from .profile_interval import profile_limits
+from .output_error_result import OutputErrorFit, Profile, assembled, profiles_of
+from .profile_ends import profile_limits
 from .separable_fit import Structure
 from .structure_search import LEAST_CHARGE, PLAUSIBLE, Scales, plausible
 
@@ -129,7 +129,7 @@ def _not_ruled_out(
     limit = level + PLAUSIBLE
     free = plausible(whole.candidates, charged, whole.variance, choice.model, level)
     return _Kept(
-        {s: profile_of(whole, whole.candidates[s]) for s in free},
+        profiles_of(whole, free, choice.model.structure),
         [
             (flow, flow_profile(whole.problem, flow, whole.scales, whole.variance))
             for flow in flows

@@ -31,6 +31,7 @@ import numpy as np
 
 from .better_structure import better_structure
 from .coloured_fit import in_coloured_noise
+from .compared_fits import at_delay
 from .delay_choice import chains_of, flows_of
 from .fit_window import WindowFit, fit_window
 from .likelihood_interval import likelihood_fit
@@ -164,7 +165,7 @@ def _robust_fit(
     delays = np.sort([at for _, at in views])
     low, high = float(delays[1]), float(delays[-1])
     profiles = {chosen.structure: profile_of(whole, chosen)}
-    fixed = whole.at_delay(chosen, delay)
+    fixed = at_delay(whole.problem, chosen, whole.scales, delay)
     interval = low, high, (high - low) / 3.92
     return assembled(whole, fixed, False, views, profiles, interval, profiles[chosen.structure])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -11,10 +12,13 @@ from .arrays import ComplexArray, FloatArray
 from .dispersed_flow import DispersedFlow
 from .fit_window import WindowFit
 from .lag_chains import lag_sum
-from .profile_interval import delay_profile, profile_limits
+from .profile_ends import profile_limits
+from .profile_interval import delay_profile
 from .separable_fit import Structure, evaluate
 from .static_gain import StaticGain, averaged_ends
 from .structure_search import Candidate, needless_charge
+
+_ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
 
 Profile: TypeAlias = tuple[FloatArray, FloatArray]
 """Delays, and the misfit at each; see `delay_profile`."""
@@ -122,9 +126,28 @@ class OutputErrorFit:
         return max(low, 0.0), high
 
 
-def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
+def profile_of(whole: WindowFit, candidate: Candidate, *, solved: bool = True) -> Profile:
     """Misfit over the delay of one candidate of a window."""
-    return delay_profile(whole.problem, candidate, whole.variance, whole.scales)
+    return delay_profile(whole.problem, candidate, whole.variance, whole.scales, solved=solved)
+
+
+def profiles_of(
+    whole: WindowFit, structures: Sequence[Structure], chosen: Structure
+) -> dict[Structure, Profile]:
+    """Profiles of structures, solved for their ends where these may be ends of all of them.
+
+    Between the points of a profile its ends are known to a few parts in a hundred; of the chosen
+    structure, and of those that reach as far as any, they are solved for.
+    """
+    found = {s: profile_of(whole, whole.candidates[s], solved=False) for s in structures}
+    limits = {s: profile_limits(*profile) for s, profile in found.items()}
+    low = min(first for first, _ in limits.values())
+    high = max(last for _, last in limits.values())
+    for s, (first, last) in limits.items():
+        margin = _ROUGHLY * (last - first)
+        if s == chosen or first - margin <= low or last + margin >= high:
+            found[s] = profile_of(whole, whole.candidates[s])
+    return found
 
 
 def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[StructureFit, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from .arrays import FloatArray
 from .better_structure import better_structure
+from .compared_fits import converged, settled
 from .condensed import MOST_LAGS, Condensed, condensed
 from .correlation import fit_percent
 from .delay_choice import chains_of
@@ -210,6 +211,7 @@ def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> W
         )
         best = int(np.argmin(cost))
         found[structure] = Candidate(structure, parameters[best], float(cost[best]))
+    found = converged(problem, found, stretch.scales, sums.noise**2, sums.samples)
     first = min(found.values(), key=lambda candidate: candidate.cost)
     freedom = max(m - 2 - first.structure.order - first.structure.zeros, 1)
     # More than noise leaves: what no structure explains counts as noise of that size.
@@ -268,16 +270,15 @@ def _first_order(
     problem: Problem, n: int, dt: float, limit: float, seen: Sequence[float]
 ) -> Candidate:
     """Best first-order model from a grid of delays and time constants."""
-    tries = [
-        search(
-            problem,
-            [Structure(1, 1)],
-            Scales(min(onset * dt, limit), min(rise, n / 4) * dt, n * dt, dt, limit),
-        )[Structure(1, 1)]
+    scales = [
+        Scales(min(onset * dt, limit), min(rise, n / 4) * dt, n * dt, dt, limit)
         for rise in _RISES
         for onset in (*_ONSETS, *seen)
     ]
-    return min(tries, key=lambda candidate: candidate.cost)
+    tries = [search(problem, [Structure(1, 1)], each)[Structure(1, 1)] for each in scales]
+    best = min(tries, key=lambda candidate: candidate.cost)
+    # It has converged, for samples are counted by its delay.
+    return settled(problem, replace(best, ends=None), scales[0])
 
 
 def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> OwnResponse:

@@ -23,6 +23,8 @@ lag of half a sample at least, its delay would be known better than to the sampl
 PLAUSIBLE = 10.0
 """A structure is not ruled out while its criterion is within this of the best."""
 
+_ENDS, _SAME_END = 5, 0.02  # of a search that are followed, and parts by which two are one
+
 LEAST_CHARGE = 7.0
 """Least charge for a parameter where structures are ruled out. Few independent samples charge less,
 and models with two zeros too many, in which a delay has no information, would never be."""
@@ -48,11 +50,17 @@ class Scales:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Best fit of one structure: ``cost`` at ``parameters`` = [tau, pole parameters...]."""
+    """Best fit of one structure: ``cost`` at ``parameters`` = [tau, pole parameters...].
+
+    `ends` (B, 1 + n) is where else a search has come to; `searched` tells that none of them has
+    been followed further.
+    """
 
     structure: Structure
     parameters: FloatArray
     cost: float
+    ends: FloatArray | None = None
+    searched: bool = False
 
     @property
     def delay(self) -> float:
@@ -93,9 +101,20 @@ def search(
         parameters, cost = fit_batch(
             problem, structure, np.array(starts), parameter_bounds(structure, scales)
         )
-        best = int(np.argmin(cost))
-        found[structure] = Candidate(structure, parameters[best], float(cost[best]))
+        order = np.argsort(cost)
+        best, ends = order[0], apart(parameters[order[:_ENDS]])
+        found[structure] = Candidate(structure, parameters[best], float(cost[best]), ends, True)
     return found
+
+
+def apart(ends: FloatArray) -> FloatArray:
+    """Leave out the first of some ends, and those that are the same as one before."""
+    size = np.maximum(np.abs(ends).max(axis=0), 1e-300)
+    kept = [ends[0]]
+    for end in ends[1:]:
+        if all(np.abs((end - other) / size).max() > _SAME_END for other in kept):
+            kept.append(end)
+    return np.array(kept[1:]).reshape(-1, ends.shape[1])
 
 
 def _worth_a_search(
@@ -113,28 +132,6 @@ def _worth_a_search(
         for order in (structure.order - 2, structure.order - 1)
     ]
     return not best[1] > best[0] * (1 - 4 / problem.data.size)
-
-
-def refine(
-    problem: Problem, candidates: dict[Structure, Candidate], scales: Scales
-) -> dict[Structure, Candidate]:
-    """Fit again from the optima of slightly different data; hopeless structures are let be."""
-    best = min(candidate.cost for candidate in candidates.values())
-    hopeless = best * (1 + 100 / problem.data.size)
-    again: dict[Structure, Candidate] = {}
-    for structure, old in candidates.items():
-        if old.cost > hopeless:
-            again[structure] = old
-            continue
-        parameters, cost = fit_batch(
-            problem,
-            structure,
-            old.parameters[None],
-            parameter_bounds(structure, scales),
-            most_iterations=6,
-        )
-        again[structure] = Candidate(structure, parameters[0], float(cost[0]))
-    return again
 
 
 def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:

@@ -11,7 +11,7 @@ from scipy.stats import invgauss
 from ctrl_realize.numerics.delayed_modes import MoveTrain
 from ctrl_realize.numerics.dispersed_flow import fit_flows, flow_profile
 from ctrl_realize.numerics.flow_modes import flow_modes
-from ctrl_realize.numerics.profile_interval import profile_limits
+from ctrl_realize.numerics.profile_ends import profile_limits
 from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.structure_search import Candidate, Scales, search
 

@@ -7,17 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ctrl_realize.numerics.compared_fits import at_delay
 from ctrl_realize.numerics.delayed_modes import MoveTrain
 from ctrl_realize.numerics.fit_window import (
     Window,
 )
 from ctrl_realize.numerics.own_terms import Stretches
 from ctrl_realize.numerics.response_bins import response_bins
-from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure, respond
-from ctrl_realize.numerics.structure_search import Candidate
+from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure, evaluate, respond
+from ctrl_realize.numerics.structure_search import Candidate, Scales
 
 ONE, TWO, ZERO = Structure(1, 1), Structure(2, 2), Structure(2, 1)
 SIZE, EDGE, DT = 120, 20, 0.5
+SCALES = Scales(onset=4.0, rise=5.0, length=50.0, dt=DT, latest=6.0)
 TRUTH = np.array([3.7, np.log(0.2)])  # delay and rate, in s and 1/s
 
 
@@ -81,6 +83,29 @@ def test_a_free_response_is_predicted_at_every_sample():
 
 
 # --- what the best of the candidates leaves
+
+
+def noise(size=1000, seed=0):
+    return np.random.default_rng(seed).standard_normal(size)
+
+
+def test_a_model_with_a_given_delay_is_the_best_one_with_it():
+    window, _ = windows()
+    kept = Candidate(ONE, TRUTH, 0.0)
+    moved = at_delay(window.problem, kept, SCALES, 4.7)
+    assert moved.structure == ONE
+    assert moved.delay == 4.7
+    assert TRUTH[0] == 3.7
+    # less delay, less lag: a second later the response must be faster
+    assert moved.poles[0].real < -0.2
+    left = window.predict(window.problem, moved) - window.output
+    assert moved.cost == pytest.approx(
+        np.sum(window.bins.width * window.bins.average(left) ** 2), rel=1e-9
+    )
+    rates = -moved.poles[0].real * np.array([0.99, 1.0, 1.01])
+    starts = np.stack([np.full(3, 4.7), np.log(rates)], axis=1)
+    slower, best, faster = evaluate(window.problem, ONE, starts).cost
+    assert best < min(slower, faster)
 
 
 # --- residuals

@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.pole_factors import parameters_from_poles
-from ctrl_realize.numerics.profile_interval import delay_error, delay_profile, profile_limits
+from ctrl_realize.numerics.profile_ends import profile_limits
+from ctrl_realize.numerics.profile_interval import delay_error, delay_profile
 from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, evaluate, fit_batch
 from ctrl_realize.numerics.step_problem import step_data, step_scales, window
 from ctrl_realize.numerics.structure_search import Candidate, parameter_bounds

@@ -13,7 +13,7 @@ from ctrl_realize.numerics.noise_level import (
     rest_noise,
     winsorised_sigma,
 )
-from ctrl_realize.numerics.profile_interval import profile_limits
+from ctrl_realize.numerics.profile_ends import profile_limits
 from ctrl_realize.numerics.step_problem import fixed_regressors, step_data
 from tests import rigs
 

@@ -1,0 +1,75 @@
+"""What is identified depends neither on the last digit of a record nor on its units.
+
+One unit in the last place of every sample is what another processor, or another order of a sum,
+does to the same record.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from tests import rigs
+
+CLOSE = 1e-6  # of the dead time, or of a sample where that is longer
+
+
+def last_digit(record):
+    sign = np.random.default_rng(0).choice([-1.0, 1.0], record.n_samples)
+    return cr.Record(record.time, record.input, record.output * (1 + sign * np.finfo(float).eps))
+
+
+def in_milliseconds(record):
+    return cr.Record(1000 * record.time, record.input, record.output)
+
+
+def in_other_units(record):
+    return cr.Record(record.time, 0.3 * record.input, 700.0 * record.output)
+
+
+CHANGES = (last_digit, in_milliseconds, in_other_units)
+
+
+def two_lags_of_random_levels():
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0, 2.0], 40), 10)
+    plant = cr.delayed_ss(rigs.lag(0.8) * rigs.lag(4.0), dead_time=0.072, dt=0.01)
+    y = 3 + np.ravel(plant.simulate(u)) + 0.02 * rng.standard_normal(u.size)
+    return cr.Record(0.01 * np.arange(u.size), u, y)
+
+
+def measured(folder, name):
+    table = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
+    time = np.linspace(table[0, 0], table[-1, 0], len(table))
+    return cr.Record(time, table[:, 1], table[:, 2])
+
+
+def answer(record):
+    fit = cr.fit_delay(record).fit
+    shape = fit.order, fit.relative_degree, sorted(flag.code for flag in fit.flags)
+    return shape, np.array([fit.dead_time, *fit.interval]) / fit.dt
+
+
+def alike(record, changes=CHANGES):
+    shape, times = answer(record)
+    for change in changes:
+        again, others = answer(change(record))
+        assert again == shape
+        np.testing.assert_allclose(others, times, rtol=0, atol=CLOSE * max(times[0], 1.0))
+
+
+@pytest.mark.parametrize(
+    ("plant", "noise", "seed"), [(rigs.R1, 0.02, 1), (rigs.R2, 0.005, 2), (rigs.R3, 0.005, 3)]
+)
+def test_a_step_record_is_answered_alike(plant, noise, seed):
+    alike(rigs.step_record(plant, noise=noise, seed=seed, before=150, after=450))
+
+
+def test_a_record_of_random_levels_is_answered_alike():
+    alike(two_lags_of_random_levels())
+
+
+@pytest.mark.parametrize("name", ["gas_furnace/record", "heating_system/edge2"])
+def test_a_measured_record_is_answered_alike(shared_data, name):
+    alike(measured(shared_data, name))
