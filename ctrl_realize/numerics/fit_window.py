@@ -246,7 +246,8 @@ def _left(
     count are those of the choice before.
     """
     sigma, quantum = noise
-    independent, chosen = float(window.output.size - window.start), None
+    independent = float(window.output.size - window.start)
+    chosen: Candidate | None = None
     for _ in range(_CHOICES):
         value = {
             s: independent * float(np.log(max(c.cost, 1e-300)))
@@ -271,7 +272,7 @@ def _left(
     wild = _wild(error)
     kept -= error
     kept += window.output
-    return _Left(chosen, kept, wild, max(level, floor), correlation, lost, independent)
+    return _Left(best, kept, wild, max(level, floor), correlation, lost, independent)
 
 
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:

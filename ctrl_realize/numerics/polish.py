@@ -307,7 +307,7 @@ def _to_level(slope: float, bend: float, rise: float) -> float:
     square = slope**2 + 2 * bend * rise
     if square <= 0:
         return rise / slope
-    return 2 * rise / (slope + np.sign(slope) * float(np.sqrt(square)))
+    return float(2 * rise / (slope + np.sign(slope) * np.sqrt(square)))
 
 
 def _newton(
