@@ -242,15 +242,15 @@ def _left(
     """Look at what the structure of the lowest criterion leaves.
 
     Not at that of the lowest cost: of parameters that fit noise alone many values are as good.
-    The criterion here is that of noise of unknown variance, n log(cost), and the samples that
-    count are those of the choice before.
+    The criterion here is that of noise of unknown variance, m log(cost) of m means, less by the
+    correlation of what the choice before has left.
     """
     sigma, quantum = noise
-    independent = float(window.output.size - window.start)
+    independent, correlation = float(window.output.size - window.start), 1.0
     chosen: Candidate | None = None
     for _ in range(_CHOICES):
         value = {
-            s: independent * float(np.log(max(c.cost, 1e-300)))
+            s: problem.data.size / correlation * float(np.log(max(c.cost, 1e-300)))
             + (s.order + s.zeros + 2) * parameter_charge(independent)
             + problem.own_count(s.order)
             for s, c in candidates.items()
