@@ -29,7 +29,6 @@ from .structure_search import (
 _HUBER = 1.345
 _PASSES = 2
 _LONG = 2**18
-_CHOICES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,33 +241,28 @@ def _left(
     """Look at what the structure of the lowest criterion leaves.
 
     Not at that of the lowest cost: of parameters that fit noise alone many values are as good.
-    The criterion here is that of noise of unknown variance, m log(cost) of m means, less by the
-    correlation of what the choice before has left.
+    The criterion here is that of white noise of unknown variance, m log(cost) of m means: a model
+    too poor would leave much that is correlated, and pass for enough by that.
     """
     sigma, quantum = noise
-    independent, correlation = float(window.output.size - window.start), 1.0
-    chosen: Candidate | None = None
-    for _ in range(_CHOICES):
-        value = {
-            s: problem.data.size / correlation * float(np.log(max(c.cost, 1e-300)))
-            + (s.order + s.zeros + 2) * parameter_charge(independent)
-            + problem.own_count(s.order)
-            for s, c in candidates.items()
-        }
-        best = candidates[choose(value)]
-        if best is chosen:
-            break
-        chosen = best
-        error = window.output - window.predict(problem, best)
-        kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
-        after = kept[window.start :]
-        lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
-        lost += problem.own_count(best.structure.order)
-        level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
-        # Far below the noise the residual is rounding, and its correlation says nothing.
-        floor = 0.3 * sigma
-        correlation = correlation_time(after) if level > floor else 1.0
-        independent = after.size / correlation
+    samples = window.output.size - window.start
+    value = {
+        s: problem.data.size * float(np.log(max(c.cost, 1e-300)))
+        + (s.order + s.zeros + 2) * parameter_charge(samples)
+        + problem.own_count(s.order)
+        for s, c in candidates.items()
+    }
+    best = candidates[choose(value)]
+    error = window.output - window.predict(problem, best)
+    kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
+    after = kept[window.start :]
+    lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
+    lost += problem.own_count(best.structure.order)
+    level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
+    # Far below the noise the residual is rounding, and its correlation says nothing.
+    floor = 0.3 * sigma
+    correlation = correlation_time(after) if level > floor else 1.0
+    independent = after.size / correlation
     wild = _wild(error)
     kept -= error
     kept += window.output
