@@ -8,7 +8,7 @@ import numpy as np
 
 from .fit_window import WindowFit
 from .output_error_result import Better, profile_of
-from .profile_interval import profile_limits
+from .profile_ends import profile_limits
 from .separable_fit import Structure, evaluate
 from .structure_search import (
     ALL_STRUCTURES,
