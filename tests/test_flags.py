@@ -1,7 +1,7 @@
 """A flag is raised in a world in which it is due, and in the world beside it is not.
 
-The worlds are those of the honesty benchmark, which counts how often. Flags of frequency responses and loops are
-tested beside them.
+The worlds are those of the honesty benchmark, which counts how often. Flags of
+frequency responses and loops are tested beside them.
 """
 
 from __future__ import annotations
