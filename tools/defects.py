@@ -110,7 +110,7 @@ DEFECTS = (
        "first_motion", KERNELS),
     # --- intervals
     _d("interval of 68 percent", "limits of the likelihood of one sigma, called 95 %",
-       "threshold: float = 3.84", "threshold: float = 1.0", "profile interval", KERNELS),
+       "\nTHRESHOLD = 3.84", "\nTHRESHOLD = 1.0", "profile interval", KERNELS),
     _d("std of the interval", "twice the standard deviation",
        "interval = low, high, (last - first) / 3.92", "interval = low, high, (last - first) / 1.96",
        "likelihood interval decisions joint_fit delay_fit", FITS),
