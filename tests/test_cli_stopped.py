@@ -11,7 +11,7 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize.cli import main
 from ctrl_realize.cli.staging import appearing
-from ctrl_realize.identification import campaign_row
+from ctrl_realize.identification.campaign.campaign import rows
 
 FAST = ["--method", "scan", "--order", "3", "--max-delay", "80"]
 COUNT = 4
@@ -69,20 +69,20 @@ def test_a_stopped_campaign_goes_on_where_it_was_with_the_same_files(
         path.rmdir() if path.is_dir() else path.unlink()
     out.rmdir()
     with monkeypatch.context() as patched:
-        stop_after(patched, (campaign_row, "identify"), 2)
+        stop_after(patched, (rows, "identify"), 2)
         assert main(command) == 130
     assert "2 finished records are kept" in capsys.readouterr().err
     assert len(list((out / "rows").iterdir())) == 2
     assert {path.name for path in tmp_path.iterdir()} == {"out"}
     with monkeypatch.context() as patched:
-        calls = stop_after(patched, (campaign_row, "identify"), COUNT)
+        calls = stop_after(patched, (rows, "identify"), COUNT)
         assert main(command) == 0
         assert len(calls) == COUNT - 2
     assert contents(out) == straight
 
 
 def test_an_interruption_before_the_first_record_leaves_nothing(files, tmp_path, monkeypatch):
-    stop_after(monkeypatch, (campaign_row, "identify"), 0)
+    stop_after(monkeypatch, (rows, "identify"), 0)
     assert main(["identify", *files, "-o", str(tmp_path / "a" / "out"), *FAST]) == 130
     assert list(tmp_path.iterdir()) == []
 
@@ -91,7 +91,7 @@ def test_a_disk_that_is_full_while_rows_are_kept_loses_no_result(files, tmp_path
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("ctrl_realize.io.campaign_store.write_text", full)
+    monkeypatch.setattr("ctrl_realize.io.store.write_text", full)
     records = [cr.read_record(file) for file in files]
     store = cr.CampaignStore(tmp_path)
     kept = cr.identify_campaign(records, method="scan", order=3, max_delay=80, store=store)

@@ -9,7 +9,7 @@ TESTS = Path(__file__).parent
 FAULTS = {
     "ctrl_realize.cli.identify_command.identify_record",  # interrupted by Ctrl-C
     "ctrl_realize.cli.results.report.write_campaign",  # the disk is full
-    "ctrl_realize.io.campaign_store.write_text",  # the disk is full
+    "ctrl_realize.io.store.write_text",  # the disk is full
     "ctrl_realize.report.build.versions",  # an error within a report
     "ctrl_realize.report.build.identification_sketches",  # no figures: seconds at every call
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ctrl_realize.wording import interval_in_time, time_within
+from ctrl_realize._wording import interval_in_time, time_within
 
 SIZES = st.floats(1e-7, 1e5)
 

@@ -6,8 +6,8 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.delay_bound import delay_bound
-from ctrl_realize.numerics.separable_fit import KnownFactor
+from ctrl_realize.numerics.cramer_rao import delay_bound
+from ctrl_realize.numerics.separable.varpro import KnownFactor
 from tests import rigs
 
 BEFORE, AFTER = 3840, 2600

@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.identification import cross_check
+from ctrl_realize.identification.validation import delay_estimates
 
 from .step_intervals import view_coverage
 from .trial import Seen, inside, quietly
@@ -42,7 +42,7 @@ def any_input(kind: str, plant: str, noise: float, seed: int) -> Seen:
     with quietly():
         model = cr.fit_delay(case.record)
         # The check would fit the same record once more.
-        with patch.object(cross_check, "fit_delay", lambda record: model):
+        with patch.object(delay_estimates, "fit_delay", lambda record: model):
             check = cr.check_delay(case.record)
     fit = model.fit
     reach = 1.96 * fit.std_given_structure

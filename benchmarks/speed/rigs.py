@@ -7,9 +7,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.identification.from_step import impulse_from_step
-from ctrl_realize.identification.steps import unit_step
-from ctrl_realize.numerics.state_space import markov
+from ctrl_realize.identification.step.impulse import impulse_from_step
+from ctrl_realize.identification.step.steps import unit_step
+from ctrl_realize.numerics.state_space.responses import markov
 
 TS = 7.8125e-4
 SAMPLES = 1000

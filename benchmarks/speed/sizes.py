@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.hankel import hankel_matrix
+from ctrl_realize.numerics.hankel.matrix import hankel_matrix
 
 from .measure import Line, cpu_seconds, once, peak_megabytes, seconds
 from .rigs import LONG_RECORDS, channels, long_pulse, long_record

@@ -32,7 +32,9 @@ DOUBTS = DELAY | GAIN | MODEL
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=10, help="records of each world; the stored table has 3")
+    parser.add_argument(
+        "--seeds", type=int, default=10, help="records of each world; the stored table has 3"
+    )
     parser.add_argument("--only", nargs="+", default=(), help="worlds to run; prints every record")
     parser.add_argument("--store", type=Path, help="file of finished records, one line each")
     parser.add_argument("--output", type=Path, default=PAGE, help="Markdown file to write")

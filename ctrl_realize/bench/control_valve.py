@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import paper
-from ..checks import positive, whole
+from .._checks import positive, whole
+from ..data import Record
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
-from ..signals import Record
 from .imperfections import slew_limited, with_play
 from .instruments import STROKE_MM, recorded
 from .linear import Core, response_to_held_input, response_to_started_sine

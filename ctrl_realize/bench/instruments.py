@@ -2,25 +2,54 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from .. import paper
+from ..data import Record
 from ..numerics.arrays import FloatArray
-from ..signals import Record
 from .imperfections import band_limited_noise, converted, drive_spikes
-
-if TYPE_CHECKING:
-    from .control_valve import Valve
 
 STROKE_MM = 2.0
 AD_RANGE_V = 10.0
 VOLT_PER_MA = 0.25
 
 
+class Disturbances(Protocol):
+    """What `recorded` has to know of a simulated set-up; see `Valve`."""
+
+    @property
+    def anti_aliasing(self) -> object:
+        """Kind of filter before the converter, or None."""
+
+    @property
+    def noise(self) -> float:
+        """Of the output, over the stroke."""
+
+    @property
+    def drift(self) -> float:
+        """Of the output, in strokes per second."""
+
+    @property
+    def hum(self) -> float:
+        """Amplitude at 50 Hz, over the stroke."""
+
+    @property
+    def input_noise(self) -> float:
+        """Of the input, over its range."""
+
+    @property
+    def spikes(self) -> float:
+        """On the input, per second."""
+
+    @property
+    def bits(self) -> int | None:
+        """Of the converter; None for one without steps."""
+
+
 def recorded(
-    valve: Valve,
+    valve: Disturbances,
     time: FloatArray,
     current: FloatArray,
     displacement: FloatArray,

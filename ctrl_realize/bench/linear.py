@@ -7,8 +7,8 @@ from scipy.linalg import expm, solve
 from scipy.signal import buttap
 
 from ..numerics.arrays import FloatArray
-from ..numerics.sampling import sample_with_dead_time
-from ..numerics.state_space import simulate
+from ..numerics.state_space.responses import simulate
+from ..numerics.state_space.sampling import sample_with_dead_time
 
 Core = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """A, B, C, D of a continuous single-input single-output system."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from .. import paper
-from ..checks import one_of, positive, real, whole
+from .._checks import one_of, positive, real, whole
 from ..errors import OptionError
 from .control_valve import Valve
 from .instruments import STROKE_MM

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
-from ..checks import numbers
+from .._checks import numbers
+from .._wording import in_time
+from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Result
-from ..signals import MeasuredFRF
-from ..wording import in_time
 from .linear import Core, dc_gain
 
 

@@ -10,7 +10,7 @@ import typer
 
 from ..frequency import compare_frf
 from ..io import load_model, read_frf
-from ..io.csv_files import write_csv
+from ..io.text.csv_files import write_csv
 from ..report import write_comparison
 from .inputs import check_files, typed_call
 from .manifest import Run

@@ -8,7 +8,7 @@ import pandas as pd
 
 from .. import paper, plots
 from ..io import save_model
-from ..io.csv_files import write_csv
+from ..io.text.csv_files import write_csv
 from ..plots.fits import evidence_height
 from ..report import Column, Page, Row, Sketch, Table, pairs, verdict_of, write_page
 from ..report.provenance import own_version, record_sha256, versions

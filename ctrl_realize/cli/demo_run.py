@@ -10,13 +10,13 @@ import control as ct
 import numpy as np
 
 from .. import bench, paper
+from ..data import MeasuredFRF, Record
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
 from ..frequency import FRFComparison, compare_frf, stepped_sine_frf
-from ..identification.campaign import Campaign
-from ..identification.campaign_run import identify_campaign
-from ..identification.delay_fit import fit_delay
-from ..signals import MeasuredFRF, Record
+from ..identification.campaign.campaign import Campaign
+from ..identification.campaign.run import identify_campaign
+from ..identification.output_error.fit import fit_delay
 from .terminal import progress
 
 

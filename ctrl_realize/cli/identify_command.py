@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
+from ..data import MeasuredFRF
 from ..errors import CtrlRealizeError, DataError, OptionError
 from ..frequency import compare_frf
-from ..identification.campaign import Campaign
-from ..identification.campaign_run import identify_campaign
+from ..identification.campaign.campaign import Campaign
+from ..identification.campaign.run import identify_campaign
 from ..identification.identify import identify as identify_record
 from ..io import read_frf
-from ..signals import MeasuredFRF
 from .inputs import Reading, calls_again, check_files, reading, typed_call, words_again
 from .manifest import Run, refuse_other_results
 from .results import campaign_table, write_campaign_files, write_record_files

@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..data import Record
 from ..errors import MissingFileError, OptionError
 from ..io import read_record
-from ..signals import Record
 
 
 @dataclass(frozen=True)

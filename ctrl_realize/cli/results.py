@@ -12,14 +12,14 @@ import control as ct
 import numpy as np
 
 from .. import report
+from .._wording import in_digits, time_unit
+from ..data import Record
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
-from ..identification.campaign import Campaign
+from ..identification.campaign.campaign import Campaign
 from ..io import save_model
-from ..io.csv_files import write_csv
+from ..io.text.csv_files import write_csv
 from ..report.tables import dead_time_cells
-from ..signals import Record
-from ..wording import in_digits, time_unit
 from .terminal import complain, one_line, printable, table
 
 

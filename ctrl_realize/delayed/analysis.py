@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from scipy.optimize import brentq
 
-from ..checks import real
+from .._checks import real
 from ..numerics.arrays import ComplexArray
 from .parts import CoreAndDelays
 

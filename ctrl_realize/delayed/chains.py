@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..checks import whole
+from .._checks import whole
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
 

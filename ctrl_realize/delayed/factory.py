@@ -9,9 +9,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import positive, real
+from .._checks import positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
-from ..numerics.sampling import sample_with_dead_time, split_dead_time
+from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
 from .parts import check_core
 from .system import MAX_DELAY, DelayedStateSpace
 

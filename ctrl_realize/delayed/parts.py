@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import system_names
+from .._checks import system_names
 from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, IntArray, read_only
 from .chains import Matrices, augment, chain_labels

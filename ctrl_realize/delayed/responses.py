@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite, whole
+from .._checks import finite, whole
 from ..errors import DataError
-from ..numerics import state_space
 from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.state_space import responses
 from .chains import later, powers
 from .parts import CoreAndDelays
 
@@ -19,7 +19,7 @@ from .parts import CoreAndDelays
 class DelayedResponses(CoreAndDelays):
     """Responses whose cost does not grow with the delay."""
 
-    _schur: state_space.Schur | None
+    _schur: responses.Schur | None
 
     def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
         """Evaluate the transfer matrix: core(x) x^-d, shape (outputs, inputs, K).
@@ -30,9 +30,9 @@ class DelayedResponses(CoreAndDelays):
         if points.ndim > 1:
             raise ValueError("input list must be 1D")
         if self._schur is None:
-            self._schur = state_space.schur_form(self._core.A)
+            self._schur = responses.schur_form(self._core.A)
         with np.errstate(divide="ignore", invalid="ignore"):
-            out = state_space.frequency_response(
+            out = responses.frequency_response(
                 self._schur, self._core.B, self._core.C, self._core.D, points
             )
             if any(self.input_delays):
@@ -57,7 +57,7 @@ class DelayedResponses(CoreAndDelays):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        return self._with_delay(state_space.markov, whole(count, "count", 1))
+        return self._with_delay(responses.markov, whole(count, "count", 1))
 
     def step(self, count: int) -> FloatArray:
         """Compute the response to a unit step on each input, delay included.
@@ -68,7 +68,7 @@ class DelayedResponses(CoreAndDelays):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        return self._with_delay(state_space.step_response, whole(count, "count", 1))
+        return self._with_delay(responses.step_response, whole(count, "count", 1))
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
         """Compute the response from rest to any input, delay included.
@@ -95,7 +95,7 @@ class DelayedResponses(CoreAndDelays):
             )
         held = np.stack([later(u, d) for u, d in zip(rows, self.input_delays, strict=True)])
         core = self._core
-        out = state_space.simulate(core.A, core.B, core.C, core.D, held)
+        out = responses.simulate(core.A, core.B, core.C, core.D, held)
         out = np.stack([later(y, q) for y, q in zip(out, self.output_delays, strict=True)])
         return out[0] if self.issiso() and given.ndim == 1 else out
 

@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import control as ct
 
-from ..checks import system_name
+from .._checks import system_name
 from ..errors import DelayRangeError
 from .algebra import DelayedAlgebra
 from .analysis import DelayedAnalysis

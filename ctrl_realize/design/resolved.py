@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..errors import UnresolvedWarning, UnsuitableSystemError, warn_caller
-from ..identification.delay_fit_result import is_firm
+from ..identification.output_error.result import is_firm
 from ..results import Flag
 
 SIGN_UNKNOWN = "gain_not_resolved"

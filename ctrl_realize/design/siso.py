@@ -7,7 +7,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import band
+from .._checks import band
 from ..delayed import DelayedStateSpace
 from ..delayed.parts import check_entries
 from ..errors import OptionError, UnsuitableSystemError

@@ -8,17 +8,16 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of
+from .._checks import one_of
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
-from ..numerics.spectra import hold_response, unwrapped_phase
+from ..numerics.rational.spectra import hold_response, unwrapped_phase
 from ..results import Flag
 from .comparison import FRFComparison, decibels, hertz
 from .disagreement import disagreement
-from .held import same_time, sampled_every
-from .measured_points import MeasuredPoints, check_single_channel, measured_points
+from .points import MeasuredPoints, check_single_channel, measured_points, same_time, sampled_every
 from .trusted_band import trusted_points
 
 _LEAST = 1e-70

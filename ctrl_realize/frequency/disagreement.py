@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..numerics.bands import running_median, widest_run
+from ..numerics.rational.bands import running_median, widest_run
 from ..results import Flag
 from .comparison import FRFComparison, hertz
 

@@ -9,18 +9,17 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from ..checks import positive, whole
+from .._checks import positive, whole
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
-from ..numerics.rational_fit import FRFData
-from ..numerics.rational_search import DEFAULT_ORDERS, dead_time_bound, fit_structures
-from ..numerics.rational_starts import longest_search
-from ..numerics.spectra import hold_response
+from ..numerics.rational.fit import FRFData
+from ..numerics.rational.search import DEFAULT_ORDERS, dead_time_bound, fit_structures
+from ..numerics.rational.spectra import hold_response
+from ..numerics.rational.starts import longest_search
 from .frf_selection import chosen_model
-from .held import held_every, sampled_every
-from .points import frf_points
+from .points import frf_points, held_every, sampled_every
 
 _SAMPLES_PER_SHORTEST_PERIOD = 20
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import control as ct
 import numpy as np
 
-from ..checks import numbers
+from .._checks import numbers
+from .._wording import in_time, interval_in_time, time_within
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, Result
-from ..wording import in_time, interval_in_time, time_within
 
 if TYPE_CHECKING:
     import pandas as pd

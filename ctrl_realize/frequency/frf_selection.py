@@ -9,20 +9,20 @@ import numpy as np
 
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
-from ..numerics.rational import chain_state_space
-from ..numerics.rational_bounds import (
-    covariance,
-    error_root,
-    pole_deviations,
-    profile_interval,
-)
-from ..numerics.rational_fit import FRFData, RationalFit
-from ..numerics.rational_search import (
+from ..numerics.rational.fit import FRFData, RationalFit
+from ..numerics.rational.model import chain_state_space
+from ..numerics.rational.search import (
     dead_time_bound,
     fit_structures,
     information_criteria,
     residual_variance,
     smallest_cost,
+)
+from ..numerics.rational.uncertainty import (
+    covariance,
+    error_root,
+    pole_deviations,
+    profile_interval,
 )
 from ..numerics.statistics import mixture_quantile
 from ..results import Flag

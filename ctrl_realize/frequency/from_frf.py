@@ -7,17 +7,16 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of, positive, whole
+from .._checks import one_of, positive, whole
+from ..data.impulse_estimate import ImpulseEstimate
 from ..errors import DataError
-from ..identification.impulse_estimate import ImpulseEstimate
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.blas_threads import single_threaded
-from ..numerics.fir_kernels import cautious_std, fit_kernel
-from ..numerics.lagged import NormalEquations
-from ..numerics.spectra import hold_response
+from ..numerics.rational.spectra import hold_response
+from ..numerics.regression.fir import cautious_std, fit_kernel
+from ..numerics.regression.normal_equations import NormalEquations
 from ..results import Flag
-from .held import held_every, same_time
-from .points import FRFPoints, frf_points
+from .points import FRFPoints, frf_points, held_every, same_time
 
 _BLOCK = 256
 """Points whose rows are in memory at once."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import DataError
 from ..numerics.arrays import BoolArray
-from ..numerics.spectra import PeriodStatistics, period_statistics
+from ..numerics.rational.spectra import PeriodStatistics, period_statistics
 from .spectral_estimate import Estimate, Stream
 
 _MIN_LINE_POWER = 1e-4

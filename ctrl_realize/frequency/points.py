@@ -1,16 +1,16 @@
-"""The points of a frequency response that an estimate uses, each with its weight."""
+"""Points of a frequency response: frequencies, values, deviations, and the hold of a sampled input."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
+import control as ct
 import numpy as np
 
-from ..checks import band, one_of
-from ..errors import DataError, OptionError
-from ..numerics.arrays import ComplexArray, FloatArray
-from .measured_points import measured_points
+from .._checks import band, one_of
+from ..errors import DataError, OptionError, UnsuitableSystemError
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 
 _SMOOTHED_POINTS = 9
 """Neighbours over which standard deviations are smoothed; odd."""
@@ -117,3 +117,93 @@ def _smoothed(std: FloatArray) -> FloatArray:
     padded = np.pad(np.log(std), half, mode="reflect")
     kernel = np.full(_SMOOTHED_POINTS, 1 / _SMOOTHED_POINTS)
     return np.asarray(np.exp(np.convolve(padded, kernel, mode="valid")))
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPoints:
+    """Frequencies and what was measured there; all arrays have shape (K,)."""
+
+    frequency_hz: FloatArray
+    response: ComplexArray
+    coherence: FloatArray | None
+    std: FloatArray | None
+    repeats: float | None = None
+    """From whose scatter `std` was taken; None where it counts as known."""
+
+    @property
+    def omega(self) -> FloatArray:
+        """The same frequencies in rad/s."""
+        return 2 * np.pi * self.frequency_hz
+
+    def only(self, kept: BoolArray) -> MeasuredPoints:
+        """Keep the points that are marked."""
+        return MeasuredPoints(
+            self.frequency_hz[kept],
+            self.response[kept],
+            None if self.coherence is None else self.coherence[kept],
+            None if self.std is None else self.std[kept],
+            self.repeats,
+        )
+
+
+def measured_points(frf: Any) -> MeasuredPoints:
+    """Take the points of an FRF of one channel, with coherence and std where it has some."""
+    if not isinstance(frf, ct.FrequencyResponseData):
+        raise UnsuitableSystemError(
+            f"frf is a {type(frf).__name__}; needed is a MeasuredFRF or a control FRD"
+        )
+    check_single_channel(frf, "frf")
+    order = np.argsort(frf.omega, kind="stable")
+    coherence, std = (
+        None if beside is None else np.reshape(beside, -1)[order]
+        for beside in (getattr(frf, "coherence", None), getattr(frf, "std", None))
+    )
+    return MeasuredPoints(
+        np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi),
+        np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order],
+        coherence,
+        std,
+        getattr(frf, "repeats", None),
+    )
+
+
+def check_single_channel(system: Any, what: str) -> None:
+    """Refuse several inputs or outputs."""
+    if (system.noutputs, system.ninputs) != (1, 1):
+        raise UnsuitableSystemError(
+            f"{what} has {system.ninputs} inputs and {system.noutputs} outputs; take one channel "
+            f"at a time, as {what}[i, j]"
+        )
+
+
+SAME = 1e-6
+"""Relative difference up to which two sample times are one."""
+
+
+def sampled_every(frf: Any) -> float | None:
+    """Sample time of the records that a response was estimated from, in s; None if not known."""
+    return getattr(frf, "sample_time", None)
+
+
+def held_every(frf: Any, hold: str | None, dt: float | None) -> float | None:
+    """Sample time in s of the hold that a response has in it; None for none.
+
+    Parameters
+    ----------
+    frf : control.FrequencyResponseData
+    hold : {"auto", "zoh", None}
+    dt : float or None
+        Sample time of the hold where `frf` does not tell it.
+    """
+    if hold is None:
+        return None
+    one_of(hold, "hold", ("auto", "zoh"))
+    known = sampled_every(frf)
+    if known is None and hold == "zoh" and dt is None:
+        raise OptionError("hold='zoh' needs dt, the sample time of the held input in s")
+    return dt if known is None and hold == "zoh" else known
+
+
+def same_time(one: float, other: float) -> bool:
+    """Tell whether two sample times are one."""
+    return abs(one - other) <= SAME * other

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data import Record
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
-from ..numerics.sines import SineFit, fit_sines
-from ..signals import Record
+from ..numerics.rational.sines import SineFit, fit_sines
 
 LEAST_SAMPLES = 8
 """Samples that a sine with offset and drift needs."""

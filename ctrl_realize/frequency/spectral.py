@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from ..checks import one_of, real, whole
+from .._checks import one_of, real, whole
+from ..data import MeasuredFRF, Record
+from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError, TimeAxisError
-from ..signals import MeasuredFRF, Record
-from ..signals.given import as_records, check_complete
 from .periods import from_periods
 from .spectral_estimate import Stream
 from .welch import from_segments

@@ -7,12 +7,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..checks import numbers, real
+from .._checks import numbers, real
+from ..data import MeasuredFRF, Record
+from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..numerics.sines import dominant_frequency
-from ..signals import MeasuredFRF, Record
-from ..signals.given import as_records, check_complete
+from ..numerics.rational.sines import dominant_frequency
 from .sine_batches import LEAST_SAMPLES, batches, fit_batch, misfit_beside_line
 
 Sweep: TypeAlias = Sequence[Record] | Sequence[Sequence[Record]]

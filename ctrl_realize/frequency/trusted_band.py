@@ -6,12 +6,12 @@ from typing import Literal
 
 import numpy as np
 
-from ..checks import band, real
+from .._checks import band, real
 from ..errors import DataError, OptionError
 from ..numerics.arrays import BoolArray
-from ..numerics.bands import running_median, widest_run
+from ..numerics.rational.bands import running_median, widest_run
 from .comparison import hertz
-from .measured_points import MeasuredPoints
+from .points import MeasuredPoints
 
 DEFAULT_MIN_COHERENCE = 0.95
 DEFAULT_MAX_RELATIVE_STD = 0.1

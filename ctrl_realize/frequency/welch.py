@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import get_window
 
-from ..checks import whole
+from .._checks import whole
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
-from ..numerics.spectra import SpectralSums, independent_segments, segment_sums
+from ..numerics.rational.spectra import SpectralSums, independent_segments, segment_sums
 from .spectral_estimate import Estimate, Stream
 
 _LONGEST_DEFAULT_SEGMENT = 8192

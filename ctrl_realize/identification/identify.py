@@ -9,20 +9,20 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from ..checks import one_of, whole
+from .._checks import one_of, whole
+from ..data import Record, StepResponse
+from ..data.given import as_records
 from ..delayed import DelayedStateSpace
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
-from ..signals import Record, StepResponse
-from ..signals.given import as_records
-from .channel_fit import fit_channels
-from .delay_fit import MOST_ORDER, fit_delay
-from .delay_scan import estimate_delay
-from .from_step import impulse_from_step
-from .mode_choice import with_modes_judged
-from .orders import scan_orders
-from .steps import unit_step
+from .model_class import with_modes_judged
+from .output_error.fit import MOST_ORDER, fit_delay
+from .realization.delay_scan import estimate_delay
+from .realization.order_scan import scan_orders
+from .state_space_fit.fit import fit_channels
+from .step.impulse import impulse_from_step
+from .step.steps import unit_step
 
 Method = Literal["output_error", "scan", "paper"]
 

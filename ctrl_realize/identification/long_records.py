@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..numerics.excitation import lively_start
+from ..data import Record
+from ..numerics.signals.excitation import lively_start
 from ..results import Flag
-from ..signals import Record
 
 MOST_SAMPLES = 100_000
 """Samples of all records together that a model of sections is fitted to. A delay of whole samples

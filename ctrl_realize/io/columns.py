@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ..errors import DataError, OptionError
+from .cells import NUMBER
 from .tables import Table
-from .text_cells import NUMBER
 from .units import split_unit
 
 Selector = str | int | Sequence[str | int]

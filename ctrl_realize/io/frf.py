@@ -10,12 +10,13 @@ from typing import Literal
 
 import numpy as np
 
+from ..data import MeasuredFRF
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..signals import MeasuredFRF
 from .checks import MAX_BYTES
 from .columns import check_lengths, find_column, has_header, named, plain_name
-from .tables import Table, read_table
+from .read import read_table
+from .tables import Table
 from .text_options import TextOptions
 from .units import plain_unit
 

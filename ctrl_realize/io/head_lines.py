@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import FileFormatError
-from .text_cells import DELIMITERS
+from .cells import DELIMITERS
 
 HEAD_BYTES = 1 << 18
 MAX_HEAD_LINES = 1000

@@ -12,10 +12,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..checks import one_of
+from .._checks import one_of
+from ..data import Record
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
-from ..signals import Record
 from .checks import MAX_BYTES
 from .columns import (
     Selector,
@@ -26,7 +26,8 @@ from .columns import (
     holds_numbers,
     named,
 )
-from .tables import Table, read_table
+from .read import read_table
+from .tables import Table
 from .text_options import TextOptions
 from .time_column import time_in_seconds
 

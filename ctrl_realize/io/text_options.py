@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..checks import whole
+from .._checks import whole
 from ..errors import OptionError
 
 _IN_NUMBERS = {"delimiter": frozenset("0123456789eE"), "comment": frozenset("0123456789eE.,+-")}

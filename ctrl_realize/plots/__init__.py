@@ -8,22 +8,20 @@ from typing import Any
 import control as ct
 
 from .. import errors
-from .bootstraps import bootstrap_plot as bootstrap_plot
 from .campaigns import campaign_plot as campaign_plot
-from .closed_loops import closed_loop_plot as closed_loop_plot
-from .comparisons import comparison_plot as comparison_plot
-from .delay_checks import delay_check_plot as delay_check_plot
-from .design_models import hankel_plot as hankel_plot
-from .design_models import process_model_plot as process_model_plot
+from .delays import bootstrap_plot as bootstrap_plot
+from .delays import delay_check_plot as delay_check_plot
 from .fits import dead_time_plot as dead_time_plot
 from .fits import fit_plot as fit_plot
 from .frequencies import frf_fit_plot as frf_fit_plot
 from .frequencies import frf_plot as frf_plot
 from .frequencies import truth_plot as truth_plot
+from .frf_comparison import comparison_plot as comparison_plot
 from .impulses import channels_plot as channels_plot
 from .impulses import impulse_estimate_plot as impulse_estimate_plot
 from .impulses import impulse_plot as impulse_plot
-from .margins import margins_plot as margins_plot
+from .loops import closed_loop_plot as closed_loop_plot
+from .loops import margins_plot as margins_plot
 from .records import onset_plot as onset_plot
 from .records import record_plot as record_plot
 from .records import step_plot as step_plot
@@ -37,7 +35,9 @@ from .scans import delay_plot as delay_plot
 from .scans import order_plot as order_plot
 from .scans import singular_value_plot as singular_value_plot
 from .tracks import track_plot as track_plot
-from .tuning_rules import pid_comparison_plot as pid_comparison_plot
+from .tuning import hankel_plot as hankel_plot
+from .tuning import pid_comparison_plot as pid_comparison_plot
+from .tuning import process_model_plot as process_model_plot
 
 __all__ = [
     "bootstrap_plot",

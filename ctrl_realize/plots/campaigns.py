@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from .._wording import in_time
 from ..errors import DataError
-from ..identification.campaign import Campaign
-from ..identification.campaign_row import CampaignRow
-from ..wording import in_time
+from ..identification.campaign.campaign import Campaign
+from ..identification.campaign.rows import CampaignRow
 from . import style
 from .names import plain
 

@@ -9,14 +9,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from .._wording import interval_in_time, time_within
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
-from ..identification.delay_fit_result import DelayFit
-from ..identification.steps import unit_step
-from ..wording import interval_in_time, time_within
+from ..identification.output_error.result import DelayFit
+from ..identification.step.steps import unit_step
 from . import style
 from .names import plain, wrapped
-from .scales import time_unit
+from .style import axis_time_unit
 
 _RULED_OUT = 10.0
 """Structures with a larger excess are not drawn."""
@@ -142,7 +142,7 @@ def _name(result: DelayFit) -> str:
 def _data_and_model(
     upper: Axes, lower: Axes, result: DelayFit, **kwargs: Any
 ) -> list[list[Line2D]]:
-    factor, unit = time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
+    factor, unit = axis_time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
     time = factor * result.time
     looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
     label = f"mean of {len(result.records)} records" if _averaged(result) else "measured"
@@ -225,7 +225,7 @@ def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
     """Draw one row for each structure that is not ruled out, and one for each view."""
     rows = _evidence_rows(result)
     low, high = result.interval
-    factor, unit = time_unit(max(high, *(seen for _, seen, _, _ in rows)), axes)
+    factor, unit = axis_time_unit(max(high, *(seen for _, seen, _, _ in rows)), axes)
     axes.axvspan(factor * low, factor * high, color=style.BAND, alpha=0.22, linewidth=0)
     axes.axvline(factor * result.dead_time, color=style.MODEL, linewidth=1.5)
     points: list[Line2D] = []

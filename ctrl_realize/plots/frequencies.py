@@ -11,13 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from ..bench.truth import ValveTruth
+from ..data import MeasuredFRF
 from ..frequency.frf_fit import FRFFit
 from ..numerics.arrays import FloatArray
-from ..signals import MeasuredFRF
 from . import style
-from .frf_curves import FITTED, TRUSTED_COHERENCE, Curve, curves_of
+from .frf_comparison import FITTED, TRUSTED_COHERENCE, Curve, curves_of
 from .names import plain
-from .scales import decibel, frequency_axis, phase_ticks
+from .style import decibel, frequency_axis, phase_ticks
 
 _FEW_POINTS = 60
 """So few measured points are drawn as dots as well: what lies between them is not known."""

@@ -10,15 +10,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from ..data import ImpulseResponse
+from ..data.impulse_estimate import ImpulseEstimate
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
-from ..identification.channels import ChannelRealization
-from ..identification.impulse_estimate import ImpulseEstimate
+from ..identification.realization.mimo import ChannelRealization
 from ..numerics.arrays import FloatArray
-from ..signals import ImpulseResponse
 from . import style
 from .names import plain
-from .scales import time_unit
+from .style import axis_time_unit
 
 
 def impulse_plot(
@@ -78,7 +78,7 @@ def impulse_plot(
     with style.canvas(
         ax, rows, columns=columns, size=size, title=title, default_title=impulse.name
     ) as axes:
-        factor, unit = time_unit(count * impulse.dt, axes[-1])
+        factor, unit = axis_time_unit(count * impulse.dt, axes[-1])
         lines = []
         for index, (one, values) in enumerate(zip(axes, density, strict=True)):
             drawn = _one(one, impulse, values[:count], factor, **kwargs)
@@ -126,7 +126,7 @@ def channels_plot(
     ['input 0 to output 0', 'input 0 to output 1']
     """
     drawn = impulse_plot(fit.impulse, ax=ax, title=title, **kwargs)
-    factor, _ = time_unit(1.0, drawn.axes[-1, 0])
+    factor, _ = axis_time_unit(1.0, drawn.axes[-1, 0])
     for place, axes in np.ndenumerate(drawn.axes):
         if fit.delays[place] >= 0:
             end = factor * fit.delays[place] * fit.impulse.dt
@@ -160,7 +160,7 @@ def impulse_estimate_plot(estimate: ImpulseEstimate, *args: Any, **kwargs: Any) 
     'impulse response [1/s]'
     """
     drawn = impulse_plot(estimate, *args, **kwargs)
-    factor, _ = time_unit(1.0, drawn.axes[-1, 0])
+    factor, _ = axis_time_unit(1.0, drawn.axes[-1, 0])
     time = factor * estimate.time
     density = estimate.density.reshape(*drawn.axes.shape, -1)
     spread = 2 * (estimate.std / estimate.dt).reshape(density.shape)

@@ -11,16 +11,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from ..data import Record, StepResponse
+from ..data.given import as_record
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
-from ..identification.steps import unit_step
+from ..identification.step.steps import unit_step
 from ..numerics.arrays import FloatArray
-from ..signals import Record, StepResponse
-from ..signals.given import as_record
 from . import style
-from .dead_times import mark_dead_time
+from .delays import mark_dead_time
 from .names import plain, wrapped
-from .scales import time_unit
+from .style import axis_time_unit
 
 _FEW_SAMPLES = 60
 """So few samples are drawn as points as well: what lies between them is not known."""
@@ -61,7 +61,7 @@ def record_plot(
     with style.canvas(
         ax, 2, title=title, default_title=record.name, size=(8.0, 5.2), heights=(2.2, 1.0)
     ) as (upper, lower):
-        factor, unit = time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
+        factor, unit = axis_time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
         time = factor * record.time
         measured = _signals(upper, time, record.output, record.output_labels, **kwargs)
         driven = _signals(lower, time, record.input, record.input_labels, color=style.INPUT)
@@ -110,7 +110,7 @@ def step_plot(
     longest = max(float(one.time[-1]) for one in steps)
     rising = steps[0].output[-1] > 0
     with style.canvas(ax, title=title, default_title=steps[0].name) as (axes,):
-        factor, unit = time_unit(longest, axes)
+        factor, unit = axis_time_unit(longest, axes)
         lines = _measured_steps(axes, steps, factor, **kwargs)
         if system is not None:
             lines += _model_step(axes, system, longest, factor)
@@ -162,7 +162,7 @@ def onset_plot(
     near = [_until(one, shown) for one in steps]
     name = f"{steps[0].name}: onset" if steps[0].name else "onset"
     with style.canvas(ax, title=title, default_title=name) as (axes,):
-        factor, unit = time_unit(shown, axes)
+        factor, unit = axis_time_unit(shown, axes)
         lines = _measured_steps(axes, near, factor, before=before, **kwargs)
         axes.axvline(0.0, color=style.INPUT, linewidth=1.5, linestyle=":")
         axes.annotate(

@@ -9,16 +9,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..checks import whole
+from .._checks import whole
+from ..data import Record
 from ..errors import OptionError
-from ..identification.channel_fit_result import ChannelFit
-from ..identification.prediction import Prediction
-from ..identification.residual_check import ResidualCheck
+from ..identification.state_space_fit.result import ChannelFit
+from ..identification.validation.prediction import Prediction
+from ..identification.validation.residuals_result import ResidualCheck
 from ..numerics.arrays import FloatArray
-from ..signals import Record
 from . import style
 from .names import wrapped
-from .scales import time_unit
+from .style import axis_time_unit
 
 
 def residual_plot(
@@ -158,7 +158,7 @@ def _signals(
     axes: Axes, record: Record, values: FloatArray, row: int, label: str, looks: dict[str, Any]
 ) -> list[Line2D]:
     """Draw an output as it was measured and as a model says it is."""
-    factor, unit = time_unit(float(np.ptp(record.time)), axes)
+    factor, unit = axis_time_unit(float(np.ptp(record.time)), axes)
     time = factor * record.time
     measured = np.atleast_2d(record.output)[row]
     settings = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": label, **looks}

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..design.delay_robustness import DelayRobustness
-from ..design.robustness import RobustnessCheck, UncertaintyBound
+from ..design.loops.delay_robustness import DelayRobustness
+from ..design.loops.robustness import RobustnessCheck, UncertaintyBound
 from ..numerics.arrays import FloatArray
 from . import style
-from .scales import HERTZ, time_unit
+from .style import HERTZ, axis_time_unit
 
 
 def delay_robustness_plot(
@@ -45,7 +45,7 @@ def delay_robustness_plot(
     """
     with style.canvas(ax, title=title, default_title="Robustness to the dead time") as (axes,):
         times = found.dead_times
-        factor, unit = time_unit(float(times.max()), axes)
+        factor, unit = axis_time_unit(float(times.max()), axes)
         low, high = found.dead_time_interval
         axes.axvspan(low * factor, high * factor, color=style.BAND, alpha=0.2, label="interval")
         axes.axvline(

@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from .._wording import in_time
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
-from ..identification.delay_scan_result import DelayScan
-from ..identification.orders import OrderScan
-from ..identification.realization_result import Realization
+from ..identification.realization.delay_scan_result import DelayScan
+from ..identification.realization.order_scan import OrderScan
+from ..identification.realization.result import Realization
 from ..numerics.arrays import FloatArray
-from ..wording import in_time
 from . import style
 
 

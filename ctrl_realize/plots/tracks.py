@@ -7,10 +7,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .. import wording
-from ..identification.tracked import DelayTrack
+from .. import _wording
+from ..identification.tracking.results import DelayTrack
 from . import style
-from .scales import time_unit
+from .style import axis_time_unit
 
 
 def track_plot(
@@ -46,9 +46,9 @@ def track_plot(
     """
     told = np.asarray(track.tells, dtype=bool)
     with style.canvas(ax, 2, title=title, size=(8.0, 5.2), heights=(2.0, 1.0)) as axes:
-        factor, unit = time_unit(float(np.max(np.abs(track.time))), axes[1])
+        factor, unit = axis_time_unit(float(np.max(np.abs(track.time))), axes[1])
         time = factor * track.time
-        scale, name = wording.time_unit(float(np.nanmax(track.high)))
+        scale, name = _wording.time_unit(float(np.nanmax(track.high)))
         looks = {"color": style.MODEL, "label": "dead time", **kwargs}
         axes[0].fill_between(
             time, scale * track.low, scale * track.high, where=told,

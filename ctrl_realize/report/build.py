@@ -9,12 +9,12 @@ from typing import Any
 
 import control as ct
 
+from ..data import Record
+from ..data.given import as_record
 from ..delayed import DelayedStateSpace
 from ..errors import UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
-from ..identification.campaign import Campaign
-from ..signals import Record
-from ..signals.given import as_record
+from ..identification.campaign.campaign import Campaign
 from .page import Page, Table, pairs, write_page
 from .provenance import own_version, versions
 from .sketches import (

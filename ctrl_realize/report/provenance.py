@@ -9,8 +9,8 @@ from importlib import metadata
 
 import numpy as np
 
+from ..data import Record
 from ..errors import MissingFileError
-from ..signals import Record
 
 _PACKAGES = ("ctrl-realize", "control", "numpy", "scipy", "matplotlib", "slycot")
 

@@ -15,14 +15,14 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from .. import plots
+from ..data import Record, StepResponse
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, NoStepError
 from ..frequency.comparison import FRFComparison
-from ..identification.campaign import Campaign
-from ..identification.steps import unit_step
+from ..identification.campaign.campaign import Campaign
+from ..identification.step.steps import unit_step
 from ..io.atomic import replaced_when_complete
 from ..plots.fits import evidence_height
-from ..signals import Record, StepResponse
 from .page import PageFigure
 from .svg import inline_svg, laid_out, missing_glyphs_allowed
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from .._wording import in_digits, numbers_alike, time_unit
+from ..data import Record
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
-from ..identification.campaign import Campaign
-from ..identification.campaign_row import CampaignRow
+from ..identification.campaign.campaign import Campaign
+from ..identification.campaign.rows import CampaignRow
 from ..results import Result
-from ..signals import Record
-from ..wording import in_digits, numbers_alike, time_unit
 from .page import Column, Row, Table, pairs
 from .provenance import file_sha256, record_sha256
 

@@ -8,15 +8,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from .._wording import in_time, interval_in_time, number_within, poles_in_words, time_within
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
-from ..identification.campaign import Campaign
-from ..identification.delay_fit_result import gain_in_words
-from ..identification.delay_scan_result import DelayScan
-from ..plots.dead_times import estimate_of, interval_of
+from ..identification.campaign.campaign import Campaign
+from ..identification.output_error.result import gain_in_words
+from ..identification.realization.delay_scan_result import DelayScan
+from ..plots.delays import estimate_of, interval_of
 from ..results import Flag
-from ..wording import in_time, interval_in_time, number_within, poles_in_words, time_within
 
 _CONTRADICTED = "frf_disagrees"
 

@@ -12,16 +12,16 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "data": (
         "Data",
         "What was measured, and reading it from files.",
-        ("ctrl_realize.signals", "ctrl_realize.io.records", "ctrl_realize.io.frf"),
+        ("ctrl_realize.data", "ctrl_realize.io.records", "ctrl_realize.io.frf"),
     ),
     "steps": (
         "From data to an impulse response",
         "Each step of the method is a plain function.",
         (
-            "ctrl_realize.identification.steps",
-            "ctrl_realize.identification.from_step",
-            "ctrl_realize.identification.from_io",
-            "ctrl_realize.identification.impulse_estimate",
+            "ctrl_realize.identification.step.steps",
+            "ctrl_realize.identification.step.impulse",
+            "ctrl_realize.identification.impulse.from_io",
+            "ctrl_realize.data.impulse_estimate",
             "ctrl_realize.frequency.from_frf",
         ),
     ),

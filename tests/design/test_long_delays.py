@@ -10,7 +10,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DelayRangeError, UnsuitableSystemError
-from ctrl_realize.numerics.line_sums import LineSum
+from ctrl_realize.numerics.state_space.line_sums import LineSum
 
 CORES = {
     "lag": (np.array([[0.999]]), np.array([[1.0]])),

@@ -9,7 +9,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.design import performance
-from ctrl_realize.design.pid_table import UNSTABLE
+from ctrl_realize.design.tuning.table import UNSTABLE
 from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
 
 DT = 0.01

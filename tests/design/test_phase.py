@@ -8,7 +8,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
-from ctrl_realize.numerics.phase_slope import dead_time_from_phase
+from ctrl_realize.numerics.rational.phase import dead_time_from_phase
 
 DT = 7.8125e-4
 

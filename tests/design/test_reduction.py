@@ -13,8 +13,7 @@ from scipy.integrate import quad
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError, UnsuitableSystemError
-from ctrl_realize.numerics.half_rule import half_rule
-from ctrl_realize.numerics.process_step import process_step
+from ctrl_realize.numerics.state_space.process_models import half_rule, process_step
 
 ProcessModel = cr.design.ProcessModel
 

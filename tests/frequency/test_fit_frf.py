@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.spectra import hold_response
+from ctrl_realize.numerics.rational.spectra import hold_response
 
 F = np.geomspace(0.1, 30, 80)
 S = 2j * np.pi * F

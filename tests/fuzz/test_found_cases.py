@@ -20,8 +20,8 @@ from ctrl_realize.errors import (
     TimeAxisError,
     UnsuitableSystemError,
 )
-from ctrl_realize.numerics.pole_moves import moved_core, pole_directions
-from ctrl_realize.numerics.rise import rise_time
+from ctrl_realize.numerics.signals.rise import rise_time
+from ctrl_realize.numerics.state_space.pole_sensitivity import moved_core, pole_directions
 from tests.fuzz.lane import good_end
 
 PLANT = ct.ss(0.9, 1, 0.1, 0, 0.1)

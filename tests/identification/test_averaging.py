@@ -10,14 +10,14 @@ from numpy.testing import assert_allclose
 from scipy.special import chdtrc
 
 import ctrl_realize as cr
-from ctrl_realize.identification.averaging import (
+from ctrl_realize.identification.output_error.averaging import (
     MeanStep,
     aligned_steps,
     mean_step,
     repeatability,
     widened,
 )
-from ctrl_realize.identification.repeatability import Repeatability
+from ctrl_realize.identification.output_error.repeatability import Repeatability
 from tests import rigs
 
 TS = rigs.TS

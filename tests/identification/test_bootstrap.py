@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.identification.bootstrap import bootstrap
+from ctrl_realize.identification.validation.bootstrap import bootstrap
 from tests import rigs
 
 TS = rigs.TS

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.identification.campaign_row import (
-    fingerprint,
-)
+from ctrl_realize.identification.campaign.rows import fingerprint
 
 DT = 0.1
 TIME = DT * np.arange(200)

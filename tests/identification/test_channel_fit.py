@@ -6,12 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.errors import (
-    DataError,
-    DelayRangeError,
-    OptionError,
-    OrderError,
-)
+from ctrl_realize.errors import DataError, DelayRangeError, OptionError, OrderError
 
 DT = 0.1
 CORE = ct.ss(

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.identification.delay_check import DelayCheck, DelayView, common_dead_time
+from ctrl_realize.identification.validation.delay_estimates_result import (
+    DelayCheck,
+    DelayView,
+    common_dead_time,
+)
 from tests.rigs import R1, R2, step_record
 
 DT = 0.01

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ctrl_realize.identification.delay_check import (
+from ctrl_realize.identification.validation.delay_estimates_result import (
     DelayCheck,
     DelayView,
     common_dead_time,

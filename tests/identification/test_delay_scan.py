@@ -11,14 +11,14 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DelayRangeError, OptionError, OrderError
-from ctrl_realize.identification.scan_curve import (
+from ctrl_realize.identification.realization.scan_curve import (
     best_delay,
     curve_flags,
     flat_set,
     local_minima,
     noise_flags,
 )
-from ctrl_realize.numerics.state_space import markov
+from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles import dense
 from tests.oracles.plants import modal, valve_pulse
 from tests.rigs import TS

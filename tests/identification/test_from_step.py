@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError
-from ctrl_realize.numerics.filters import low_pass
+from ctrl_realize.numerics.signals.filters import low_pass
 
 DT = 0.01
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.errors import UnsuitableSystemError
-from ctrl_realize.identification.known_dynamics import known_factor
+from ctrl_realize.identification.output_error.known import known_factor
 from tests.rigs import lag, pair
 
 S = 1j * np.array([0.1, 1.0, 7.0, 40.0, 300.0])

@@ -10,8 +10,8 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError, OrderError
-from ctrl_realize.identification.order_choice import suggest_order
-from ctrl_realize.identification.scan_surface import scan_surface
+from ctrl_realize.identification.realization.order import suggest_order
+from ctrl_realize.identification.realization.scan_surface import scan_surface
 from tests.oracles import dense
 from tests.oracles.plants import valve_pulse
 from tests.rigs import R2, TS, step_record

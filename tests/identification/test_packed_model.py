@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.identification.packed_model import PackedModel
+from ctrl_realize.identification.campaign.packed_model import PackedModel
 from tests.rigs import step_record
 
 RNG = np.random.default_rng(1)

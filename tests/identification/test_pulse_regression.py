@@ -9,7 +9,7 @@ from scipy import stats
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.identification.pulse_regression import (
+from ctrl_realize.identification.impulse.regression import (
     OKID_ORDERS,
     through_arx,
     with_prior,

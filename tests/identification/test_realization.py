@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, DelayRangeError, OptionError, OrderError
-from ctrl_realize.numerics.state_space import markov
+from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles.plants import modal, valve_pulse
 from tests.rigs import R3, TS, exact_step
 

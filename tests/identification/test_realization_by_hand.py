@@ -7,9 +7,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError
-from ctrl_realize.identification.realization import (
-    uses_feedthrough,
-)
+from ctrl_realize.identification.realization.realize import uses_feedthrough
 
 DT = 0.1
 K = np.arange(40)

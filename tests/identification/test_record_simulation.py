@@ -8,11 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
+from ctrl_realize.delayed.simulation import as_delayed, simulate_record
 from ctrl_realize.errors import DataError, UnsuitableSystemError
-from ctrl_realize.identification.record_simulation import (
-    as_delayed,
-    simulate_record,
-)
 
 DT = 0.1
 

@@ -10,7 +10,7 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize.cli.staging import appearing
 from ctrl_realize.io.atomic import replaced_when_complete, write_text
-from ctrl_realize.io.csv_files import write_csv
+from ctrl_realize.io.text.csv_files import write_csv
 
 
 def names(folder):

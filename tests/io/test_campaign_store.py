@@ -18,7 +18,7 @@ from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError
-from ctrl_realize.identification.campaign_row import fingerprint
+from ctrl_realize.identification.campaign.rows import fingerprint
 from tests.rigs import step_record
 
 

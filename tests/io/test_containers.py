@@ -22,7 +22,7 @@ from numpy.testing import assert_array_equal
 
 from ctrl_realize.errors import CtrlRealizeError, DataError, FileFormatError, OptionError
 from ctrl_realize.io import read_record
-from ctrl_realize.io.mat import mat_arrays
+from ctrl_realize.io.containers.mat import mat_arrays
 
 N = 40
 T = 0.25 * np.arange(N)

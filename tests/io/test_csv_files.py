@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ctrl_realize.io.csv_files import as_text, write_csv
+from ctrl_realize.io.text.csv_files import as_text, write_csv
 
 FORMULA_SIGNS = "=+-@\t\r\n\uff1d\uff0b\uff0d\uff20"
 NAMES = [

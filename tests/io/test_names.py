@@ -17,7 +17,7 @@ import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize.cli import main
 from ctrl_realize.cli.results import file_name
-from ctrl_realize.io.csv_files import write_csv
+from ctrl_realize.io.text.csv_files import write_csv
 from ctrl_realize.plots.names import plain, wrapped
 from ctrl_realize.report.svg import inline_svg, laid_out
 

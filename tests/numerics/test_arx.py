@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.arx import (
+from ctrl_realize.numerics.regression.arx import (
     arx_equations,
     arx_markov,
     arx_markov_std,
@@ -13,8 +13,8 @@ from ctrl_realize.numerics.arx import (
     excited_directions,
     solve_arx,
 )
-from ctrl_realize.numerics.lagged import normal_equations
-from ctrl_realize.numerics.state_space import markov
+from ctrl_realize.numerics.regression.normal_equations import normal_equations
+from ctrl_realize.numerics.state_space.responses import markov
 
 
 def test_arx_of_the_hairdryer_has_the_published_coefficients(shared_data):

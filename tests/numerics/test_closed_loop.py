@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.closed_loop import (
+from ctrl_realize.numerics.loops.circle import (
     damped_circle,
     gain_gaps,
     largest_gain,

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.coloured_noise import coloured_criterion, noise_lags
+from ctrl_realize.numerics.signals.noise_model import coloured_criterion, noise_lags
 
 
 def test_the_lags_of_autoregressive_noise_are_found():

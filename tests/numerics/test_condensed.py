@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.condensed import MOST_LAGS, condensed
-from ctrl_realize.numerics.delayed_modes import SampledInput
-from ctrl_realize.numerics.lagged import normal_equations
+from ctrl_realize.numerics.output_error.condensed import MOST_LAGS, condensed
+from ctrl_realize.numerics.regression.normal_equations import normal_equations
+from ctrl_realize.numerics.separable.responses import SampledInput
 
 DT = 0.01
 LAGS = 40

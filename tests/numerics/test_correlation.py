@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.correlation import (
+from ctrl_realize.numerics.signals.correlation import (
     autoregression,
     correlation,
     cross_bound,

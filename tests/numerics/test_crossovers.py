@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.crossovers import (
+from ctrl_realize.numerics.loops.crossings import (
     follow,
     frequency_grid,
     negative_axis_crossings,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.delay_bound import delay_bound
-from ctrl_realize.numerics.delayed_modes import MoveTrain
-from ctrl_realize.numerics.pole_factors import parameters_from_poles
-from ctrl_realize.numerics.separable_fit import KnownFactor, respond
+from ctrl_realize.numerics.cramer_rao import delay_bound
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.varpro import KnownFactor, respond
 from tests import rigs
 
 SENSOR = 2 * np.pi * 30.0

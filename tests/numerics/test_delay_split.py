@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.delay_split import joined_columns, joined_rows, split_delays
-from ctrl_realize.numerics.state_space import markov
+from ctrl_realize.numerics.state_space.delay_split import joined_columns, joined_rows, split_delays
+from ctrl_realize.numerics.state_space.responses import markov
 
 delays_of = st.lists(st.integers(0, 30), min_size=1, max_size=4)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.delayed_modes import MoveTrain, SampledInput, SeveralInputs
+from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput, SeveralInputs
 
 POLES = np.array([[-0.4 + 0j, -0.3 + 2j, -0.3 - 2j], [-1.1 + 0j, -0.2 + 0.1j, -0.2 - 0.1j]])
 

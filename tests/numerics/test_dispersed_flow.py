@@ -8,12 +8,11 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.stats import invgauss
 
-from ctrl_realize.numerics.delayed_modes import MoveTrain
-from ctrl_realize.numerics.dispersed_flow import fit_flows, flow_profile
-from ctrl_realize.numerics.flow_modes import flow_modes
-from ctrl_realize.numerics.profile_ends import profile_limits
-from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure
-from ctrl_realize.numerics.structure_search import Candidate, Scales, search
+from ctrl_realize.numerics.separable.dispersion import fit_flows, flow_modes, flow_profile
+from ctrl_realize.numerics.separable.profile_ends import profile_limits
+from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.structures import Candidate, Scales, search
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure
 
 
 def residence(mean: float, spread: float):

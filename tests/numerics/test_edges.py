@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from ctrl_realize.numerics.edges import Edge, despike, difference_noise, find_edges
+from ctrl_realize.numerics.signals.edges import Edge, despike, difference_noise, find_edges
 
 
 def white(n, seed=0):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.excitation import lively_start
+from ctrl_realize.numerics.signals.excitation import lively_start
 
 
 def moving(samples: int) -> np.ndarray:

@@ -7,11 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import sosfreqz
 
-from ctrl_realize.numerics.filters import (
-    butterworth,
-    butterworth_group_delay,
-    low_pass,
-)
+from ctrl_realize.numerics.signals.filters import butterworth, butterworth_group_delay, low_pass
 
 DT = 1 / 1280
 

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.fir_kernels import cautious_std, fit_kernel
-from ctrl_realize.numerics.lagged import normal_equations
+from ctrl_realize.numerics.regression.fir import cautious_std, fit_kernel
+from ctrl_realize.numerics.regression.normal_equations import normal_equations
 
 
 def kernel_matrix(kernel, fit, n, channel=0):

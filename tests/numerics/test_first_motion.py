@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ctrl_realize.numerics.first_motion import first_motion
+from ctrl_realize.numerics.signals.onset import first_motion
 from tests import rigs
 
 EDGE = 300

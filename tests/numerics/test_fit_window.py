@@ -7,15 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.compared_fits import at_delay
-from ctrl_realize.numerics.delayed_modes import MoveTrain
-from ctrl_realize.numerics.fit_window import (
-    Window,
+from ctrl_realize.numerics.separable.compared_fits import at_delay
+from ctrl_realize.numerics.separable.local_terms import Stretches
+from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.structures import Candidate, Scales
+from ctrl_realize.numerics.separable.varpro import (
+    KnownFactor,
+    Problem,
+    Structure,
+    evaluate,
+    respond,
 )
-from ctrl_realize.numerics.own_terms import Stretches
-from ctrl_realize.numerics.response_bins import response_bins
-from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure, evaluate, respond
-from ctrl_realize.numerics.structure_search import Candidate, Scales
+from ctrl_realize.numerics.separable.window import Window
+from ctrl_realize.numerics.signals.bins import response_bins
 
 ONE, TWO, ZERO = Structure(1, 1), Structure(2, 2), Structure(2, 1)
 SIZE, EDGE, DT = 120, 20, 0.5

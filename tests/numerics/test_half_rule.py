@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.half_rule import half_rule
+from ctrl_realize.numerics.state_space.process_models import half_rule
 
 
 def reduced(lags, leads, dead_time, order=1):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.hankel import (
+from ctrl_realize.numerics.hankel.matrix import (
     BlockHankel,
     HankelStack,
     fft_length,

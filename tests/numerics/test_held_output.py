@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.held_output import held_share, longest_hold, samples_at_limit
+from ctrl_realize.numerics.validation.held_output import held_share, longest_hold, samples_at_limit
 
 TIME = np.arange(300)
 RISE = np.where(TIME > 100, -np.expm1(-(TIME - 100) / 40), 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.iae import integrated_absolute_error, markov_stack
+from ctrl_realize.numerics.hankel.iae import integrated_absolute_error, markov_stack
 from tests.oracles.plants import modal
 
 

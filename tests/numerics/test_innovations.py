@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.innovations import feedback_chance, nonlinear_chance
+from ctrl_realize.numerics.validation.innovations import feedback_chance, nonlinear_chance
 
 N = 600
 SURE = 1e-6

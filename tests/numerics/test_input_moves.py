@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from ctrl_realize.numerics.input_moves import input_moves
+from ctrl_realize.numerics.signals.step_sequence import input_moves
 
 NOISE = 0.01
 N = 1000

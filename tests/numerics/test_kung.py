@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.delay_models import realize_at, realize_at_delays
-from ctrl_realize.numerics.hankel import hankel_matrix
-from ctrl_realize.numerics.kung import realize_block, realize_symmetric, tail_bound
-from ctrl_realize.numerics.state_space import markov
+from ctrl_realize.numerics.hankel.delay_models import realize_at, realize_at_delays
+from ctrl_realize.numerics.hankel.kung import realize_block, realize_symmetric, tail_bound
+from ctrl_realize.numerics.hankel.matrix import hankel_matrix
+from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles import dense
 from tests.oracles.plants import modal, valve_pulse
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.special import gammainc
 
-from ctrl_realize.numerics.lag_chains import (
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.lag_chains import (
     SHORTEST,
     LagChain,
     fit_chains,
     fit_diffusion,
     still_improving,
 )
-from ctrl_realize.numerics.pole_factors import parameters_from_poles
-from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, fit_batch
-from ctrl_realize.numerics.step_problem import step_data, step_scales, window
-from ctrl_realize.numerics.structure_search import Candidate, parameter_bounds
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, fit_batch
 
 SIGMA = 1e-3
 

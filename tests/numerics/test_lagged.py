@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.lagged import normal_equations
+from ctrl_realize.numerics.regression.normal_equations import normal_equations
 
 
 def by_rows(z, y, lags, offset):

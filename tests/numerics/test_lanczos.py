@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.block_svd import leading_triplets
-from ctrl_realize.numerics.hankel import hankel_matrix
-from ctrl_realize.numerics.lanczos import largest_magnitude, leading_eigenpairs
-from ctrl_realize.numerics.recurrence import extreme_pairs
+from ctrl_realize.numerics.hankel.lanczos import largest_magnitude, leading_eigenpairs
+from ctrl_realize.numerics.hankel.matrix import hankel_matrix
+from ctrl_realize.numerics.hankel.recurrence import extreme_pairs
+from ctrl_realize.numerics.hankel.svd import leading_triplets
 from tests.oracles.plants import modal, valve_pulse
 
 KINDS = ["clean", "zero-phase", "causal", "unfiltered"]

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.noise_level import (
+from ctrl_realize.numerics.signals.noise import (
     correlation_time,
     hum_frequencies,
     mad_sigma,

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.onset import correlation_onset, phase_slope
+from ctrl_realize.numerics.signals.onset import correlation_onset, phase_slope
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.95])

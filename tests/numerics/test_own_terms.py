@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.delayed_modes import SampledInput, SeveralInputs
-from ctrl_realize.numerics.own_terms import FixedTerms, OwnTerms, Stretches
-from ctrl_realize.numerics.pole_factors import poles_from_parameters
-from ctrl_realize.numerics.separable_fit import KnownFactor, Problem, Structure, evaluate
+from ctrl_realize.numerics.separable.local_terms import FixedTerms, OwnTerms, Stretches
+from ctrl_realize.numerics.separable.poles import poles_from_parameters
+from ctrl_realize.numerics.separable.responses import SampledInput, SeveralInputs
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure, evaluate
 
 CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
 EDGES = np.array([0, 70, 180])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.parameter_change import parameter_change
+from ctrl_realize.numerics.validation.parameter_change import parameter_change
 
 N = 900
 THIRDS = 3 * np.arange(N) // N

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.pole_factors import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
 
 GAP = 0.01  # relative distance that coinciding poles of one pair are given
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.compared_fits import converged, on_new_data
-from ctrl_realize.numerics.pole_factors import parameters_from_poles
-from ctrl_realize.numerics.polish import polish, settle, solve_level
-from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, evaluate
-from ctrl_realize.numerics.step_problem import step_data, step_scales, window
-from ctrl_realize.numerics.structure_search import parameter_bounds, search
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.compared_fits import converged, on_new_data
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.polish import polish, settle, solve_level
+from ctrl_realize.numerics.separable.structures import parameter_bounds, search
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate
 
 SIGMA, DEAD = 0.01, 20.3
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.process_step import process_step
+from ctrl_realize.numerics.state_space.process_models import process_step
 
 TIME = np.linspace(0, 20, 41)
 

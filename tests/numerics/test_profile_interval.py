@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from ctrl_realize.numerics.pole_factors import parameters_from_poles
-from ctrl_realize.numerics.profile_ends import profile_limits
-from ctrl_realize.numerics.profile_interval import delay_error, delay_profile
-from ctrl_realize.numerics.separable_fit import KnownFactor, Structure, evaluate, fit_batch
-from ctrl_realize.numerics.step_problem import step_data, step_scales, window
-from ctrl_realize.numerics.structure_search import Candidate, parameter_bounds
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.profile import delay_error, delay_profile
+from ctrl_realize.numerics.separable.profile_ends import profile_limits
+from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate, fit_batch
 
 SIGMA, DEAD, LAGS = 0.01, 20.3, (12.0, 30.0)
 

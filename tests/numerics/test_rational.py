@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.rational import (
+from ctrl_realize.numerics.rational.model import (
     basis_functions,
     chain_state_space,
     factor_parameters,
@@ -16,7 +16,7 @@ from ctrl_realize.numerics.rational import (
     poles_of,
     project,
 )
-from ctrl_realize.numerics.vector_fitting import relocate_poles, trial_poles
+from ctrl_realize.numerics.rational.starts import relocate_poles, trial_poles
 
 S = 1j * np.geomspace(0.05, 20, 60)
 POLES = {

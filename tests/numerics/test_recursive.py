@@ -5,9 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.pole_moves import moved_core, pole_directions, sensitivity_system
-from ctrl_realize.numerics.recursive import DelayBank
-from ctrl_realize.numerics.state_space import markov, simulate
+from ctrl_realize.numerics.regression.recursive import DelayBank
+from ctrl_realize.numerics.state_space.pole_sensitivity import (
+    moved_core,
+    pole_directions,
+    sensitivity_system,
+)
+from ctrl_realize.numerics.state_space.responses import markov, simulate
 from tests.rigs import R3, lag, pair
 
 DT = 1e-3

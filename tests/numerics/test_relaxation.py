@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.relaxation import relaxation
+from ctrl_realize.numerics.signals.baseline import relaxation
 
 
 def noise(count, seed=0):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.response_bins import Bins, response_bins
+from ctrl_realize.numerics.signals.bins import Bins, response_bins
 
 
 def test_means_are_those_of_the_samples_of_each_bin():

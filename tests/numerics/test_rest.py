@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.rest import rest_line
+from ctrl_realize.numerics.signals.baseline import rest_line
 
 
 def white(n, seed=0):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.sampling import (
+from ctrl_realize.numerics.state_space.sampling import (
     sample_with_dead_time,
     split_dead_time,
     zero_order_hold,

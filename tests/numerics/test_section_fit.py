@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.section_fit import Experiment, fit_sections
-from ctrl_realize.numerics.sections import in_sections, motion
-from ctrl_realize.numerics.state_space import markov, simulate
+from ctrl_realize.numerics.state_space.responses import markov, simulate
+from ctrl_realize.numerics.state_space.section_fit import Experiment, fit_sections
+from ctrl_realize.numerics.state_space.sections import in_sections, motion
 
 PLANT = (
     np.array([[0.7, 0.3, 0.0], [-0.3, 0.7, 0.2], [0.0, 0.0, 0.4]]),

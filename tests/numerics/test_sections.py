@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.sections import in_sections, motion
-from ctrl_realize.numerics.state_space import markov
+from ctrl_realize.numerics.state_space.responses import markov
+from ctrl_realize.numerics.state_space.sections import in_sections, motion
 
 SAMPLES = 60
 

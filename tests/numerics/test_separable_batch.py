@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.delayed_modes import MoveTrain
-from ctrl_realize.numerics.own_terms import Stretches
-from ctrl_realize.numerics.separable_fit import (
+from ctrl_realize.numerics.separable.local_terms import Stretches
+from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.varpro import (
     Bounds,
     KnownFactor,
     Problem,

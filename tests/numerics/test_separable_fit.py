@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.delayed_modes import MoveTrain, SampledInput
-from ctrl_realize.numerics.pole_factors import parameters_from_poles, poles_from_parameters
-from ctrl_realize.numerics.response_bins import response_bins
-from ctrl_realize.numerics.separable_fit import (
+from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput
+from ctrl_realize.numerics.separable.structures import Scales, parameter_bounds, search
+from ctrl_realize.numerics.separable.varpro import (
     KnownFactor,
     Problem,
     Structure,
@@ -19,7 +19,7 @@ from ctrl_realize.numerics.separable_fit import (
     fit_batch,
     respond,
 )
-from ctrl_realize.numerics.structure_search import Scales, parameter_bounds, search
+from ctrl_realize.numerics.signals.bins import response_bins
 from tests import rigs
 
 ONES = np.ones(300, dtype=np.int64)

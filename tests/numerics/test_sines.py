@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.sines import dominant_frequency, fit_sines
+from ctrl_realize.numerics.rational.sines import dominant_frequency, fit_sines
 
 N, DT = 300, 0.01
 T = DT * np.arange(N)

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
 
-from ctrl_realize.numerics.spectra import (
+from ctrl_realize.numerics.rational.spectra import (
     hold_response,
     independent_segments,
     period_statistics,

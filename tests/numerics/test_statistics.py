@@ -9,11 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from ctrl_realize.numerics.statistics import (
-    circle_quantile,
-    trimmed_statistics,
-    upper_quantile,
-)
+from ctrl_realize.numerics.statistics import circle_quantile, trimmed_statistics, upper_quantile
 
 samples = arrays(np.float64, st.integers(7, 40), elements=st.floats(-1e3, 1e3, width=32))
 

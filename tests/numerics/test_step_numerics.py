@@ -7,14 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.first_motion import first_motion
-from ctrl_realize.numerics.noise_level import (
-    hum_frequencies,
-    rest_noise,
-    winsorised_sigma,
-)
-from ctrl_realize.numerics.profile_ends import profile_limits
-from ctrl_realize.numerics.step_problem import fixed_regressors, step_data
+from ctrl_realize.numerics.output_error.step_data import fixed_regressors, step_data
+from ctrl_realize.numerics.separable.profile_ends import profile_limits
+from ctrl_realize.numerics.signals.noise import hum_frequencies, rest_noise, winsorised_sigma
+from ctrl_realize.numerics.signals.onset import first_motion
 from tests import rigs
 
 

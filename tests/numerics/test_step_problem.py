@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.separable_fit import KnownFactor
-from ctrl_realize.numerics.step_problem import (
+from ctrl_realize.numerics.output_error.step_data import (
     StepData,
     fixed_regressors,
     step_data,
     stop_at,
     window,
 )
+from ctrl_realize.numerics.separable.varpro import KnownFactor
 
 EDGE, DELAY, LAG, DT = 200, 40, 60.0, 0.5
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.pole_factors import parameters_from_poles
-from ctrl_realize.numerics.separable_fit import KnownFactor, Structure
-from ctrl_realize.numerics.step_problem import step_data, step_scales, window
-from ctrl_realize.numerics.structure_search import (
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.structures import (
     FASTEST,
     PLAUSIBLE,
     SLOWER_WITH_ZEROS,
@@ -21,6 +20,7 @@ from ctrl_realize.numerics.structure_search import (
     plausible,
     search,
 )
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
 
 SCALES = Scales(onset=2.0, rise=0.5, length=10.0, dt=0.01, latest=3.0, earliest=0.25)
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.white_step import white_step
+from ctrl_realize.numerics.validation.white_step import white_step
 
 DT = 0.05
 N = 800

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.response_bins import response_bins
-from ctrl_realize.numerics.whitening import noise_covariance, whitener
+from ctrl_realize.numerics.signals.bins import response_bins
+from ctrl_realize.numerics.signals.noise_model import noise_covariance, whitener
 
 RADIUS, ANGLE = 0.95, 2 * np.pi / 20
 RINGING = np.array([1.0, -2 * RADIUS * np.cos(ANGLE), RADIUS**2])

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 import ctrl_realize as cr
 from ctrl_realize import plots
 from ctrl_realize.errors import OptionError
-from ctrl_realize.identification.delay_check import DelayView
+from ctrl_realize.identification.validation.delay_estimates_result import DelayView
 
 PLANT = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
 

@@ -13,10 +13,10 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize import report
+from ctrl_realize._wording import interval_in_time
 from ctrl_realize.report.provenance import record_sha256
 from ctrl_realize.report.sketches import identification_sketches
 from ctrl_realize.report.verdict import comparison_verdict, verdict_of
-from ctrl_realize.wording import interval_in_time
 
 HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(2)>$\\frac{'
 

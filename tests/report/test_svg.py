@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from ctrl_realize.plots import style
-from ctrl_realize.report.svg import (
-    envelope,
-    inline_svg,
-    laid_out,
-    scales,
-)
+from ctrl_realize.report.svg import envelope, inline_svg, laid_out, scales
 
 
 def drawn(draw, key, size, description):

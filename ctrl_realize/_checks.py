@@ -1,0 +1,158 @@
+"""Checks of arguments, and rules for names, that many public functions share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import DataError, OptionError
+
+MOST = 10**12
+"""No count of samples, lags or states is larger."""
+
+
+def positive(value: Any, name: str, what: str) -> float:
+    """Return `value` as a float when it is a finite number above zero.
+
+    Raises
+    ------
+    OptionError
+        Anything else; `what` says in the message what the number is.
+    """
+    number = real(value, name, what)
+    if number <= 0:
+        raise OptionError(f"{name}={value!r}; needed is a positive {what}")
+    return number
+
+
+def real(value: Any, name: str, what: str) -> float:
+    """Return `value` as a float when it is a finite real number."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise OptionError(f"{name}={value!r}; needed is a finite number: {what}")
+    return float(value)
+
+
+def band(value: Any, name: str, what: str) -> tuple[float, float]:
+    """Return the two ends of a band."""
+    ends = tuple(value) if isinstance(value, Iterable) else ()
+    if len(ends) != 2:
+        raise OptionError(f"{name}={value!r}; needed are two numbers, the ends: {what}")
+    return real(ends[0], name, what), real(ends[1], name, what)
+
+
+def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
+    """Return `value` as an int when it is a whole number in low...high."""
+    limits = f">= {low}" if high is None else f"in {low}...{high}"
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise OptionError(f"{name}={value!r}; needed is a whole number {limits}")
+    number = int(value)
+    if abs(number) > MOST:
+        raise OptionError(f"{name} is beyond {MOST:.0e}; needed is a whole number {limits}")
+    if number < low or (high is not None and number > high):
+        raise OptionError(f"{name}={number}; needed is a whole number {limits}")
+    return number
+
+
+def numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Take real numbers and nothing else; masked ones are missing, NaN.
+
+    Raises
+    ------
+    DataError
+        Text, complex values, times, rows of different lengths.
+    """
+    array = _array(values, what)
+    if array.dtype.kind in "mM":
+        raise DataError(
+            f"{what} holds {array.dtype} values; needed are seconds, for instance "
+            "(stamps - stamps[0]) / np.timedelta64(1, 's')"
+        )
+    if array.dtype.kind not in "biuf":
+        raise DataError(
+            f"{what} holds {array.dtype} values; needed are real numbers (a ragged list, text or "
+            "complex values cannot be used)"
+        )
+    return np.asarray(array, dtype=np.float64)
+
+
+def complex_numbers(values: ArrayLike, what: str) -> NDArray[np.complex128]:
+    """Take real or complex numbers and nothing else; masked ones are missing, NaN."""
+    array = _array(values, what)
+    if array.dtype.kind not in "biufc":
+        raise DataError(f"{what} holds {array.dtype} values; needed are complex numbers")
+    return np.asarray(array, dtype=np.complex128)
+
+
+def finite(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Take real numbers that are finite."""
+    array = numbers(values, what)
+    bad = int(np.sum(~np.isfinite(array)))
+    if bad:
+        raise DataError(f"{what} has {bad} non-finite value{'s' if bad > 1 else ''}")
+    return array
+
+
+def _array(values: Any, what: str) -> NDArray[Any]:
+    try:
+        return np.asarray(_unmasked(values))
+    except ValueError as error:
+        raise DataError(f"{what} is no array: its rows have different lengths") from error
+
+
+def _unmasked(given: Any) -> Any:
+    """Put NaN where something is masked, in lists too: below a mask is anything, often 1e20."""
+    if isinstance(given, np.ma.MaskedArray):
+        mask = np.ma.getmaskarray(given)
+        if given.dtype.kind not in "biufc" or not mask.any():
+            return given.data
+        return np.where(mask, np.nan, given.data)
+    if isinstance(given, list | tuple) and any(
+        isinstance(part, list | tuple | np.ma.MaskedArray) for part in given
+    ):
+        return [_unmasked(part) for part in given]
+    return given
+
+
+def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:
+    """Return `value` when it is one of the choices."""
+    # an array would compare one by one
+    if not isinstance(value, str) or value not in choices:
+        raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
+    return str(value)
+
+
+def spelled_out(text: str) -> str:
+    """Make a text that can be written: file names that are no UTF-8 hold lone surrogates."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def system_name(name: str) -> str:
+    """Make a name that python-control takes: a dot stands between system and signal there."""
+    return name.replace(".", "_")
+
+
+def system_names(names: Sequence[str]) -> list[str]:
+    """Make names of signals that python-control takes, different ones where the given ones are.
+
+    Examples
+    --------
+    >>> from ctrl_realize._checks import system_names
+    >>> system_names(["FIC101.OP", "FIC101_OP", "TIC7.PV"])
+    ['FIC101_OP_2', 'FIC101_OP', 'TIC7_PV']
+    """
+    made = [system_name(name) for name in names]
+    taken = {name for name in names if "." not in name}
+    for position, (name, wish) in enumerate(zip(names, made, strict=True)):
+        if name == wish:
+            continue
+        number = 2
+        while made[position] in taken:
+            made[position] = f"{wish}_{number}"
+            number += 1
+        taken.add(made[position])
+    return made

@@ -1,0 +1,201 @@
+"""Numbers in words: times with a unit that suits them, with as many digits as are worth reading."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from .numerics.arrays import FloatArray
+
+UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}
+"""Name of a unit of time -> how many of it are in a second."""
+
+
+def time_unit(largest: float) -> tuple[float, str]:
+    """Choose s, ms or µs for times up to `largest` s; returns (units per second, name).
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import time_unit
+    >>> time_unit(3.0), time_unit(0.029)
+    ((1.0, 's'), (1000.0, 'ms'))
+    """
+    name = "s" if largest >= 0.5 else "ms" if largest >= 0.5e-3 else "µs"
+    return UNITS[name], name
+
+
+def in_time(seconds: float, digits: int = 3) -> str:
+    """Write a time with a unit that suits it.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import in_time
+    >>> in_time(0.02890625), in_time(1.3), in_time(8.06313e-06), in_time(float("nan"))
+    ('28.9 ms', '1.3 s', '8.06 µs', 'unknown')
+    """
+    if not np.isfinite(seconds):
+        return "unknown" if np.isnan(seconds) else "infinite"
+    if seconds == 0:
+        return "0 s"
+    factor, name = time_unit(abs(seconds))
+    return f"{_plainly(seconds * factor, digits)} {name}"
+
+
+def poles_in_words(poles: Iterable[complex]) -> str:
+    """Write poles in rad/s as an engineer reads them: lags, pairs, integrators.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import poles_in_words
+    >>> poles_in_words([-2.0, -20 + 99j, -20 - 99j, 0.0])
+    'lag 0.5 s, pair at 16.1 Hz (damping 0.2), integrator'
+    >>> poles_in_words([-1300 + 10700j, -1300 - 10700j])
+    'pair at 1715 Hz (damping 0.12)'
+    """
+    upper = [p for p in map(complex, poles) if p.imag >= 0]
+    return ", ".join(map(_pole_in_words, sorted(upper, key=lambda p: (p == 0, -p.real))))
+
+
+def _pole_in_words(pole: complex) -> str:
+    if pole == 0:
+        return "integrator"
+    size = abs(pole)
+    if pole.imag > 0:
+        return f"pair at {_plainly(size / (2 * np.pi), 3)} Hz (damping {-pole.real / size:.2g})"
+    return f"{'lag' if pole.real < 0 else 'growing in'} {in_time(1 / size)}"
+
+
+def interval_in_time(low: float, high: float) -> str:
+    """Write an interval of times in one unit, with digits that show its width.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import interval_in_time
+    >>> interval_in_time(0.0256, 0.03737), interval_in_time(0.124534, 0.125411)
+    ('25.6 to 37.4 ms', '124.53 to 125.41 ms')
+    >>> interval_in_time(0.0, 0.00327)
+    '0 to 3.27 ms'
+    >>> interval_in_time(0.026, 0.0374)
+    '26.0 to 37.4 ms'
+    """
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return f"{in_time(low)} to {in_time(high)}"
+    factor, name = time_unit(max(abs(low), abs(high)))
+    low, high = factor * low, factor * high
+    ends = numbers_alike((low, high), low, high)
+    return f"{' to '.join(ends)} {name}"
+
+
+def time_within(value: float, low: float, high: float) -> str:
+    """Write an estimate in the unit of its interval, and rounded to the same place.
+
+    What is rounded alike keeps its order: an estimate never seems to lie outside.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import interval_in_time, time_within
+    >>> time_within(0.12486, 0.12473, 0.12612), interval_in_time(0.12473, 0.12612)
+    ('124.9 ms', '124.7 to 126.1 ms')
+    >>> time_within(0.0304, 0.0, 41.2), interval_in_time(0.0, 41.2)
+    ('0.0 s', '0 to 41.2 s')
+    """
+    if not (np.isfinite(low) and np.isfinite(high) and np.isfinite(value)):
+        return in_time(value, 4)
+    factor, name = time_unit(max(abs(low), abs(high)))
+    return f"{number_within(factor * value, factor * low, factor * high)} {name}"
+
+
+def number_within(value: float, low: float, high: float) -> str:
+    """Write an estimate rounded to the place to which the ends of its interval are.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import number_within
+    >>> number_within(37.0712, 36.9, 38.2), number_within(2.0, 2.0, 2.0)
+    ('37.1', '2.000')
+    """
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return f"{value:.4g}"
+    return numbers_alike((value,), low, high)[0]
+
+
+def numbers_alike(values: Iterable[float], low: float, high: float) -> list[str]:
+    """Write numbers with one number of decimals, such that ``high - low`` has two digits.
+
+    The larger end has at least three digits in all, four where there is no width.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import numbers_alike
+    >>> numbers_alike([9.1234, 37.44], 9.0, 37.0), numbers_alike([0.0, 12345.6], 0.0, 12e3)
+    (['9.1', '37.4'], ['0', '12346'])
+    """
+    several = [float(value) for value in values]
+    largest, width = max(abs(low), abs(high)), high - low
+    if largest == 0 or not 1e-3 < largest < 1e6:
+        return [f"{value:.6g}" for value in several]
+    least = (4 if width <= 0 else 3) - 1 - int(np.floor(np.log10(largest)))
+    # a width of one that was computed as 0.9999... is one
+    shown = 1 - int(np.floor(np.log10(width) + 1e-9)) if width > 0 else least
+    decimals = int(np.clip(max(shown, least), 0, 9))
+    return ["0" if value == 0 else f"{value:.{decimals}f}" for value in several]
+
+
+def _plainly(value: float, digits: int) -> str:
+    """Write a number without an exponent where its digits allow it."""
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
+
+
+def in_digits(value: float, digits: int = 4) -> str:
+    """Write a number, and nothing where it is not finite.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import in_digits
+    >>> in_digits(16.00001), in_digits(float("nan"))
+    ('16', '')
+    """
+    return f"{value:.{digits}g}" if np.isfinite(value) else ""
+
+
+def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
+    """Write a matrix in one line, its rows apart; long rows are cut.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize._wording import in_numbers
+    >>> in_numbers(np.array([[0.53770001, 2.0], [1e-5, 0.0]]))
+    '0.5377, 2; 1e-05, 0'
+    """
+    rows = []
+    for row in np.atleast_2d(values):
+        shown = ", ".join(f"{value:.{digits}g}" for value in row[:most])
+        rows.append(shown + (", …" if row.size > most else ""))
+    return "; ".join(rows)
+
+
+def in_percent(fits: Iterable[float]) -> str:
+    """Write how much of each output a model explains.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import in_percent
+    >>> in_percent([98.761, float("-inf")])
+    '98.76 %, undefined: the output is constant'
+    """
+    constant = "undefined: the output is constant"
+    return ", ".join(f"{fit:.2f} %" if np.isfinite(fit) else constant for fit in fits)
+
+
+def named(kind: str, name: str) -> str:
+    """Call a thing by its name, if it has one.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import named
+    >>> named("record", "valve_16mA"), named("record", "")
+    ("record 'valve_16mA'", 'the record')
+    """
+    return f"{kind} {name!r}" if name else f"the {kind}"

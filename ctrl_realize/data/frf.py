@@ -1,0 +1,327 @@
+"""A measured frequency response that python-control can draw beside a model."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._checks import complex_numbers, numbers, positive, real, system_name, system_names
+from ..errors import DataError, OptionError
+from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.statistics import circle_quantile
+from ..results import as_asked, as_code
+from .frf_algebra import FRFAlgebra
+from .frf_operands import SAME
+from .record_checks import check_size
+
+
+class MeasuredFRF(FRFAlgebra):
+    """Measured frequency response function.
+
+    It is a `control.FrequencyResponseData` without a time base (``dt=None``), the form in which
+    python-control draws and combines it with continuous and discrete systems alike.
+
+    Parameters
+    ----------
+    response : array_like, shape (K,) or (p, m, K)
+        Complex response.
+    frequency_hz : array_like, shape (K,)
+        Frequencies in Hz, in any order; they are sorted.
+    coherence : array_like, same shape as `response`, optional
+        Squared coherence, 0...1.
+    std : array_like, same shape as `response`, optional
+        Standard deviation of the complex response (root mean square of the error).
+    repeats : float, optional
+        Number of repeats, periods or independent segments from whose scatter `std` was taken,
+        above 1 and not necessarily whole. Without it `std` counts as known.
+    sample_time : float, optional
+        Sample time in s of the records that the response was estimated from. An input that is
+        held between the samples leaves its hold in the response, half a sample of delay;
+        `fit_frf`, `compare_frf` and `impulse_from_frf` then reckon with it.
+    name : str, optional
+    inputs, outputs : str or sequence of str, optional
+        Signal names. In all names a dot becomes an underscore, as python-control takes no dots.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (K,)
+    complex : ndarray
+        The complex response (python-control's attribute), sorted by frequency.
+    coherence, std : ndarray or None
+    repeats, sample_time : float or None
+
+    Raises
+    ------
+    DataError
+        Shapes that do not match, values that are not finite, negative frequencies; also when
+        indexing chooses no channel.
+
+    Notes
+    -----
+    ``frf[output, input]`` takes channels by number, name or slice, with their coherence and
+    standard deviation.
+
+    A standard deviation from few repeats is itself uncertain: 1.96 of it, or circles of
+    ``sqrt(3) * std``, hold 95 % only where there are many. `circle` and the intervals of
+    `design.margins` reckon with `repeats`.
+
+    Arithmetic carries deviation, coherence, repeats and sample time along. Exact systems and
+    numbers scale the deviation; two measured responses count as independent, one with itself does
+    not. ``frf.feedback(K)`` knows that the response stands twice in ``frf / (1 + K frf)``. Where
+    the coherence or the hold of a result is not known a `DataWarning` says that it is left out.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> frf = cr.MeasuredFRF([1.0, 0.5 - 0.5j, -0.1j], [0.1, 1.0, 10.0])
+    >>> frf.between_hz(0.5, 20.0)
+    <MeasuredFRF 'measured': 2 points, 1...10 Hz>
+    >>> (2 * cr.MeasuredFRF([1.0], [0.1], std=[0.1], sample_time=0.01)).std
+    array([0.2])
+    """
+
+    def __init__(
+        self,
+        response: ArrayLike,
+        frequency_hz: ArrayLike,
+        *,
+        coherence: ArrayLike | None = None,
+        std: ArrayLike | None = None,
+        repeats: float | None = None,
+        sample_time: float | None = None,
+        name: str = "measured",
+        inputs: Any = None,
+        outputs: Any = None,
+    ) -> None:
+        values = complex_numbers(response, "response")
+        grid = numbers(frequency_hz, "frequency_hz")
+        if grid.ndim != 1 or grid.size == 0:
+            raise DataError(f"frequency_hz has shape {grid.shape}; needed is (K,), K >= 1")
+        if values.ndim not in (1, 3) or values.shape[-1] != grid.size:
+            raise DataError(
+                f"response has shape {values.shape}, frequency_hz has {grid.size} points; "
+                "needed is (K,) or (outputs, inputs, K)"
+            )
+        _check_finite(grid, "frequency_hz")
+        _check_finite(values, "response")
+        check_size(grid, "frequency_hz")
+        check_size(_largest_part(values), "response")
+        if np.any(grid < 0):
+            raise DataError(f"frequency_hz goes down to {grid.min():g} Hz; needed is >= 0")
+        order = np.argsort(grid, kind="stable")
+        grid = grid[order]
+        values = values[..., order]
+        signals: dict[str, Any] = {
+            key: system_names([names] if isinstance(names, str) else names)
+            for key, names in (("inputs", inputs), ("outputs", outputs))
+            if names
+        }
+        # Not smooth: python-control would draw the interpolating splines far beyond the measured
+        # band, where they run off. Margins and products with systems do without.
+        signals["name"] = system_name(str(name))
+        super().__init__(values, 2 * np.pi * grid, dt=None, smooth=False, **signals)
+        self._single = values.ndim == 1
+        self.frequency_hz = read_only(grid)
+        self.coherence = _beside(coherence, values, order, "coherence")
+        self.std = _beside(std, values, order, "std")
+        if self.coherence is not None and (
+            self.coherence.min() < 0 or self.coherence.max() > 1 + 1e-9
+        ):
+            raise DataError(
+                f"coherence runs from {self.coherence.min():g} to {self.coherence.max():g}; "
+                "needed are values in 0...1"
+            )
+        if self.std is not None and self.std.min() < 0:
+            raise DataError(f"std goes down to {self.std.min():g}; needed is >= 0")
+        self.repeats = None if repeats is None else real(repeats, "repeats", "number above 1")
+        if self.repeats is not None and self.repeats <= 1:
+            raise OptionError(f"repeats={repeats!r}; a scatter needs more than one")
+        self.sample_time = (
+            None if sample_time is None else positive(sample_time, "sample_time", "time in s")
+        )
+
+    def __repr__(self) -> str:
+        return as_asked(self)
+
+    def _repr_eval_(self) -> str:
+        parts = [
+            as_code(self.frdata[0, 0] if self._single else self.frdata),
+            as_code(self.frequency_hz),
+        ]
+        for name in ("coherence", "std"):
+            if getattr(self, name) is not None:
+                parts.append(f"{name}={as_code(getattr(self, name))}")
+        for name in ("repeats", "sample_time", "name"):
+            if getattr(self, name) is not None:
+                parts.append(f"{name}={getattr(self, name)!r}")
+        parts.append(f"inputs={self.input_labels!r}, outputs={self.output_labels!r}")
+        return f"MeasuredFRF({', '.join(parts)})"
+
+    def _repr_info_(self, html: bool = False) -> str:
+        line = self._line()
+        return escape(line) if html else line
+
+    def _line(self) -> str:
+        return (
+            f"<MeasuredFRF {self.name!r}: {self.frequency_hz.size} points, "
+            f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz>"
+        )
+
+    def __str__(self) -> str:
+        # python-control's lists every point.
+        return self._line()
+
+    def _repr_html_(self) -> str | None:
+        return None
+
+    def eval(self, omega: Any, squeeze: bool | None = None) -> Any:
+        """Return the response at measured frequencies, in rad/s.
+
+        See `control.FrequencyResponseData.eval`. A frequency may differ from the measured one by
+        the rounding of a conversion, as 6.283185307179586 * f and 2 * (f * pi) do.
+        """
+        asked = numbers(omega, "omega")
+        right = np.clip(np.searchsorted(self.omega, asked), 1, max(self.omega.size - 1, 1))
+        near = [self.omega[np.minimum(at, self.omega.size - 1)] for at in (right - 1, right)]
+        for own in near:
+            asked = np.where(np.abs(own - asked) <= SAME * own, own, asked)
+        return super().eval(asked, squeeze)
+
+    def __getitem__(self, key: Any) -> Any:
+        """Take channels as python-control does, ``frf[output, input]`` by number, name or slice.
+
+        Coherence and standard deviation come along. One channel comes as from one record, with
+        arrays of shape (K,).
+        """
+        taken = super().__getitem__(key)
+        if not isinstance(taken, ct.FrequencyResponseData):
+            return taken
+        # python-control reads the key a second time, for an FRF whose values are the places.
+        p, m = self.noutputs, self.ninputs
+        places = ct.FrequencyResponseData(
+            np.arange(p * m, dtype=np.complex128).reshape(p, m, 1),
+            [1.0],
+            inputs=self.input_labels,
+            outputs=self.output_labels,
+        )[key].frdata[:, :, 0]
+        chosen = places.real.astype(int)
+        if chosen.size == 0:
+            raise DataError(
+                f"[{key}] chooses no channel of {p} outputs and {m} inputs; count from 0"
+            )
+        return MeasuredFRF(
+            _channels(self.frdata, chosen),
+            self.frequency_hz,
+            coherence=None if self.coherence is None else _channels(self.coherence, chosen),
+            std=None if self.std is None else _channels(self.std, chosen),
+            repeats=self.repeats,
+            sample_time=self.sample_time,
+            name=taken.name,
+            inputs=taken.input_labels,
+            outputs=taken.output_labels,
+        )
+
+    def circle(self, level: float = 0.95) -> FloatArray:
+        r"""Radii of the circles around the points that hold the true response, each with `level`.
+
+        For a complex normal error. With the standard deviation *s* from *n* repeats the radius is
+        :math:`s \sqrt{(n - 1) ((1 - level)^{-1 / (n - 1)} - 1)}`, which many repeats bring to
+        :math:`s \sqrt{-\log(1 - level)}`.
+
+        Returns
+        -------
+        ndarray, same shape as the response
+
+        Raises
+        ------
+        DataError
+            No standard deviation.
+        OptionError
+            A `level` that is not between 0 and 1.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> for repeats in None, 5:
+        ...     frf = cr.MeasuredFRF([1.0], [0.1], std=[0.1], repeats=repeats)
+        ...     print(frf.circle().round(3))
+        [0.173]
+        [0.211]
+        """
+        if self.std is None:
+            raise DataError("this FRF has no standard deviation, so nothing tells its error")
+        if not 0 < real(level, "level", "part between 0 and 1") < 1:
+            raise OptionError(f"level={level!r}; needed is above 0 and below 1")
+        return np.asarray(self.std * circle_quantile(level, self.repeats))
+
+    def between_hz(self, low: float, high: float) -> MeasuredFRF:
+        """Cut out the points with low <= frequency <= high, in Hz."""
+        return self._select(
+            (self.frequency_hz >= low) & (self.frequency_hz <= high),
+            f"between {low:g} and {high:g} Hz",
+        )
+
+    def trusted(self, min_coherence: float = 0.95) -> MeasuredFRF:
+        """Keep the points whose coherence is at least `min_coherence` (in every channel)."""
+        if self.coherence is None:
+            raise DataError(
+                "this FRF has no coherence; choose a band with between_hz(low, high) instead"
+            )
+        if not 0 <= min_coherence <= 1:
+            raise OptionError(f"min_coherence={min_coherence!r}; needed is a value in 0...1")
+        good = self.coherence.reshape(-1, self.frequency_hz.size).min(axis=0) >= min_coherence
+        return self._select(good, f"with a coherence of {min_coherence:g}")
+
+    def _select(self, keep: np.ndarray[Any, np.dtype[np.bool_]], where: str) -> MeasuredFRF:
+        if not keep.any():
+            raise DataError(
+                f"no point of the FRF lies {where}; it has {self.frequency_hz.size} points, "
+                f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz"
+            )
+        return MeasuredFRF(
+            (self.frdata[0, 0] if self._single else self.frdata)[..., keep],
+            self.frequency_hz[keep],
+            coherence=None if self.coherence is None else self.coherence[..., keep],
+            std=None if self.std is None else self.std[..., keep],
+            repeats=self.repeats,
+            sample_time=self.sample_time,
+            name=self.name,
+            inputs=self.input_labels,
+            outputs=self.output_labels,
+        )
+
+
+def _channels(values: np.ndarray[Any, Any], places: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Take the entries at `places`, counted along rows; one entry comes without its two axes."""
+    taken = values.reshape(-1, values.shape[-1])[places]
+    return np.asarray(taken[0, 0] if places.size == 1 else taken)
+
+
+def _beside(
+    values: ArrayLike | None, response: ComplexArray, order: np.ndarray[Any, Any], what: str
+) -> FloatArray | None:
+    if values is None:
+        return None
+    array = numbers(values, what)
+    if array.shape != response.shape:
+        raise DataError(f"{what} has shape {array.shape}, response has {response.shape}")
+    _check_finite(array, what)
+    check_size(array.reshape(-1, array.shape[-1]), what)
+    return read_only(array[..., order])
+
+
+def _largest_part(values: ComplexArray) -> FloatArray:
+    """Return the larger of real and imaginary part, shape (channels, K); an absolute overflows."""
+    largest = np.maximum(np.abs(values.real), np.abs(values.imag))
+    return np.asarray(largest.reshape(-1, values.shape[-1]))
+
+
+def _check_finite(values: np.ndarray[Any, Any], what: str) -> None:
+    bad = ~np.isfinite(values)
+    if bad.any():
+        first = int(np.flatnonzero(bad.reshape(-1, values.shape[-1]).any(axis=0))[0])
+        raise DataError(f"{what} has {int(bad.sum())} non-finite values, the first at {first}")

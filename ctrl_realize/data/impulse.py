@@ -1,0 +1,192 @@
+"""A unit-pulse response, and the filter that is still in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import sosfreqz
+
+from .._checks import numbers, positive
+from ..errors import DataError, OptionError
+from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.signals.filters import butterworth, butterworth_group_delay
+from ..numerics.signals.time_axis import EXTREME
+from .step import StepResponse
+
+Sampling = Literal["step-invariant", "impulse-invariant"]
+
+
+@dataclass(frozen=True)
+class FilterSpec:
+    """Butterworth low-pass that a signal went through.
+
+    Attributes
+    ----------
+    order : int
+    cutoff_hz : float
+        Frequency of -3 dB (-6 dB when `zero_phase`) in Hz.
+    zero_phase : bool
+        Run forward and backward: no delay, twice the attenuation.
+    dt : float
+        Sample time in s of the filtered signal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> low_pass = cr.FilterSpec(order=5, cutoff_hz=20.0, zero_phase=False, dt=0.001)
+    >>> gain = abs(low_pass.response(np.array([2 * np.pi * 20.0])))
+    >>> print(gain.round(3), f"{low_pass.group_delay:.1f} samples")
+    [0.707] 25.7 samples
+    """
+
+    order: int
+    cutoff_hz: float
+    zero_phase: bool
+    dt: float
+
+    def response(self, omega: ArrayLike) -> ComplexArray:
+        """Frequency response at `omega` in rad/s; divide a model's by it to take it out."""
+        points = np.atleast_1d(numbers(omega, "omega")) * self.dt
+        sos = butterworth(self.order, self.cutoff_hz, self.dt)
+        response = np.asarray(sosfreqz(sos, worN=points)[1], dtype=np.complex128)
+        return (np.abs(response) ** 2).astype(np.complex128) if self.zero_phase else response
+
+    @property
+    def group_delay(self) -> float:
+        """Delay at low frequency that the filter adds, in samples."""
+        if self.zero_phase:
+            return 0.0
+        return butterworth_group_delay(self.order, self.cutoff_hz, self.dt)
+
+    def __str__(self) -> str:
+        way = "zero-phase" if self.zero_phase else "causal"
+        return f"{way} Butterworth, order {self.order}, {self.cutoff_hz:.4g} Hz"
+
+
+@dataclass(frozen=True, eq=False)
+class ImpulseResponse:
+    """Response to a unit pulse: the Markov parameters G_0, G_1 and so on.
+
+    The pulse has height 1 and lasts one sample, so a model's D, CB, CAB, ... are these numbers,
+    and their sum is the gain. ``density == markov / dt`` is the response to a unit area.
+
+    Parameters
+    ----------
+    markov : array_like, shape (N,) or (p, m, N)
+        Markov parameters; p outputs, m inputs.
+    dt : float
+        Sample time in s.
+    filter : FilterSpec, optional
+        Low-pass that is still in the data.
+    noise : array_like, shape (P,), optional
+        What the same processing made of samples taken at rest: the noise in `markov`.
+    sampling : {"step-invariant", "impulse-invariant"}, optional
+        What a model of the data reproduces exactly: the step response of a plant behind a
+        zero-order hold (backward difference, the default), or samples of the continuous impulse
+        response (central difference), which come half a sample earlier.
+    name : str, optional
+    step : StepResponse, optional
+        The step response that it was made of.
+
+    Raises
+    ------
+    DataError
+        Wrong shape or values that are not finite.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> g = cr.ImpulseResponse([0.0, 0.5, 0.25, 0.125], dt=0.1)
+    >>> g.n_samples, float(g.density[1])
+    (4, 5.0)
+    """
+
+    markov: FloatArray
+    dt: float
+    filter: FilterSpec | None = None
+    noise: FloatArray | None = None
+    sampling: Sampling = "step-invariant"
+    name: str = ""
+    step: StepResponse | None = None
+
+    def __init__(
+        self,
+        markov: ArrayLike,
+        dt: float,
+        *,
+        filter: FilterSpec | None = None,
+        noise: ArrayLike | None = None,
+        sampling: Sampling = "step-invariant",
+        name: str = "",
+        step: StepResponse | None = None,
+    ) -> None:
+        values = _finite(markov, "markov")
+        if values.ndim not in (1, 3) or values.shape[-1] < 2 or values.size == 0:
+            raise DataError(
+                f"markov has shape {values.shape}; needed is (N,) or (outputs, inputs, N) "
+                "with N >= 2"
+            )
+        # the quotient of a record's largest output and smallest step; its square is a double
+        if np.abs(values).max() > EXTREME**2:
+            raise DataError(f"markov goes up to {np.abs(values).max():g}, which is no measurement")
+        seconds = positive(dt, "dt", "sample time in s")
+        if sampling not in ("step-invariant", "impulse-invariant"):
+            raise OptionError(
+                f"sampling={sampling!r}; choose 'step-invariant' or 'impulse-invariant'"
+            )
+        fix = object.__setattr__
+        fix(self, "markov", read_only(values))
+        fix(self, "dt", seconds)
+        fix(self, "filter", filter)
+        fix(self, "noise", None if noise is None else read_only(_finite(noise, "noise")))
+        fix(self, "sampling", sampling)
+        fix(self, "name", str(name))
+        fix(self, "step", step)
+
+    @property
+    def n_samples(self) -> int:
+        """Number of Markov parameters."""
+        return int(self.markov.shape[-1])
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return 1 if self.markov.ndim == 1 else int(self.markov.shape[1])
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return 1 if self.markov.ndim == 1 else int(self.markov.shape[0])
+
+    @property
+    def density(self) -> FloatArray:
+        """Response to an impulse of unit area: markov / dt."""
+        return self.markov / self.dt
+
+    @property
+    def time(self) -> FloatArray:
+        """Time of each Markov parameter in s, from 0."""
+        return np.arange(self.n_samples, dtype=np.float64) * self.dt
+
+    def __repr__(self) -> str:
+        name = f" {self.name!r}" if self.name else ""
+        channels = "" if self.markov.ndim == 1 else f", {self.n_outputs} x {self.n_inputs} channels"
+        still = f", {self.filter}" if self.filter is not None else ""
+        return (
+            f"<ImpulseResponse{name}: {self.n_samples} samples of {self.dt:g} s{channels}{still}>"
+        )
+
+
+def _finite(values: ArrayLike, what: str) -> FloatArray:
+    array = numbers(values, what)
+    bad = ~np.isfinite(array)
+    if bad.any():
+        raise DataError(
+            f"{what} has {int(bad.sum())} non-finite values, the first at index "
+            f"{int(np.flatnonzero(bad.reshape(-1, array.shape[-1]).any(axis=0))[0])}"
+        )
+    return array

@@ -1,0 +1,93 @@
+"""An impulse response that was estimated, with its standard deviations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._wording import in_time
+from ..numerics.arrays import FloatArray, read_only
+from ..results import Flag, Result
+from . import ImpulseResponse
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ImpulseEstimate(ImpulseResponse, Result):
+    """Estimated unit-pulse response: an `ImpulseResponse` with standard deviations.
+
+    ``markov +- 2 std`` is the 95 % band of each Markov parameter by itself, under white output
+    noise; errors of neighbours are correlated. `noise_std` is the noise that is left in the
+    outputs, per output.
+
+    Attributes
+    ----------
+    markov, std : ndarray, shape (N,) or (p, m, N)
+    noise_std : ndarray, shape (p,)
+        Standard deviation of what the estimate does not explain, in the unit of the outputs.
+    method : str
+        How it was made, in words.
+    rows : int
+        Equations used: samples whose whole past is known.
+    choices : tuple of str
+        What was chosen, and why.
+    flags : tuple of Flag
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
+    >>> y = 3.0 * np.roll(u, 5) + 0.1 * noise
+    >>> estimate = cr.impulse_from_io(cr.Record(0.01 * np.arange(2000), u, y), 20)
+    >>> print(f"{estimate.markov[5]:.3f} +- {2 * estimate.std[5]:.3f}")
+    2.998 +- 0.004
+    >>> print(estimate.noise_std.round(2))
+    [0.1]
+    """
+
+    std: FloatArray
+    noise_std: FloatArray
+    method: str
+    rows: int
+    choices: tuple[str, ...]
+    flags: tuple[Flag, ...]
+
+    def __init__(
+        self,
+        markov: ArrayLike,
+        dt: float,
+        *,
+        std: FloatArray,
+        noise_std: FloatArray,
+        method: str,
+        rows: int,
+        choices: tuple[str, ...] = (),
+        flags: tuple[Flag, ...] = (),
+        name: str = "",
+    ) -> None:
+        super().__init__(markov, dt, name=name)
+        fix = object.__setattr__
+        fix(self, "std", read_only(std))
+        fix(self, "noise_std", read_only(noise_std))
+        fix(self, "method", method)
+        fix(self, "rows", rows)
+        fix(self, "choices", choices)
+        fix(self, "flags", flags)
+
+    def _title(self) -> str:
+        return f"Impulse response {self.name!r}" if self.name else "Impulse response"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        gains = np.atleast_2d(self.markov.sum(axis=-1))
+        return [
+            ("method", self.method),
+            ("length", f"{self.n_samples} samples of {in_time(self.dt, 6)}, {self.rows} equations"),
+            ("sum (gain)", ", ".join(f"{g:.4g}" for g in gains.ravel())),
+            ("largest std", f"{self.std.max():.3g}"),
+            ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
+        ]
+
+    def __repr__(self) -> str:
+        return super().__repr__().replace("<ImpulseResponse", "<ImpulseEstimate")

@@ -1,0 +1,60 @@
+"""What a record refuses: text, wrong shapes, values that no instrument shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .._checks import spelled_out
+from ..errors import DataError, OptionError
+from ..numerics.arrays import FloatArray
+from ..numerics.signals.time_axis import EXTREME
+
+
+def check_shape(values: FloatArray, what: str, samples: int) -> None:
+    """Refuse a signal that is not (N,) or (signals, N) with the N of the time axis."""
+    if values.ndim not in (1, 2) or values.size == 0:
+        raise DataError(f"{what} has shape {values.shape}; needed is ({samples},) or (signals, N)")
+    if values.shape[-1] != samples:
+        turned = values.ndim == 2 and values.shape[0] == samples
+        hint = f"; it looks transposed, pass {what}.T" if turned else ""
+        raise DataError(f"{what} has {values.shape[-1]} samples, time has {samples}{hint}")
+
+
+def check_finite(values: FloatArray, what: str, *, allow_nan: bool = False) -> None:
+    """Refuse infinities, and NaN unless it stands for a missing sample."""
+    bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
+    if bad.any():
+        first = int(np.flatnonzero(bad.any(axis=0) if values.ndim == 2 else bad)[0])
+        count = int(bad.sum())
+        raise DataError(
+            f"{what} has {count} non-finite sample{'s' if count > 1 else ''}, "
+            f"the first at index {first}"
+        )
+
+
+def check_size(values: FloatArray, what: str) -> None:
+    """Refuse numbers that no instrument shows and whose squares overflow."""
+    # NaN stands for a missing sample here, and is not larger than anything
+    large = np.abs(values) > EXTREME
+    if large.any():
+        first = int(np.flatnonzero(large.any(axis=0) if values.ndim == 2 else large)[0])
+        raise DataError(
+            f"{what} is beyond {EXTREME:g} at index {first}; is the file damaged, or a unit wrong?"
+        )
+
+
+def labelled(
+    given: Sequence[str] | None, count: int, letter: str, argument: str
+) -> tuple[str, ...]:
+    """Return one name for each of `count` signals, made from `letter` if none are given."""
+    if given is None:
+        return (letter,) if count == 1 else tuple(f"{letter}[{i}]" for i in range(count))
+    if not isinstance(given, Sequence):
+        raise OptionError(f"{argument} is a {type(given).__name__}; needed are {count} names")
+    labels = (given,) if isinstance(given, str) else tuple(given)
+    labels = tuple(spelled_out(str(label)) for label in labels)
+    if len(labels) != count or len(set(labels)) != count:
+        raise OptionError(f"{argument}={labels!r}; needed are {count} different names")
+    return labels

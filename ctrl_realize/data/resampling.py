@@ -1,0 +1,57 @@
+"""A uniform time axis for samples whose time jitters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._checks import numbers, positive, real
+from ..errors import DataError, OptionError, TimeAxisError
+from ..numerics.arrays import FloatArray
+from ..numerics.signals.time_axis import axis_fault, sample_time
+from .record_checks import check_finite, check_shape, check_size
+
+MIN_SAMPLES = 3
+MAX_DENSER = 100
+
+
+def resampled(
+    time: ArrayLike, input: ArrayLike, output: ArrayLike, dt: float | None, max_jitter: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Interpolate time, input and output; see `Record.resampled`."""
+    if real(max_jitter, "max_jitter", "in sample steps, >= 0") < 0:
+        raise OptionError(f"max_jitter={max_jitter:g}; needed is >= 0, in sample steps")
+    stamps = numbers(time, "time")
+    if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
+        raise DataError(f"time has shape {stamps.shape}; needed is (N,), N >= {MIN_SAMPLES}")
+    check_finite(stamps, "time")
+    check_size(stamps, "time")
+    steps = np.diff(stamps)
+    fault = axis_fault(stamps) if np.any(steps <= 0) else None
+    if fault is not None:
+        raise TimeAxisError(f"{fault}; resampling needs time that rises")
+    usual = float(np.median(steps))
+    worst = int(np.argmax(steps))
+    if steps[worst] > (1 + max_jitter) * usual:
+        raise TimeAxisError(
+            f"time has a gap at row {worst + 1}: {steps[worst]:.6g} s where {usual:.6g} s is "
+            f"usual; max_jitter={max_jitter:g} allows {(1 + max_jitter) * usual:.6g} s"
+        )
+    step = sample_time(stamps) if dt is None else positive(dt, "dt", "sample time in s")
+    samples = (stamps[-1] - stamps[0]) / step
+    if samples > MAX_DENSER * stamps.size:
+        raise OptionError(
+            f"dt={step:g} s makes {samples:.4g} samples of {stamps.size}; at most "
+            f"{MAX_DENSER} times as many are made"
+        )
+    count = int(np.floor(samples * (1 + 1e-12))) + 1
+    uniform = stamps[0] + step * np.arange(count)
+    moved = []
+    for what, given in (("input", input), ("output", output)):
+        values = numbers(given, what)
+        check_shape(values, what, stamps.size)
+        check_finite(values, what)
+        rows = np.atleast_2d(values)
+        fresh = np.stack([np.interp(uniform, stamps, row) for row in rows])
+        moved.append(fresh[0] if values.ndim == 1 else fresh)
+    return uniform, moved[0], moved[1]

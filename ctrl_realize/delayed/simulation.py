@@ -1,0 +1,126 @@
+"""Simulation of a model with the input of a record, from a start that nobody has measured."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, Literal
+
+import control as ct
+import numpy as np
+
+from .._checks import one_of
+from ..data import Record
+from ..data.given import check_complete
+from ..errors import DataError, UnsuitableSystemError
+from ..numerics.arrays import FloatArray
+from ..numerics.state_space.responses import markov, step_response
+from . import DelayedStateSpace
+
+Start = Literal["estimate", "rest"]
+
+PIECES = 16
+"""Levels into which the unknown input within a dead time is divided at most."""
+
+
+def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatArray:
+    """Simulate the outputs of a record, shape (p, N), with the start that fits it best.
+
+    Misses count as parts of the range of each output. An offset of every output is always free.
+    With ``start="estimate"`` so are the state of the core, and what was on its way through the
+    dead times when the record began.
+    """
+    one_of(start, "start", ("estimate", "rest"))
+    check_complete(record, "a simulation")
+    model = as_delayed(system, record)
+    u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
+    p, N = y.shape
+    # At rest, the input stood at its first value before the record.
+    forced = np.atleast_2d(model.simulate(u - u[:, :1]))
+    columns = [np.kron(np.eye(p), np.ones((N, 1)))]
+    if start == "estimate":
+        columns += _unknown_starts(model, N)
+    regressors = np.hstack(columns)
+    # Every output in its own unit, lest the large ones alone say where the simulation starts.
+    unit = np.repeat(_units(y), N)
+    alike = regressors / unit[:, None]
+    scale = np.linalg.norm(alike, axis=0)
+    scale[scale == 0] = 1.0
+    weights = np.linalg.lstsq(alike / scale, (y - forced).ravel() / unit, rcond=1e-10)[0]
+    return np.asarray(forced + (regressors @ (weights / scale)).reshape(p, N))
+
+
+def _units(outputs: FloatArray) -> FloatArray:
+    """Range of every output over the largest one; 1 where an output stands still."""
+    ranges = np.ptp(outputs, axis=1)
+    largest = ranges.max() or 1.0
+    return np.asarray(np.where(ranges > 0, ranges, largest) / largest)
+
+
+def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
+    """Responses (p N, columns) to the initial state, and to what is inside the delay chains."""
+    core = model.delay_free
+    n, p, m = core.nstates, core.noutputs, core.ninputs
+    free = markov(core.A, np.eye(n), core.C, np.zeros((p, n)), N + 1)[:, :, 1:]
+    parts = [_through_outputs(free, model)] if n else []
+    if any(model.input_delays):
+        steps = step_response(core.A, core.B, core.C, core.D, N)
+        for j in range(m):
+            pulses = [
+                _later(steps[:, [j]], first) - _later(steps[:, [j]], last)
+                for first, last in _pieces(min(model.input_delays[j], N))
+            ]
+            if pulses:
+                parts.append(_through_outputs(np.concatenate(pulses, axis=1), model))
+    for i in range(p):
+        for first, last in _pieces(min(model.output_delays[i], N)):
+            level = np.zeros((p, N))
+            level[i, first:last] = 1.0
+            parts.append(level.reshape(-1, 1))
+    return parts
+
+
+def _pieces(samples: int) -> list[tuple[int, int]]:
+    edges = np.unique(np.linspace(0, samples, min(samples, PIECES) + 1).round())
+    return [(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def _later(responses: FloatArray, samples: int) -> FloatArray:
+    out = np.zeros_like(responses)
+    out[..., samples:] = responses[..., : max(responses.shape[-1] - samples, 0)]
+    return out
+
+
+def _through_outputs(responses: FloatArray, model: DelayedStateSpace) -> FloatArray:
+    """Delay responses (p, columns, N) at the outputs, and lay them out as (p N, columns)."""
+    late = np.stack([_later(r, q) for r, q in zip(responses, model.output_delays, strict=True)])
+    return late.transpose(0, 2, 1).reshape(-1, responses.shape[1])
+
+
+def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedStateSpace:
+    """Check that a system fits a record, and give it delays (of zero) where it has none."""
+    if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
+        raise UnsuitableSystemError(
+            f"system is a {type(system).__name__}; needed is a discrete control.StateSpace"
+        )
+    model = system if isinstance(system, ct.StateSpace) else ct.ss(system)
+    if not model.isdtime(strict=True) or model.dt is True:
+        raise UnsuitableSystemError(
+            "the system is not discrete with a sample time; delayed_ss(system, dt=...) samples it"
+        )
+    if not np.isclose(model.dt, record.dt, rtol=1e-3, atol=0):
+        raise DataError(
+            f"the record has the sample time {record.dt:g} s, the system {model.dt:g} s"
+        )
+    if (model.ninputs, model.noutputs) != (record.n_inputs, record.n_outputs):
+        raise DataError(
+            f"the record has {record.n_inputs} inputs and {record.n_outputs} outputs, the system "
+            f"{model.ninputs} and {model.noutputs}"
+        )
+    delayed = model if isinstance(model, DelayedStateSpace) else DelayedStateSpace(model)
+    worst = np.abs(delayed.delay_free.poles()).max(initial=0.0)
+    if stable and worst > 1 + 1e-6:
+        raise UnsuitableSystemError(
+            f"the system is unstable (a pole at |z| = {worst:.6g}): its simulation runs away from "
+            "any record"
+        )
+    return delayed

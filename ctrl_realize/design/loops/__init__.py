@@ -1,0 +1,1 @@
+"""Open and closed loops: margins, performance, robustness."""

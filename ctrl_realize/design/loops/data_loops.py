@@ -1,0 +1,176 @@
+"""Open loops that are known at measured frequencies only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from ..._checks import whole
+from ...delayed.parts import check_entries
+from ...errors import DataError
+from ...frequency.points import MeasuredPoints, measured_points
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.loops.crossings import half_turns
+from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
+from ...results import Flag
+from .loop import open_loop
+
+
+@dataclass(frozen=True)
+class DataLoop:
+    """Loop response on a grid, interpolated in log magnitude and delay-free phase.
+
+    ``log_gain`` and ``phase`` are monotone cubics over log omega, which pass through the points
+    and do not overshoot between them; ``phase`` is without ``dead_time``.
+    """
+
+    omega: FloatArray
+    values: ComplexArray
+    std: FloatArray | None
+    repeats: float | None
+    dead_time: float
+    log_gain: Any
+    phase: Any
+    unstable_poles: int
+    integrators: int
+
+    def __call__(self, omega: FloatArray) -> ComplexArray:
+        """Interpolated response."""
+        x = np.log(omega)
+        turn = self.phase(x) - omega * self.dead_time
+        return np.asarray(np.exp(self.log_gain(x) + 1j * turn), dtype=np.complex128)
+
+    def dense(self) -> tuple[FloatArray, ComplexArray]:
+        """Grid with 8 points between neighbours, and more where the delay turns fast."""
+        low, top = self.omega[0], self.omega[-1]
+        ratios = np.log(self.omega[1:] / self.omega[:-1])
+        share = np.arange(8) / 8
+        inner = (self.omega[:-1, None] * np.exp(ratios[:, None] * share)).ravel()
+        turns = int(16 * abs(self.dead_time) * top / (2 * np.pi)) + 2
+        grid = np.unique(np.concatenate([inner, self.omega, np.linspace(low, top, turns)]))
+        return grid, self(grid)
+
+    def closed_loop_count(self) -> tuple[int, bool]:
+        """Nyquist count between the first and the last point; see `flags` for what is assumed."""
+        grid, values = self.dense()
+        # An integrator would start the curve a quarter turn away from the real axis; a stable
+        # high-pass in its place starts it there.
+        slow = (1j * grid / (1j * grid + 0.1 * grid[-1])) ** self.integrators
+        turns = half_turns((1 + values) * slow)
+        # Beyond the last point the loop is taken to be small, and the curve to return to 1.
+        turns -= float(np.angle(1 + values[-1]) + np.angle(slow[-1])) / np.pi
+        count = self.unstable_poles - turns
+        return max(0, round(count)), abs(count - round(count)) > 0.25
+
+    def flags(self) -> tuple[Flag, ...]:
+        """Warn of what lies outside the band."""
+        found = []
+        if abs(self.values[-1]) > 0.9:
+            found.append(
+                Flag(
+                    "band_ends_early",
+                    f"|L| is still {abs(self.values[-1]):.3g} at the last point "
+                    f"({self.omega[-1]:.4g} rad/s): crossovers above it are not seen, and "
+                    "stability cannot be told",
+                )
+            )
+        if self.integrators == 0 and abs(np.sin(np.angle(self.values[0]))) > 0.5:
+            found.append(
+                Flag(
+                    "band_starts_late",
+                    f"the phase at the first point ({self.omega[0]:.4g} rad/s) is "
+                    f"{np.degrees(np.angle(self.values[0])):.3g} deg, far from the real axis: "
+                    "the count assumes that it goes there directly",
+                )
+            )
+        return tuple(found)
+
+
+def data_loop(
+    plant: Any, controller: Any, unstable_poles: int, integrators: int | None
+) -> DataLoop:
+    """Make a `DataLoop` of measured or computed responses, with systems on their grid."""
+    data = plant if isinstance(plant, ct.FrequencyResponseData) else controller
+    other = controller if data is plant else plant
+    check_entries(data)
+    points = _above_zero(data)
+    _check_points(points)
+    omega, values, std, known = points.omega, points.response, points.std, 0.0
+    if other is not None:
+        beside = _on_grid(other, omega)
+        values = values * beside.values
+        known = beside.delay
+        if integrators is None and beside.integrators:
+            integrators = beside.integrators + _read_integrators(omega, points.response)
+        std = None if std is None else std * np.abs(beside.values)
+    # What is known of the delay is taken out before the rest is searched for.
+    wait = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
+    phase = unwrap_with_dead_time(omega, values, wait) + omega * wait
+    x = np.log(omega)
+    if integrators is None:
+        integrators = _read_integrators(omega, values)
+    return DataLoop(
+        omega,
+        values,
+        std,
+        points.repeats,
+        wait,
+        PchipInterpolator(x, np.log(np.abs(values))),
+        PchipInterpolator(x, phase),
+        whole(unstable_poles, "unstable_poles", 0),
+        whole(integrators, "integrators", 0),
+    )
+
+
+def _above_zero(data: ct.FrequencyResponseData) -> MeasuredPoints:
+    points = measured_points(data)
+    return points.only(points.frequency_hz > 0)
+
+
+def _check_points(points: MeasuredPoints) -> None:
+    """Refuse what cannot be interpolated."""
+    count = points.frequency_hz.size
+    if count < 3 or np.any(np.diff(points.frequency_hz) <= 0):
+        raise DataError(
+            f"the response has {count} points above 0 rad/s, needed are at least 3 distinct "
+            "ones; average repeated frequencies first"
+        )
+    if np.any(points.response == 0):
+        raise DataError("the response is 0 at some frequency; leave that point out")
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """The other part of a loop on the grid of the data; `delay` in s is what is known of it."""
+
+    values: ComplexArray
+    delay: float = 0.0
+    integrators: int = 0
+
+
+def _on_grid(other: Any, omega: FloatArray) -> _Beside:
+    """Evaluate what stands beside the data in the loop."""
+    if not isinstance(other, ct.FrequencyResponseData):
+        loop = open_loop(other)
+        return _Beside(loop(omega), loop.delay, loop.integrators())
+    points = _above_zero(other)
+    if not np.array_equal(points.omega, omega):
+        raise DataError("the two responses have different frequencies; interpolate one first")
+    return _Beside(points.response)
+
+
+def _read_integrators(omega: FloatArray, values: ComplexArray) -> int:
+    """Read the number of integrators off the slope of the gain over the lowest octave.
+
+    The phase alone does not tell: an unstable pole starts at -180 deg too.
+    """
+    lowest = np.flatnonzero((omega <= 2 * omega[0]) | (np.arange(omega.size) < 3))
+    gain = np.abs(values[lowest])
+    if np.median(gain) < 3:
+        return 0
+    slope = np.polyfit(np.log(omega[lowest]), np.log(gain), 1)[0]
+    return int(np.clip(np.round(-slope), 0, 3))

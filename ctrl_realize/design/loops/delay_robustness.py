@@ -1,0 +1,239 @@
+"""What a loop does when the dead time is not the one it was designed for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._wording import in_time, interval_in_time
+from ...delayed import DelayedStateSpace
+from ...errors import OptionError
+from ...numerics.arrays import BoolArray, FloatArray, IntArray, locked, read_only
+from ...numerics.blas_threads import single_threaded
+from ...results import Result
+from ..resolved import warn_unresolved
+from ..siso import delayed_system, held_fraction, interval_of_dead_time
+from .loop import Loop, open_loop
+from .margin_result import Margins
+from .margins import loop_margins
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MAX_DELAYS = 21
+"""Most delays within an interval that are tried."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DelayRobustness(Result):
+    """Stability and margins of one controller over a range of dead times.
+
+    ``stable`` is true when the loop is stable for every delay within `dead_time_interval` (widened
+    to whole samples and to the nominal delay); `stable_from` and `stable_to` bound the whole range
+    around the nominal delay in which it is stable.
+
+    Attributes
+    ----------
+    delays : ndarray of int, shape (K,)
+        Delays tried, in samples, rising.
+    stable_at : ndarray of bool, shape (K,)
+    modulus_margin : ndarray, shape (K,)
+        ``min |1 + L|``; 0 where unstable.
+    dead_time_interval : tuple of float
+        In s, from the identification or as given.
+    nominal : int
+        Delay of the system as given.
+    dt : float
+    stable_from, stable_to : float
+        Dead times in s, in whole samples; beyond them the loop is unstable.
+    held : float
+        Time in s by which the delay overstates the dead time, where the core holds a fraction of
+        a sample: ``dead_times = delays * dt - held``.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([4.0, -3.8], [1, -1], 0.01))
+    >>> found = cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
+    >>> print(f"stable from {found.stable_from:.2f} to {found.stable_to:.2f} s")
+    stable from 0.08 to 0.12 s
+    >>> print(f"worst modulus margin {found.worst_modulus_margin:.2f}")
+    worst modulus margin 0.11
+    """
+
+    delays: IntArray
+    stable_at: BoolArray
+    modulus_margin: FloatArray
+    dead_time_interval: tuple[float, float]
+    nominal: int
+    dt: float
+    stable_from: float
+    stable_to: float
+    held: float = 0.0
+
+    @property
+    def stable(self) -> bool:
+        """Stable over the whole interval, delays between those tried included."""
+        times = self.dead_times[self._inside()]
+        slack = 1e-6 * self.dt
+        # nan, of a loop that is unstable to begin with, compares as false.
+        return bool(
+            self.stable_from <= max(times.min(), 0.0) + slack
+            and times.max() <= self.stable_to + slack
+        )
+
+    @property
+    def worst_modulus_margin(self) -> float:
+        """Smallest modulus margin over the interval; its inverse is the worst Ms."""
+        return float(self.modulus_margin[self._inside()].min())
+
+    @property
+    def dead_times(self) -> FloatArray:
+        """Dead times in s that belong to `delays`."""
+        return np.asarray(self.delays * self.dt - self.held, dtype=np.float64)
+
+    def _inside(self) -> BoolArray:
+        low, high = self.dead_time_interval
+        inside = (self.delays >= np.floor((low + self.held) / self.dt + 1e-9)) & (
+            self.delays <= np.ceil((high + self.held) / self.dt - 1e-9)
+        )
+        return np.asarray(inside | (self.delays == self.nominal), dtype=np.bool_)
+
+    def table(self) -> pd.DataFrame:
+        """One row for each delay."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "delay": self.delays,
+                "dead_time": self.dead_times,
+                "stable": self.stable_at,
+                "modulus_margin": self.modulus_margin,
+            }
+        )
+
+    def _title(self) -> str:
+        return "Robustness to the dead time"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        low, high = self.dead_time_interval
+        return [
+            (
+                "nominal",
+                f"{in_time(self.nominal * self.dt - self.held, 4)} ({self.nominal} samples)",
+            ),
+            ("interval", interval_in_time(low, high)),
+            ("over the interval", "stable" if self.stable else "UNSTABLE somewhere"),
+            ("worst modulus margin", f"{self.worst_modulus_margin:.4g}"),
+            ("stable", f"from {in_time(self.stable_from, 4)} to {in_time(self.stable_to, 4)}"),
+        ]
+
+    def __repr__(self) -> str:
+        word = "stable" if self.stable else "unstable somewhere"
+        low, high = self.dead_time_interval
+        return f"<DelayRobustness {word} in {low:.4g}...{high:.4g} s>"
+
+
+@single_threaded
+def delay_robustness(
+    system: Any, controller: Any, dead_time_interval: tuple[float, float] | None = None
+) -> DelayRobustness:
+    """Check a controller over an interval of dead times.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Plant; its core stays, its delay is varied.
+    controller : system
+        Of the same sample time.
+    dead_time_interval : (float, float), optional
+        In s; by default that of the identification, ``system.fit.dead_time_interval``.
+
+    Returns
+    -------
+    DelayRobustness
+
+    Raises
+    ------
+    OptionError
+        No interval given and none known, or one that is none.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([2.0, -1.8], [1, -1], 0.01))
+    >>> cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
+    <DelayRobustness stable in 0.08...0.12 s>
+    """
+    plant = delayed_system(system, "robustness to the dead time")
+    warn_unresolved(plant)
+    interval = interval_of_dead_time(plant, dead_time_interval)
+    if interval is None:
+        raise OptionError(
+            "the system carries no interval of its dead time; give "
+            "dead_time_interval=(low, high) in s"
+        )
+    loop = open_loop(plant, controller)
+    return over_interval(plant, loop, loop_margins(loop), interval, MAX_DELAYS)
+
+
+def over_interval(
+    plant: DelayedStateSpace,
+    loop: Loop,
+    found: Margins,
+    interval: tuple[float, float],
+    most: int,
+) -> DelayRobustness:
+    """Vary the delay of a loop's first factor, the plant; `found` are the loop's own margins.
+
+    Within the interval at most `most` delays are tried, its ends always.
+    """
+    low, high = interval
+    nominal, dt, held = int(plant.delay), float(plant.dt), held_fraction(plant)
+    first = int(np.floor((low + held) / dt + 1e-9))
+    last = int(np.ceil((high + held) / dt - 1e-9))
+    step = max(1, -(-(last - first) // (most - 1)))
+    delays = np.unique([*range(first, last, step), last, nominal]).astype(np.int64)
+    sizes = np.array([_modulus(found if d == nominal else _at(loop, int(d))) for d in delays])
+    earlier, later = _room(found)
+    return DelayRobustness(
+        delays=locked(delays),
+        stable_at=locked(sizes > 0),
+        modulus_margin=read_only(sizes),
+        dead_time_interval=interval,
+        nominal=nominal,
+        dt=dt,
+        stable_from=float(np.maximum(0.0, dt * (nominal - earlier) - held)),
+        stable_to=dt * (nominal + later) - held,
+        held=held,
+    )
+
+
+def _at(loop: Loop, delay: int) -> Margins:
+    # The chain of so long a delay need not exist for its response to be known.
+    plant = replace(loop.factors[0], delay=delay)
+    return loop_margins(replace(loop, factors=(plant, *loop.factors[1:])))
+
+
+def _modulus(found: Margins) -> float:
+    return found.modulus_margin if found.stable else 0.0
+
+
+def _room(found: Margins) -> tuple[float, float]:
+    """Whole samples that the delay may shrink and grow by; nan from an unstable start.
+
+    The gain of the loop does not depend on the delay: stability is lost where one of its gain
+    crossovers turns to -1, and nowhere else.
+    """
+    if not found.stable:
+        return float("nan"), float("nan")
+    lag = np.mod(np.radians(found.phase_margins), 2 * np.pi)
+    waits = np.array([2 * np.pi - lag, lag]) / found.gain_crossovers / found.dt
+    earlier, later = np.ceil(waits.min(axis=1, initial=np.inf)) - 1
+    return float(earlier), float(later)

@@ -1,0 +1,191 @@
+"""One system of a loop, as functions of frequency that a Nyquist count can use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...delayed import DelayedStateSpace
+from ...errors import UnsuitableSystemError
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.state_space.responses import frequency_response, schur_form
+from ..delay_line import DelayLineController
+
+NEAR_AXIS = 1e-7
+"""Poles closer than this to the border of stability, or beyond it, are reflected inwards."""
+
+MAX_FEATURES = 100
+"""Zeros are looked for in factors of at most this order; plain systems above it are chains."""
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One system of a loop.
+
+    ``response(w)`` and ``characteristic(w)`` take the shifted variable w = z - 1 (discrete) or
+    w = s (continuous). Near z = 1, where oversampled systems live, z - 1 keeps its digits.
+    """
+
+    response: Callable[[ComplexArray], ComplexArray]
+    characteristic: Callable[[ComplexArray], ComplexArray]
+    delay: int
+    hidden_delay: int
+    features: ComplexArray
+    poles: ComplexArray
+
+
+def factor(system: Any, dt: float, rate: float = 0.0) -> Factor:
+    """Make a `Factor` of one system, a number included; `rate` as in `reflected`."""
+    if isinstance(system, DelayLineController):
+        return _line_factor(system)
+    if isinstance(system, ct.TransferFunction):
+        return _polynomial_factor(system, dt, rate)
+    if isinstance(system, ct.StateSpace):
+        delay = int(system.delay) if isinstance(system, DelayedStateSpace) else 0
+        core = system.delay_free if isinstance(system, DelayedStateSpace) else system
+        return _state_space_factor(core, dt, rate, delay)
+    gain = complex(system)
+    none = np.zeros(0, dtype=np.complex128)
+    return Factor(lambda w: np.full(w.size, gain), np.ones_like, 0, 0, none, none)
+
+
+def reflected(
+    poles: ComplexArray, dt: float, rate: float = 0.0
+) -> tuple[ComplexArray, ComplexArray]:
+    """Find the poles at or beyond the border of stability, and stable places for them.
+
+    In continuous time `rate` (rad/s) says how far from the axis a place must be to be far.
+
+    Returns
+    -------
+    moved, places : ndarray
+        In the plane of z, or of s when `dt` is 0.
+    """
+    if dt:
+        moved = poles[np.abs(poles) > 1 - NEAR_AXIS]
+        size = np.abs(moved)
+        return moved, moved / size * np.minimum(1 / size, 0.9)
+    moved = poles[poles.real > -NEAR_AXIS * rate]
+    return moved, -np.maximum(np.abs(moved.real), 0.1 * rate) + 1j * moved.imag
+
+
+def pole_ratio(
+    poles: ComplexArray, dt: float, rate: float = 0.0
+) -> Callable[[ComplexArray], ComplexArray]:
+    """Make prod (z - p) / (z - q) over the poles p that `reflected` moves to q."""
+    origin = 1.0 if dt else 0.0
+    moved, places = (points - origin for points in reflected(poles, dt, rate))
+
+    def ratio(w: ComplexArray) -> ComplexArray:
+        value = np.ones(w.size, dtype=np.complex128)
+        for p, q in zip(moved, places, strict=True):
+            value *= (w - p) / (w - q)
+        return value
+
+    return ratio
+
+
+def in_s_plane(points: ComplexArray, dt: float) -> ComplexArray:
+    """Map poles or zeros to the s-plane; those at z = 0 have no place there."""
+    if not dt:
+        return points
+    # Far inside the circle nothing sharp happens that the even part of a grid would miss.
+    return np.asarray(np.log(points[np.abs(points) > 0.05]) / dt, dtype=np.complex128)
+
+
+def _state_space_factor(core: ct.StateSpace, dt: float, rate: float, delay: int) -> Factor:
+    A = np.asarray(core.A, dtype=np.float64)
+    shift = 1.0 if dt else 0.0
+    # The Schur form of A - I: the slow poles of an oversampled model keep their distance to 1.
+    form = schur_form(A - shift * np.eye(A.shape[0]))
+    poles = np.diag(form[0]) + shift
+    B, C, D = (np.asarray(M, dtype=np.float64) for M in (core.B, core.C, core.D))
+
+    def response(w: ComplexArray) -> ComplexArray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = frequency_response(form, B, C, D, w)
+        return np.asarray(values[0, 0], dtype=np.complex128)
+
+    features = poles
+    if 0 < core.nstates <= MAX_FEATURES:
+        zeros = np.asarray(core.zeros(), dtype=np.complex128)
+        features = np.concatenate([poles, zeros[np.isfinite(zeros)]])
+    # A plain system may hold a chain of its own: its order bounds how often it turns.
+    hidden = int(np.sum(np.abs(poles) < 1 - 1e-3)) if dt and core.nstates > 8 else 0
+    return Factor(
+        response, pole_ratio(poles, dt, rate), delay, hidden, in_s_plane(features, dt), poles
+    )
+
+
+def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> Factor:
+    num = np.atleast_1d(np.asarray(system.num[0][0], dtype=np.float64))
+    den = np.atleast_1d(np.asarray(system.den[0][0], dtype=np.float64))
+    num = np.trim_zeros(num, "f") if np.any(num) else np.zeros(1)
+    den = np.trim_zeros(den, "f")
+    if num.size > den.size:
+        raise UnsuitableSystemError(
+            f"{system.name!r} is improper (numerator of degree {num.size - 1} over "
+            f"{den.size - 1}); give its derivative a filter"
+        )
+    delay = 0
+    while dt and den.size > num.size and den[-1] == 0:
+        # Zeros at the end of den are a delay, and would lose digits in a shifted polynomial.
+        den, delay = den[:-1], delay + 1
+    poles = np.asarray(np.roots(den), dtype=np.complex128)
+    zeros = np.asarray(np.roots(num), dtype=np.complex128)
+    shift = 1.0 if dt else 0.0
+    top, bottom = (shifted_polynomial(p, shift) for p in (num, den))
+    ratio = pole_ratio(poles, dt, rate)
+
+    def response(w: ComplexArray) -> ComplexArray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(top(w) / bottom(w), dtype=np.complex128)
+
+    def characteristic(w: ComplexArray) -> ComplexArray:
+        # den itself over its roots: where roots of a cluster are inexact the dipole cancels.
+        exact = bottom(w)
+        rooted = den[0] * np.prod(w[:, None] + shift - poles, axis=1)
+        return np.asarray(ratio(w) * exact / rooted, dtype=np.complex128)
+
+    features = in_s_plane(np.concatenate([poles, zeros]), dt)
+    return Factor(response, characteristic, delay, 0, features, poles)
+
+
+def shifted_polynomial(
+    coefficients: FloatArray, shift: float
+) -> Callable[[ComplexArray], ComplexArray]:
+    """Make p(w + shift) as a function of w, by a Taylor shift where the degree allows it."""
+    degree = coefficients.size - 1
+    if shift == 0.0 or degree > 8:
+        return lambda w: np.asarray(np.polyval(coefficients, w + shift), dtype=np.complex128)
+    moved = coefficients.astype(np.float64)
+    for stop in range(degree, 0, -1):
+        for i in range(1, stop + 1):
+            moved[i] += shift * moved[i - 1]
+    return lambda w: np.asarray(np.polyval(moved, w), dtype=np.complex128)
+
+
+def _line_factor(system: DelayLineController) -> Factor:
+    dt = float(system.dt)
+    ratio = pole_ratio(system.inner_poles, dt)
+
+    def response(w: ComplexArray) -> ComplexArray:
+        forward, back = system.paths(w + 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(forward / back, dtype=np.complex128)
+
+    def characteristic(w: ComplexArray) -> ComplexArray:
+        return np.asarray(ratio(w) * system.paths(w + 1)[1], dtype=np.complex128)
+
+    return Factor(
+        response,
+        characteristic,
+        0,
+        2 * system.line_length,
+        in_s_plane(system.inner_poles, dt),
+        system.inner_poles,
+    )

@@ -1,0 +1,186 @@
+"""Open loops as functions of frequency, with what a Nyquist count must know about them.
+
+A loop is a product of factors. Each factor tells its exact response (core(z) z^-d, never a
+polynomial of the augmented matrix), and its *characteristic*: its open-loop characteristic
+polynomial over a stable reference polynomial of the same degree. The product of
+1 + L and all characteristics has the closed-loop poles as its zeros, and no pole outside the
+stable region. Poles on the unit circle therefore need no indented contour, and a pole cancelled
+inside the loop still counts as the closed-loop pole that it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...delayed.parts import check_entries
+from ...errors import UnsuitableSystemError
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.loops.crossings import frequency_grid
+from .factors import Factor, factor
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Product of factors: ``L(omega)``, exact at any delay.
+
+    Attributes
+    ----------
+    factors : tuple of Factor
+    dt : float
+        Sample time in s; 0 for a continuous loop.
+    dead_time : float
+        Delay in s of a continuous loop, beside its factors.
+    """
+
+    factors: tuple[Factor, ...]
+    dt: float
+    dead_time: float = 0.0
+
+    def variable(self, omega: FloatArray) -> ComplexArray:
+        """Compute w = exp(j omega dt) - 1, or j omega for a continuous loop."""
+        s = 1j * omega
+        return np.asarray(np.expm1(s * self.dt) if self.dt else s, dtype=np.complex128)
+
+    @property
+    def delay(self) -> float:
+        """Delay in s that stands apart from all dynamics."""
+        return self.dead_time + self.dt * sum(part.delay for part in self.factors)
+
+    def delay_free(self, omega: FloatArray) -> ComplexArray:
+        """Response without the delay that stands apart."""
+        w = self.variable(omega)
+        value = np.ones(omega.size, dtype=np.complex128)
+        with np.errstate(invalid="ignore"):
+            for part in self.factors:
+                value = value * part.response(w)
+        return value
+
+    def __call__(self, omega: FloatArray) -> ComplexArray:
+        """Loop response L at frequencies in rad/s."""
+        turn = np.exp(-1j * omega * self.delay)
+        return np.asarray(self.delay_free(omega) * turn, dtype=np.complex128)
+
+    def characteristic(self, omega: FloatArray) -> ComplexArray:
+        """Closed-loop characteristic function, without poles outside the stable region."""
+        w = self.variable(omega)
+        value = 1 + self(omega)
+        for part in self.factors:
+            value = value * part.characteristic(w)
+        return np.asarray(value, dtype=np.complex128)
+
+    @property
+    def poles(self) -> ComplexArray:
+        """All poles of the factors, delays excepted."""
+        return np.concatenate([part.poles for part in self.factors])
+
+    def integrators(self) -> int:
+        """Count the poles at z = 1 (s = 0)."""
+        origin = 1.0 if self.dt else 0.0
+        scale = 1e-7 if self.dt else 1e-9 * max(1.0, float(np.abs(self.poles).max(initial=0.0)))
+        return int(np.sum(np.abs(self.poles - origin) < scale))
+
+    def grid(self) -> FloatArray:
+        """Frequencies that follow the loop from far below its slowest pole to its end."""
+        features = np.concatenate([part.features for part in self.factors])
+        sizes = np.abs(features)
+        sizes = sizes[sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)]
+        if self.dt:
+            top = np.pi / self.dt
+            slowest = min(float(sizes.min(initial=top)), top)
+            hidden = sum(part.hidden_delay for part in self.factors) * self.dt
+            low = self._low_end(1e-3 * slowest)
+            return frequency_grid(low, top, features, self.delay + hidden)
+        slowest = float(sizes.min(initial=1 / self.delay if self.delay else 1.0))
+        low = self._low_end(1e-3 * slowest)
+        top = self._high_end(1e3 * float(sizes.max(initial=slowest)))
+        return frequency_grid(low, top, features, self.delay)
+
+    def _low_end(self, low: float) -> float:
+        # An integrating loop must start above gain 1, however slow it is. Where the gain does not
+        # grow towards 0 a zero cancels the integrator.
+        if self.integrators():
+            gain = abs(self.delay_free(np.array([low]))[0])
+            while gain < 10 and low > 1e-200:
+                low *= 1e-2
+                before, gain = gain, abs(self.delay_free(np.array([low]))[0])
+                if gain < 1.5 * before:
+                    break
+        return low
+
+    def _high_end(self, top: float) -> float:
+        if self.delay == 0:
+            return max(top, self._below(top))
+        return max(self._below(top * 1e-6), 20 / self.delay)
+
+    def _below(self, top: float) -> float:
+        # A strictly proper loop is done where its gain stays small.
+        for _ in range(60):
+            gains = np.abs(self.delay_free(top * np.geomspace(1, 1e3, 30)))
+            if gains.max() < 0.05 or np.ptp(gains) < 1e-3 * gains.max():
+                break
+            top *= 2
+        return top
+
+
+def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loop:
+    """Make a `Loop` of one or two single-input single-output systems.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Systems with several channels, of mixed time bases, or that are no linear systems.
+    """
+    systems = [plant] if controller is None else [plant, controller]
+    for system in systems:
+        if isinstance(system, (ct.StateSpace, ct.TransferFunction, int, float, np.number)):
+            check_entries(system)
+    bases = {base for base in map(_time_base, systems) if base is not None}
+    if len(bases) > 1:
+        words = " and ".join(_words(base) for base in sorted(bases))
+        raise UnsuitableSystemError(
+            f"plant and controller have different time bases: {words}; "
+            "sample the continuous one first (design.to_discrete, or .discretised(dt) of a PID)"
+        )
+    dt = bases.pop() if bases else 0.0
+    rate = 0.0 if dt else _rate(systems, dead_time)
+    return Loop(tuple(factor(system, dt, rate) for system in systems), dt, dead_time)
+
+
+def _rate(systems: list[Any], dead_time: float) -> float:
+    """Fastest rate of a continuous loop in rad/s: what counts as far from the axis."""
+    sizes = [
+        float(np.abs(system.poles()).max(initial=0.0))
+        for system in systems
+        if isinstance(system, (ct.StateSpace, ct.TransferFunction))
+    ]
+    return max([*sizes, 1 / dead_time if dead_time else 0.0]) or 1.0
+
+
+def _words(dt: float) -> str:
+    return f"dt = {dt:g} s" if dt else "continuous"
+
+
+def _time_base(system: Any) -> float | None:
+    """Return dt, 0.0 for continuous, None for a pure gain."""
+    if isinstance(system, (int, float, np.number)):
+        return None
+    if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
+        raise UnsuitableSystemError(
+            f"got a {type(system).__name__}; needed is a control.StateSpace, TransferFunction, "
+            "FrequencyResponseData or a number"
+        )
+    if not system.issiso():
+        raise UnsuitableSystemError(
+            f"{system.name!r} has {system.ninputs} inputs and {system.noutputs} outputs; margins "
+            "are for one input and one output. Take one channel, or look at "
+            "control.singular_values_response"
+        )
+    if system.dt is True:
+        raise UnsuitableSystemError(
+            f"{system.name!r} is discrete without a sample time (dt=True); give dt in s"
+        )
+    return None if system.dt is None else float(system.dt)

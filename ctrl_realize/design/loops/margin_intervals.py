@@ -1,0 +1,186 @@
+"""How well measured data know the margins of a loop.
+
+The errors of the points are taken to be independent, Gaussian and equal in all directions of the
+plane; their standard deviation is known, or from the scatter of so many repeats. Around each
+measured value lies a disk for the true one, and what a margin may be is read off these disks. A
+derivative at the crossover that was measured would not do: noise lets a flat loop cross the unit
+circle many times, and the derivative at one crossing knows nothing of the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.statistics import circle_quantile, upper_quantile
+from .data_loops import DataLoop
+from .margin_result import Margins
+
+Interval = tuple[float, float]
+Stretch = tuple[float, float, bool]
+"""Lowest and highest value that a stretch of frequency allows, and whether it must hold one."""
+
+TAIL = 0.025
+"""Probability that is left beyond either end of an interval."""
+
+NEAR = np.geomspace(1e-8, 0.1, 280)
+"""Relative distances from a crossover at which the curve is looked at, for the smallest noise."""
+
+
+@dataclass(frozen=True)
+class _Tube:
+    """The measured curve and the radius of its disks.
+
+    On a curve without noise a margin depends on one direction of the error only, and 1.96 standard
+    deviations of it (Student's where repeats told them) are exact to first order; noise beside the
+    crossover makes the interval wider, never narrower.
+    """
+
+    omega: FloatArray
+    values: ComplexArray
+    spread: FloatArray
+    alone: float
+    together: float
+
+    @property
+    def radius(self) -> FloatArray:
+        return self.alone * self.spread
+
+    def runs(self, distance: FloatArray, side: FloatArray) -> list[tuple[slice, bool]]:
+        """Stretches of frequency in which the truth may cross a line, and whether it must.
+
+        Beyond a stretch all disks together (`together`) tell on which side of the line it is.
+        """
+        near = np.concatenate([[False], distance <= self.together * self.spread, [False]])
+        starts, stops = np.flatnonzero(near[1:] & ~near[:-1]), np.flatnonzero(near[:-1] & ~near[1:])
+        found = []
+        for start, stop in zip(starts, stops, strict=True):
+            inside = start > 0 and stop < self.omega.size
+            crosses = inside and side[start - 1] * side[stop] < 0
+            found.append((slice(int(start), int(stop)), bool(crosses)))
+        return found
+
+
+def margin_intervals(loop: DataLoop, plain: Margins) -> dict[str, Interval]:
+    """95 % intervals of the margins of measured data.
+
+    Phase and delay margin: disks that meet the unit circle. Gain margin: disks that meet the
+    negative real axis. The true crossover is somewhere, and it is the disk at that one frequency
+    that has to hold the truth, whatever noise does elsewhere. Modulus margin: `closest_approach`.
+    """
+    tube = _tube(loop, np.concatenate([plain.gain_crossovers, plain.phase_crossovers]))
+    found = {}
+    phases, waits = _phase_margins(tube)
+    if plain.phase_margins.size:
+        low, high = _nearest(phases)
+        found["phase_margin"] = (float(np.degrees(low)), float(np.degrees(high)))
+    if plain.gain_margins.size:
+        low, high = _nearest(_log_gain_margins(tube))
+        found["gain_margin"] = (float(np.exp(low)), float(np.exp(high)))
+    found["modulus_margin"] = closest_approach(loop)
+    if plain.stable and np.isfinite(plain.delay_margin):
+        found["delay_margin"] = _nearest(waits)
+    return found
+
+
+def closest_approach(loop: DataLoop) -> Interval:
+    r"""Interval of at least 95 % for ``min |1 + L|``.
+
+    The smallest of many distances that are measured with errors is too small by itself, and
+    more so the flatter the minimum; an interval around it would not cover the truth. Here each
+    point bounds its own distance :math:`\theta_i`, from the distance r that was measured and the
+    standard deviation s in any direction:
+
+    .. math:: \sqrt{r_i^2 - a s_i^2} - z s_i \le \theta_i \le r_i + z' s_i.
+
+    The smallest lower bound holds as soon as that of the truly closest point does: z = 1.96. The
+    smallest upper bound needs all of them to hold: z' is for 0.025 / K with K points. With
+    ``a = -2 log 0.025 - z^2`` the bound is exact at distance 0 and far away, and conservative
+    between (r is Rice-distributed). Where repeats told s, Student's quantiles and that of F take
+    the places.
+    """
+    spread = _spread(loop, loop.omega)
+    most = upper_quantile(TAIL / loop.omega.size, loop.repeats)
+    high = float(np.min(np.abs(1 + loop.values) + most * spread))
+    # Between the points the curve itself counts, with the error of its neighbours.
+    omega, values = loop.dense()
+    beside, z = _spread(loop, omega), upper_quantile(TAIL, loop.repeats)
+    # The circle counts in standard deviations of both directions together.
+    bend = 2 * circle_quantile(1 - TAIL, loop.repeats) ** 2 - z**2
+    inner = np.sqrt(np.maximum(np.abs(1 + values) ** 2 - bend * beside**2, 0))
+    return max(0.0, float(np.min(inner - z * beside))), high
+
+
+def _spread(loop: DataLoop, omega: FloatArray) -> FloatArray:
+    """Standard deviation in one direction of the plane; `std` is that of both together."""
+    assert loop.std is not None
+    beside = np.interp(np.log(omega), np.log(loop.omega), loop.std)
+    return np.asarray(beside / np.sqrt(2), dtype=np.float64)
+
+
+def _tube(loop: DataLoop, crossovers: FloatArray) -> _Tube:
+    grid, _ = loop.dense()
+    around = np.outer(crossovers, np.concatenate([1 - NEAR, [1.0], 1 + NEAR])).ravel()
+    omega = np.unique(np.concatenate([grid, around]))
+    omega = omega[(omega >= loop.omega[0]) & (omega <= loop.omega[-1])]
+    return _Tube(
+        omega,
+        loop(omega),
+        _spread(loop, omega),
+        upper_quantile(TAIL, loop.repeats),
+        upper_quantile(TAIL / (2 * loop.omega.size), loop.repeats),
+    )
+
+
+def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:
+    """Phase margins in rad and delay margins in s of each stretch that may meet the circle."""
+    size, radius = np.abs(tube.values), tube.radius
+    meets = np.abs(size - 1) <= radius
+    cosine = (size**2 + 1 - radius**2) / (2 * size)
+    arc = np.arccos(np.clip(cosine, -1, 1))
+    phases: list[Stretch] = []
+    waits: list[Stretch] = []
+    for part, crosses in tube.runs(np.abs(size - 1), size - 1):
+        at = np.arange(part.start, part.stop)[meets[part]]
+        if at.size == 0:
+            continue
+        # Phases of a stretch are counted from one of them, so that none is cut at 180 deg.
+        first = at[np.argmin(np.abs(size[at] - 1))]
+        middle = np.angle(-tube.values[first]) + np.angle(tube.values[at] / tube.values[first])
+        low, high = middle - arc[at], middle + arc[at]
+        phases.append((float(low.min()), float(high.max()), crosses))
+        # A lead of less than nothing is a lag of almost a turn; where -1 itself is within
+        # reach the loop may be at the border.
+        later = np.where(high < 0, 2 * np.pi, 0.0)
+        wait = np.maximum(low + later, 0) / tube.omega[at], (high + later) / tube.omega[at]
+        waits.append((float(wait[0].min()), float(wait[1].max()), crosses))
+    return phases, waits
+
+
+def _log_gain_margins(tube: _Tube) -> list[Stretch]:
+    """Logarithms of the gain margin of each stretch that may meet the negative real axis."""
+    x, y, radius = tube.values.real, tube.values.imag, tube.radius
+    half = np.sqrt(np.maximum(radius**2 - y**2, 0))
+    meets = (np.abs(y) <= radius) & (half - x > 0)
+    distance = np.where(x < 0, np.abs(y), np.abs(tube.values))
+    found: list[Stretch] = []
+    for part, crosses in tube.runs(distance, y):
+        at = np.arange(part.start, part.stop)[meets[part]]
+        if at.size:
+            smallest = float(np.min(-x[at] - half[at]))
+            high = -np.log(smallest) if smallest > 0 else float("inf")
+            found.append((float(-np.log(np.max(half[at] - x[at]))), float(high), crosses))
+    return found
+
+
+def _nearest(stretches: list[Stretch]) -> Interval:
+    """Interval of the value nearest to 0, of values that lie one or more in each stretch."""
+    close = [0.0 if low <= 0 <= high else min(abs(low), abs(high)) for low, high, _ in stretches]
+    far = [max(abs(low), abs(high)) for low, high, _ in stretches]
+    sure = [bound for bound, (_, _, crosses) in zip(far, stretches, strict=True) if crosses]
+    most = min(sure) if sure else max(far)
+    kept = [part for part, bound in zip(stretches, close, strict=True) if bound <= most]
+    low, high = min(part[0] for part in kept), max(part[1] for part in kept)
+    return max(low, -most), min(high, most)

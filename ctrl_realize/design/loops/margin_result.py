@@ -1,0 +1,152 @@
+"""What is known of the stability of a loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..._wording import in_time
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...results import Flag, Result
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Margins(Result):
+    """Stability margins of a loop with negative feedback.
+
+    With L the open loop: ``gain_margin = 1/|L|`` at a phase crossover, ``phase_margin = 180 deg +
+    arg L`` at a gain crossover, ``modulus_margin = min |1 + L|``, and ``delay_margin`` is the
+    least of ``(phase margin taken in 0...360 deg) / omega`` over all gain crossovers. Of several
+    gain or phase margins the one nearest to instability is given, as python-control does; all
+    crossovers are there.
+
+    Attributes
+    ----------
+    gain_margin : float
+        Ratio; below 1 where the gain must not be *reduced* further. inf without a phase crossover.
+    phase_margin : float
+        Degrees, -180...180. inf without a gain crossover.
+    modulus_margin : float
+        Smallest distance of L to -1; its inverse is the peak of the sensitivity, `ms`.
+    delay_margin : float
+        Dead time in s that may be added before the loop is unstable; nan if it already is.
+    delay_margin_samples : float
+        The same in samples; nan for a continuous loop.
+    stable : bool
+        Closed-loop stability, from a Nyquist count that sees every pole of the factors, hidden
+        ones and those on the unit circle included.
+    unstable_poles : int
+        Closed-loop poles on or outside the stable region.
+    gain_crossovers, phase_crossovers : ndarray
+        In rad/s, rising.
+    phase_margins, gain_margins : ndarray
+        One for each gain crossover in degrees, one for each phase crossover.
+    modulus_crossover : float
+        Where ``|1 + L|`` is smallest, rad/s.
+    dt : float
+        Sample time in s, 0 if continuous.
+    intervals : dict of str to (float, float)
+        For measured responses with a standard deviation, which counts as known unless the
+        response says from how many `repeats` it was taken: 95 % intervals of the four margins.
+        They hold at noise that makes the response cross and come back many
+        times, and are then not centred: the smallest of many noisy distances is too small by
+        itself. Otherwise empty.
+    flags : tuple of Flag
+    response : tuple of ndarray
+        (omega, L) as followed by the count, for drawing.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> found = cr.design.margins(plant, cr.design.pid(plant))
+    >>> print(f"gain {found.gain_margin:.2f}, phase {found.phase_margin:.1f} degrees")
+    gain 3.14, phase 61.4 degrees
+    >>> print(f"{1e3 * found.delay_margin:.1f} ms more dead time until it is unstable")
+    63.2 ms more dead time until it is unstable
+    """
+
+    gain_margin: float
+    phase_margin: float
+    modulus_margin: float
+    delay_margin: float
+    stable: bool
+    unstable_poles: int
+    gain_crossovers: FloatArray
+    phase_crossovers: FloatArray
+    phase_margins: FloatArray
+    gain_margins: FloatArray
+    modulus_crossover: float
+    dt: float
+    response: tuple[FloatArray, ComplexArray]
+    intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
+    flags: tuple[Flag, ...] = ()
+
+    @property
+    def delay_margin_samples(self) -> float:
+        """Delay margin in samples."""
+        return self.delay_margin / self.dt if self.dt else float("nan")
+
+    @property
+    def ms(self) -> float:
+        """Peak of the sensitivity, 1 / modulus_margin."""
+        return float(1 / self.modulus_margin) if self.modulus_margin else float("inf")
+
+    @property
+    def gain_crossover(self) -> float:
+        """Gain crossover of the phase margin, rad/s; nan without one."""
+        if self.phase_margins.size == 0:
+            return float("nan")
+        return float(self.gain_crossovers[np.argmin(np.abs(self.phase_margins))])
+
+    @property
+    def phase_crossover(self) -> float:
+        """Phase crossover of the gain margin, rad/s; nan without one."""
+        if self.gain_margins.size == 0:
+            return float("nan")
+        return float(self.phase_crossovers[np.argmin(np.abs(np.log(self.gain_margins)))])
+
+    def _title(self) -> str:
+        return "Stability margins"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        verdict = "stable" if self.stable else f"UNSTABLE ({self.unstable_poles} poles)"
+        delay = in_time(self.delay_margin, 4)
+        if np.isnan(self.delay_margin):
+            delay = "none: the loop is unstable as it is"
+        elif self.dt and np.isfinite(self.delay_margin):
+            delay += f" = {self.delay_margin_samples:.4g} samples"
+        rows = [
+            ("closed loop", verdict),
+            ("gain margin", _gain_in_words(self.gain_margin, self.phase_crossover)),
+            ("phase margin", _phase_in_words(self.phase_margin, self.gain_crossover)),
+            (
+                "modulus margin",
+                f"{self.modulus_margin:.4g} at {self.modulus_crossover:.4g} rad/s "
+                f"(Ms = {self.ms:.4g})",
+            ),
+            ("delay margin", delay),
+        ]
+        for name, (low, high) in self.intervals.items():
+            rows.append((f"95 % {name.replace('_', ' ')}", f"{low:.4g} ... {high:.4g}"))
+        return rows
+
+    def __repr__(self) -> str:
+        state = "stable" if self.stable else "unstable"
+        return (
+            f"<Margins {state}: gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} deg, "
+            f"modulus {self.modulus_margin:.4g}, delay {self.delay_margin:.4g} s>"
+        )
+
+
+def _gain_in_words(margin: float, crossover: float) -> str:
+    if not np.isfinite(margin):
+        return "infinite: the phase never crosses -180 deg"
+    return f"{margin:.4g} ({20 * np.log10(margin):.3g} dB) at {crossover:.4g} rad/s"
+
+
+def _phase_in_words(margin: float, crossover: float) -> str:
+    if not np.isfinite(margin):
+        return "infinite: the gain never crosses 1"
+    return f"{margin:.4g} deg at {crossover:.4g} rad/s"

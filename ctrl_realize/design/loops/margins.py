@@ -1,0 +1,253 @@
+"""Stability margins that are right at any dead time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._checks import real
+from ...errors import OptionError
+from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
+from ...numerics.loops.crossings import (
+    follow,
+    half_turns,
+    negative_axis_crossings,
+    smallest_distance,
+    unit_crossings,
+)
+from ...results import Flag
+from ..resolved import warn_unresolved
+from .data_loops import DataLoop, data_loop
+from .loop import Loop, open_loop
+from .margin_intervals import margin_intervals
+from .margin_result import Margins
+
+Curve = Callable[[FloatArray], ComplexArray]
+"""Response of a loop at frequencies in rad/s."""
+
+MARGINAL = 1e-9
+"""Distance to -1 below which the closed loop counts as being on the border of stability."""
+
+
+def margins(
+    loop: Any,
+    controller: Any = None,
+    *,
+    dead_time: float = 0.0,
+    unstable_poles: int = 0,
+    integrators: int | None = None,
+) -> Margins:
+    """Gain, phase, modulus and delay margin of a loop, exact at any dead time.
+
+    All crossovers are bracketed on the exact frequency response, core(z) z^-d, and found by root
+    finding. Stability is decided by a Nyquist count.
+
+    Parameters
+    ----------
+    loop : system or FrequencyResponseData
+        The open loop, or the plant if `controller` is given. Discrete systems with or without a
+        `DelayedStateSpace` among them, continuous systems, or a response from data.
+    controller : system or float, optional
+        Controller; the loop is then plant times controller with negative feedback. Giving both
+        apart is better than giving their product: poles that cancel are still counted.
+    dead_time : float, optional
+        Further dead time in s, for continuous systems, which cannot hold one.
+    unstable_poles : int, optional
+        For data only: unstable poles that the loop has.
+    integrators : int, optional
+        For data only: integrators in the loop; read off the slope of the gain over the lowest
+        octave when not given.
+
+    Returns
+    -------
+    Margins
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Several channels, mixed or missing time bases, an improper system.
+    OptionError
+        An option that does not belong to this kind of loop.
+
+    Notes
+    -----
+    python-control's ``stability_margins`` forms the polynomial of the augmented matrix first
+    and is silently wrong from d of about 37 on.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> valve = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.029, dt=0.001)
+    >>> pi = ct.ss(ct.tf([1, -0.99], [1, -1], 0.001))
+    >>> found = cr.design.margins(valve, pi)
+    >>> found.stable, round(found.gain_margin, 3), round(found.phase_margin, 2)
+    (True, 4.437, 77.4)
+    >>> round(1e3 * found.delay_margin, 1)
+    121.2
+    """
+    if isinstance(loop, ct.FrequencyResponseData) or isinstance(
+        controller, ct.FrequencyResponseData
+    ):
+        if dead_time:
+            raise OptionError(
+                "dead_time is for continuous systems; multiply the data by "
+                "exp(-j omega tau) instead"
+            )
+        return _from_data(data_loop(loop, controller, unstable_poles, integrators))
+    if unstable_poles or integrators is not None:
+        raise OptionError(
+            "unstable_poles and integrators are for measured responses; the poles of systems "
+            "are known"
+        )
+    wait = real(dead_time, "dead_time", "dead time in s, >= 0")
+    if wait < 0:
+        raise OptionError(f"dead_time={wait:g} s; needed is >= 0")
+    exact = open_loop(loop, controller, wait)
+    if wait and exact.dt:
+        raise OptionError(
+            f"dead_time={wait:g} s with a discrete loop; put the delay into the plant "
+            "(delayed_ss, or .replace(delay=...))"
+        )
+    warn_unresolved(loop)
+    return loop_margins(exact)
+
+
+def loop_margins(loop: Loop) -> Margins:
+    """Margins of a loop that is made already."""
+    omega, values = follow(loop, loop.grid())
+    count, marginal = closed_loop_count(loop, omega)
+    crossings = _crossings(loop, omega, values)
+    if loop.dt:
+        crossings = replace(crossings, phases=_with_ends(loop, crossings.phases))
+    start = float(abs(1 + loop(np.zeros(1))[0]))
+    if start < crossings.distance:
+        crossings = replace(crossings, distance=start, closest=0.0)
+    plain = _collect(loop, crossings, count, marginal, loop.dt)
+    # So close to -1 the count cannot tell the side.
+    stable = plain.stable and crossings.distance > MARGINAL
+    return replace(plain, stable=stable, delay_margin=plain.delay_margin if stable else np.nan)
+
+
+@dataclass(frozen=True)
+class _Crossings:
+    """Where a loop on the grid `omega` has gain 1, phase -180 deg, and is closest to -1."""
+
+    omega: FloatArray
+    values: ComplexArray
+    gains: FloatArray
+    phases: FloatArray
+    distance: float
+    closest: float
+
+
+def _crossings(loop: Curve, omega: FloatArray, values: ComplexArray) -> _Crossings:
+    distance, closest = smallest_distance(lambda w: 1 + loop(w), omega)
+    return _Crossings(
+        omega,
+        values,
+        unit_crossings(loop, omega, values),
+        negative_axis_crossings(loop, omega, values),
+        distance,
+        closest,
+    )
+
+
+def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
+    """Add omega = 0 and the Nyquist frequency where the real response there is negative."""
+    top = np.pi / loop.dt
+    start = loop(np.zeros(1))[0]
+    end = loop(np.array([top]))[0]
+    if np.isfinite(start) and start.real < 0:
+        phases = np.concatenate([[0.0], phases])
+    near = phases.size > 0 and abs(phases[-1] - top) < 1e-9 * top
+    if end.real < 0 and abs(end.imag) < 1e-6 * abs(end) and not near:
+        phases = np.concatenate([phases, [top]])
+    return phases
+
+
+def closed_loop_count(loop: Loop, omega: FloatArray) -> tuple[int, bool]:
+    """Count the closed-loop poles outside the stable region.
+
+    Returns
+    -------
+    count : int
+    marginal : bool
+        A closed-loop pole is so close to the border that no side can be told.
+    """
+    _, values = follow(loop.characteristic, omega)
+    if np.any(values == 0):
+        return 0, True
+    steps = np.abs(np.angle(values[1:] / values[:-1]))
+    turns = half_turns(values)
+    # A real system starts on the real axis, unless a closed-loop pole sits at frequency 0.
+    start = abs(float(np.sin(np.angle(values[0]))))
+    marginal = bool(np.any(steps > 2.0) or abs(turns - round(turns)) > 0.1 or start > 0.5)
+    return max(0, -round(turns)), marginal
+
+
+def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
+    if marginal:
+        return (
+            Flag(
+                "marginal",
+                "a closed-loop pole lies on the border of stability, as far as double precision "
+                "can tell",
+            ),
+        )
+    if count:
+        return (
+            Flag(
+                "unstable",
+                f"the closed loop has {count} unstable poles; the margins say how far it is from "
+                "being stable",
+            ),
+        )
+    return ()
+
+
+def _collect(loop: Curve, at: _Crossings, count: int, marginal: bool, dt: float) -> Margins:
+    """Read the margins off the crossings of a loop whose unstable poles are counted."""
+    # -1 is half a turn away: the angle of -L is the margin itself, in -180...180.
+    pm = np.degrees(np.angle(-loop(at.gains)))
+    gm = 1 / np.abs(loop(at.phases))
+    waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / at.gains
+    stable = count == 0 and not marginal
+    return Margins(
+        gain_margin=float(gm[np.argmin(np.abs(np.log(gm)))]) if gm.size else float("inf"),
+        phase_margin=float(pm[np.argmin(np.abs(pm))]) if pm.size else float("inf"),
+        modulus_margin=at.distance,
+        delay_margin=float(waits.min(initial=np.inf)) if stable else float("nan"),
+        stable=stable,
+        unstable_poles=count,
+        gain_crossovers=read_only(at.gains),
+        phase_crossovers=read_only(at.phases),
+        phase_margins=read_only(pm),
+        gain_margins=read_only(gm),
+        modulus_crossover=at.closest,
+        dt=dt,
+        response=(read_only(at.omega), locked(at.values)),
+        flags=_stability_flags(count, marginal),
+    )
+
+
+def _from_data(loop: DataLoop) -> Margins:
+    count, marginal = loop.closed_loop_count()
+    plain = _collect(loop, _crossings(loop, *loop.dense()), count, marginal, 0.0)
+    plain = replace(plain, flags=(*plain.flags, *loop.flags()))
+    if loop.std is None:
+        return plain
+    intervals = margin_intervals(loop, plain)
+    flags = plain.flags
+    if plain.stable and intervals["modulus_margin"][0] == 0:
+        unsure = Flag(
+            "within_noise",
+            "-1 lies within the noise of the response: another measurement may find the closed "
+            "loop unstable",
+        )
+        flags = (*flags, unsure)
+    return replace(plain, intervals=intervals, flags=flags)

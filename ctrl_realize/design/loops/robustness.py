@@ -1,0 +1,306 @@
+"""From what the identification is unsure of to what the loop can stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import numbers
+from ...delayed import DelayedStateSpace
+from ...errors import DataError, OptionError
+from ...numerics.arrays import ComplexArray, FloatArray, read_only
+from ...numerics.blas_threads import single_threaded
+from ...results import Result
+from ..resolved import warn_unresolved
+from ..siso import delayed_system, held_fraction, interval_of_dead_time
+from .loop import open_loop
+from .margin_result import Margins
+from .margins import margins
+
+GRID_POINTS = 400
+"""Frequencies of a bound where none are given."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class UncertaintyBound(Result):
+    """Multiplicative uncertainty: every plant is ``nominal (1 + Delta)``, ``|Delta| <= bound``.
+
+    ``bound = spread + delay_part``, the largest relative difference of the given systems and the
+    effect ``|exp(-j omega x) - 1|`` of the largest error x of the dead time.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (K,)
+        rad/s.
+    bound, spread, delay_part : ndarray, shape (K,)
+        Ratios.
+    nominal : DelayedStateSpace
+    n_systems : int
+        How many systems the spread is from.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.03).system(0.001)
+    >>> omega = np.array([1.0, 10.0])
+    >>> found = cr.design.uncertainty_bound(
+    ...     [1.1 * plant], plant, omega, dead_time_interval=(0.025, 0.035)
+    ... )
+    >>> print(found.spread.round(3), found.delay_part.round(3), found.bound.round(3))
+    [0.1 0.1] [0.005 0.05 ] [0.105 0.15 ]
+    """
+
+    omega: FloatArray
+    bound: FloatArray
+    spread: FloatArray
+    delay_part: FloatArray
+    nominal: DelayedStateSpace
+    n_systems: int
+
+    @property
+    def frd(self) -> ct.FrequencyResponseData:
+        """The bound as a `control.FrequencyResponseData`."""
+        return ct.frd(self.bound.astype(complex), self.omega, name="uncertainty", smooth=True)
+
+    def check(self, controller: Any) -> RobustnessCheck:
+        """Test a controller against this bound, see `robust_stability`."""
+        return robust_stability(self, controller)
+
+    def _title(self) -> str:
+        return "Multiplicative uncertainty"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        above = np.flatnonzero(self.bound >= 1)
+        where = f"{self.omega[above[0]]:.4g} rad/s" if above.size else "nowhere on the grid"
+        return [
+            ("systems", str(self.n_systems)),
+            ("at low frequency", f"{100 * self.bound[0]:.3g} %"),
+            ("reaches 100 % at", where),
+        ]
+
+    def __repr__(self) -> str:
+        return (
+            f"<UncertaintyBound {100 * self.bound[0]:.3g} % at {self.omega[0]:.3g} rad/s ... "
+            f"{100 * self.bound[-1]:.3g} % at {self.omega[-1]:.3g} rad/s>"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustnessCheck(Result):
+    """Whether a loop stays stable for every plant within a bound (small gain).
+
+    ``robust`` is ``nominal.stable`` and ``|T| bound < 1`` at every frequency; `margin` is by how
+    much the bound may be multiplied until that fails.
+
+    Attributes
+    ----------
+    robust : bool
+    margin : float
+    omega_critical : float
+        Where ``|T| bound`` is largest, rad/s.
+    complementary : ndarray, shape (K,)
+        ``|T|`` on the grid of the bound.
+    uncertainty : UncertaintyBound
+    nominal : Margins
+    performance : float
+        Largest ``|S| / (1 - |T| bound)``: the worst sensitivity peak of all plants within the
+        bound; inf where it is not robust.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.03).system(0.001)
+    >>> bound = cr.design.uncertainty_bound([1.3 * plant], plant, dead_time_interval=(0.025, 0.035))
+    >>> found = bound.check(cr.design.pid(plant))
+    >>> print(f"margin {found.margin:.2f}, least at {found.omega_critical:.1f} rad/s")
+    margin 2.59, least at 23.5 rad/s
+    """
+
+    robust: bool
+    margin: float
+    omega_critical: float
+    complementary: FloatArray
+    uncertainty: UncertaintyBound
+    nominal: Margins
+    performance: float
+
+    def _title(self) -> str:
+        return "Robust stability"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        worst = f"{self.performance:.4g}" if np.isfinite(self.performance) else "unbounded"
+        return [
+            ("nominal loop", "stable" if self.nominal.stable else "UNSTABLE"),
+            ("all plants within the bound", "stable" if self.robust else "NOT guaranteed"),
+            ("bound may grow by", f"{self.margin:.4g} (at {self.omega_critical:.4g} rad/s)"),
+            ("worst sensitivity peak", f"{worst} (nominal {self.nominal.ms:.4g})"),
+        ]
+
+    def __repr__(self) -> str:
+        word = "robust" if self.robust else "not robust"
+        return (
+            f"<RobustnessCheck {word}: margin {self.margin:.3g} at {self.omega_critical:.3g} rad/s>"
+        )
+
+
+def uncertainty_bound(
+    systems: Any,
+    nominal: DelayedStateSpace | None = None,
+    omega: ArrayLike | None = None,
+    *,
+    dead_time_interval: tuple[float, float] | None = None,
+) -> UncertaintyBound:
+    """Bound the relative error of a nominal model by the spread of many and the unsure dead time.
+
+    Parameters
+    ----------
+    systems : Campaign or sequence of systems
+        Models of the same plant; may be empty where only the dead time is unsure.
+    nominal : DelayedStateSpace, optional
+        By default the campaign's ``system``, or the first of the sequence.
+    omega : array_like, optional
+        rad/s, rising, > 0; by default 400 points up to the Nyquist frequency.
+    dead_time_interval : (float, float), optional
+        In s; by default that of the nominal model's identification if it has one. Its effect is
+        added to the spread of the systems, which is measured at their own delays.
+
+    Returns
+    -------
+    UncertaintyBound
+
+    Raises
+    ------
+    OptionError
+        Nothing to make a bound from.
+    DataError
+        Frequencies that do not rise, systems of another sample time.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=0.001)
+    >>> others = [plant.replace(delay=29), 1.1 * plant]
+    >>> bound = cr.design.uncertainty_bound(others, plant)
+    >>> bound.check(cr.design.pid(plant))
+    <RobustnessCheck robust: margin 10 at 0.33 rad/s>
+    """
+    models = _models(systems)
+    if nominal is None:
+        nominal = getattr(systems, "system", None) or (models[0] if models else None)
+    if nominal is None:
+        raise OptionError("no systems and no nominal one; give nominal and dead_time_interval")
+    plant = delayed_system(nominal, "an uncertainty bound")
+    warn_unresolved(plant)
+    interval = interval_of_dead_time(plant, dead_time_interval)
+    if not models and interval is None:
+        raise OptionError(
+            "no systems to compare and no interval of the dead time; give dead_time_interval in s"
+        )
+    grid = _grid(plant, omega)
+    base = _response(plant, grid)
+    spread = np.zeros(grid.size)
+    for model in models:
+        other = delayed_system(model, "an uncertainty bound")
+        if not np.isclose(other.dt, plant.dt, rtol=1e-6, atol=0):
+            raise DataError(f"a system has dt={other.dt:g} s, the nominal one {plant.dt:g} s")
+        spread = np.maximum(spread, np.abs(_response(other, grid) / base - 1))
+    delay_part = np.zeros(grid.size)
+    if interval is not None:
+        low, high = interval
+        wait = plant.dead_time - held_fraction(plant)
+        off = max(abs(low - wait), abs(high - wait))
+        # |exp(-jx) - 1| grows to 2 at x = pi; beyond that some smaller error reaches 2.
+        delay_part = 2 * np.sin(np.minimum(grid * off, np.pi) / 2)
+    return UncertaintyBound(
+        omega=read_only(grid),
+        bound=read_only(spread + delay_part),
+        spread=read_only(spread),
+        delay_part=read_only(delay_part),
+        nominal=plant,
+        n_systems=len(models),
+    )
+
+
+@single_threaded
+def robust_stability(uncertainty: UncertaintyBound, controller: Any) -> RobustnessCheck:
+    """Check that a controller stabilizes every plant within a bound.
+
+    Parameters
+    ----------
+    uncertainty : UncertaintyBound
+    controller : control system
+        For the nominal plant of the bound.
+
+    Returns
+    -------
+    RobustnessCheck
+
+    Notes
+    -----
+    Sufficient, and for a bound on the size of Delta alone also necessary; a wrong dead time is
+    only one of the errors that such a bound admits, so `delay_robustness` may be kinder.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.03).system(0.001)
+    >>> bound = cr.design.uncertainty_bound([plant.replace(delay=29), 1.1 * plant], plant)
+    >>> for closed_loop_time in (0.03, 0.003):
+    ...     pi = cr.design.pid(plant, closed_loop_time=closed_loop_time)
+    ...     print(f"{cr.design.robust_stability(bound, pi).margin:.2f}")
+    10.00
+    5.28
+    """
+    plant = uncertainty.nominal
+    nominal = margins(plant, controller)
+    values = open_loop(plant, controller)(np.array(uncertainty.omega))
+    T = np.abs(values / (1 + values))
+    product = T * uncertainty.bound
+    at = int(np.argmax(product))
+    robust = bool(nominal.stable and product[at] < 1)
+    worst = float(np.max(np.abs(1 / (1 + values)) / (1 - product))) if robust else float("inf")
+    return RobustnessCheck(
+        robust=robust,
+        margin=float(1 / product[at]) if product[at] else float("inf"),
+        omega_critical=float(uncertainty.omega[at]),
+        complementary=read_only(T),
+        uncertainty=uncertainty,
+        nominal=nominal,
+        performance=worst,
+    )
+
+
+def _models(systems: Any) -> list[Any]:
+    good = getattr(systems, "good", None)
+    if good is not None:
+        return [row.system for row in good]
+    if isinstance(systems, ct.StateSpace) or not isinstance(systems, Iterable):
+        raise OptionError(
+            f"systems is a {type(systems).__name__}; needed is a Campaign or a list of systems"
+        )
+    return list(systems)
+
+
+def _grid(plant: DelayedStateSpace, omega: ArrayLike | None) -> FloatArray:
+    if omega is None:
+        top = np.pi / plant.dt
+        slow = np.abs(np.log(np.abs(np.asarray(plant.delay_free.poles())) + 1e-12)) / plant.dt
+        low = float(
+            np.clip(1e-3 * slow[slow > 1e-9 * top].min(initial=top), 1e-8 * top, 0.01 * top)
+        )
+        return np.geomspace(low, 0.999 * top, GRID_POINTS)
+    grid = numbers(omega, "omega")
+    if grid.ndim != 1 or grid.size == 0 or grid[0] <= 0 or np.any(np.diff(grid) <= 0):
+        raise DataError("omega must rise and be > 0, in rad/s")
+    return grid
+
+
+def _response(system: DelayedStateSpace, omega: FloatArray) -> ComplexArray:
+    return np.asarray(system.horner(np.exp(1j * omega * system.dt))[0, 0], dtype=np.complex128)

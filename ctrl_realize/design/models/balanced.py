@@ -1,0 +1,196 @@
+"""Balanced truncation of the core, delay kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._checks import positive, whole
+from ...delayed import DelayedStateSpace
+from ...errors import OptionError, OrderError
+from ...numerics.arrays import FloatArray, read_only
+from ...numerics.blas_threads import single_threaded
+from ...numerics.state_space.balancing import Part, balanced_truncation, split_modes
+from ...results import Result
+from ..siso import delayed_system
+
+STABLE = 1 - 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BalancedReduction(Result):
+    """How a core was reduced.
+
+    ``error_bound = 2 * singular_values[kept:].sum()``, where ``kept = order - kept_unstable``; no
+    frequency response of the reduced system is farther than that from the full one's.
+
+    Attributes
+    ----------
+    singular_values : ndarray, shape (k,)
+        Hankel singular values of the stable part of the core, falling.
+    order : int
+        Order of the reduced core, unstable part included.
+    full_order : int
+    kept_unstable : int
+        States on or outside the unit circle, which are never reduced.
+    error_bound : float
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> lags = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * ct.tf([1], [0.001, 1])
+    >>> found = cr.design.reduce(cr.delayed_ss(lags, dead_time=0.03, dt=0.001), 2).fit
+    >>> print(found.singular_values.round(4), f"error at most {found.error_bound:.1e}")
+    [5.759e-01 7.630e-02 4.000e-04] error at most 7.4e-04
+    """
+
+    singular_values: FloatArray
+    order: int
+    full_order: int
+    kept_unstable: int
+    error_bound: float
+
+    def _title(self) -> str:
+        return "Balanced truncation"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [
+            ("order", f"{self.full_order} -> {self.order}"),
+            ("kept as they are", f"{self.kept_unstable} (on or outside the unit circle)"),
+            ("largest error at any frequency", f"{self.error_bound:.4g}"),
+        ]
+
+    def __repr__(self) -> str:
+        return (
+            f"<BalancedReduction {self.full_order} -> {self.order}, "
+            f"error <= {self.error_bound:.3g}>"
+        )
+
+
+@single_threaded
+def hankel_singular_values(system: Any) -> FloatArray:
+    """Hankel singular values of the stable part of a discrete core, falling.
+
+    The delay has no part in it: with the chain each input would add d values of its own.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Any number of channels; any discrete system is taken.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], 0.1)
+    >>> print(cr.design.hankel_singular_values(cr.delayed_ss(core, 37)).round(6))
+    [1.333333]
+    """
+    core = delayed_system(system, "hankel_singular_values", siso=False).delay_free
+    (A, B, C), _ = _parts(core)
+    return balanced_truncation(A, B, C, 0)[3]
+
+
+@single_threaded
+def reduce(
+    system: Any, order: int | None = None, *, tolerance: float | None = None
+) -> DelayedStateSpace:
+    """Reduce the order of the core by balanced truncation; the delay stays.
+
+    Poles on or outside the unit circle are split off and kept. python-control's ``balred`` runs
+    the continuous algorithm on discrete systems and returns a continuous one.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Any number of channels; any discrete system is taken.
+    order : int, optional
+        Order of the core to reach.
+    tolerance : float, optional
+        Instead of `order`: the smallest order whose error bound is below this (in the unit of the
+        gain).
+
+    Returns
+    -------
+    DelayedStateSpace
+        Its ``.fit`` is a `BalancedReduction`.
+
+    Raises
+    ------
+    OrderError
+        An order larger than the core's, or smaller than its unstable part.
+    OptionError
+        Not exactly one of `order` and `tolerance`.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> lags = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * ct.tf([1], [0.001, 1])
+    >>> plant = cr.delayed_ss(lags, dead_time=0.03, dt=0.001)
+    >>> small = cr.design.reduce(plant, 2)
+    >>> small.delay, small.fit
+    (30, <BalancedReduction 3 -> 2, error <= 0.000744>)
+    """
+    plant = delayed_system(system, "reduce", siso=False)
+    core = plant.delay_free
+    if (order is None) == (tolerance is None):
+        raise OptionError(f"order={order!r}, tolerance={tolerance!r}; give exactly one of them")
+    (A, B, C), rest = _parts(core)
+    kept = rest[0].shape[0]
+    if order is None:
+        limit = positive(tolerance, "tolerance", "largest error of the frequency response")
+        tails = 2 * np.cumsum(balanced_truncation(A, B, C, 0)[3][::-1])[::-1]
+        wanted = int(np.sum(tails > limit))
+    else:
+        wanted = whole(order, "order", 0) - kept
+        if wanted < 0 or order > core.nstates:
+            raise OrderError(
+                f"order={order}; the core has order {core.nstates}, of which {kept} state(s) on or "
+                f"outside the unit circle are kept: needed is {kept}...{core.nstates}"
+            )
+    A, B, C, values = balanced_truncation(A, B, C, wanted)
+    n = A.shape[0]
+    joined = np.zeros((n + kept, n + kept))
+    joined[:n, :n], joined[n:, n:] = A, rest[0]
+    reduced = ct.StateSpace(
+        joined,
+        np.vstack([B, rest[1]]),
+        np.hstack([C, rest[2]]),
+        np.asarray(core.D),
+        core.dt,
+        remove_useless_states=False,
+    )
+    fit = BalancedReduction(
+        singular_values=read_only(values),
+        order=n + kept,
+        full_order=core.nstates,
+        kept_unstable=kept,
+        error_bound=float(2 * values[n:].sum()),
+    )
+    return DelayedStateSpace(
+        reduced,
+        plant.input_delays,
+        output_delay=plant.output_delays,
+        fit=fit,
+        name=f"{plant.name}_reduced",
+        inputs=plant.input_labels,
+        outputs=plant.output_labels,
+    )
+
+
+def _parts(core: ct.StateSpace) -> tuple[Part, Part]:
+    """Stable part, and what lies on or outside the unit circle."""
+    A, B, C = (np.asarray(M, dtype=np.float64) for M in (core.A, core.B, core.C))
+    if np.all(np.abs(np.linalg.eigvals(A)) < STABLE):
+        n = A.shape[0]
+        return (A, B, C), (np.zeros((0, 0)), B[:0], C[:, n:])
+    return split_modes(A, B, C, lambda z: abs(z) < STABLE)

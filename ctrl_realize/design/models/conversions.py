@@ -1,0 +1,281 @@
+"""Conversions that keep the dead time exact: polynomial, continuous, discrete."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._checks import positive
+from ..._wording import in_time
+from ...delayed import DelayedStateSpace, delayed_ss
+from ...errors import OptionError, UnsuitableSystemError
+from ...numerics.arrays import FloatArray
+from ...numerics.blas_threads import single_threaded
+from ...numerics.state_space.sampling import inverse_zero_order_hold, split_fraction
+from ...results import Result
+from ..siso import delayed_system, proper_ss
+from .approximations import pade_ss
+
+
+def to_tf(system: Any) -> ct.TransferFunction:
+    """Convert a discrete system with dead time to a transfer function, exactly.
+
+    Only the core's polynomial is formed, den from its poles and num from den times the Markov
+    parameters, so that the relative degree stays what it is; the delay is d zeros behind den.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Any number of channels; any discrete system is taken.
+
+    Returns
+    -------
+    control.TransferFunction
+        With the names of the system.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> lag = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.1), 3)
+    >>> tf = cr.design.to_tf(lag)
+    >>> print(tf.num[0][0], tf.den[0][0])
+    [0.1] [ 1.  -0.9  0.   0.   0. ]
+    """
+    plant = delayed_system(system, "to_tf", siso=False)
+    core, n = plant.delay_free, plant.delay_free.nstates
+    den = np.real(np.poly(np.linalg.eigvals(core.A))) if n else np.ones(1)
+    pulses = np.asarray(DelayedStateSpace(core, 0).markov(n + 1))
+    pulses = pulses.reshape(core.noutputs, core.ninputs, n + 1)
+    total = np.add.outer(plant.output_delays, plant.input_delays)
+    nums = [
+        [_numerator(den, pulses[i, j]) for j in range(core.ninputs)] for i in range(core.noutputs)
+    ]
+    dens = [
+        [np.concatenate([den, np.zeros(total[i, j])]) for j in range(core.ninputs)]
+        for i in range(core.noutputs)
+    ]
+    return ct.TransferFunction(
+        nums,
+        dens,
+        plant.dt,
+        inputs=plant.input_labels,
+        outputs=plant.output_labels,
+        name=plant.name,
+    )
+
+
+def _numerator(den: FloatArray, pulses: FloatArray) -> FloatArray:
+    num = np.convolve(den, pulses)[: den.size]
+    return num[np.argmax(num != 0) :] if np.any(num) else np.zeros(1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContinuousModel(Result):
+    """Continuous core and the dead time before it; unpacks as ``core, dead_time = model``.
+
+    Sampled behind a zero-order hold at `dt`, ``to_discrete(core, dead_time, dt)``, it is the
+    system that it was made from.
+
+    Attributes
+    ----------
+    core : control.StateSpace
+        Continuous.
+    dead_time : float
+        In s; may hold a fraction of a sample.
+    dt : float
+        Sample time in s of the discrete system.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([2], [0.08, 1]), dead_time=0.0289, dt=0.001)
+    >>> model = cr.design.to_continuous(plant)
+    >>> print(f"{model.dead_time:.4f} s", model.core.poles().real.round(6))
+    0.0289 s [-12.5]
+    """
+
+    core: ct.StateSpace
+    dead_time: float
+    dt: float
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter((self.core, self.dead_time))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # python-control's own systems do not pickle.
+        core = self.core
+        parts = (core.A, core.B, core.C, core.D, core.name, core.input_labels, core.output_labels)
+        return _rebuild_model, (*parts, self.dead_time, self.dt)
+
+    def pade(self, order: int = 5) -> ct.StateSpace:
+        """Continuous system with the dead time as a Pade approximant, see `pade_ss`."""
+        if self.dead_time == 0:
+            return self.core
+        if not self.core.issiso():
+            raise UnsuitableSystemError("pade is for one input and one output")
+        return self.core * pade_ss(self.dead_time, order)
+
+    def _title(self) -> str:
+        generic = self.core.name.startswith("sys[")
+        return "Continuous model" if generic else f"Continuous model {self.core.name}"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        poles = ", ".join(
+            f"{p.real:.4g}" + (f" ± {p.imag:.4g}j" if p.imag > 0 else "")
+            for p in self.core.poles()
+            if p.imag >= 0
+        )
+        return [
+            ("dead time", f"{in_time(self.dead_time, 5)} ({self.dead_time / self.dt:.4g} samples)"),
+            ("poles", f"{poles} rad/s" if poles else "none"),
+        ]
+
+    def __repr__(self) -> str:
+        return f"<ContinuousModel order {self.core.nstates}, dead time {self.dead_time:.6g} s>"
+
+
+def _rebuild_model(
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    D: FloatArray,
+    name: str,
+    inputs: list[str],
+    outputs: list[str],
+    dead_time: float,
+    dt: float,
+) -> ContinuousModel:
+    core = ct.StateSpace(A, B, C, D, 0, name=name, inputs=inputs, outputs=outputs)
+    return ContinuousModel(core, dead_time, dt)
+
+
+@single_threaded
+def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
+    """Undo the zero-order hold of the core; the dead time stays apart.
+
+    Exact where it exists: every pole of the core needs a logarithm. Of the many continuous models
+    with the same samples, the one with all poles below the Nyquist frequency is given. A direct
+    term that stands behind a delay is read as a fraction of a sample where one explains it (see
+    `delayed_ss`).
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Channels must share one delay.
+
+    Returns
+    -------
+    ContinuousModel
+        ``core, dead_time = to_continuous(system)``.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A pole at z = 0 or on the negative real axis: no continuous system of the same order has
+        these samples. Channels with different delays. A system that is continuous already.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([2], [0.08, 1]), dead_time=0.0289, dt=0.001)
+    >>> core, dead_time = cr.design.to_continuous(plant)
+    >>> print(core.poles().real.round(6), round(float(core.dcgain()), 9), round(dead_time, 9))
+    [-12.5] 2.0 0.0289
+    """
+    plant = delayed_system(system, "to_continuous", siso=False)
+    if not isinstance(plant.delay, int):
+        raise UnsuitableSystemError(
+            f"the channels have different delays ({plant.input_delays} at the inputs, "
+            f"{plant.output_delays} at the outputs); convert them one by one"
+        )
+    core, dt = plant.delay_free, float(plant.dt)
+    _check_logarithm(np.asarray(core.poles()))
+    A, B, C, D = (np.asarray(M, dtype=np.float64) for M in (core.A, core.B, core.C, core.D))
+    wait = plant.delay * dt
+    found = None
+    if plant.issiso() and D[0, 0] != 0 and plant.delay > 0 and core.nstates:
+        found = split_fraction(A, B, C, float(D[0, 0]), dt)
+    if found is None:
+        F, G = inverse_zero_order_hold(A, B, dt)
+    else:
+        F, G, fraction = found
+        D, wait = np.zeros((1, 1)), wait - (1 - fraction) * dt
+    continuous = ct.StateSpace(
+        F,
+        G,
+        C,
+        D,
+        0,
+        name=f"{plant.name}_continuous",
+        inputs=plant.input_labels,
+        outputs=plant.output_labels,
+        remove_useless_states=False,
+    )
+    return ContinuousModel(continuous, float(wait), dt)
+
+
+def _check_logarithm(poles: FloatArray) -> None:
+    # Rounding may leave a pole that is real and negative a hair off the axis.
+    bad = poles[(np.abs(poles) < 1e-12) | ((np.abs(poles.imag) < 1e-9) & (poles.real < 0))]
+    if bad.size:
+        raise UnsuitableSystemError(
+            f"the core has a pole at z = {complex(bad[0]):.6g}, which no continuous system of this "
+            "order has behind a zero-order hold. A lower order often has none (design.reduce), "
+            "and so has a fit of dead time and lags (design.reduce_fopdt with method='optimal')"
+        )
+
+
+def to_discrete(
+    core: Any, dead_time: float | None = None, dt: float | None = None, **names: Any
+) -> DelayedStateSpace:
+    """Sample a continuous model behind a zero-order hold, any dead time included exactly.
+
+    Parameters
+    ----------
+    core : control.StateSpace, control.TransferFunction or ContinuousModel
+    dead_time : float, optional
+        In s; that of a `ContinuousModel` if there is one, else 0. In place of a model's own it
+        is taken together with `dt` only.
+    dt : float, optional
+        Sample time in s; a `ContinuousModel` remembers its own.
+    **names
+        ``name``, ``inputs``, ``outputs``.
+
+    Returns
+    -------
+    DelayedStateSpace
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> cr.design.to_discrete(ct.tf([1], [0.08, 1]), 0.0289, 0.01)
+    <DelayedStateSpace: u -> y, order 1, z^-3 (0.03 s), dt = 0.01 s>
+    """
+    if isinstance(core, ContinuousModel):
+        if dead_time is not None and dt is None:
+            # Else to_discrete(model, 0.05), meant as a sample time, would put 0.05 s of dead time
+            # in place of the model's own, and keep the sample time.
+            raise OptionError(
+                f"the model has a dead time of its own, {core.dead_time:.6g} s; say dt=... for "
+                "another sample time, or dead_time= and dt= to replace both"
+            )
+        dead_time = core.dead_time if dead_time is None else dead_time
+        dt = core.dt if dt is None else dt
+        core = core.core
+    step = positive(dt, "dt", "sample time in s")
+    system = proper_ss(core, "to_discrete")
+    if system.isdtime(strict=True):
+        raise UnsuitableSystemError(
+            f"{system.name!r} is discrete already (dt={system.dt!r}); put a delay before it with "
+            "delayed_ss(system, delay), or sample it anew with to_discrete(to_continuous(system), "
+            "dt=...)"
+        )
+    return delayed_ss(system, dead_time=0.0 if dead_time is None else dead_time, dt=step, **names)

@@ -1,0 +1,257 @@
+"""Reduction of a model to one or two lags and a dead time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import control as ct
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..._checks import one_of
+from ...delayed import DelayedStateSpace
+from ...errors import UnsuitableSystemError
+from ...numerics.arrays import FloatArray
+from ...numerics.blas_threads import single_threaded
+from ...numerics.state_space.balancing import split_modes
+from ...numerics.state_space.process_models import half_rule, process_step
+from ..resolved import warn_unresolved
+from ..siso import delayed_system, held_fraction, proper_ss
+from .conversions import ContinuousModel, to_continuous, to_discrete
+from .process_model import ProcessModel
+
+METHODS = ("optimal", "half_rule")
+MOST_SAMPLES = 2**18
+FIT_POINTS = 1500
+"""Points of the step response that a fit looks at; more do not move the parameters."""
+
+
+@single_threaded
+def reduce_fopdt(
+    system: Any, *, method: str = "optimal", dead_time: float | None = None
+) -> ProcessModel:
+    """Reduce a system to gain, one lag and dead time.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace, ContinuousModel, or a continuous control system
+        One input and one output, stable or with one integrator. An integrating system becomes
+        ``gain exp(-theta s) / s``.
+    method : {"optimal", "half_rule"}, optional
+        ``"optimal"`` fits the step response by least squares with the static gain kept and no
+        less dead time than the system has: a lag in its place would promise phase that is not
+        there.
+        ``"half_rule"`` is Skogestad's, from the poles and zeros of the continuous core (a complex
+        pair counts as two equal lags of the same sum).
+    dead_time : float, optional
+        In s, for a continuous control system.
+
+    Returns
+    -------
+    ProcessModel
+        Its `error` tells how far off its step response is.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        An unstable system, several channels, no static gain; for the half rule also a core that
+        has no continuous counterpart.
+
+    Examples
+    --------
+    Half of the lag of 0.2 s goes to each side, and that of 0.04 s to the dead time:
+
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> lags = ct.tf([1], [1, 1]) * ct.tf([1], [0.2, 1]) * ct.tf([1], [0.04, 1])
+    >>> cr.design.reduce_fopdt(lags, method="half_rule")
+    <ProcessModel 1 exp(-0.14 s) / (1.1 s + 1)>
+    >>> round(cr.design.reduce_fopdt(lags).error, 3)
+    0.017
+    """
+    return _reduce(system, method, dead_time, 1)
+
+
+@single_threaded
+def reduce_sopdt(
+    system: Any, *, method: str = "optimal", dead_time: float | None = None
+) -> ProcessModel:
+    """Reduce a system to gain, two lags and dead time.
+
+    As `reduce_fopdt`; an integrating system keeps one lag beside its integrator.
+
+    Parameters
+    ----------
+    system, method, dead_time
+        See `reduce_fopdt`.
+
+    Returns
+    -------
+    ProcessModel
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> lags = ct.tf([1], [1, 1]) * ct.tf([1], [0.2, 1]) * ct.tf([1], [0.04, 1])
+    >>> cr.design.reduce_sopdt(lags, method="half_rule")
+    <ProcessModel 1 exp(-0.02 s) / (1 s + 1) (0.22 s + 1)>
+    """
+    return _reduce(system, method, dead_time, 2)
+
+
+def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> ProcessModel:
+    one_of(method, "method", METHODS)
+    if isinstance(system, ProcessModel):
+        core = ct.ss(system.transfer_function())
+        system = ContinuousModel(core, system.dead_time, _resolution(system))
+    continuous, plant = _both_forms(system, dead_time)
+    time, step, integrating, gain = _step_record(plant)
+    if method == "half_rule":
+        model = _by_half_rule(continuous or to_continuous(plant), order, integrating, gain)
+    else:
+        least = continuous.dead_time if continuous else _dead_time(plant)
+        model = _by_fit(time, step / gain, order, integrating, gain, least)
+    total = _total(time, step / gain, integrating)
+    square = np.trapezoid((model.step(time) - step) ** 2, time) / total
+    scale = total if integrating else 1.0
+    return replace(model, error=float(np.sqrt(square) / abs(gain) / scale))
+
+
+def _resolution(model: ProcessModel) -> float:
+    return max(model.lag + model.second_lag, model.dead_time) / 500
+
+
+def _both_forms(
+    system: Any, dead_time: float | None
+) -> tuple[ContinuousModel | None, DelayedStateSpace]:
+    if isinstance(system, ContinuousModel):
+        return system, to_discrete(system)
+    if getattr(system, "dt", None) == 0 or getattr(system, "dt", 0) is None:
+        core = proper_ss(system, "a reduction")
+        wait = 0.0 if dead_time is None else dead_time
+        speeds = np.abs(core.poles())
+        speeds = speeds[speeds > 1e-12]
+        span = float(np.sum(1 / speeds)) + wait
+        if span == 0:
+            raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
+        model = ContinuousModel(core, wait, span / 1000)
+        if np.any(core.D):
+            # A direct term jumps; whole samples keep the jump where it is.
+            step = wait / max(1, round(wait / model.dt)) if wait else model.dt
+            model = ContinuousModel(core, wait, step)
+        return model, to_discrete(model)
+    warn_unresolved(system)
+    return None, delayed_system(system, "a reduction")
+
+
+def _dead_time(plant: DelayedStateSpace) -> float:
+    """Dead time in s, without the fraction of a sample that a direct term may hold."""
+    if plant.delay and np.any(plant.delay_free.D):
+        try:
+            return float(to_continuous(plant).dead_time)
+        except UnsuitableSystemError:
+            return float(plant.dead_time) - held_fraction(plant)
+    return float(plant.dead_time)
+
+
+def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool, float]:
+    """Step response until it has settled (or runs along its ramp), thinned; its gain."""
+    if not plant.issiso():
+        raise UnsuitableSystemError(
+            f"a reduction needs one input and one output; {plant.name!r} has {plant.ninputs} "
+            f"inputs and {plant.noutputs} outputs"
+        )
+    dt, core = plant.dt, plant.delay_free
+    poles = np.asarray(core.poles())
+    at_one = np.abs(poles - 1) < 1e-9
+    if np.any(np.abs(poles[~at_one]) > 1 - 1e-12) or at_one.sum() > 1:
+        raise UnsuitableSystemError(
+            "the system is unstable or has more than one integrator; lags and a dead time cannot "
+            "stand for it"
+        )
+    integrating = bool(at_one.any())
+    slowest = float(np.abs(poles[~at_one]).max(initial=0.0))
+    settling = 10 / -np.log(slowest) if slowest > 0 else 4.0
+    count = int(min(MOST_SAMPLES, plant.delay * 1.5 + settling + 20))
+    step = plant.step(count)
+    gain = _slope(core) if integrating else float(np.real(core.dcgain()))
+    if gain == 0 or not np.isfinite(gain):
+        raise UnsuitableSystemError(f"the static gain is {gain:g}; there is nothing to reduce to")
+    stride = max(1, count // FIT_POINTS)
+    return np.arange(count)[::stride] * dt, step[::stride], integrating, float(gain)
+
+
+def _slope(core: ct.StateSpace) -> float:
+    """Slope per second of the step response of an integrating core."""
+    A, B, C = (np.asarray(M, dtype=np.float64) for M in (core.A, core.B, core.C))
+    integrator, _ = split_modes(A, B, C, lambda z: abs(z - 1) < 1e-9)
+    return float((integrator[2] @ integrator[1])[0, 0] / core.dt)
+
+
+def _by_half_rule(
+    model: ContinuousModel, order: int, integrating: bool, gain: float
+) -> ProcessModel:
+    poles, zeros = np.asarray(model.core.poles()), np.asarray(model.core.zeros())
+    if integrating:
+        poles = np.delete(poles, np.argmin(np.abs(poles)))
+    if np.any(poles.real >= 0):
+        raise UnsuitableSystemError("the half rule needs stable lags")
+    zeros = zeros[np.isfinite(zeros) & (np.abs(zeros) > 0)]
+    # A complex pair becomes two equal lags of the same sum: each has tau = -Re p / |p|^2.
+    lags = -poles.real / np.abs(poles) ** 2
+    times = -zeros.real / np.abs(zeros) ** 2
+    factor, kept, wait = half_rule(
+        lags,
+        times[times > 0],
+        -times[times < 0],
+        model.dead_time,
+        order - int(integrating),
+        integrating=integrating,
+    )
+    lag, second = [*sorted(kept, reverse=True), 0.0, 0.0][:2]
+    return ProcessModel(gain * factor, lag, wait, second, integrating, "half rule")
+
+
+def _by_fit(
+    time: FloatArray,
+    shape: FloatArray,
+    order: int,
+    integrating: bool,
+    gain: float,
+    dead_time: float,
+) -> ProcessModel:
+    """Fit lags and a dead time of at least `dead_time`."""
+    lags = order - int(integrating)
+    # Total of dead time and lags: the area over the step response, or the offset of the ramp.
+    total = _total(time, shape, integrating)
+    span = time[-1]
+
+    def unpack(p: FloatArray) -> tuple[float, float, float]:
+        first, second = ([float(x) for x in p[:lags]] + [0.0, 0.0])[:2]
+        return max(first, second), min(first, second), float(p[-1])
+
+    def misfit(p: FloatArray) -> FloatArray:
+        lag, second, wait = unpack(p)
+        return process_step(time, lag, second, wait, integrating=integrating) - shape
+
+    tiny = 1e-9 * span
+    lower = np.array([*[tiny] * lags, dead_time])
+    upper = np.full(lags + 1, 2 * span + dead_time)
+    best: Any = None
+    for share in (0.1, 0.4, 0.7):
+        parts = {0: [total], 1: [(1 - share) * total, share * total]}.get(
+            lags, [(1 - share) * 0.7 * total, (1 - share) * 0.3 * total, share * total]
+        )
+        start = np.clip(parts, lower + tiny, upper)
+        found = least_squares(misfit, start, bounds=(lower, upper), x_scale=total)
+        if best is None or found.cost < best.cost:
+            best = found
+    lag, second, wait = unpack(best.x)
+    return ProcessModel(gain, lag, wait, second, integrating, "optimal")
+
+
+def _total(time: FloatArray, shape: FloatArray, integrating: bool) -> float:
+    total = time[-1] - shape[-1] if integrating else np.trapezoid(1 - shape, time)
+    return float(np.clip(total, 1e-3 * time[-1], time[-1]))

@@ -1,0 +1,1 @@
+"""Controllers that predict through the dead time: Smith predictor, LQR, LQG."""

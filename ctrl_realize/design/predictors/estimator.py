@@ -1,0 +1,169 @@
+"""Kalman filter of a core behind its dead time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._wording import in_numbers
+from ...delayed import DelayedStateSpace
+from ...delayed.chains import augment
+from ...errors import DelayRangeError
+from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
+from ...numerics.blas_threads import single_threaded
+from ...results import Result
+from ..resolved import warn_unresolved
+from ..siso import delayed_system
+from .riccati import has_states, riccati, weight_matrix
+
+MOST_APART = 2000
+"""Samples by which outputs may differ in delay; the solver then holds 500 MB."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KalmanPredictor(Result):
+    """Steady Kalman filter of the core behind its dead time.
+
+    ``x[k+1] = A x[k] + B u[k-d] + gain (y[k] - C x[k] - D u[k-d])``. The inputs on their way are
+    known, so the chain needs no gain: the filter of the whole system is ``[gain; 0]``.
+
+    Where outputs are delayed, x is the core's state with the outputs on their way behind it,
+    ``y*[k-1] ... y*[k-q]`` of each, and A, B, C, D are those of core and outputs: the filter
+    predicts the core's state of now from what was measured `q` samples late.
+
+    Attributes
+    ----------
+    gain : ndarray, shape (n + q, p)
+        q is the sum of the output delays.
+    covariance : ndarray, shape (n, n)
+        Of the error of the core's state predicted one sample ahead.
+    poles : ndarray, shape (n + q,)
+        Of the estimator, eigenvalues of A - gain C.
+    dt : float
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[1.0]], [[0.0]], 0.1), 3)
+    >>> found = cr.design.kalman_predictor(plant, 1.0, 1.0)
+    >>> print(found.gain.round(4), found.covariance.round(4), found.poles.real.round(4))
+    [[0.5377]] [[1.4839]] [0.3623]
+    """
+
+    gain: FloatArray
+    covariance: FloatArray
+    poles: ComplexArray
+    dt: float
+
+    def _title(self) -> str:
+        return "Kalman predictor"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        largest = float(np.abs(self.poles).max(initial=0.0))
+        return [
+            ("gain", in_numbers(self.gain)),
+            ("slowest pole", f"|z| = {largest:.4g}"),
+        ]
+
+    def __repr__(self) -> str:
+        return f"<KalmanPredictor order {self.gain.shape[0]}>"
+
+
+@single_threaded
+def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) -> KalmanPredictor:
+    """Steady Kalman filter of a system with dead time.
+
+    Equal to `control.dlqe` of the augmented system with process noise on the core's states only,
+    at the cost of a Riccati equation of the core: what all outputs are late by is a prediction.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Its delays may differ from channel to channel. Outputs of different delays make the
+        Riccati equation larger by what they differ.
+    QN : array_like, shape (n, n)
+        Covariance of the process noise on the core's states. For noise that enters with the
+        input use ``B @ B.T`` of the core.
+    RN : array_like, shape (p, p) or number
+        Covariance of the measurement noise.
+
+    Returns
+    -------
+    KalmanPredictor
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A core that these covariances cannot observe, or one without states.
+    DelayRangeError
+        Delays of outputs that differ by more than 2000 samples.
+    DataError, OptionError
+        Covariances of the wrong shape, or not symmetric.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.9]], [[1.0]], [[1.0]], [[0.0]], 0.1)
+    >>> print(cr.design.kalman_predictor(cr.delayed_ss(core, 3), 1.0, 1.0).gain.round(4))
+    [[0.5377]]
+    """
+    plant = delayed_system(system, "kalman_predictor", siso=False)
+    warn_unresolved(plant)
+    core = plant.delay_free
+    has_states(core, "kalman_predictor")
+    weight = weight_matrix(QN, core.nstates, "QN", "core state(s)")
+    price = weight_matrix(RN, core.noutputs, "RN", "output(s)")
+    common = min(plant.output_delays)
+    own = tuple(q - common for q in plant.output_delays)
+    if sum(own) > MOST_APART:
+        raise DelayRangeError(
+            f"the delays of the outputs differ by {sum(own)} samples together; a Riccati equation "
+            f"takes them up to {MOST_APART}. Sample the system more slowly, or use one output"
+        )
+    A, C = _with_outputs(core, own)
+    noise = np.zeros_like(A)
+    noise[: core.nstates, : core.nstates] = weight
+    gain, cost, poles = riccati(ct.dlqr, A.T, C.T, noise, price, "QN and RN")
+    if common:
+        gain, cost = _late(core, plant.output_delays, common, (A, gain.T, cost, noise))
+        poles = np.append(poles, np.zeros(common * core.noutputs))
+    else:
+        gain = gain.T
+    n = core.nstates
+    return KalmanPredictor(read_only(gain), read_only(cost[:n, :n]), locked(poles), float(plant.dt))
+
+
+def _with_outputs(core: ct.StateSpace, delays: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return A and C of the core with the outputs that are on their way."""
+    matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
+    A, _, C, _ = augment(matrices, (0,) * core.ninputs, delays)
+    return A, C
+
+
+def _late(
+    core: ct.StateSpace, delays: tuple[int, ...], common: int, found: tuple[FloatArray, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Predict the filter of outputs that all are `common` samples late.
+
+    What is learnt about the state then is carried on by A to now; what is on its way to an
+    output is that output of the states between.
+    """
+    A, gain, cost, noise = found
+    n, C = core.nstates, np.asarray(core.C, dtype=np.float64)
+    between = [gain]
+    for _ in range(common):
+        between.append(A @ between[-1])
+        cost = A @ cost @ A.T + noise
+    rows = [between[-1][:n]]
+    at = n
+    for i, q in enumerate(delays):
+        # y*[k+1-j] for j = 1 ... common, then what the smaller filter holds of its own delay.
+        rows += [C[[i]] @ between[common - j][:n] for j in range(1, common + 1)]
+        rows.append(gain[at : at + q - common])
+        at += q - common
+    return np.vstack(rows), cost

@@ -1,0 +1,163 @@
+"""Output feedback through a dead time: filter, prediction, state feedback."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...delayed import DelayedStateSpace
+from ...delayed.chains import augment
+from ...delayed.deferred import MAX_STATES
+from ...errors import DelayRangeError
+from ...numerics.arrays import FloatArray
+from ...numerics.blas_threads import single_threaded
+from ..delay_line import DelayLineController
+from ..loops.loop_check import loop_check, refuse_poles, refuse_unstable, warn_of
+from ..resolved import check_sign, warn_unresolved
+from ..siso import delayed_system
+from .estimator import kalman_predictor
+from .regulator import TOO_LONG, regulator
+from .riccati import has_states
+
+
+@single_threaded
+def lqg(
+    system: DelayedStateSpace,
+    Q: ArrayLike,
+    R: ArrayLike,
+    QN: ArrayLike,
+    RN: ArrayLike,
+    *,
+    name: str = "lqg",
+) -> ct.StateSpace:
+    """Output feedback: Kalman predictor, prediction over the dead time, state feedback.
+
+    Works for unstable and integrating cores too, where a Smith predictor cannot. Its states are
+    those of the core and of the delay line. It has no integral action: for that, put an integrator
+    before the plant first and after the controller then.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Its delays may differ from channel to channel.
+    Q, R
+        As for `predictor_lqr`.
+    QN, RN
+        As for `kalman_predictor`.
+    name : str, optional
+
+    Returns
+    -------
+    control.StateSpace
+        From error to plant input, for negative feedback: ``margins(system, lqg(...))``. For one
+        input and output it is a `DelayLineController`, whose ``.regulator`` and ``.estimator``
+        are its parts, and whose ``.check``, a `LoopCheck`, tells what the loop does on `system`
+        and over its interval of dead times; for several a plain system.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A core without states, weights that do not stabilize it, or an unstable core behind a dead
+        time that it cannot be predicted over.
+    DelayRangeError
+        Several channels with delays too long for dense matrices.
+
+    Warns
+    -----
+    ModelWarning
+        The loop is unstable for some dead time within the interval that the system carries.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[1.02]], [[1.0]], [[0.1]], [[0.0]], 0.01), 10)
+    >>> controller = cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0)
+    >>> cr.design.margins(plant, controller)
+    <Margins stable: gain 2.323, phase 44.23 deg, modulus 0.5479, delay 0.138 s>
+    """
+    plant = delayed_system(system, "lqg", siso=False)
+    check_sign(plant, "lqg")
+    warn_unresolved(plant)
+    core = plant.delay_free
+    has_states(core, "lqg")
+    law = regulator(plant, Q, R)
+    estimator = kalman_predictor(plant, QN, RN)
+    matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
+    A, B, C, D = augment(matrices, (0,) * core.ninputs, tuple(plant.output_delays))
+    L = estimator.gain
+    # Estimated core and line of own outputs, as the chains of the plant hold them.
+    inner, into = A - L @ C, B - L @ D
+    n, d = A.shape[0], sum(plant.input_delays)
+    # What is on its way to an output counts among the states of the estimator, and for nothing.
+    gain, passed = np.split(law.gain, [core.nstates + d], axis=1)
+    K = np.hstack([gain[:, : core.nstates], passed, gain[:, core.nstates :]])
+    if not plant.issiso():
+        # Separation: the loop has the poles of the regulator and those of the estimator.
+        poles = np.concatenate([law.poles, estimator.poles])
+        refuse_poles(poles, "the controller", TOO_LONG)
+        return _several_channels(plant, (inner, into, K, L), name)
+    line = np.zeros((n, d))
+    if d:
+        line[:, -1:] = into
+    else:
+        # u[k] is formed from the state alone, and acts at once.
+        inner = inner - into @ K
+
+    def made(**more: Any) -> DelayLineController:
+        notes = {"model": plant, "regulator": law, "estimator": estimator, **more}
+        # Negative feedback: the controller sees e = -y.
+        return DelayLineController(
+            inner,
+            -L,
+            -K[:, :n],
+            np.zeros((1, 1)),
+            line,
+            -K[:, n:],
+            float(plant.dt),
+            name=name,
+            inputs="e",
+            outputs=plant.input_labels[0],
+            notes=notes,
+            pulses=(
+                np.asarray(core.A, np.float64),
+                np.asarray(core.B, np.float64),
+                np.vstack([np.zeros((n, core.nstates)), -law.core_gain]),
+            ),
+        )
+
+    check = loop_check(plant, made())
+    refuse_unstable(check, "the controller", TOO_LONG)
+    warn_of(check, "larger R and RN make it slower and more robust")
+    return made(check=check)
+
+
+def _several_channels(
+    plant: DelayedStateSpace, parts: tuple[FloatArray, ...], name: str
+) -> ct.StateSpace:
+    """Close the estimator's own lines by the gain; all channels in one plain system."""
+    inner, into, K, L = parts
+    n, m = into.shape
+    if n + sum(plant.input_delays) > MAX_STATES:
+        raise DelayRangeError(
+            f"the controller of several channels has {n + sum(plant.input_delays)} states in a "
+            f"dense matrix; {MAX_STATES} are the most. Sample the plant more slowly, "
+            "cr.design.to_discrete(core, dead_time, dt), or close one channel at a time"
+        )
+    free = inner, into, np.zeros((1, n)), np.zeros((1, m))
+    A, B, _, _ = augment(free, plant.input_delays, (0,))
+    errors = np.vstack([-L, np.zeros((A.shape[0] - n, L.shape[1]))])
+    return ct.StateSpace(
+        A - B @ K,
+        errors,
+        -K,
+        np.zeros((m, L.shape[1])),
+        float(plant.dt),
+        name=name,
+        inputs=[f"e_{label}" for label in plant.output_labels],
+        outputs=list(plant.input_labels),
+        remove_useless_states=False,
+    )

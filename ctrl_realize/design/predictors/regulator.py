@@ -1,0 +1,268 @@
+"""Optimal state feedback through a dead time, without the big Riccati equation.
+
+An input sent now acts d samples later on the core. What the core's state will be then is known:
+``x[k+d] = A^d x[k] + sum_i A^(i-1) B u[k-i]``. Feeding back that prediction with the gain of the
+core alone is the optimum of the whole system, chain included. Where the inputs have different
+delays the optimum is still a law on the core and what is under way, see
+`numerics.delayed_regulator`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._wording import in_numbers
+from ...delayed import DelayedStateSpace
+from ...errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
+from ...numerics.blas_threads import single_threaded
+from ...numerics.state_space import responses
+from ...numerics.state_space.delayed_lqr import line_gain
+from ...results import Result
+from ..delay_line import DelayLineController
+from ..loops.loop_check import LoopCheck, loop_check, refuse_poles, refuse_unstable, warn_of
+from ..resolved import check_sign, warn_unresolved
+from ..siso import delayed_system
+from .riccati import has_states, riccati, weight_matrix
+
+MOST_MEMORY = 2e9
+"""Bytes for the laws of inputs that act after different delays."""
+TOO_LONG = (
+    "An unstable core is not predicted over so long a dead time in double precision; sample it "
+    "more slowly, or shorten the dead time"
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictorLQR(Result):
+    """State feedback ``u = -gain @ x`` on the states of the system, chain included.
+
+    With one delay d for all inputs: ``gain = [core_gain A^d, ...]`` on the core's states, and
+    ``core_gain A^(i-1) B`` on the input that was sent i samples ago, together ``core_gain`` times
+    the predicted state. With different delays the inputs that act sooner make the best of what
+    the slower ones have under way; after the longest delay the core moves as ``A - B core_gain``
+    in any case.
+
+    Attributes
+    ----------
+    gain : ndarray, shape (m, n + sum of delays)
+        On the states of the `DelayedStateSpace`, in its order.
+    core_gain : ndarray, shape (m, n)
+        On the core's state as if there were no delay.
+    poles : ndarray
+        Closed-loop poles: those of the core with `core_gain`; those of the chains are at 0.
+    cost : ndarray, shape (n, n)
+        Solution P of the core's Riccati equation: the cost from the state on that is predicted
+        for the end of the longest delay.
+    delay : int, or tuple of int where the inputs differ
+        In samples.
+    dt : float
+    check : LoopCheck or None
+        Of the loop that the gain closes, broken at the plant's input, with the states measured,
+        on the system itself and over its interval of dead times. None for several inputs, whose
+        loop is known by its `poles` only.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[0.9]], [[1.0]], [[1.0]], [[0.0]], 0.1), 3)
+    >>> found = cr.design.predictor_lqr(plant, 1.0, 1.0)
+    >>> print(found.core_gain.round(4), found.gain.round(4), found.poles.real.round(4))
+    [[0.5377]] [[0.392  0.5377 0.4839 0.4355]] [0.3623]
+    """
+
+    gain: FloatArray
+    core_gain: FloatArray
+    poles: ComplexArray
+    cost: FloatArray
+    delay: int | tuple[int, ...]
+    dt: float
+    check: LoopCheck | None = None
+
+    def _title(self) -> str:
+        return "LQR through the dead time"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        largest = float(np.abs(self.poles).max(initial=0.0))
+        delays = (self.delay,) if isinstance(self.delay, int) else self.delay
+        samples = ", ".join(str(d) for d in delays)
+        seconds = ", ".join(f"{d * self.dt:.4g}" for d in delays)
+        return [
+            ("delay", f"{samples} samples ({seconds} s)"),
+            ("gain on the core", in_numbers(self.core_gain)),
+            ("slowest closed-loop pole", f"|z| = {largest:.4g}"),
+            *(self.check.rows() if self.check is not None else []),
+        ]
+
+    def _notes(self) -> list[str]:
+        return [str(flag) for flag in self.check.flags] if self.check is not None else []
+
+    def __repr__(self) -> str:
+        n = self.core_gain.shape[1]
+        return f"<PredictorLQR order {n}, delay {self.delay}, gain {self.gain.shape}>"
+
+
+@single_threaded
+def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
+    """Linear-quadratic regulator of a system with dead time.
+
+    Equal to `control.dlqr` of the augmented system with Q on the core's states, at the price of
+    the core's Riccati equation: milliseconds at any delay.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        Its delays may differ from input to input; delays at outputs do not matter here.
+    Q : array_like, shape (n, n)
+        Weight on the core's states, positive semidefinite. For a weight on the output use
+        ``C.T @ C`` of the core.
+    R : array_like, shape (m, m) or number
+        Weight on the inputs, positive definite. It must not couple inputs of different delays.
+
+    Returns
+    -------
+    PredictorLQR
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A core that these weights cannot stabilize, or one without states; a core so unstable that
+        double precision cannot predict it over the dead time.
+    DelayRangeError
+        Different delays of inputs, so long that the recursion does not fit into memory.
+    DataError
+        Weights of the wrong shape.
+    OptionError
+        Weights that are not symmetric, or an R that couples inputs of different delays.
+
+    Warns
+    -----
+    ModelWarning
+        The loop is unstable for some dead time within the interval that the system carries.
+
+    Notes
+    -----
+    Different delays cost one step of a Riccati recursion of the core's size for each sample
+    between the shortest and the longest; known as the regulator for multiple input delays [1]_.
+
+    References
+    ----------
+    .. [1] H. Zhang, L. Xie and D. Wang, "Linear quadratic regulation for discrete-time systems
+       with multiple input delays", Proc. American Control Conference, 2006.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.9]], [[1.0]], [[1.0]], [[0.0]], 0.1)
+    >>> found = cr.design.predictor_lqr(cr.delayed_ss(core, 3), 1.0, 1.0)
+    >>> print(found.gain.round(4))
+    [[0.392  0.5377 0.4839 0.4355]]
+
+    A heater that acts at once beside one that acts four samples later:
+
+    >>> both = cr.delayed_ss(ct.ss([[0.9]], [[0.1, 1.0]], [[1.0]], 0, 0.1), [0, 4])
+    >>> cr.design.predictor_lqr(both, 1.0, np.eye(2))
+    <PredictorLQR order 1, delay (0, 4), gain (2, 5)>
+    """
+    found = regulator(system, Q, R)
+    plant = delayed_system(system, "predictor_lqr", siso=False)
+    if plant.ninputs > 1:
+        refuse_poles(found.poles, "the regulator", TOO_LONG)
+        return found
+    check = loop_check(*_state_loop(plant, found))
+    refuse_unstable(check, "the regulator", TOO_LONG)
+    warn_of(check, "a larger R makes it slower and more robust")
+    return replace(found, check=check)
+
+
+def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
+    """Solve for the gain, see `predictor_lqr`, without a look at the loop."""
+    plant = delayed_system(system, "predictor_lqr", siso=False)
+    check_sign(plant, "predictor_lqr")
+    warn_unresolved(plant)
+    delays = tuple(plant.input_delays)
+    core = plant.delay_free
+    has_states(core, "predictor_lqr")
+    A, B = np.asarray(core.A, dtype=np.float64), np.asarray(core.B, dtype=np.float64)
+    weight = weight_matrix(Q, core.nstates, "Q", "core state(s)")
+    price = weight_matrix(R, core.ninputs, "R", "input(s)")
+    _check_coupling(price, delays)
+    _check_memory(core.nstates + sum(delays), delays)
+    gain, cost, poles = riccati(ct.dlqr, A, B, weight, price, "Q and R")
+    shared = len(set(delays)) == 1
+    with np.errstate(over="ignore", invalid="ignore"):
+        lines = (
+            _predicted(A, B, gain, delays[0])
+            if shared
+            else line_gain(A, B, (weight, price), (gain, cost), delays)
+        )
+    if not np.all(np.isfinite(lines)):
+        raise UnsuitableSystemError(
+            f"the core is unstable, and grows beyond all numbers within the delay of {max(delays)} "
+            "samples: no controller can stabilize it through so long a dead time"
+        )
+    # What is on its way to an output has left the core: no input can change it any more.
+    passed = np.zeros((gain.shape[0], sum(plant.output_delays)))
+    return PredictorLQR(
+        gain=read_only(np.hstack([lines, passed])),
+        core_gain=read_only(gain),
+        poles=locked(poles),
+        cost=read_only(cost),
+        delay=delays[0] if shared else delays,
+        dt=float(plant.dt),
+    )
+
+
+def _state_loop(
+    plant: DelayedStateSpace, found: PredictorLQR
+) -> tuple[DelayedStateSpace, DelayLineController]:
+    """Loop of one input: the core's states, weighted by the gain, and the line of past inputs."""
+    core, d, dt = plant.delay_free, plant.input_delays[0], float(plant.dt)
+    n = core.nstates
+    on_state, line = found.gain[:, :n], found.gain[:, n : n + d]
+    A, B = np.asarray(core.A, dtype=np.float64), np.asarray(core.B, dtype=np.float64)
+    seen = ct.StateSpace(A, B, on_state, 0, dt, remove_useless_states=False)
+    nothing = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.ones((1, 1))
+    controller = DelayLineController(
+        *nothing, np.zeros((0, d)), -line, dt, name="lqr", pulses=(A, B, -found.core_gain)
+    )
+    return DelayedStateSpace(seen, d, fit=plant.fit), controller
+
+
+def _check_memory(states: int, delays: tuple[int, ...]) -> None:
+    steps = max(delays) - min(delays)
+    size = 8 * steps * states * len(delays)
+    if size > MOST_MEMORY:
+        raise DelayRangeError(
+            f"the delays of the inputs differ by up to {steps} samples, and the regulator of all "
+            f"of them takes {size / 1e9:.3g} GB; {MOST_MEMORY / 1e9:g} GB are the most. Sample the "
+            "system more slowly, cr.design.to_discrete(core, dead_time, dt), or use one input"
+        )
+
+
+def _check_coupling(price: FloatArray, delays: tuple[int, ...]) -> None:
+    apart = np.not_equal.outer(delays, delays)
+    if np.any(price[apart]):
+        i, j = (int(x) for x in np.argwhere(apart & (price != 0))[0])
+        raise OptionError(
+            f"R couples the inputs {i} and {j}, which have the delays {delays[i]} and "
+            f"{delays[j]}: sent together, they act at different times. Set R[{i}, {j}] to 0, or "
+            "use control.dlqr on the augmented system"
+        )
+
+
+def _predicted(A: FloatArray, B: FloatArray, gain: FloatArray, d: int) -> FloatArray:
+    """Gain times the state after the common delay d; newest input first in each line."""
+    m = B.shape[1]
+    # K A^(i-1) B are the Markov parameters of (A, B, K).
+    pulses = responses.markov(A, B, gain, np.zeros((m, m)), d + 1)[:, :, 1:]
+    ahead = gain @ np.linalg.matrix_power(A, d)
+    return np.hstack([ahead, *(pulses[:, j, :] for j in range(m))])

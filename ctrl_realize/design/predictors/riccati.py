@@ -1,0 +1,54 @@
+"""Riccati equations of a core: weights checked, failures in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import numbers
+from ...errors import DataError, OptionError, UnsuitableSystemError
+from ...numerics.arrays import ComplexArray, FloatArray
+
+
+def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray:
+    """Return a symmetric weight or covariance of the size that is needed."""
+    weight = np.atleast_2d(numbers(given, name))
+    if weight.shape != (size, size):
+        raise DataError(f"{name} has shape {weight.shape}; there are {size} {of}")
+    if not np.all(np.isfinite(weight)):
+        raise DataError(f"{name} has non-finite entries")
+    if not np.allclose(weight, weight.T, rtol=1e-9, atol=0):
+        raise OptionError(f"{name} is not symmetric")
+    return weight
+
+
+def has_states(core: ct.StateSpace, purpose: str) -> None:
+    """Refuse a static core, which has no state to regulate or to estimate."""
+    if core.nstates == 0:
+        raise UnsuitableSystemError(
+            f"{purpose} needs a core with states; this plant is a static gain behind its dead time"
+            ". design.pid(rule='optimal') or design.smith_predictor with an integral controller "
+            "work on it"
+        )
+
+
+def riccati(
+    solver: Any, A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, weights: str
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Return gain, cost and closed-loop poles of `control.dlqr`, or say why there are none."""
+    try:
+        gain, cost, poles = solver(A, B, Q, R)
+    # Slycot, where it is there, has errors of its own, all of them ArithmeticErrors.
+    except (ArithmeticError, ct.ControlArgument, ValueError) as error:
+        raise UnsuitableSystemError(
+            f"the Riccati equation of the core has no stabilizing solution for these {weights} "
+            f"({error}); an unstable or integrating mode may be out of reach or without weight"
+        ) from error
+    return (
+        np.atleast_2d(np.asarray(gain, dtype=np.float64)),
+        np.atleast_2d(np.asarray(cost, dtype=np.float64)),
+        np.asarray(poles, dtype=np.complex128),
+    )

@@ -1,0 +1,242 @@
+"""Smith predictors without hidden modes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._checks import positive
+from ...delayed import DelayedStateSpace
+from ...errors import OptionError, UnsuitableSystemError
+from ...numerics.arrays import FloatArray
+from ...numerics.state_space import responses
+from ...numerics.state_space.balancing import Part, split_modes
+from ..delay_line import DelayLineController
+from ..loops.loop_check import loop_check, refuse_unstable, warn_of
+from ..resolved import check_sign, warn_unresolved
+from ..siso import delayed_system, same_rate
+from .predictor_filter import predictor_filter, removed_part
+
+ON_CIRCLE = 1e-9
+
+
+def smith_predictor(
+    system: DelayedStateSpace,
+    controller: Any,
+    *,
+    filter_time: float | None = None,
+    remove_slow: bool | None = None,
+    name: str = "smith",
+) -> DelayLineController:
+    """Wrap a controller that was designed for the core so that it copes with the dead time.
+
+    The result C_s is used like any controller, ``loop = system * C_s`` with negative feedback.
+    Without a filter the closed loop from set-point to output is that of core and controller
+    alone, z^-d later. It has nC + n + d states and no hidden mode (feedback of the difference of
+    two models has n more, which show as uncontrollable poles of the core).
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+        The plant, one input and one output, stable or with one integrator.
+    controller : control.StateSpace, control.TransferFunction or float
+        Controller designed for ``system.delay_free``, of the same sample time.
+    filter_time : float, optional
+        Time constant in s of the filter on the prediction error. It makes the loop robust to a
+        wrong dead time or gain, slows down the rejection of loads, and leaves the set-point
+        response to a prefilter. Half the dead time is a usual start.
+    remove_slow : bool, optional
+        Take poles slower than the dead time out of the predictor, so that loads die out with the
+        controller rather than with the plant (for lag-dominated cores). An integrator is always
+        taken out.
+    name : str, optional
+
+    Returns
+    -------
+    DelayLineController
+        A `control.StateSpace` from error to plant input. Its attributes tell what it is made of:
+        ``model``, ``primary``, ``filter_time``, ``removed_poles``, ``check``, a `LoopCheck` of
+        the loop on `system` itself, and ``robustness``, its `DelayRobustness` at the ends of the
+        identified interval of the dead time (None if the system does not carry one).
+
+    Warns
+    -----
+    ModelWarning
+        The closed loop is unstable for some dead time within the interval that the
+        identification gave.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        An unstable core: its modes would be hidden inside the predictor and grow there. An
+        integrating core without `filter_time`, for the same reason. A continuous, improper or
+        multi-channel system. A controller that makes the loop unstable on `system` itself.
+    OptionError
+        A filter that is no filter.
+
+    Notes
+    -----
+    Smith (1957); filter after Normey-Rico and Camacho, *Control of Dead-time Processes* (2007),
+    chapter 7. The prediction is computed as ``y0[k] = sum_i g_i u[k-i] + C A^d x[k-d]``, with the
+    line of past inputs and the state of the model behind its dead time.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
+    >>> pi = ct.tf([2.0, -1.8], [1, -1], 0.01)
+    >>> predictor = cr.design.smith_predictor(plant, pi)
+    >>> predictor.nstates                       # 1 + 1 + 10
+    12
+    >>> cr.design.margins(plant, predictor)
+    <Margins stable: gain 2.387, phase 64.42 deg, modulus 0.5772, delay 0.1622 s>
+    """
+    plant = delayed_system(system, "a Smith predictor")
+    check_sign(plant, "a Smith predictor")
+    warn_unresolved(plant)
+    primary = same_rate(controller, plant.dt, "a Smith predictor")
+    core, d = plant.delay_free, int(plant.delay)
+    poles = np.asarray(core.poles())
+    _refuse_unstable(poles)
+    integrating = bool(np.any(np.abs(poles - 1) < ON_CIRCLE))
+    seconds = None if filter_time is None else positive(filter_time, "filter_time", "time in s")
+    if integrating and seconds is None:
+        raise UnsuitableSystemError(
+            "the core integrates: in a plain Smith predictor the integrator is a hidden mode that "
+            "drifts, and a load leaves a lasting error. Give filter_time, half the dead time for "
+            f"a start ({0.5 * d * plant.dt:.3g} s)"
+        )
+    if remove_slow and seconds is None:
+        raise OptionError("remove_slow needs filter_time: it is the filter that removes them")
+    slow = _slow_poles(poles, d) if remove_slow else np.zeros(0)
+    drop = np.concatenate([slow, [1.0]]) if integrating else slow
+    removed, kept = split_modes(
+        np.asarray(core.A),
+        np.asarray(core.B),
+        np.asarray(core.C),
+        lambda z: bool(np.any(np.abs(z - drop) < 1e-9 * (1 + abs(z)))),
+    )
+    A, B, C, D, E, h, pulses = _assemble(
+        plant, primary, removed, kept, _filter(seconds, plant, slow, integrating)
+    )
+    notes = {
+        "model": plant,
+        "primary": DelayedStateSpace(primary, 0, name=primary.name),
+        "filter_time": seconds,
+        "removed_poles": drop,
+    }
+
+    def made(**more: Any) -> DelayLineController:
+        return DelayLineController(
+            *(A, B, C, D, E, h, float(plant.dt)),
+            name=name,
+            inputs="e",
+            outputs=plant.input_labels[0],
+            notes={**notes, **more},
+            pulses=pulses,
+        )
+
+    check = loop_check(plant, made())
+    refuse_unstable(
+        check,
+        "the Smith predictor",
+        "Its closed loop is that of core and controller alone: give a controller whose loop with "
+        "system.delay_free is stable (design.margins(system.delay_free, controller))",
+    )
+    warn_of(check, "give a longer filter_time or a slower controller", stacklevel=3)
+    return made(check=check, robustness=check.robustness)
+
+
+def _refuse_unstable(poles: FloatArray) -> None:
+    outside = poles[np.abs(poles) > 1 + ON_CIRCLE]
+    if outside.size:
+        raise UnsuitableSystemError(
+            f"the core is unstable (pole at {complex(outside[0]):.6g}): the predictor holds a copy "
+            "of the unstable mode that no measurement corrects, so any error grows. Use "
+            "design.lqg, whose estimator corrects it"
+        )
+    on = poles[np.abs(np.abs(poles) - 1) <= ON_CIRCLE]
+    if np.any(np.abs(on - 1) > ON_CIRCLE) or on.size > 1:
+        raise UnsuitableSystemError(
+            f"the core has {on.size} poles on the unit circle; at most one, at z = 1, can be taken "
+            "out of the predictor. Use design.lqg"
+        )
+
+
+def _slow_poles(poles: FloatArray, delay: int) -> FloatArray:
+    """Real poles whose time constant exceeds the dead time."""
+    real = poles[np.abs(poles.imag) < 1e-9].real
+    return np.asarray(real[(real > np.exp(-1 / max(delay, 1))) & (np.abs(real - 1) > ON_CIRCLE)])
+
+
+def _filter(
+    seconds: float | None, plant: DelayedStateSpace, slow: FloatArray, integrating: bool
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    if seconds is None:
+        return np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), 1.0
+    alpha = float(np.exp(-plant.dt / seconds))
+    if np.any(np.abs(slow - alpha) < 1e-6):
+        raise OptionError(
+            f"filter_time={seconds:g} s is the time constant of a pole to remove; choose another"
+        )
+    return predictor_filter(alpha, int(plant.delay), slow, integrating=integrating)
+
+
+def _assemble(
+    plant: DelayedStateSpace,
+    primary: ct.StateSpace,
+    removed: Part,
+    kept: Part,
+    filter_: tuple[FloatArray, FloatArray, FloatArray, float],
+) -> tuple[Any, ...]:
+    """Matrices of u = C v, v = F (e + y_d) - y_0, with states [x_c; x_d; x_F] and the line.
+
+    Last the pulse response that all but the last column of the line are made of.
+    """
+    core, d = plant.delay_free, int(plant.delay)
+    Ac, Bc, Cc, Dc = (
+        np.asarray(M, dtype=np.float64) for M in (primary.A, primary.B, primary.C, primary.D)
+    )
+    Ak, Bk, Ck = kept
+    Af, Bf, Cf, Df = filter_
+    nc, nk, nf = Ac.shape[0], Ak.shape[0], Af.shape[0]
+    if d == 0:
+        # Nothing to predict, and with F = 1 nothing to filter: the controller itself.
+        return Ac, Bc, Cc, Dc, np.zeros((nc, 0)), np.zeros((1, 0)), None
+    taps = responses.markov(core.A, core.B, core.C, core.D, d + 1)[0, 0]
+    direct = float(core.D[0, 0])
+    # Rows over [x_c, x_d, x_F], the line and e.
+    n = nc + nk + nf
+    into = np.zeros((1, n)), np.zeros((1, d)), Df * np.ones((1, 1))
+    ahead = Ck @ np.linalg.matrix_power(Ak, d)
+    into[0][0, nc : nc + nk] = (Df * Ck - ahead)[0]
+    into[0][0, nc + nk :] = Cf[0]
+    into[1][0] = -taps[1:]
+    into[1][0, -1] += Df * direct
+    # v still holds -g_0 u[k]: u (1 + Dc g_0) = Cc x_c + Dc (the rest of v)
+    solve = 1 + Dc[0, 0] * taps[0]
+    if abs(solve) < 1e-12:
+        raise UnsuitableSystemError(
+            "controller and direct term of the core make an algebraic loop of gain -1"
+        )
+    out = [Dc @ block / solve for block in into]
+    out[0][0, :nc] += Cc[0] / solve
+    v = [block - taps[0] * row for block, row in zip(into, out, strict=True)]
+    A, E, B = np.zeros((n, n)), np.zeros((n, d)), np.zeros((n, 1))
+    A[:nc, :nc] = Ac
+    A[:nc] += Bc @ v[0]
+    E[:nc], B[:nc] = Bc @ v[1], Bc @ v[2]
+    A[nc : nc + nk, nc : nc + nk] = Ak
+    E[nc : nc + nk, -1] = Bk[:, 0]
+    if nf:
+        A[nc + nk :, nc : nc + nk] = Bf @ Ck
+        A[nc + nk :, nc + nk :] = Af
+        E[nc + nk :, -1] = Bf[:, 0] * direct + removed_part(filter_, removed)[:, 0]
+        B[nc + nk :] = Bf
+    # The line holds -taps alone, through the controller's B and D.
+    mix = -np.vstack([Bc, np.zeros((nk + nf, 1)), Dc]) / solve
+    core_A, core_B, core_C = (np.asarray(M, np.float64) for M in (core.A, core.B, core.C))
+    return A, B, out[0], out[2], E, out[1], (core_A, core_B, mix @ core_C)

@@ -1,0 +1,1 @@
+"""PID controllers: tuning rules, comparison, optimal settings."""

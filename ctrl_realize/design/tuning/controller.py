@@ -1,0 +1,219 @@
+"""PID controllers that remember their parameters."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._checks import one_of, positive, real
+from ..._wording import in_time
+from ...delayed import DelayedStateSpace
+from ...errors import OptionError
+from ...numerics.arrays import FloatArray
+from ...results import as_asked, html_card, text_card
+from ..loops.loop_check import LoopCheck
+from ..models.process_model import ProcessModel
+
+DISCRETIZATIONS = ("tustin", "forward", "backward")
+
+
+class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+    """PID controller in ideal form, continuous or discrete; a `control.StateSpace`.
+
+    Continuous: ``kp (1 + 1/(ti s) + td s / (tf s + 1))`` from error to plant input. Discrete: the
+    integral by `method`, the derivative by backward differences, which never ring.
+
+    Parameters
+    ----------
+    kp : float
+        Gain.
+    ti : float
+        Integral time in s; inf for none.
+    td : float
+        Derivative time in s; 0 for none.
+    tf : float
+        Time constant of the derivative filter in s; > 0 where there is a derivative.
+    dt : float
+        Sample time in s; 0 for a continuous controller.
+    method : {"tustin", "forward", "backward"}
+        Rule for the integral.
+    rule : str
+        Where the parameters come from.
+    model : ProcessModel, optional
+        What the rule looked at.
+    name : str, optional
+    check : LoopCheck, optional
+        What the loop does on the model that the controller was tuned for.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> pi = cr.design.PIDController(0.5, 0.2, dt=0.001)
+    >>> pi
+    <PIDController 'PI': kp = 0.5, ti = 0.2 s, dt = 0.001 s>
+    >>> pi.kind, pi.nstates
+    ('PI', 1)
+    """
+
+    def __init__(
+        self,
+        kp: float,
+        ti: float = float("inf"),
+        td: float = 0.0,
+        tf: float = 0.0,
+        *,
+        dt: float = 0.0,
+        method: str = "tustin",
+        rule: str = "given",
+        model: ProcessModel | None = None,
+        name: str | None = None,
+        check: LoopCheck | None = None,
+    ) -> None:
+        self.kp = real(kp, "kp", "gain")
+        self.ti = float("inf") if ti == float("inf") else positive(ti, "ti", "integral time in s")
+        self.td = real(td, "td", "derivative time in s")
+        self.tf = real(tf, "tf", "time constant of the derivative filter in s")
+        self.method = one_of(method, "method", DISCRETIZATIONS)
+        self.rule = rule
+        self.model = model
+        self.check = check
+        if self.td < 0 or self.tf < 0 or (self.td > 0 and self.tf == 0):
+            raise OptionError(
+                f"td={self.td:g} s, tf={self.tf:g} s; needed are td >= 0 and, with a derivative, "
+                "tf > 0 (td/10 is usual)"
+            )
+        step = real(dt, "dt", "sample time in s, 0 for continuous")
+        if step < 0:
+            raise OptionError(f"dt={step:g}; needed is a sample time in s, or 0 for continuous")
+        self.kind = "P" + "I" * (self.ti < float("inf")) + "D" * (self.td > 0)
+        super().__init__(
+            *self._matrices(step),
+            step,
+            name=name or (self.kind if rule == "given" else f"{self.kind}_{rule}"),
+            inputs=["e"],
+            outputs=["u"],
+            remove_useless_states=False,
+        )
+
+    def _matrices(self, h: float) -> tuple[FloatArray, ...]:
+        parts: list[tuple[float, float, float, float]] = [(0.0, 0.0, 0.0, self.kp)]
+        if self.ti < float("inf"):
+            parts.append(self._integral(h))
+        if self.td > 0:
+            parts.append(self._derivative(h))
+        A = np.diag([part[0] for part in parts[1:]]).reshape(len(parts) - 1, len(parts) - 1)
+        B = np.array([[part[1]] for part in parts[1:]]).reshape(-1, 1)
+        C = np.array([[part[2] for part in parts[1:]]]).reshape(1, -1)
+        return A, B, C, np.array([[sum(part[3] for part in parts)]])
+
+    def _integral(self, h: float) -> tuple[float, float, float, float]:
+        if h == 0:
+            return 0.0, 1.0, self.kp / self.ti, 0.0
+        share = self.kp * h / self.ti
+        direct = {"forward": 0.0, "tustin": 0.5, "backward": 1.0}[self.method]
+        return 1.0, 1.0, share, share * direct
+
+    def _derivative(self, h: float) -> tuple[float, float, float, float]:
+        if h == 0:
+            slope = self.kp * self.td / self.tf
+            return -1 / self.tf, 1 / self.tf, -slope, slope
+        pole = self.tf / (self.tf + h)
+        slope = self.kp * self.td / (self.tf + h)
+        return pole, 1.0, slope * (pole - 1), slope
+
+    def discretised(self, dt: float, method: str | None = None) -> PIDController:
+        """Sample the controller (or sample it anew) with `dt` in s."""
+        positive(dt, "dt", "sample time in s")
+        # What was found of the loop was found of this sample time.
+        return self._again(dt=dt, method=method or self.method, check=None)
+
+    @property
+    def continuous(self) -> PIDController:
+        """The same controller in continuous time."""
+        return self._again(dt=0.0, check=None)
+
+    def checked(self, check: LoopCheck) -> PIDController:
+        """The same controller with what was found of its loop."""
+        return self._again(check=check)
+
+    def report(self) -> str:
+        """Tell the parameters, and what the loop does on its model, as plain text."""
+        title, rows, flags = self._card()
+        return text_card(title, rows, flags=flags)
+
+    def _again(self, **changes: Any) -> PIDController:
+        settings = {**self._settings(), **changes}
+        return PIDController(self.kp, self.ti, self.td, self.tf, **settings)
+
+    def _settings(self) -> dict[str, Any]:
+        """All that makes this controller, beside its four parameters."""
+        names = ("dt", "method", "rule", "model", "name", "check")
+        return {name: getattr(self, name) for name in names}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, ((self.kp, self.ti, self.td, self.tf), self._settings())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> PIDController:
+        return self._again()
+
+    def __mul__(self, other: Any) -> Any:
+        """Series: first `other`, then the controller. A plant with dead time keeps it."""
+        return NotImplemented if isinstance(other, DelayedStateSpace) else super().__mul__(other)
+
+    def __repr__(self) -> str:
+        return as_asked(self)
+
+    def _repr_eval_(self) -> str:
+        parameters = ", ".join(
+            f"float('{value!r}')" if np.isinf(value) else repr(value)
+            for value in (self.kp, self.ti, self.td, self.tf)
+        )
+        # Not the model that a rule looked at, nor what was found of the loop.
+        settings = self._settings()
+        words = ", ".join(f"{key}={settings[key]!r}" for key in ("dt", "method", "rule", "name"))
+        return f"PIDController({parameters}, {words})"
+
+    def _repr_info_(self, html: bool = False) -> str:
+        line = self._line()
+        return escape(line) if html else line
+
+    def _line(self) -> str:
+        words = [f"kp = {self.kp:.4g}"]
+        if "I" in self.kind:
+            words.append(f"ti = {self.ti:.4g} s")
+        if "D" in self.kind:
+            words.append(f"td = {self.td:.4g} s, tf = {self.tf:.4g} s")
+        words.append(f"dt = {self.dt:.4g} s" if self.dt else "continuous")
+        return f"<PIDController {self.name!r}: {', '.join(words)}>"
+
+    def __str__(self) -> str:
+        # python-control's shows matrices, in which nobody finds the parameters again.
+        return f"{self._line()}\n\n{super().__str__()}"
+
+    def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
+        rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]
+        if "I" in self.kind:
+            rows.append(("integral time ti", in_time(self.ti, 4)))
+        if "D" in self.kind:
+            rows.append(("derivative time td", in_time(self.td, 4)))
+            rows.append(("its filter tf", in_time(self.tf, 4)))
+        step = f"{in_time(self.dt, 6)}, {self.method} rule" if self.dt else "none: continuous"
+        rows.append(("sample time", step))
+        if self.check is None:
+            return f"PID controller {self.name}", rows, []
+        rows += self.check.rows()
+        return f"PID controller {self.name}", rows, [str(flag) for flag in self.check.flags]
+
+    def _repr_html_(self) -> str:
+        title, rows, flags = self._card()
+        return html_card(title, rows, flags=flags)
+
+    def _repr_markdown_(self) -> None:
+        return None
+
+
+def _rebuild(parameters: tuple[float, ...], settings: dict[str, Any]) -> PIDController:
+    return PIDController(*parameters, **settings)

@@ -1,0 +1,258 @@
+"""PID controllers by tuning rules."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..._checks import one_of, positive, real
+from ...delayed import DelayedStateSpace
+from ...errors import OptionError, UnsuitableSystemError
+from ...numerics.blas_threads import single_threaded
+from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
+from ..loops.margins import margins
+from ..models.process_model import ProcessModel
+from ..models.reduction import METHODS as REDUCTIONS
+from ..models.reduction import reduce_fopdt, reduce_sopdt
+from ..resolved import check_sign, warn_unresolved
+from ..siso import delayed_system
+from .controller import DISCRETIZATIONS, PIDController
+from .optimal import optimal
+from .rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
+
+RULES = (*MODEL_RULES, *SYSTEM_RULES)
+KINDS = ("P", "PI", "PD", "PID")
+SAFE = ("amigo", "simc", "lambda")
+"""Rules that are tried in place of one whose loop is unstable; then the optimal PI."""
+MOST_SENSITIVE = 2.0
+"""Largest Ms of a loop to recommend: gain and phase margin are then at least 2 and 29 deg
+(Astrom and Hagglund, Advanced PID Control, 2006, section 4.6)."""
+FINE = 1000
+"""Samples within the total time of a process model, so many that sampling does not matter."""
+SETTLED = 10_000
+"""Samples behind the delay after which a step response has the sign of the gain."""
+
+
+@single_threaded
+def pid(
+    system: Any,
+    rule: str = "simc",
+    kind: str = "PI",
+    *,
+    closed_loop_time: float | None = None,
+    max_sensitivity: float = 1.4,
+    derivative_filter: float = 10.0,
+    reduction: str = "optimal",
+    method: str = "tustin",
+    dt: float | None = None,
+    name: str | None = None,
+) -> PIDController:
+    """Tune a P, PI, PD or PID controller.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace or ProcessModel
+        Plant with one input and one output. A system gives a discrete controller of its sample
+        time; the rules then see half a sample more dead time, the age of a held output. A
+        process model gives a continuous controller unless `dt` is given.
+    rule : str, optional
+        ``"simc"``, ``"lambda"``, ``"imc"``, ``"amigo"``, ``"ziegler_nichols"`` and
+        ``"cohen_coon"`` look at a reduced model; ``"ziegler_nichols_ultimate"`` at the exact
+        ultimate gain; ``"optimal"`` minimizes the integrated absolute error after a load step
+        subject to `max_sensitivity`.
+    kind : {"P", "PI", "PD", "PID"}, optional
+        Not every rule knows every kind.
+    closed_loop_time : float, optional
+        In s, for simc, lambda and imc.
+    max_sensitivity : float, optional
+        Ms, for the optimal rule.
+    derivative_filter : float, optional
+        td / tf, 1...100.
+    reduction : {"optimal", "half_rule"}, optional
+        How a system is reduced, see `reduce_fopdt`.
+    method : {"tustin", "forward", "backward"}, optional
+        Discretization of the integral.
+    dt : float, optional
+        Sample time in s, for a process model only.
+    name : str, optional
+
+    Returns
+    -------
+    PIDController
+        A `control.StateSpace` from error to plant input, with the parameters as attributes. Its
+        `check`, a `LoopCheck`, tells what the loop does on `system` itself, not on what the rule
+        made of it, and over the interval of dead times that an identified system carries.
+
+    Warns
+    -----
+    ModelWarning
+        The loop is unstable for some dead time within that interval.
+
+    Raises
+    ------
+    OptionError
+        A rule or kind that does not exist, or options that do not belong together.
+    UnsuitableSystemError
+        An unstable plant, several channels, an integrating plant for a rule that has no answer;
+        a rule whose controller makes the loop unstable on `system` itself.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> valve = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.029, dt=0.001)
+    >>> cr.design.pid(valve)
+    <PIDController 'PI_simc': kp = 1.356, ti = 0.08 s, dt = 0.001 s>
+    >>> cr.design.pid(cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029))
+    <PIDController 'PI_simc': kp = 1.379, ti = 0.08 s, continuous>
+    """
+    options: dict[str, Any] = {
+        "closed_loop_time": closed_loop_time,
+        "max_sensitivity": max_sensitivity,
+        "derivative_filter": derivative_filter,
+        "reduction": reduction,
+        "method": method,
+        "dt": dt,
+    }
+    made, plant = tuned(system, rule, kind, **options, name=name)
+    check = closed_on(system, plant, made)
+    if not check.stable:
+        works = _one_that_works(system, rule, kind, options)
+        refuse_unstable(check, f"the {kind} controller of rule={rule!r}", works)
+    warn_of(check, "a slower rule ('amigo', 'lambda') may be stable over all of it")
+    return made.checked(check)
+
+
+def tuned(
+    system: Any,
+    rule: str = "simc",
+    kind: str = "PI",
+    *,
+    closed_loop_time: float | None = None,
+    max_sensitivity: float = 1.4,
+    derivative_filter: float = 10.0,
+    reduction: str = "optimal",
+    method: str = "tustin",
+    dt: float | None = None,
+    name: str | None = None,
+) -> tuple[PIDController, DelayedStateSpace]:
+    """Follow a rule, see `pid`, without a look at the loop; returns the plant it was for too."""
+    one_of(rule, "rule", RULES)
+    one_of(kind, "kind", KINDS)
+    one_of(method, "method", DISCRETIZATIONS)
+    known = kinds_of(rule)
+    if kind not in known:
+        raise OptionError(f"rule={rule!r} has no {kind}; it knows {', '.join(known)}")
+    ratio = real(derivative_filter, "derivative_filter", "td / tf")
+    if not 1 <= ratio <= 100:
+        raise OptionError(f"derivative_filter={ratio:g}; needed is td / tf in 1...100")
+    target = None
+    if closed_loop_time is not None:
+        if rule not in ("simc", "lambda", "imc"):
+            raise OptionError(f"closed_loop_time is for simc, lambda and imc, not for {rule!r}")
+        target = positive(closed_loop_time, "closed_loop_time", "time in s")
+    limit = real(max_sensitivity, "max_sensitivity", "Ms")
+    if not 1.01 <= limit <= 10:
+        raise OptionError(f"max_sensitivity={limit:g}; needed is Ms in 1.01...10")
+    plant, step = reference_plant(system, dt)
+    model: ProcessModel | None = None
+    if rule in MODEL_RULES:
+        model = _model(system, plant, rule, kind, reduction, step)
+        kp, ti, td = MODEL_RULES[rule][0](model, kind, target)
+    elif rule == "optimal":
+        total = _total_time(system, plant)
+        kp, ti, td = optimal(
+            plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method
+        )
+    else:
+        kp, ti, td = _ultimate(plant, kind)
+    made = PIDController(
+        kp, ti, td, td / ratio, dt=step, method=method, rule=rule, model=model, name=name
+    )
+    return made, plant
+
+
+def closed_on(system: Any, plant: DelayedStateSpace, controller: PIDController) -> LoopCheck:
+    """Check a controller on the system that it was tuned for, `plant` in discrete form."""
+    if isinstance(system, ProcessModel) and not controller.dt:
+        return loop_check(system.transfer_function(), controller, system.dead_time)
+    return loop_check(plant, controller)
+
+
+def _one_that_works(system: Any, rule: str, kind: str, options: dict[str, Any]) -> str:
+    """Say which rule gives a loop that is stable and not on the verge of being unstable."""
+    tries = [
+        (name, form, reduction)
+        for form in dict.fromkeys((kind, "PI"))
+        for name in dict.fromkeys((rule, *SAFE))
+        for reduction in REDUCTIONS
+        if name in MODEL_RULES
+    ]
+    tried = (rule, kind, options["reduction"])
+    for name, form, reduction in [*tries, ("optimal", "PI", options["reduction"])]:
+        if form not in kinds_of(name) or (name, form, reduction) == tried:
+            continue
+        changed = {**options, "closed_loop_time": None, "reduction": reduction}
+        try:
+            made, plant = tuned(system, name, form, **changed)
+        except ValueError:
+            continue
+        found = closed_on(system, plant, made).margins
+        if found.stable and found.ms <= MOST_SENSITIVE:
+            how = f"rule={name!r}, kind={form!r}, reduction={reduction!r}"
+            return f"Use {how}, which is stable on it with Ms = {found.ms:.3g}"
+    return "None of the other rules does better; look at design.compare_pid, or use design.lqg"
+
+
+def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, float]:
+    """Discrete plant to look at, and the sample time of the controller (0: continuous)."""
+    if isinstance(system, ProcessModel):
+        if dt is not None:
+            step = positive(dt, "dt", "sample time in s")
+            return system.system(step), step
+        # A continuous controller is tuned on a plant sampled so finely that it does not matter.
+        return system.system(system.total_time / FINE), 0.0
+    plant = delayed_system(system, "a PID controller")
+    check_sign(plant, "a PID controller")
+    warn_unresolved(plant)
+    if dt is not None:
+        raise OptionError(
+            f"dt={dt:g} is for process models; the controller of a system takes its sample time, "
+            f"{plant.dt:g} s"
+        )
+    return plant, float(plant.dt)
+
+
+def _model(
+    system: Any, plant: DelayedStateSpace, rule: str, kind: str, reduction: str, step: float
+) -> ProcessModel:
+    second = rule == "simc" and "D" in kind
+    if isinstance(system, ProcessModel):
+        found = system
+        if system.second_lag and not second:
+            found = reduce_fopdt(system, method=reduction)
+    else:
+        found = (reduce_sopdt if second else reduce_fopdt)(plant, method=reduction)
+    # A controller output held over a sample is half a sample old on average.
+    return replace(found, dead_time=found.dead_time + step / 2)
+
+
+def _total_time(system: Any, plant: DelayedStateSpace) -> float:
+    if isinstance(system, ProcessModel):
+        return system.total_time
+    return reduce_sopdt(plant).total_time + float(plant.dt)
+
+
+def _ultimate(plant: DelayedStateSpace, kind: str) -> Parameters:
+    if np.any(np.abs(np.asarray(plant.delay_free.poles())) > 1 + 1e-9):
+        raise UnsuitableSystemError("the plant is unstable; it has no ultimate gain to start from")
+    reverse = bool(np.real(plant.step(plant.delay + SETTLED)[-1]) < 0)
+    found = margins(-plant if reverse else plant)
+    if found.gain_margins.size == 0:
+        raise UnsuitableSystemError("the plant never turns by 180 deg: it has no ultimate gain")
+    at = int(np.argmin(found.gain_margins))
+    gain, omega = float(found.gain_margins[at]), float(found.phase_crossovers[at])
+    kp, ti, td = ultimate(gain, 2 * np.pi / omega, kind)
+    return -kp if reverse else kp, ti, td

@@ -1,0 +1,157 @@
+"""Tuning rules: parameters of an ideal PID from a process model.
+
+Each function returns (kp, ti, td); ti is inf and td 0 where the kind has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...errors import OptionError, UnsuitableSystemError
+from ..models.process_model import ProcessModel
+
+Parameters = tuple[float, float, float]
+Rule = Callable[[ProcessModel, str, float | None], Parameters]
+INF = float("inf")
+
+
+def simc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Skogestad (2003), sections 3-4; the closed-loop time defaults to the dead time."""
+    theta = model.dead_time
+    tau_c = theta if closed_loop_time is None else closed_loop_time
+    if tau_c + theta == 0:
+        raise OptionError("the model has no dead time; give closed_loop_time in s")
+    if model.integrating:
+        kp, ti, second = 1 / (model.gain * (tau_c + theta)), 4 * (tau_c + theta), model.lag
+    else:
+        kp = model.lag / (model.gain * (tau_c + theta))
+        ti, second = min(model.lag, 4 * (tau_c + theta)), model.second_lag
+    if "D" not in kind:
+        return kp, ti if "I" in kind else INF, 0.0
+    if second == 0:
+        raise OptionError(
+            "simc gives a derivative only for a second lag; use kind='PI', or a model from "
+            "reduce_sopdt"
+        )
+    if "I" not in kind:
+        return kp, INF, second
+    # The rule is for the series form; this is the ideal form of the same controller.
+    factor = 1 + second / ti
+    return kp * factor, ti * factor, second / factor
+
+
+def lambda_(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Lambda tuning: cancel the lag; closed-loop time by default the lag, or 3 dead times if more.
+
+    Dahlin (1968); for integrating models after Chien and Fruehauf (1990).
+    """
+    theta = model.dead_time
+    fallback = 3 * theta if model.integrating else max(model.lag, 3 * theta)
+    target = fallback if closed_loop_time is None else closed_loop_time
+    if model.integrating:
+        ti = 2 * target + theta
+        return ti / (model.gain * (target + theta) ** 2), ti, 0.0
+    return model.lag / (model.gain * (target + theta)), model.lag, 0.0
+
+
+def imc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Internal model control: Rivera, Morari and Skogestad (1986), table II.
+
+    PI is the improved one; the closed-loop time defaults to 1.7 (PI) or 0.8 (PID) dead times, the
+    smallest that they allow.
+    """
+    _needs_lag(model, "imc")
+    theta, tau = model.dead_time, model.lag
+    fallback = (0.8 if kind == "PID" else 1.7) * theta
+    target = max(fallback, 0.1 * tau) if closed_loop_time is None else closed_loop_time
+    if kind == "PI":
+        return (2 * tau + theta) / (2 * model.gain * target), tau + theta / 2, 0.0
+    return (
+        (2 * tau + theta) / (2 * model.gain * (target + theta / 2)),
+        tau + theta / 2,
+        tau * theta / (2 * tau + theta),
+    )
+
+
+def amigo(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Astrom and Hagglund, Advanced PID Control (2006), section 7.5: Ms near 1.4."""
+    L, K = _dead_time(model, "amigo"), model.gain
+    if model.integrating:
+        if kind == "PI":
+            return 0.35 / (K * L), 13.4 * L, 0.0
+        return 0.45 / (K * L), 8 * L, 0.5 * L
+    T = model.lag
+    if kind == "PI":
+        kp = 0.15 / K + (0.35 - L * T / (L + T) ** 2) * T / (K * L)
+        return kp, 0.35 * L + 13 * L * T**2 / (T**2 + 12 * L * T + 7 * L**2), 0.0
+    kp = (0.2 + 0.45 * T / L) / K
+    return kp, (0.4 * L + 0.8 * T) / (L + 0.1 * T) * L, 0.5 * L * T / (0.3 * L + T)
+
+
+def ziegler_nichols(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Ziegler and Nichols (1942), from the step response: quarter-amplitude damping."""
+    L = _dead_time(model, "ziegler_nichols")
+    a = model.gain * L if model.integrating else model.gain * L / model.lag
+    return {"P": (1 / a, INF, 0.0), "PI": (0.9 / a, L / 0.3, 0.0), "PID": (1.2 / a, 2 * L, L / 2)}[
+        kind
+    ]
+
+
+def cohen_coon(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Cohen and Coon (1953): quarter-amplitude damping, with the lag's own decay."""
+    _needs_lag(model, "cohen_coon")
+    L = _dead_time(model, "cohen_coon")
+    r, a = L / model.lag, model.gain * L / model.lag
+    return {
+        "P": ((1 + r / 3) / a, INF, 0.0),
+        "PI": ((0.9 + r / 12) / a, L * (30 + 3 * r) / (9 + 20 * r), 0.0),
+        "PD": ((1.25 + r / 6) / a, INF, L * (6 - 2 * r) / (22 + 3 * r)),
+        "PID": ((4 / 3 + r / 4) / a, L * (32 + 6 * r) / (13 + 8 * r), 4 * L / (11 + 2 * r)),
+    }[kind]
+
+
+def ultimate(gain: float, period: float, kind: str) -> Parameters:
+    """Ziegler and Nichols (1942), from the gain and period of sustained oscillation."""
+    return {
+        "P": (0.5 * gain, INF, 0.0),
+        "PI": (0.45 * gain, period / 1.2, 0.0),
+        "PID": (0.6 * gain, period / 2, period / 8),
+    }[kind]
+
+
+def _dead_time(model: ProcessModel, rule: str) -> float:
+    if model.dead_time <= 0:
+        raise OptionError(f"rule={rule!r} divides by the dead time, and the model has none")
+    return model.dead_time
+
+
+def _needs_lag(model: ProcessModel, rule: str) -> None:
+    if model.integrating or not np.isfinite(model.lag):
+        raise UnsuitableSystemError(
+            f"rule={rule!r} is for models with a lag, not for integrating ones; use 'simc', "
+            "'lambda', 'amigo' or 'optimal'"
+        )
+
+
+MODEL_RULES: dict[str, tuple[Rule, tuple[str, ...]]] = {
+    "simc": (simc, ("P", "PI", "PD", "PID")),
+    "lambda": (lambda_, ("PI",)),
+    "imc": (imc, ("PI", "PID")),
+    "amigo": (amigo, ("PI", "PID")),
+    "ziegler_nichols": (ziegler_nichols, ("P", "PI", "PID")),
+    "cohen_coon": (cohen_coon, ("P", "PI", "PD", "PID")),
+}
+"""Rules that look at a process model, and the kinds that they know."""
+
+SYSTEM_RULES: dict[str, tuple[str, ...]] = {
+    "ziegler_nichols_ultimate": ("P", "PI", "PID"),
+    "optimal": ("P", "PI", "PD", "PID"),
+}
+"""Rules that look at the frequency response of the plant itself, and the kinds that they know."""
+
+
+def kinds_of(rule: str) -> tuple[str, ...]:
+    """Return the kinds of controller that a rule knows."""
+    return MODEL_RULES[rule][1] if rule in MODEL_RULES else SYSTEM_RULES[rule]

@@ -1,0 +1,211 @@
+"""Tuning rules side by side on one plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..._checks import one_of
+from ...delayed import DelayedStateSpace
+from ...errors import OptionError
+from ...numerics.blas_threads import single_threaded
+from ...results import Result
+from ..loops.loop_check import loop_check
+from ..loops.margin_result import Margins
+from ..loops.performance import Performance, measured, plant_time, settled_responses
+from ..models.process_model import ProcessModel
+from .controller import PIDController
+from .pid import KINDS, RULES, reference_plant, tuned
+from .rules import kinds_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+UNSTABLE = Performance(float("inf"), float("inf"), float("nan"), float("inf"))
+"""What a loop achieves that does not settle."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PIDComparison(Result):
+    """Controllers of several rules for one plant, with what each achieves.
+
+    ``margins[i]`` and ``performance[i]`` belong to ``controllers[i]``.
+
+    Attributes
+    ----------
+    controllers : tuple of PIDController
+    margins : tuple of Margins
+    performance : tuple of Performance
+        inf where the loop is unstable.
+    refused : tuple of (str, str, str)
+        Rule, kind and reason where a rule has no answer for this plant.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> found = cr.design.compare_pid(plant, ["simc", "amigo"], ["PI"])
+    >>> print(found.table()[["rule", "kp", "ti", "ms", "iae_load"]].round(3).to_string(index=False))
+     rule    kp   ti    ms  iae_load
+     simc 1.356 0.08 1.591     0.059
+    amigo 0.565 0.07 1.222     0.125
+    """
+
+    controllers: tuple[PIDController, ...]
+    margins: tuple[Margins, ...]
+    performance: tuple[Performance, ...]
+    refused: tuple[tuple[str, str, str], ...] = ()
+
+    def table(self) -> pd.DataFrame:
+        """One row for each controller; times in s, phase margin in degrees."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            [
+                {
+                    "rule": c.rule,
+                    "kind": c.kind,
+                    "kp": c.kp,
+                    "ti": c.ti,
+                    "td": c.td,
+                    "stable": m.stable,
+                    "gain_margin": m.gain_margin,
+                    "phase_margin": m.phase_margin,
+                    "ms": m.ms,
+                    "delay_margin": m.delay_margin,
+                    "iae_setpoint": p.setpoint_error,
+                    "iae_load": p.load_error,
+                    "overshoot": p.overshoot,
+                    "settling_time": p.settling_time,
+                }
+                for c, m, p in zip(self.controllers, self.margins, self.performance, strict=True)
+            ]
+        )
+
+    def best(self, max_sensitivity: float = 2.0) -> PIDController:
+        """Controller of least load error among the stable ones with Ms within the limit.
+
+        Where the system carries an interval of dead times, the loop must be stable over all of
+        it.
+        """
+        fit = [
+            (p.load_error, i)
+            for i, (m, p) in enumerate(zip(self.margins, self.performance, strict=True))
+            if m.stable and m.ms <= max_sensitivity and not self._unsafe(i)
+        ]
+        if not fit:
+            unsafe = sum(map(self._unsafe, range(len(self.controllers))))
+            raise OptionError(
+                f"no controller has Ms <= {max_sensitivity:g}; the smallest is "
+                f"{min((m.ms for m in self.margins if m.stable), default=float('inf')):.3g}"
+                + (f"; {unsafe} are unstable within the interval of the dead time" * bool(unsafe))
+            )
+        return self.controllers[min(fit)[1]]
+
+    def _unsafe(self, i: int) -> bool:
+        """Whether a controller is unstable for some dead time of the interval."""
+        check = self.controllers[i].check
+        return check is not None and check.stable_within_interval is False
+
+    def _title(self) -> str:
+        return "PID rules"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [
+            (
+                f"{c.kind} {c.rule}",
+                f"Ms {m.ms:.3g}, phase {m.phase_margin:.3g} deg, IAE load {p.load_error:.3g} s, "
+                f"set-point {p.setpoint_error:.3g} s, overshoot {100 * p.overshoot:.3g} %"
+                if m.stable
+                else "UNSTABLE",
+            )
+            for c, m, p in zip(self.controllers, self.margins, self.performance, strict=True)
+        ]
+
+    def _notes(self) -> list[str]:
+        refused = [f"{kind} {rule}: {reason}" for rule, kind, reason in self.refused]
+        unsafe = [
+            f"{c.kind} {c.rule}: {c.check.flags[0]}"
+            for i, c in enumerate(self.controllers)
+            if c.check is not None and self._unsafe(i)
+        ]
+        return unsafe + refused
+
+    def __repr__(self) -> str:
+        stable = sum(m.stable for m in self.margins)
+        return f"<PIDComparison: {len(self.controllers)} controllers, {stable} stable>"
+
+
+@single_threaded
+def compare_pid(
+    system: Any,
+    rules: Sequence[str] | None = None,
+    kinds: Sequence[str] = ("PI", "PID"),
+    **options: Any,
+) -> PIDComparison:
+    """Tune by several rules and compare margins and step responses on the plant itself.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace or ProcessModel
+        See `pid`. A process model is sampled finely (1000 samples per total time).
+    rules : sequence of str, optional
+        All by default.
+    kinds : sequence of str, optional
+    **options
+        Further arguments of `pid`.
+
+    Returns
+    -------
+    PIDComparison
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> found = cr.design.compare_pid(valve, ["simc", "amigo", "optimal"], ["PI"])
+    >>> found
+    <PIDComparison: 3 controllers, 3 stable>
+    >>> found.best(max_sensitivity=1.5).rule
+    'optimal'
+    """
+    for rule in rules or ():
+        one_of(rule, "rule", RULES)
+    for kind in kinds:
+        one_of(kind, "kind", KINDS)
+    plant, _ = reference_plant(system, options.get("dt"))
+    total = _span(system, plant)
+    made: list[tuple[PIDController, Margins, Performance]] = []
+    refused: list[tuple[str, str, str]] = []
+    for rule in rules or RULES:
+        for kind in kinds:
+            if kind not in kinds_of(rule):
+                continue
+            try:
+                controller, _ = tuned(system, rule, kind, **options)
+            except ValueError as error:
+                # A rule without an answer for this plant is a row of the result, not its end.
+                refused.append((rule, kind, str(error)))
+                continue
+            sampled = controller if controller.dt else controller.discretised(plant.dt)
+            check = loop_check(plant, sampled)
+            reached = _performance(plant, sampled, total) if check.stable else UNSTABLE
+            made.append((controller.checked(check), check.margins, reached))
+    if not made:
+        reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
+        raise OptionError(f"no rule could tune this plant: {reasons or 'none knows these kinds'}")
+    controllers, found_margins, found_performance = zip(*made, strict=True)
+    return PIDComparison(controllers, found_margins, found_performance, tuple(refused))
+
+
+def _performance(plant: DelayedStateSpace, controller: Any, total: float) -> Performance:
+    setpoint, load, _ = settled_responses(plant, controller, total)
+    return measured(setpoint, load, float(plant.dt))
+
+
+def _span(system: Any, plant: DelayedStateSpace) -> float:
+    """Guess how long the plant takes, in s."""
+    if isinstance(system, ProcessModel):
+        return system.total_time
+    return plant_time(plant)

@@ -1,0 +1,1 @@
+"""Many records: table, statistics, one model of all."""

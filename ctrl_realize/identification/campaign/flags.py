@@ -1,0 +1,159 @@
+"""Say what one should know before trusting the table of a campaign."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from ..._wording import in_time
+from ...numerics.validation.own_response import homogeneity
+from ...results import Flag
+from ..output_error.repeat_flags import BY_CHANCE, NO_COMMON_GAIN, SAME
+from .rows import CampaignRow
+
+Rows = tuple[CampaignRow, ...]
+
+_SAME_HEIGHT = 1e-6  # part of the step by which heights may differ and be one
+
+
+def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[Flag, ...]:
+    """List the flags of a campaign: of all its rows, of those identified, and of those not."""
+    found = (
+        _failed(rows, failed),
+        *_different_gains(good),
+        *_different_times(good),
+        _same_records(good),
+        _amplitude_trend(good, method),
+    )
+    return tuple(flag for flag in found if flag is not None)
+
+
+def _different_gains(rows: Rows) -> list[Flag]:
+    """Test whether one gain holds for all records, by chi-square where their errors are known."""
+    gains, errors = (np.array([getattr(row, k) for row in rows]) for k in ("gain", "gain_std"))
+    known = np.isfinite(gains)
+    gains, errors = gains[known], errors[known]
+    if gains.size < 2 or not np.median(gains):
+        return []
+    ratios = gains / float(np.median(gains))
+    apart = float(np.max(np.abs(ratios - 1)))
+    statistic, chance = homogeneity(gains, errors)
+    differ = chance < BY_CHANCE and apart > SAME
+    told = f"chi-square {statistic:.3g}, p = {chance:.2g}"
+    if not np.isfinite(errors).any():
+        # A scan knows no error of its gain; what noise leaves of it is a few percent.
+        differ, told = apart > NO_COMMON_GAIN, "no error of them is known"
+    if not differ:
+        return []
+    flags = [
+        Flag(
+            "gains_differ",
+            f"the gain differs from record to record, {gains.min():.3g} to {gains.max():.3g} "
+            f"({told}): the plant is not linear, or not the same",
+        )
+    ]
+    if apart > NO_COMMON_GAIN:
+        flags.insert(
+            0,
+            Flag(
+                "no_common_gain",
+                f"no one gain follows all records: they have {gains.min():.3g} to "
+                f"{gains.max():.3g}; identify those of one operating point by themselves",
+            ),
+        )
+    return flags
+
+
+def _different_times(rows: Rows) -> list[Flag]:
+    """Test dead times, and dead times with lags, by chi-square about their weighted means."""
+    flags = []
+    for code, what, name, ends in (
+        ("records_differ", "dead time", "dead_time", "interval"),
+        ("lags_differ", "total delay (dead time and lags)", "total_delay", "total_delay_interval"),
+    ):
+        values = np.array([getattr(row, name) for row in rows])
+        low, high = np.array([getattr(row, ends) for row in rows]).reshape(-1, 2).T
+        with np.errstate(invalid="ignore"):
+            errors = (high - low) / 3.92
+        # The flat set of a scan claims no level, and is no standard error.
+        errors[~(errors > 0) | ~np.isfinite([row.gain_std for row in rows])] = np.inf
+        statistic, chance = homogeneity(values, errors)
+        if chance < BY_CHANCE:
+            flags.append(
+                Flag(
+                    code,
+                    f"the {what} differs from record to record by more than the intervals allow, "
+                    f"{in_time(values.min())} to {in_time(values.max())} (chi-square "
+                    f"{statistic:.3g}, p = {chance:.2g}): trigger jitter, friction, or a plant "
+                    "that is not linear or not the same",
+                )
+            )
+    return flags
+
+
+def _failed(rows: Rows, failed: Rows) -> Flag | None:
+    if not failed:
+        return None
+    names = ", ".join(row.name for row in failed[:5])
+    more = "" if len(failed) <= 5 else f" and {len(failed) - 5} more"
+    return Flag(
+        "failed_records",
+        f"{len(failed)} of {len(rows)} records failed: {names}{more}; the table tells why",
+    )
+
+
+def _same_records(rows: Rows) -> Flag | None:
+    """Find records whose results agree in every digit, which noise never lets happen."""
+    alike: dict[tuple[float, ...], list[str]] = {}
+    for row in rows:
+        results = (row.delay, row.misfit, row.gain, row.amplitude, *row.interval)
+        alike.setdefault(results, []).append(row.name)
+    twice = [names for names in alike.values() if len(names) > 1]
+    if not twice:
+        return None
+    extra = sum(len(names) - 1 for names in twice)
+    names = ", ".join(twice[0][:4]) + (", ..." if len(twice[0]) > 4 else "")
+    more = "" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)"
+    return Flag(
+        "same_records",
+        f"{extra} of {len(rows)} records are others over again: {names} have the same results to "
+        f"the last digit{more}; the scatter and its interval are too small",
+    )
+
+
+def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
+    """Test whether the delay depends on the height of the step, by the rank correlation."""
+    from scipy.stats import pearsonr, spearmanr  # scipy.stats takes a while to import
+
+    if rows and method != "output_error":
+        # A realization of one order more takes a lag out of the delay: compared is what is alike.
+        orders = Counter(row.order for row in rows)
+        rows = tuple(row for row in rows if row.order == orders.most_common(1)[0][0])
+    heights = np.array([abs(row.amplitude) for row in rows])
+    delays = np.array([row.delay for row in rows])
+    known = np.isfinite(heights) & np.isfinite(delays)
+    heights, delays = heights[known], delays[known]
+    if heights.size < 8 or np.ptp(heights) <= _SAME_HEIGHT * heights.max() or np.ptp(delays) == 0:
+        return None
+    correlation, chance = spearmanr(heights, delays)
+    if heights.size < 10:
+        # So few ranks stand in order by chance (1 in 35 campaigns of four and four records, where
+        # Student's distribution says 1 in 350): the delays themselves have to agree.
+        chance = max(chance, pearsonr(heights, delays).pvalue)
+    # 1 %: one false alarm in a hundred campaigns of a linear plant.
+    if not chance < 0.01:
+        return None
+    way = "longer" if correlation > 0 else "shorter"
+    # Noise is larger beside a smaller step: a scan's bias grows with it, a fit misses fast lags.
+    doubt = ""
+    if method != "output_error":
+        doubt = "; or the bias of the scan, which grows with the noise: method='output_error' tells"
+    elif len({row.order for row in rows if np.isfinite(row.delay)}) > 1:
+        doubt = "; or a lag that only large steps show above the noise, as the orders differ"
+    return Flag(
+        "amplitude_trend",
+        f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, chance "
+        f"{chance:.1g}): friction, a slew limit or another nonlinearity, for which one linear "
+        f"model cannot hold at all amplitudes{doubt}",
+    )

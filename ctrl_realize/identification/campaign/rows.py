@@ -1,0 +1,271 @@
+"""One record of a campaign: its model in numbers, or the error that stopped it."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import warnings
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from importlib import metadata
+from typing import Any, Protocol
+
+import control as ct
+import numpy as np
+import scipy
+
+from ..._checks import spelled_out
+from ...data import Record
+from ...delayed import DelayedStateSpace
+from ...errors import CtrlRealizeError, DataError
+from ...results import Flag
+from ..identify import Method, identify
+from ..output_error.result import DelayFit
+from ..realization.delay_scan_result import DelayScan
+from ..step.steps import detect_step
+from .packed_model import PackedModel
+
+RecordSource = Record | Callable[[], Record]
+
+_LONGEST_ERROR = 1000  # characters; a text of megabytes would fill table and report
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignRow:
+    """What one record gave.
+
+    Exactly one of `system` and `error` is None; without a system all numbers are NaN. A campaign
+    has thousands of rows, so that each keeps its model packed, a few kB.
+
+    Attributes
+    ----------
+    name : str
+    amplitude : float
+        Height of the input step; NaN where there is none.
+    delay : float
+        Estimated delay in samples.
+    dead_time : float
+        ``delay * dt`` in s.
+    interval : tuple of float
+        Interval of the dead time in s.
+    misfit : float
+        Misfit of the model for a unit step, so that records can be compared.
+    gain, gain_std : float
+        Gain of the model at zero frequency, and its standard error if its structure is the
+        plant's; NaN where the method knows none.
+    total_delay : float
+        Dead time and lags of the model in s, NaN where the method tells none.
+    total_delay_interval : tuple of float
+        95 % interval of the total delay, in s.
+    model : PackedModel or None
+        Core, delays and names of the model.
+    error : str or None
+        What stopped this record, in one line.
+    flags : tuple of Flag
+    warnings : tuple of str
+        What was warned of on the way.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> record = cr.bench.valve().step_record(16.0, 1)
+    >>> silent = cr.Record(record.time, 0 * record.input, record.output, name="plug was out")
+    >>> rows = cr.identify_campaign([record, silent], method="scan").rows
+    >>> print(rows[0].name, rows[0].delay, "samples")
+    valve_16mA 45.0 samples
+    >>> print(rows[1].error)
+    NoStepError: no step in the input of record 'plug was out': it is 0 throughout. ...
+    """
+
+    name: str
+    amplitude: float = float("nan")
+    delay: float = float("nan")
+    dead_time: float = float("nan")
+    interval: tuple[float, float] = (float("nan"), float("nan"))
+    misfit: float = float("nan")
+    gain: float = float("nan")
+    gain_std: float = float("nan")
+    total_delay: float = float("nan")
+    total_delay_interval: tuple[float, float] = (float("nan"), float("nan"))
+    model: PackedModel | None = field(default=None, repr=False)
+    error: str | None = None
+    flags: tuple[Flag, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def system(self) -> DelayedStateSpace | None:
+        """The model, built anew on each access; None if the record failed."""
+        return None if self.model is None else self.model.unpack()
+
+    @property
+    def order(self) -> int | None:
+        """Order of the model without its delay."""
+        return None if self.model is None else self.model.order
+
+    @property
+    def dt(self) -> float:
+        """Sample time of the model in s; NaN without one."""
+        return float("nan") if self.model is None else self.model.dt
+
+    @property
+    def delay_interval(self) -> tuple[float, float]:
+        """Interval of the delay in samples; NaN without a model."""
+        return self.interval[0] / self.dt, self.interval[1] / self.dt
+
+    def __repr__(self) -> str:
+        what = self.error if self.model is None else f"delay {self.delay:.4g} samples"
+        return f"<CampaignRow {self.name!r}: {what}>"
+
+
+class RowStore(Protocol):
+    """Keeps finished rows, so that a run that was stopped can go on (see `CampaignStore`)."""
+
+    def load(self, key: str) -> CampaignRow | None:
+        """Return the row kept under `key`, None if there is none."""
+        ...
+
+    def save(self, key: str, row: CampaignRow) -> CampaignRow:
+        """Keep a row; return it as `load` will."""
+        ...
+
+    def attempt(self, key: str) -> AbstractContextManager[None]:
+        """Note that a record is being identified, as long as the block lasts.
+
+        Raises
+        ------
+        DataError
+            The process has died over it before, so often that it is not tried again.
+        """
+        ...
+
+
+def identify_row(
+    source: RecordSource,
+    position: int,
+    method: Method,
+    options: dict[str, Any],
+    store: RowStore | None,
+) -> CampaignRow:
+    """Identify one record; what stops it becomes the row's error."""
+    row = CampaignRow(source_name(source, position))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            record = read_source(source)
+            if not record.issiso:
+                raise DataError(
+                    f"{record!r}: a campaign compares the delays of one input and one output; for "
+                    "several channels see fit_channels, which takes several records too"
+                )
+            row = replace(row, name=record.name or row.name, amplitude=_amplitude(record))
+            key = fingerprint(record, method, options)
+            kept = store.load(key) if store is not None else None
+            if kept is not None:
+                return replace(kept, name=row.name)
+            with store.attempt(key) if store is not None else nullcontext():
+                row = _with_model(row, identify(record, method=method, **options))
+        except Exception as error:
+            # Whatever it is, also in a function of the caller's that reads files, the other
+            # records go on. It is cheap and may be mended by then: tried again on resuming.
+            text = spelled_out(" ".join(str(error).split())[:_LONGEST_ERROR])
+            row = replace(row, error=f"{type(error).__name__}: {text}")
+    row = replace(row, warnings=tuple(dict.fromkeys(str(entry.message) for entry in caught)))
+    if store is None or row.model is None:
+        return row
+    try:
+        return store.save(key, row)
+    except (CtrlRealizeError, OSError) as error:
+        # A full disk, or labels that no file takes: the result is there, and will be made again.
+        text = spelled_out(f"not kept in the store: {error}"[:_LONGEST_ERROR])
+        return replace(row, warnings=(*row.warnings, text))
+
+
+def read_source(source: RecordSource) -> Record:
+    """Return a source's record, read if it is a function."""
+    record = source if isinstance(source, Record) else source()
+    if not isinstance(record, Record):
+        raise DataError(f"the function gave a {type(record).__name__}; needed is a Record")
+    return record
+
+
+def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:
+    """SHA-256 of a record's samples, of what is done with them, and by which versions."""
+    digest = hashlib.sha256(repr(sorted(versions().items())).encode())
+    for values in (record.time, record.input, record.output):
+        digest.update(str(values.shape).encode())
+        digest.update(np.ascontiguousarray(values).tobytes())
+    settings = sorted((name, _exact(value)) for name, value in options.items())
+    digest.update(repr((method, settings, record.input_labels, record.output_labels)).encode())
+    return digest.hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages that a row's numbers depend on."""
+    return {"ctrl-realize": _own_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+
+
+@functools.cache
+def _own_version() -> str:
+    try:
+        return metadata.version("ctrl-realize")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _exact(value: Any) -> str:
+    """Write a setting with all digits; python-control shows eight, or a system's name alone."""
+    if isinstance(value, ct.StateSpace):
+        return repr([getattr(value, letter).tolist() for letter in "ABCD"] + [value.dt])
+    if isinstance(value, ct.TransferFunction):
+        sides = (value.num, value.den)
+        return repr([[[p.tolist() for p in row] for row in side] for side in sides] + [value.dt])
+    return repr(value)
+
+
+def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
+    fit = system.fit
+    low, high = fit.dead_time_interval
+    return replace(
+        row,
+        delay=float(fit.delay),
+        dead_time=float(fit.dead_time),
+        interval=(float(low), float(high)),
+        misfit=_scaled_misfit(fit, row.amplitude),
+        gain=_gain(system),
+        gain_std=float(getattr(fit, "gain_std_given_structure", np.nan)),
+        total_delay=float(_or_nan(getattr(fit, "total_delay", None))),
+        total_delay_interval=getattr(fit, "total_delay_interval", (np.nan, np.nan)),
+        model=PackedModel.of(system),
+        flags=tuple(fit.flags),
+    )
+
+
+def _scaled_misfit(fit: DelayFit | DelayScan, amplitude: float) -> float:
+    """Misfit for a unit step: a scan works on one, a fit on the raw record."""
+    if isinstance(fit, DelayScan):
+        return fit.misfit
+    return fit.residual / (abs(amplitude) if np.isfinite(amplitude) else 1.0)
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value
+
+
+def _gain(system: DelayedStateSpace) -> float:
+    # An integrating plant has no gain: it is infinite, and no warning of it.
+    return complex(system(1.0, warn_infinite=False)).real
+
+
+def source_name(source: RecordSource, position: int) -> str:
+    """Name a record before it is read: by the first argument of the function that reads it."""
+    arguments = getattr(source, "args", ())
+    known = source.name if isinstance(source, Record) else str(arguments[0]) if arguments else ""
+    return spelled_out(known) or f"record {position}"
+
+
+def _amplitude(record: Record) -> float:
+    try:
+        return detect_step(record).amplitude
+    except CtrlRealizeError:
+        return float("nan")

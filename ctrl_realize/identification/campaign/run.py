@@ -1,0 +1,109 @@
+"""Identify the records of a campaign, in parallel if asked, each on its own."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator
+from inspect import signature
+from typing import Any
+
+from ..._checks import one_of
+from ...data import Record
+from ...errors import DataError, OptionError
+from ..identify import METHODS, Method, identify
+from .campaign import Campaign
+from .rows import CampaignRow, RecordSource, RowStore
+from .workers import identified
+
+
+def identify_campaign(
+    records: Iterable[RecordSource],
+    *,
+    n_jobs: int = 1,
+    method: Method = "output_error",
+    progress: bool | None = None,
+    store: RowStore | None = None,
+    **options: Any,
+) -> Campaign:
+    """Identify every record of a campaign; one bad record never stops the rest.
+
+    Parameters
+    ----------
+    records : iterable of Record, or of functions that return one
+        A function, such as ``functools.partial(cr.read_record, path)``, is called where the
+        record is identified, so that files are read by the workers, one at a time, and a file
+        that cannot be read is a row with its error.
+    n_jobs : int, optional
+        Processes to use (joblib; -1 for all cores). The result does not depend on it. A record
+        whose process is killed by the system, twice, is a row that says so. Inside
+        joblib's ``parallel_config(backend="dask")`` the work goes to a Dask cluster.
+    method : {"output_error", "scan", "paper"}, optional
+    progress : bool, optional
+        Show a progress bar; default: where somebody can see it.
+    store : CampaignStore, optional
+        Folder that keeps each record's result as it is finished, for thousands of records: a run
+        that was stopped goes on where it was when it is called again with the same store, and
+        memory stays flat, because of each fit only a summary is kept.
+    **options
+        Further arguments of `identify`, the same for all records.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    DataError
+        `records` is empty.
+    OptionError
+        An argument that `identify` does not take.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.bench.valve()
+    >>> records = [valve.step_record(16.0, seed) for seed in range(3)]
+    >>> campaign = cr.identify_campaign(records, method="paper")
+    >>> campaign
+    <Campaign: 3 records, method 'paper'>
+    >>> campaign.delays
+    array([53., 55., 59.])
+    """
+    one_of(method, "method", METHODS)
+    _check_options(options)
+    if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or not 0 < abs(n_jobs) <= 10_000:
+        raise OptionError(f"n_jobs={n_jobs!r}; needed is a number of processes, or -1 for all")
+    if not isinstance(records, Iterable):
+        raise DataError(f"records is a {type(records).__name__}; needed are several records")
+    sources = list(records)
+    if not sources:
+        raise DataError("there are no records to identify")
+    for position, source in enumerate(sources):
+        if not isinstance(source, Record) and not callable(source):
+            raise DataError(
+                f"records[{position}] is a {type(source).__name__}; needed is a Record, or a "
+                "function that returns one (functools.partial(read_record, path))"
+            )
+    found = identified(sources, n_jobs, method, options, store)
+    rows = dict(_with_bar(found, len(sources), progress))
+    in_order = tuple(rows[position] for position in range(len(sources)))
+    return Campaign(in_order, tuple(sources), method, options)
+
+
+def _check_options(options: dict[str, Any]) -> None:
+    known = set(signature(identify).parameters) - {"record", "method"}
+    strange = sorted(set(options) - known)
+    if strange:
+        raise OptionError(f"{', '.join(strange)}: identify takes {', '.join(sorted(known))}")
+
+
+def _with_bar(
+    rows: Iterable[tuple[int, CampaignRow]], total: int, progress: bool | None
+) -> Iterator[tuple[int, CampaignRow]]:
+    with warnings.catch_warnings():
+        # In a notebook without ipywidgets tqdm warns, and falls back to text by itself.
+        warnings.filterwarnings("ignore", message="IProgress not found")
+        from tqdm.auto import tqdm
+    # disable=None: no bar where the output is not a terminal.
+    disable = None if progress is None else not progress
+    yield from tqdm(rows, total=total, desc="identify", unit="record", disable=disable)

@@ -1,0 +1,98 @@
+"""Records of a campaign spread over processes, of which the system may kill one.
+
+A process dies without a word where its memory is exhausted or compiled code fails. Which of the
+records that were under way was at fault nobody tells, so each of them is identified once more, in
+a process of its own; who dies there too is a row with the reason, and all others go on.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ..identify import Method
+from .rows import CampaignRow, RecordSource, RowStore, identify_row, source_name
+
+
+def identified(
+    sources: Sequence[RecordSource],
+    n_jobs: int,
+    method: Method,
+    options: dict[str, Any],
+    store: RowStore | None,
+) -> Iterator[tuple[int, CampaignRow]]:
+    """Identify records with joblib; give position and row of each as it is finished."""
+    from joblib import Parallel, delayed  # not needed by who identifies one record
+
+    pending = dict(enumerate(sources))
+    with TemporaryDirectory(prefix="ctrl_realize-", ignore_cleanup_errors=True) as marks:
+
+        def spread(positions: Sequence[int], processes: int) -> Iterator[tuple[int, CampaignRow]]:
+            tasks = (
+                delayed(_marked)(Path(marks), pending[position], position, method, options, store)
+                for position in positions
+            )
+            rows: Any = Parallel(n_jobs=processes, return_as="generator_unordered")(tasks)
+            for position, row in rows:
+                yield position, row
+                del pending[position]
+
+        while pending:
+            try:
+                yield from spread(list(pending), n_jobs)
+            except Exception as error:
+                if not _is_death(error):
+                    raise
+                started = [
+                    position for position in pending if _mark(Path(marks), position).exists()
+                ]
+                # on other machines' disks no mark is seen
+                for position in started or list(pending):
+                    try:
+                        # two processes: one would be this one
+                        yield from spread([position], 2)
+                    except Exception as again:
+                        if not _is_death(again):
+                            raise
+                        yield position, _dead(pending.pop(position), position, again)
+
+
+def _marked(
+    marks: Path,
+    source: RecordSource,
+    position: int,
+    method: Method,
+    options: dict[str, Any],
+    store: RowStore | None,
+) -> tuple[int, CampaignRow]:
+    """Identify a record; a mark tells that it is under way."""
+    with suppress(OSError):
+        _mark(marks, position).touch()
+    row = identify_row(source, position, method, options, store)
+    with suppress(OSError):
+        _mark(marks, position).unlink()
+    return position, row
+
+
+def _mark(marks: Path, position: int) -> Path:
+    return marks / str(position)
+
+
+def _is_death(error: Exception) -> bool:
+    """Tell whether a process died; Dask says so after it has tried several times."""
+    return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
+
+
+def _dead(source: RecordSource, position: int, error: Exception) -> CampaignRow:
+    codes = re.search(r"exit codes? of the workers? (?:are|is) \{(.*?)\}", str(error))
+    how = f" ({codes[1]})" if codes else ""
+    return CampaignRow(
+        source_name(source, position),
+        error=f"the process that identified this record was killed by the system{how}, also where "
+        "it had nothing else to do; most often the memory is exhausted",
+    )

@@ -1,0 +1,1 @@
+"""Impulse responses from records of any input."""

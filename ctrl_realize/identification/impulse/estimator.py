@@ -1,0 +1,115 @@
+"""Which estimate of a pulse response suits a record: judged on the part that it has not seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+from scipy.signal import fftconvolve
+
+from ...data import Record
+from ...delayed.simulation import simulate_record
+from ...errors import DataError, UnsuitableSystemError
+from ...numerics.arrays import FloatArray
+from ...numerics.regression.arx import ArxFit, arx_state_space
+from .regression import PulseRegression, through_arx, with_prior
+
+HELD_BACK = 1 / 3
+"""Part of every record that the estimates are judged on."""
+CLEARLY = 0.5
+"""Part of the error of the regularized estimate to which OKID must bring it to be taken."""
+MOST_JUDGED = 6000
+"""Samples at the end of a record that are simulated to judge an estimate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Method that predicts best, the kernel of every output, and what it was chosen by."""
+
+    method: str
+    kernels: tuple[str, ...]
+    reason: str
+
+
+def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice:
+    """Fit the first two thirds of every record by both methods, and simulate the rest.
+
+    The regularized estimate is kept unless OKID is clearly better: its errors are known better.
+    Where the first two thirds are too short for one of them, the other is taken.
+    """
+    p = group[0].n_outputs
+    free = ("auto",) * p
+    splits = [round((1 - HELD_BACK) * record.n_samples) for record in group]
+    first = tuple(_until(record, split) for record, split in zip(group, splits, strict=True))
+    try:
+        smooth = with_prior(first, count, start, free)
+    except DataError:
+        return Choice("regularized", free, "")
+    kernels = smooth.kernels
+    if any(record.n_missing for record in group):
+        # What is simulated needs every sample of the input.
+        return Choice("regularized", kernels, "")
+    try:
+        arx = through_arx(first, count, start, None)
+    except DataError:
+        return Choice("regularized", kernels, "")
+    smooth_error = _error(group, splits, smooth, count)
+    arx_error = _error(group, splits, arx, count)
+    better = arx_error < CLEARLY * smooth_error
+    reason = (
+        f"on the last third of the data, unseen, the regularized estimate misses "
+        f"{100 * smooth_error:.3g} % of the output, OKID {_percent(arx_error)}"
+    )
+    return Choice("okid" if better else "regularized", kernels, reason)
+
+
+def _percent(error: float) -> str:
+    return f"{100 * error:.3g} %" if error < 10 else "all of it (unstable, or nearly)"
+
+
+def _until(record: Record, split: int) -> Record:
+    return Record(
+        record.time[:split], record.input[..., :split], record.output[..., :split], missing="keep"
+    )
+
+
+def _error(
+    group: tuple[Record, ...], splits: list[int], found: PulseRegression, count: int
+) -> float:
+    """Root mean square of what is missed on the held-back parts, over that of the output."""
+    missed = total = 0.0
+    for record, split in zip(group, splits, strict=True):
+        begin = max(split - max(2 * count, record.n_samples - split), 0)
+        begin = max(begin, record.n_samples - MOST_JUDGED)
+        part = _from(record, begin)
+        behind = max(split - begin, 0)
+        y = np.atleast_2d(part.output)[:, behind:]
+        model = _by_arx(found.arx, part) if found.arx else _by_convolution(found.markov, part)
+        error = y - model[:, behind:]
+        error = error - error.mean(axis=1, keepdims=True)
+        # Of an output that stands still nearly everything can be missed: a million times is enough.
+        least = np.maximum(1e-6 * np.abs(error).max(axis=1, keepdims=True), 1e-300)
+        scale = np.maximum(y.std(axis=1, keepdims=True), least)
+        missed += float(((error / scale) ** 2).sum())
+        total += float(y.size)
+    return float(np.sqrt(missed / total))
+
+
+def _from(record: Record, begin: int) -> Record:
+    return Record(record.time[begin:], record.input[..., begin:], record.output[..., begin:])
+
+
+def _by_convolution(markov: FloatArray, record: Record) -> FloatArray:
+    u = np.atleast_2d(record.input)
+    u = u - u[:, :1]
+    full = fftconvolve(markov, u[None], axes=-1)[:, :, : u.shape[1]]
+    return np.asarray(full.sum(axis=1))
+
+
+def _by_arx(fit: ArxFit, record: Record) -> FloatArray:
+    system = ct.ss(*arx_state_space(fit), record.dt)
+    try:
+        return simulate_record(system, record, "estimate")
+    except UnsuitableSystemError:
+        return np.full(np.atleast_2d(record.output).shape, 1e6 * float(np.ptp(record.output)))

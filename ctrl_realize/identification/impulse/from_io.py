@@ -1,0 +1,236 @@
+"""Unit-pulse responses from records of any input."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from ..._checks import one_of, whole
+from ...data import Record
+from ...data.given import as_records
+from ...data.impulse_estimate import ImpulseEstimate
+from ...errors import DataError, DataWarning, OptionError
+from ...numerics.blas_threads import single_threaded
+from ...numerics.signals.onset import correlation_onset
+from ...results import Flag
+from .estimator import Choice, choose_estimate
+from .regression import PulseRegression, through_arx, with_prior, without_prior
+
+Method = Literal["auto", "regularized", "least_squares", "okid"]
+Kernel = Literal["auto", "TC", "DC", "SS"]
+Start = Literal["unknown", "rest"]
+
+SHORTEST, LONGEST = 100, 1 / 3
+"""Length that is tried first, in samples, and the longest, as a part of the longest record."""
+
+MOST_UNKNOWNS = 400
+"""Most lags of all inputs together to which the length grows by itself; time goes with its cube."""
+
+SURE = 0.999
+"""Chance that no output seems to follow an input that it does not follow."""
+
+TAIL = 0.05
+"""Part of the largest Markov parameter that may be left at the end of the window."""
+
+
+@single_threaded
+def impulse_from_io(
+    records: Record | Sequence[Record],
+    length: int | None = None,
+    *,
+    method: Method = "auto",
+    kernel: Kernel = "auto",
+    start: Start = "unknown",
+    arx_order: int | None = None,
+) -> ImpulseEstimate:
+    """Estimate the unit-pulse response from input and output of any shape.
+
+    Means do not matter: every record has one free constant per output. Missing samples
+    (``Record(..., missing="keep")``) take out the equations that they touch.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        One or several experiments on the same plant, with the same sample time and channels.
+    length : int, optional
+        Number of Markov parameters; the response must have died away within it. Default: 100, or
+        twice the lag at which the last output begins to follow an input, doubled until it has, up
+        to a third of the longest record and 400 over the number of inputs.
+    method : {"auto", "regularized", "least_squares", "okid"}
+        ``"auto"`` is ``"okid"`` where that halves the error of ``"regularized"`` on the last
+        third of the data, unseen, and ``"regularized"`` otherwise. ``"regularized"`` weighs the
+        data against a prior of decay, tuned by its marginal likelihood; ``"least_squares"`` has
+        no prior and needs an input that excites every lag; ``"okid"`` goes through a high-order
+        ARX model, and is for plants that ring for longer than can be modelled by `length` free
+        numbers.
+    kernel : {"auto", "TC", "DC", "SS"}
+        Prior of the regularized method. TC allows a jump at lag 0, SS is smooth, DC finds the
+        correlation of neighbours itself; ``"auto"`` takes TC or SS, whichever has the larger
+        marginal likelihood, for every output by itself.
+    start : {"unknown", "rest"}
+        What came before a record: unknown (the first ``length - 1`` outputs are then only past,
+        ``arx_order`` for OKID), or rest at the first sample of the input, which uses every
+        sample.
+    arx_order : int, optional
+        Order of the ARX model of OKID, at least the delay plus the order of the plant; default:
+        chosen by BIC up to 128.
+
+    Returns
+    -------
+    ImpulseEstimate
+        Goes into `realize`, `estimate_delay` and `scan_orders` as any impulse response; has
+        `std` beside.
+
+    Raises
+    ------
+    DataError
+        Records that are too short, that differ in sample time or channels, or an input that does
+        not excite the plant.
+    OptionError
+        Unknown method, kernel or start.
+
+    Warns
+    -----
+    DataWarning
+        When the prior had to fill in directions that the input does not excite.
+
+    Notes
+    -----
+    The normal equations are summed by FFT, so 1e5 samples and 1000 lags take seconds. Noise is
+    taken as white: coloured noise leaves the estimate unbiased, but makes `std` too small at the
+    frequencies where it is strong. The response is step-invariant: right for a plant behind a
+    zero-order hold.
+
+    References
+    ----------
+    T. Chen, H. Ohlsson, L. Ljung, Automatica 48 (2012), 1525-1535; J.-N. Juang et al., J. Guidance
+    16 (1993), 320-329.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> rng = np.random.default_rng(1)
+    >>> t, u = 0.1 * np.arange(800), rng.choice([-1.0, 1.0], 800)
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> y = 20 + plant.simulate(u) + 0.02 * rng.standard_normal(800)
+    >>> g = cr.impulse_from_io(cr.Record(t, u, y), 60)
+    >>> error = g.markov - plant.markov(60)
+    >>> bool(np.abs(error).max() < 0.01)
+    True
+    """
+    one_of(method, "method", ("auto", "regularized", "least_squares", "okid"))
+    one_of(kernel, "kernel", ("auto", "TC", "DC", "SS"))
+    one_of(start, "start", ("unknown", "rest"))
+    if arx_order is not None and method != "okid":
+        raise OptionError(f"arx_order={arx_order!r} belongs to method='okid', not {method!r}")
+    group = as_group(records)
+    longest = max(record.n_samples for record in group)
+    most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].n_inputs), 2)
+    if length is None:
+        # A window that ends before the response begins would show nothing, and no tail either.
+        count = min(max(SHORTEST, 2 * _latest_onset(group, most)), most)
+    else:
+        count = whole(length, "length", 2)
+    chosen = choose_estimate(group, count, start) if method == "auto" else None
+    while True:
+        found = _estimate(group, count, start, chosen, (method, kernel, arx_order))
+        tail = _tail_flags(found)
+        if length is not None or not tail or count == most:
+            break
+        count = min(2 * count, most)
+    for flag in found.flags:
+        if flag.code == "partly_excited":
+            # one frame more: the limit of BLAS threads around this function
+            warnings.warn(flag.message, DataWarning, stacklevel=3)
+    flags = found.flags + tail
+    siso = group[0].input.ndim == 1 and group[0].output.ndim == 1
+    return ImpulseEstimate(
+        found.markov[0, 0] if siso else found.markov,
+        group[0].dt,
+        std=found.std[0, 0] if siso else found.std,
+        noise_std=found.noise_std,
+        method=found.method,
+        rows=found.rows,
+        choices=(chosen.reason,) if chosen is not None and chosen.reason else (),
+        flags=flags,
+        name=group[0].name,
+    )
+
+
+def _latest_onset(group: tuple[Record, ...], lags: int) -> int:
+    """Lag at which the last of the outputs begins to follow an input; 0 where none does."""
+    record = max(group, key=lambda one: one.n_samples)
+    if record.n_missing:
+        return 0
+    u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
+    moving = [row for row in u if np.ptp(row) > 0]
+    onsets = [
+        correlation_onset(drive, row, lags, SURE).onset
+        for drive in moving
+        for row in y
+        if np.ptp(row) > 0
+    ]
+    return max([0, *onsets])
+
+
+def _estimate(
+    group: tuple[Record, ...],
+    count: int,
+    start: str,
+    chosen: Choice | None,
+    asked: tuple[str, str, int | None],
+) -> PulseRegression:
+    """Estimate by what was asked for, or by what was chosen."""
+    method, kernel, arx_order = asked
+    kernels = (kernel,) * group[0].n_outputs
+    if chosen is not None:
+        method = chosen.method
+        kernels = chosen.kernels if kernel == "auto" else kernels
+    if method == "okid":
+        return through_arx(group, count, start, arx_order)
+    if method == "least_squares":
+        return without_prior(group, count, start)
+    return with_prior(group, count, start, kernels)
+
+
+def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
+    """Flag responses that have not died away at the end of the window."""
+    count = found.markov.shape[-1]
+    tail = slice(count - max(count // 10, 1), None)
+    size = np.sqrt(np.mean(found.markov[..., tail] ** 2, axis=-1))
+    noise = np.sqrt(np.mean(found.std[..., tail] ** 2, axis=-1))
+    share = size / np.maximum(np.abs(found.markov).max(axis=-1), 1e-300)
+    alive = (share > TAIL) & (size > 3 * noise)
+    if not np.any(alive):
+        return ()
+    return (
+        Flag(
+            "not_died_away",
+            f"at the end of {count} samples the response is still {100 * share[alive].max():.0f} % "
+            "of its largest; what comes later is missing, and disturbs what is here. Choose a "
+            "larger length, or method='okid'",
+        ),
+    )
+
+
+def as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:
+    """Check that records are of one plant: the same sample time and channels."""
+    group = as_records(records)
+    first = group[0]
+    for i, other in enumerate(group[1:], start=1):
+        if not np.isclose(other.dt, first.dt, rtol=1e-3, atol=0):
+            raise DataError(
+                f"record {i} has the sample time {other.dt:g} s, the first one {first.dt:g} s; "
+                "resample one of them"
+            )
+        if (other.n_inputs, other.n_outputs) != (first.n_inputs, first.n_outputs):
+            raise DataError(
+                f"record {i} has {other.n_inputs} inputs and {other.n_outputs} outputs, the "
+                f"first one {first.n_inputs} and {first.n_outputs}"
+            )
+    return group

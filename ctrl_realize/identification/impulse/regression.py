@@ -1,0 +1,257 @@
+"""The regressions behind `impulse_from_io`: with a prior, without, and through an ARX model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc, ndtri
+
+from ..._checks import whole
+from ...data import Record
+from ...errors import DataError
+from ...numerics.arrays import FloatArray
+from ...numerics.regression.arx import (
+    ArxFit,
+    arx_equations,
+    arx_markov,
+    arx_markov_std,
+    arx_state_space,
+    excited_directions,
+    least_squares,
+    solve_arx,
+)
+from ...numerics.regression.fir import cautious_std, fit_kernel
+from ...numerics.regression.normal_equations import NormalEquations, normal_equations
+from ...results import Flag
+
+OKID_ORDERS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+"""ARX orders among which BIC chooses."""
+SILENT = 0.01
+"""Level of the tests for a response: share of false alarms."""
+
+MOST_GROWTH = 60.0
+"""Decades by which a pulse response may grow before its numbers mean nothing."""
+
+RIDGE = 1e-9
+"""Added to the Gram matrix of an output without noise, as a share of its diagonal."""
+
+
+@dataclass(frozen=True, eq=False)
+class PulseRegression:
+    """Pulse responses (p, m, N) with their std, noise per output (p,), and how they were found.
+
+    `kernels` are the priors of the outputs, `arx` the model, where there are any.
+    """
+
+    markov: FloatArray
+    std: FloatArray
+    noise_std: FloatArray
+    rows: int
+    method: str
+    flags: tuple[Flag, ...] = ()
+    kernels: tuple[str, ...] = ()
+    arx: ArxFit | None = None
+
+
+def without_prior(group: tuple[Record, ...], count: int, start: str) -> PulseRegression:
+    """Estimate `count` free Markov parameters by least squares."""
+    m = group[0].n_inputs
+    equations = _fir_equations(group, count, start, m * count + 1)
+    excited, wanted = excited_directions(equations.gram), m * count
+    if excited < wanted:
+        raise DataError(
+            _unexcited(excited, wanted)
+            + (", method='regularized'" if excited > 2 * m else "")
+            + " or a richer input"
+        )
+    solution = least_squares(equations)
+    noise = np.diag(solution.noise)
+    left = equations.freedom - wanted
+    ratio = (np.diag(equations.power) / noise - left) / wanted
+    return PulseRegression(
+        markov=solution.coefficients.T.reshape(-1, m, count),
+        std=solution.std.T.reshape(-1, m, count),
+        noise_std=np.sqrt(noise),
+        rows=equations.rows,
+        method="least squares",
+        flags=_silence(fdtrc(wanted, left, np.maximum(ratio, 0.0)) > SILENT),
+    )
+
+
+def with_prior(
+    group: tuple[Record, ...], count: int, start: str, kernels: Sequence[str]
+) -> PulseRegression:
+    """Estimate Markov parameters under a prior of decay, output by output.
+
+    `kernels` has one name for each output.
+    """
+    m, p = group[0].n_inputs, group[0].n_outputs
+    equations = _fir_equations(group, count, start, 2 * m + 8)
+    excited, wanted = excited_directions(equations.gram), m * count
+    if excited < min(wanted, 2 * m + 1):
+        raise DataError(_unexcited(excited, wanted) + " or a richer input")
+    flags: tuple[Flag, ...] = ()
+    if excited < wanted:
+        note = Flag(
+            "partly_excited",
+            f"the input excites {excited} of {wanted} lags; the rest is what the prior says",
+        )
+        flags = (note,)
+    single = [
+        NormalEquations(
+            equations.gram,
+            equations.cross[:, [a]],
+            equations.power[[a]][:, [a]],
+            equations.rows,
+            equations.freedom,
+        )
+        for a in range(p)
+    ]
+    fits = [fit_kernel(one, count, kernel) for one, kernel in zip(single, kernels, strict=True)]
+    spread = [cautious_std(one, count, fit) for one, fit in zip(single, fits, strict=True)]
+    # Twice the log Bayes factor against no response at all; 6 is "strong" by Kass and Raftery.
+    nothing = -equations.freedom / 2 * np.log(np.diag(equations.power))
+    silent = 2 * (np.array([fit.evidence for fit in fits]) - nothing) < 6
+    return PulseRegression(
+        markov=np.stack([fit.markov for fit in fits]),
+        std=np.stack(spread),
+        noise_std=np.sqrt([fit.noise_variance for fit in fits]),
+        rows=equations.rows,
+        method=f"{', '.join(dict.fromkeys(f.kernel for f in fits))} kernel, "
+        f"{', '.join(f'{f.effective:.0f}' for f in fits)} free parameters",
+        flags=flags + _silence(silent),
+        kernels=tuple(f.kernel for f in fits),
+    )
+
+
+def through_arx(
+    group: tuple[Record, ...], count: int, start: str, arx_order: int | None
+) -> PulseRegression:
+    """Estimate a long ARX model and expand it to `count` Markov parameters (OKID)."""
+    m, p = group[0].n_inputs, group[0].n_outputs
+    total = sum(record.n_samples for record in group)
+    if arx_order is None:
+        # At least five equations for each unknown, or BIC's asymptotics mean nothing.
+        most = min(count - 1, total // (5 * (m + p)) - 1)
+        orders = tuple(q for q in OKID_ORDERS if q <= most) or (1,)
+    else:
+        orders = (whole(arx_order, "arx_order", 1),)
+    while True:
+        top = orders[-1]
+        equations = _okid_equations(group, top, start)
+        excited = excited_directions(equations.gram[top * p :, top * p :])
+        if excited == m * (top + 1):
+            break
+        if len(orders) == 1:
+            raise DataError(
+                f"the input does not excite {m * (top + 1) - excited} of the {m * (top + 1)} lags "
+                f"of an ARX model of order {top}; choose a smaller arx_order, or a richer input"
+            )
+        orders = orders[:-1]
+    if not np.all(np.diag(equations.gram) > 0):
+        raise DataError("an output does not move at all: no ARX model follows from it")
+    if excited_directions(equations.gram) < equations.gram.shape[0]:
+        # Without noise the output follows many models of high order; any of them will do.
+        equations = replace(
+            equations, gram=equations.gram + np.diag(RIDGE * np.diag(equations.gram))
+        )
+    fits = {}
+    for order in orders:
+        columns = [*range(order * p), *range(top * p, top * p + (order + 1) * m)]
+        try:
+            fit = solve_arx(equations.take(columns), order, order + 1)
+        except np.linalg.LinAlgError:
+            raise DataError(
+                f"the equations of an ARX model of order {order} are rounding: the output moves "
+                "by too little beside its level; take the level out, or record more digits"
+            ) from None
+        misfit = equations.rows * np.linalg.slogdet(fit.noise)[1]
+        fits[misfit + p * len(columns) * np.log(equations.rows)] = (order, fit)
+    order, fit = fits[min(fits)]
+    growth = count * np.log10(np.abs(np.linalg.eigvals(arx_state_space(fit)[0])).max() + 1e-9)
+    if growth > MOST_GROWTH:
+        raise DataError(
+            f"the ARX model of order {order} is unstable: its pulse response grows by "
+            f"1e{growth:.0f} within {count} samples; choose another arx_order, or "
+            "method='regularized'"
+        )
+    markov, std = arx_markov(fit, count), arx_markov_std(fit, count)
+    # Beyond this many standard deviations lies one of all numbers in 1 % of cases.
+    level = -float(ndtri(SILENT / 2 / (m * count)))
+    silent = np.all(np.abs(markov) <= level * std, axis=(1, 2))
+    return PulseRegression(
+        markov=markov,
+        std=std,
+        noise_std=np.sqrt(np.diag(fit.noise)),
+        rows=equations.rows,
+        method=f"OKID, ARX order {order}",
+        flags=_silence(silent),
+        arx=fit,
+    )
+
+
+def _okid_equations(group: tuple[Record, ...], order: int, start: str) -> NormalEquations:
+    m, p = group[0].n_inputs, group[0].n_outputs
+    parts = []
+    for record in group:
+        u, y = _signals(record, order, start)
+        if u.shape[1] > order:
+            parts.append(arx_equations(u, y, order, order + 1))
+    _check_rows(parts, (order + 1) * (m + p) + 1, order + 1)
+    return _with_moving_outputs(reduce(add, parts))
+
+
+def _fir_equations(
+    group: tuple[Record, ...], count: int, start: str, needed: int
+) -> NormalEquations:
+    parts = []
+    for record in group:
+        u, y = _signals(record, count - 1, start)
+        if u.shape[1] >= count:
+            parts.append(normal_equations(u, y, count))
+    _check_rows(parts, needed, count)
+    return _with_moving_outputs(reduce(add, parts))
+
+
+def _with_moving_outputs(equations: NormalEquations) -> NormalEquations:
+    if not np.all(np.diag(equations.power) > 0):
+        raise DataError("an output is constant: there is no response to estimate")
+    return equations
+
+
+def _unexcited(excited: int, wanted: int) -> str:
+    return (
+        f"the input does not excite {wanted - excited} of the {wanted} lags asked for (a constant "
+        "excites none, a sine two); choose a shorter length"
+    )
+
+
+def _signals(record: Record, past: int, start: str) -> tuple[FloatArray, FloatArray]:
+    """Return input and output as (signals, N), with a past at rest in front when asked."""
+    u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
+    if start == "rest":
+        u, y = (np.concatenate([np.repeat(z[:, :1], past, axis=1), z], axis=1) for z in (u, y))
+    return u, y
+
+
+def _check_rows(equations: Sequence[NormalEquations], needed: int, past: int) -> None:
+    freedom = sum(e.freedom for e in equations)
+    if freedom < needed:
+        raise DataError(
+            f"only {sum(e.rows for e in equations)} samples have a complete past of {past} "
+            f"samples, and {needed + len(equations)} are needed; choose a shorter length, take "
+            "more records, or start='rest' when the plant was at rest before"
+        )
+
+
+def _silence(silent: NDArray[np.bool_]) -> tuple[Flag, ...]:
+    """Flag the outputs that do not follow the input."""
+    return tuple(
+        Flag("no_response", f"output {a} shows no response to the input above the noise")
+        for a in np.flatnonzero(silent)
+    )

@@ -1,0 +1,201 @@
+"""Lags behind a dead time, or any modes and zeros: which of two models a record asks for.
+
+A record of one input and one output is fitted with lags first. Where their residual still follows
+the input, a model of sampled sections is fitted as well (`fit_channels`), and both are compared on
+the same samples under the same noise: autoregressive, its lags chosen for each by BIC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import control as ct
+import numpy as np
+
+from .._wording import in_time, interval_in_time
+from ..data import Record
+from ..delayed import DelayedStateSpace
+from ..errors import DataError, OrderError, UnsuitableSystemError
+from ..numerics.arrays import FloatArray
+from ..numerics.output_error.input_data import MOST_SAMPLES
+from ..numerics.signals.noise import correlation_time
+from ..numerics.signals.noise_model import coloured_criterion
+from ..results import Flag
+from .long_records import lively_parts
+from .output_error.checks import Shown, against_one_model, nonlinear_flags
+from .output_error.result import DelayFit
+from .state_space_fit.fit import Outcome, from_starts
+from .state_space_fit.result import ChannelFit
+from .validation.residuals import check_residuals
+
+LAGS = 25
+"""Samples after the dead time within which a residual is asked whether it follows the input."""
+CLEAR = 10.0
+"""How much smaller the criterion of the modes must be to take the place of the lags."""
+MOST_STARTS = 3
+"""Estimates of the impulse response that the modes start from at most."""
+HOPELESS = 2.0
+"""How much more lags may leave than modes for their interval to count."""
+_KEPT = (
+    "records_differ",
+    "gains_differ",
+    "amplitude_trend",
+    "same_records",
+    "feedback",
+    "cancelled_pair",
+    "held_output",
+    "output_at_limit",
+)
+"""Flags of the record, whatever model is chosen."""
+_FAR_APART = 0.5  # width of an interval, in dead times, from which models disagree
+_NOTHING = 0.5  # samples
+_ROUNDING = 1e-12
+
+Residuals = list[FloatArray]
+
+
+def with_modes_judged(
+    system: DelayedStateSpace, max_delay: int | None, *, asked: bool = False
+) -> DelayedStateSpace:
+    """Try modes where the residual of lags follows the input; return the better model.
+
+    With `asked`, the structure is what the user wants: its residual is judged, nothing is tried.
+    """
+    fit: DelayFit = system.fit
+    records, cut = lively_parts(fit.records)
+    try:
+        follows, left = _left(system, records)
+    except UnsuitableSystemError:  # an unstable model simulates nothing
+        follows, left = [True] * len(records), None
+    if not any(follows):
+        return system
+    why = "nothing else could be fitted"
+    outlying = fit.repeatability is not None and fit.repeatability.outlying
+    if asked:
+        why = "identify without order and structures, or fit_channels, tries any modes and zeros"
+    elif outlying:
+        why = "the records are not of one plant, so that no other model was tried"
+    else:
+        try:
+            found = from_starts(records, most_starts=MOST_STARTS, enough=MOST_SAMPLES)
+            gain = _gain(fit, records, left, found)
+            late = max_delay is not None and _delay(found.system) > max_delay
+            if gain > CLEAR and not late:
+                return _chosen(found, fit, sum(follows), gain, cut)
+            why = (
+                f"a model of {found.system.fit.order} states starts after max_delay"
+                if late
+                else f"a model of {found.system.fit.order} states (fit_channels) is no better"
+            )
+        except (DataError, OrderError) as refused:
+            why = f"for modes and zeros, {refused}"
+    if left is None:
+        return system
+    flag = Flag(
+        "input_in_residual",
+        f"the residual of {sum(follows)} of {len(follows)} record(s) still follows the input: the "
+        f"plant is more than lags behind a dead time, or not linear; {why}",
+    )
+    return system.replace(fit=replace(fit, flags=(*fit.flags, flag)))
+
+
+def _left(system: DelayedStateSpace, records: Sequence[Record]) -> tuple[list[bool], Residuals]:
+    """Tell which residuals follow the input, at any lag of a response, and return them."""
+    late = int(np.ceil(np.max(system.delay)))
+    checks = [
+        check_residuals(system, record, lags=min(late + LAGS, record.n_samples // 3))
+        for record in records
+    ]
+    return [not check.independent for check in checks], [np.ravel(c.residual) for c in checks]
+
+
+def _delay(system: DelayedStateSpace) -> int:
+    return int(system.input_delays[0] + system.output_delays[0])
+
+
+def _gain(
+    fit: DelayFit, records: Sequence[Record], left: Residuals | None, found: Outcome
+) -> float:
+    """How much smaller the criterion of the modes is than that of the lags."""
+    if left is None:
+        return float("inf")
+    modes = found.system.fit
+    samples = sum(e.size for e in left)
+    starts = len(records)
+    # parameters, dead time, and the initial states
+    lags = 2 * fit.order - fit.relative_degree + 2 + starts * fit.order
+    other = 2 * modes.order + modes.direct + 1 + starts * modes.order
+    theirs = _left(found.system, records)[1]
+    fewer = (lags - other) * float(np.log(samples))
+    return float(coloured_criterion(left)[0] - coloured_criterion(theirs)[0] + fewer)
+
+
+def _chosen(
+    found: Outcome, lags: DelayFit, following: int, gain: float, cut: tuple[Flag, ...]
+) -> DelayedStateSpace:
+    """Give the modes their dead time, its interval, and the reasons."""
+    system = found.system
+    modes: ChannelFit = system.fit
+    dt = lags.dt
+    independent = max(correlation_time(np.ravel(c.residual)) for c in modes.checks)
+    own = found.search.plausible(found.best, independent)
+    low, high = dt * own[0], dt * own[1]
+    if lags.residual <= HOPELESS * float(modes.noise_std[0]):
+        low, high = min(low, lags.interval[0]), max(high, lags.interval[1])
+    dead_time = dt * _delay(system)
+    flags = [*cut, *modes.flags, *(flag for flag in lags.flags if flag.code in _KEPT)]
+    if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
+        check = modes.checks[0]
+        signals = check.record.output, check.simulated, check.record.input
+        shown, total = Shown(*map(np.ravel, signals)), _total_delay(system)
+        flags += against_one_model(shown, _delay(system))
+        if total is not None and all(flag.code != "not_linear" for flag in flags):
+            flags += nonlinear_flags(shown, _delay(system), total / dt)
+    if own[0] <= _NOTHING:
+        flags.append(
+            Flag(
+                "no_delay_resolved",
+                f"a model without dead time fits as well (up to {in_time(high)})",
+            )
+        )
+    if high - low > max(_FAR_APART * max(dead_time, dt), 2 * dt * (own[1] - own[0])):
+        flags.append(
+            Flag(
+                "structures_disagree",
+                f"modes put the dead time in {interval_in_time(dt * own[0], dt * own[1])}, lags "
+                f"behind a dead time in {interval_in_time(*lags.interval)}",
+            )
+        )
+    reasons = (
+        f"{modes.order} states with zeros (fit_channels) instead of {lags.order} lags behind a "
+        f"dead time: the residual of the lags follows the input in {following} of "
+        f"{len(lags.records)} record(s), and on the same samples, with autoregressive noise for "
+        f"both, BIC is {gain:.0f} smaller",
+        "dead time: whole samples, behind a hold; interval: where models of this order are not "
+        "ruled out, and that of the lags unless they leave twice as much",
+    )
+    fit = replace(
+        modes,
+        dead_time=dead_time,
+        interval=(low, high),
+        total_delay=_total_delay(system),
+        lags=lags,
+        choices=(*reasons, *modes.choices),
+        flags=tuple(flags),
+    )
+    return system.replace(fit=fit)
+
+
+def _total_delay(system: DelayedStateSpace) -> float | None:
+    """Delay of slow signals in s: the moments of the pulse response, less half a hold."""
+    core: ct.StateSpace = system.delay_free
+    inside = np.eye(core.nstates) - core.A
+    states = np.linalg.solve(inside, core.B)
+    total = float((core.D + core.C @ states)[0, 0])
+    first = float((core.C @ np.linalg.solve(inside, states))[0, 0])
+    # what rounding leaves of a plant without gain
+    nothing = _ROUNDING * float((np.abs(core.D) + np.abs(core.C) @ np.abs(states))[0, 0])
+    if abs(total) <= nothing or not np.isfinite(first / total):
+        return None
+    return float((_delay(system) + first / total - 0.5) * system.dt)

@@ -1,0 +1,1 @@
+"""Output-error fits of records: entry points, flags and results."""

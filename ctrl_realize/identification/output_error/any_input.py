@@ -1,0 +1,175 @@
+"""Output-error fit of records whose input is no step: one, or several of one plant together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..._wording import named
+from ...data import Record
+from ...errors import DataError
+from ...numerics.arrays import FloatArray
+from ...numerics.output_error.input_fit import SampledFit, fit_sampled
+from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.output_error.step_data import bare_data
+from ...numerics.signals.noise import mad_sigma
+from ...numerics.validation.own_response import OwnResponse
+from ...results import Flag
+from .averaging import common_sample_time, compared, delay_outliers, widened
+from .flags import sampled_flags
+from .repeat_flags import repeat_flags
+from .repeatability import Repeatability
+from .result import DelayFit
+from .summary import summarise, with_repeats
+
+FOLLOWS = 36.0
+"""Least chi-square of the response to the input: six standard deviations. White noise that has
+nothing to do with the input reached 23 in 25 records, with the best of all delays and lags."""
+LEAST_MOVE = 1e-70
+"""Least move of a signal that is fitted: squares of less underflow."""
+_APART = 5.0  # standard deviations by which a record's gain may lie from the others'
+
+
+def fit_any_input(
+    records: tuple[Record, ...], limit: float | None, settings: Mapping[str, Any]
+) -> tuple[DelayFit, OutputErrorFit]:
+    """Fit one model to all records, each with its own level, drift and initial state.
+
+    A record whose delay or gain lies apart from the others' is left out, as among step records,
+    until none of the rest does.
+    """
+    dt = common_sample_time(records)
+    latest = None if limit is None else limit * dt
+    used = tuple(range(len(records)))
+    if len(records) == 1:
+        found = _fit(records, dt, latest, settings)
+        return _summary(found, found.fit, records, used, limit, ()), found.fit
+    while True:
+        found = _fit(tuple(records[i] for i in used), dt, latest, settings)
+        own = [found.own_delay(*_signals(record)) for record in records]
+        repeats = _repeatability(own, records, used, found.fit.delay)
+        apart = {*delay_outliers(repeats, used), *_gain_outliers(own, used)}
+        if not apart:
+            break
+        used = tuple(i for i in used if i not in apart)
+    fit = widened(found.fit, repeats, used)
+    flags = repeat_flags(repeats)
+    result = _summary(found, fit, records, used, limit, flags)
+    return with_repeats(result, repeats), fit
+
+
+def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
+    return np.ravel(record.output), np.ravel(record.input)
+
+
+def _fit(
+    records: tuple[Record, ...], dt: float, latest: float | None, settings: Mapping[str, Any]
+) -> SampledFit:
+    for record in records:
+        _check_moves(record)
+    outputs, inputs = zip(*map(_signals, records), strict=True)
+    ways = {name: value for name, value in settings.items() if name != "whiten"}
+    found = fit_sampled(outputs, inputs, dt, latest=latest, **ways)
+    if found.explained < FOLLOWS:
+        raise DataError(
+            f"{_named(records)}: the output does not follow the input (the best of all models "
+            f"lowers the squares by {found.explained:.3g} variances of the noise, {FOLLOWS:g} are "
+            "needed); are the channels right, does the input excite the plant?"
+        )
+    return found
+
+
+def _check_moves(record: Record) -> None:
+    for name, values in zip(("output", "input"), _signals(record), strict=True):
+        moves = float(np.ptp(values))
+        if moves < LEAST_MOVE:
+            raise DataError(
+                f"the {name} of {named('record', record.name)} moves by {moves:.3g} in all: there "
+                "is nothing to fit"
+            )
+
+
+def _named(records: tuple[Record, ...]) -> str:
+    if len(records) > 1:
+        return f"{len(records)} records"
+    return named("record", records[0].name)
+
+
+def _repeatability(
+    own: list[OwnResponse], records: tuple[Record, ...], used: tuple[int, ...], delay: float
+) -> Repeatability:
+    return compared(
+        tuple(record.name or f"record {i}" for i, record in enumerate(records)),
+        np.array([float(np.ptp(record.input)) for record in records]),
+        own,
+        used,
+        delay,
+    )
+
+
+def _gain_outliers(own: list[OwnResponse], used: tuple[int, ...]) -> tuple[int, ...]:
+    """Positions of records whose gain lies apart from the others': another plant, or none."""
+    gains = np.array([own[i].gain for i in used])
+    centre, scatter = float(np.median(gains)), mad_sigma(gains)
+    return tuple(
+        i for i in used if abs(own[i].gain - centre) > _APART * max(scatter, own[i].gain_error)
+    )
+
+
+def _summary(
+    found: SampledFit,
+    fit: OutputErrorFit,
+    records: tuple[Record, ...],
+    used: tuple[int, ...],
+    limit: float | None,
+    flags: tuple[Flag, ...],
+) -> DelayFit:
+    """Lay what was fitted out record after record, on one time axis."""
+    data = found.data
+    times: list[FloatArray] = []
+    parts = zip(used, data.offsets, data.starts, data.outputs, strict=True)
+    for i, offset, start, output in parts:
+        time = records[i].time[offset + start : offset + output.size]
+        times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
+    measured = [y[start:] for y, start in zip(data.outputs, data.starts, strict=True)]
+    signal = [u[start:] for u, start in zip(data.inputs, data.starts, strict=True)]
+    length = max(y.size for y in data.outputs) * data.dt
+    flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
+    joined = bare_data(np.concatenate(measured), np.concatenate(signal), data.dt, fit.residual)
+    fit = replace(fit, fitted=np.concatenate(found.fitted))
+    result = summarise(fit, joined, np.concatenate(times), records, flags)
+    if found.condensed is None:
+        return result
+    sums = found.condensed
+    reason = (
+        f"all {sums.samples} samples, condensed to {sums.data.size} sums of products over "
+        f"{sums.drive.factor.shape[1]} lags (noise made white by {sums.noise_lags} lags of its "
+        "own); time, measured and fitted show a stretch of them"
+    )
+    return replace(result, choices=(reason, *result.choices))
+
+
+def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:
+    """Say where only a stretch of long records was used."""
+    if found.condensed is not None:
+        return ()
+    sizes = [output.size for output in found.data.outputs]
+    long = [
+        (records[i].n_samples, size, offset)
+        for i, size, offset in zip(used, sizes, found.data.offsets, strict=True)
+        if records[i].n_samples > size
+    ]
+    if not long:
+        return ()
+    whole, size, offset = max(long)
+    others = f", and so of {len(long) - 1} more" if len(long) > 1 else ""
+    return (
+        Flag(
+            "cut",
+            f"{size} samples were fitted, from sample {offset} on, of a record of {whole}{others}; "
+            "give the best part with `between`, or pieces as several records",
+        ),
+    )

@@ -1,0 +1,297 @@
+"""What a record says against the model that was fitted to it: tests that know no plant.
+
+One model with one gain and one dead time, no feedback, an output that is measured at every
+sample, and an input that did nothing before the record: each of these is asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..._wording import in_time
+from ...data import Record
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.signals.excitation import lively_start
+from ...numerics.validation.held_output import held_share, longest_hold, samples_at_limit
+from ...numerics.validation.innovations import feedback_chance, nonlinear_chance
+from ...numerics.validation.parameter_change import ParameterChange, parameter_change
+from ...numerics.validation.white_step import WhiteStep, white_step
+from ...results import Flag
+from .result import DelayFit
+
+RARE = 1e-4
+"""Chance of an alarm by noise alone, of each test. Of 290 records without feedback (29 worlds of
+`benchmarks.worlds`) the least chance was 1e-3; of 60 loops that are no pure limit cycle, all were
+below 1e-4."""
+_HELD = 0.5
+"""Part of the moving samples that repeat the one before, from which an output counts as held."""
+_GAINS_APART = 0.1
+_DELAYS_APART = 0.05
+"""Least difference between groups of samples that is worth a flag: of gains, of the dead time
+(and no less than a sample); as a part of the common one."""
+_EXPLAINED = 0.05
+"""Part of the residual that products of inputs must explain to be worth a flag."""
+_REACHED = 1.5
+"""Total delays over which products of inputs must reach, lest they make up for what is cut off."""
+_TWO_SIDED = 1.96
+_OFF = 0.2
+"""Relative difference of gains or total delays that is worth a flag."""
+_MOST_SAMPLES, _REGRESSED = 20_000, 4000
+"""Samples that are looked at; of the long regressions."""
+_LEAST_PAST, _MOST_PAST = 30, 150
+
+
+def checked(fit: DelayFit, *, alone: bool = True) -> DelayFit:
+    """Add what the record says against the model, and widen the interval where it says more.
+
+    By the time for which samples are held; and, where the residual is coloured, by what
+    generalised least squares make of the delay.
+
+    Parameters
+    ----------
+    fit : DelayFit
+        Of one record, or of several.
+    alone : bool, optional
+        The model is all that lies between input and output; there are no known dynamics besides.
+
+    Returns
+    -------
+    DelayFit
+        The same with further flags; `interval` may be wider.
+    """
+    codes = {flag.code for flag in fit.flags}
+    flags: list[Flag] = []
+    low, high = fit.interval
+    stepped = bool(np.isfinite(fit.onset))
+    loop = () if stepped else feedback_flags(fit.records, fit.delay_interval[1])
+    flags += loop
+    if len(fit.records) == 1:
+        shown = _shown(fit)
+        flags += _limit_flags(shown.output)
+        if "coarse_quantisation" not in codes:
+            held, hold = _held_flags(shown, fit.dt)
+            flags += held
+            low = max(low - hold, 0.0)
+        if stepped:
+            flags += _earlier_input(fit, codes)
+        step = _white(fit, shown) if alone and "coloured_residual" in codes else None
+        if step is not None:
+            low = max(min(low, step.delay - _TWO_SIDED * step.delay_error), 0.0)
+            high = max(high, step.delay + _TWO_SIDED * step.delay_error)
+            flags += _white_flags(fit, step)
+        # Parts of one step are not several responses.
+        if not loop and not (stepped and _moves(shown.drive) < 2):
+            flags += against_one_model(shown, fit.delay)
+            if not stepped and all(flag.code != "not_linear" for flag in flags):
+                flags += nonlinear_flags(shown, fit.delay, fit.total_delay / fit.dt)
+    known = [flag for flag in flags if flag.code not in codes]
+    return replace(fit, interval=(low, high), flags=(*fit.flags, *known))
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Stretch of a record that was fitted: output, model and input, shape (M,) each."""
+
+    output: FloatArray
+    fitted: FloatArray
+    drive: FloatArray
+
+    @property
+    def residual(self) -> FloatArray:
+        """What the model leaves."""
+        return np.asarray(self.output - self.fitted)
+
+
+def _shown(fit: DelayFit) -> Shown:
+    record = fit.records[0]
+    first = round((float(fit.time[0]) - float(record.time[0])) / fit.dt)
+    count = min(fit.measured.size, _MOST_SAMPLES)
+    drive = np.ravel(record.input)[first : first + count]
+    return Shown(fit.measured[:count], fit.fitted[:count], drive)
+
+
+def _white(fit: DelayFit, shown: Shown) -> WhiteStep | None:
+    """One step of generalised least squares from a fit whose residual is coloured."""
+    if not np.all(fit.poles) or not fit.gain:
+        return None
+    lead = fit.gain * float(np.real(np.prod(-fit.poles) / np.prod(-fit.zeros)))
+    numerator = lead * np.atleast_1d(np.real(np.poly(fit.zeros)))[::-1]
+    step = white_step(shown.output, shown.drive, fit.dt, fit.dead_time, fit.poles, numerator)
+    reach = max(fit.total_delay, fit.dead_time)
+    # Farther off, one step of a linear approximation is no estimate.
+    return step if step is None or abs(step.delay - fit.dead_time) <= reach else None
+
+
+def _white_flags(fit: DelayFit, step: WhiteStep) -> list[Flag]:
+    gains = abs(step.gain - fit.gain) + _TWO_SIDED * step.gain_error
+    totals = abs(step.total - fit.total_delay) + _TWO_SIDED * step.total_error
+    if gains <= _OFF * abs(fit.gain) and totals <= _OFF * abs(fit.total_delay):
+        return []
+    gain, total = _TWO_SIDED * step.gain_error, _TWO_SIDED * step.total_error
+    return [
+        Flag(
+            "gain_open",
+            f"disturbances are coloured: with weights for that, gain and total delay are "
+            f"{step.gain:.3g} -+ {gain:.2g} and {in_time(step.total)} -+ {in_time(total)}: "
+            "neither is firm; a longer record, or one with less disturbance, tells them",
+        )
+    ]
+
+
+def _moves(drive: FloatArray) -> int:
+    return int(np.count_nonzero(np.abs(np.diff(drive)) > 0.1 * np.ptp(drive)))
+
+
+def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:
+    """Tell whether an input follows the output; `delay`, in samples, is not exceeded."""
+    chances = []
+    for record in records:
+        start = lively_start(np.atleast_2d(record.input), _REGRESSED)
+        part = slice(start, start + _REGRESSED)
+        output, drive = np.ravel(record.output)[part], np.ravel(record.input)[part]
+        chances.append(feedback_chance(output, drive, _past(output.size, delay)))
+    if min(chances) >= RARE / len(chances):
+        return ()
+    return (
+        Flag(
+            "feedback",
+            f"what is new in the input goes with what is new in the output (p = "
+            f"{min(chances):.1g}): a controller or an operator closes a loop, or the output "
+            "answers within the same sample; dead time, gain and lags may be those of the "
+            "controller turned round: move the input by hand",
+        ),
+    )
+
+
+def _past(size: int, delay: float) -> int:
+    """Past inputs that reach beyond a dead time, also one that is found wrong."""
+    return int(min(max(size // 12, _LEAST_PAST, 1.5 * delay + 10), _MOST_PAST, size // 6))
+
+
+def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
+    """Tell whether one gain and one dead time (in samples) hold for all of a record."""
+    fitted, residual, size = shown.fitted, shown.residual, shown.fitted.size
+    late = shown.drive[np.clip(np.arange(size) - round(delay), 0, None)]
+    parts = np.minimum(3 * np.arange(size) // size, 2)
+    flags = []
+    if told := _told(parameter_change(residual, fitted, parts), delay):
+        flags.append(
+            Flag(
+                "time_varying",
+                f"from third to third of the record, {told}: the plant changes with time; what "
+                "is reported is a mean",
+            )
+        )
+    for what, groups in (
+        ("level of the input", _thirds(late)),
+        ("level of the output", _thirds(fitted)),
+        ("direction", (np.gradient(fitted) > 0).astype(np.int64)),
+    ):
+        if told := _told(parameter_change(residual, fitted, groups), delay):
+            flags.append(
+                Flag(
+                    "not_linear",
+                    f"by {what}, {told}: the plant is not linear; what is reported is a mean",
+                )
+            )
+            break
+    return tuple(flags)
+
+
+def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...]:
+    """Tell whether products of past inputs predict the output.
+
+    Not of step records, where such products are but other functions of the time since the step,
+    nor where the regression does not reach over the response; `delay` and `total` in samples.
+    """
+    output, drive = shown.output[:_REGRESSED], shown.drive[:_REGRESSED]
+    past = min(2 * _past(output.size, delay), output.size // 5)
+    # Of a total delay beyond a tenth of the record flags of its own tell.
+    if past < _REACHED * min(total, output.size / 10):
+        return ()
+    chance, part = nonlinear_chance(output, drive, past)
+    if chance >= RARE or part < _EXPLAINED:
+        return ()
+    return (
+        Flag(
+            "not_linear",
+            f"products of past inputs predict {100 * part:.0f} % of what is new in the output (p "
+            f"= {chance:.1g}): the plant is not linear, or its dead time depends on the level; "
+            "what is reported is a mean. Fit records about one level each",
+        ),
+    )
+
+
+def _thirds(values: FloatArray) -> IntArray:
+    """Groups of low, middle and high values."""
+    levels = np.unique(values)
+    bounds = levels[1:] if levels.size <= 3 else np.quantile(values, [1 / 3, 2 / 3])
+    return np.searchsorted(bounds, values, side="right").astype(np.int64)
+
+
+def _told(change: ParameterChange | None, delay: float) -> str:
+    """Say by how much gains and delays differ; nothing where they do not, or hardly."""
+    if change is None or change.chance >= RARE:
+        return ""
+    apart = np.ptp(change.shifts) > max(_DELAYS_APART * delay, 1.0)
+    if not apart and np.ptp(change.gains) <= _GAINS_APART:
+        return ""
+    gains = ", ".join(f"{100 * gain:+.2g}" for gain in change.gains)
+    shifts = ", ".join(f"{shift:+.2g}" for shift in change.shifts)
+    return (
+        f"the residual asks for gains of {gains} % and delays of {shifts} samples beside the "
+        f"common ones (p = {change.chance:.1g})"
+    )
+
+
+def _held_flags(shown: Shown, dt: float) -> tuple[list[Flag], float]:
+    """Tell whether an output is held between samples, and for how long, in s."""
+    share = held_share(shown.output, shown.fitted)
+    if share <= _HELD:
+        return [], 0.0
+    hold = dt * longest_hold(shown.output, shown.fitted)
+    flag = Flag(
+        "held_output",
+        f"while the output moves, {100 * share:.0f} % of its samples repeat the one before: it is "
+        "held, by an analyser or a historian's dead band, and comes late by that; the dead time "
+        f"may be up to {in_time(hold)} shorter",
+    )
+    return [flag], hold
+
+
+def _limit_flags(output: FloatArray) -> list[Flag]:
+    count = samples_at_limit(output)
+    if not count:
+        return []
+    return [
+        Flag(
+            "output_at_limit",
+            f"{count} samples stand at the highest or lowest value, without noise: the output is "
+            "cut off there, and gain and lags are those of what is left",
+        )
+    ]
+
+
+def _earlier_input(fit: DelayFit, codes: set[str]) -> list[Flag]:
+    """Where a response begins with its step, tell whether an earlier move may be behind it."""
+    before = float(fit.records[0].time[0])
+    rest = _first_move(fit.records[0]) - before
+    moving = "not_at_rest" in codes
+    if "no_delay_resolved" not in codes or not (moving or rest < fit.total_delay):
+        return []
+    why = "the output was moving" if moving else f"there is {in_time(rest)} of record"
+    return [
+        Flag(
+            "earlier_input",
+            f"the output moves as the input does, and {why} before: a move of the input before "
+            "the record explains that as well, with any dead time; gain and lags are then wrong "
+            "too. Let the plant rest longer before the step",
+        )
+    ]
+
+
+def _first_move(record: Record) -> float:
+    signal = np.ravel(record.input)
+    return float(record.time[int(np.argmax(np.abs(signal - signal[0]) > 0.1 * np.ptp(signal)))])

@@ -1,0 +1,289 @@
+"""Say what one should know before trusting an output-error fit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..._wording import in_time, interval_in_time, time_within
+from ...numerics.arrays import FloatArray
+from ...numerics.output_error.interval import flow_lead
+from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.output_error.step_data import StepData
+from ...numerics.separable.profile_ends import profile_limits
+from ...results import Flag
+from .model_flags import cancelled_pair, open_gain, slow_modes
+from .result import is_firm
+
+_SAMPLES_BESIDE_NOTHING = 0.5
+_BEYOND = 20.0  # ranges: no overshoot goes as far
+_FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
+
+
+def fit_flags(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> tuple[Flag, ...]:
+    """List the flags of a fit of one (mean) step record."""
+    length = (data.output.size - data.edge) * data.dt
+    found = [
+        *model_flags(fit, data.dt, length, max_delay),
+        _misfit(fit),
+        *_disturbances(data, fit),
+    ]
+    return tuple(flag for flag in found if flag is not None)
+
+
+def sampled_flags(
+    fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
+) -> tuple[Flag, ...]:
+    """List the flags of a fit of a record whose input is no step."""
+    found = model_flags(fit, dt, length, max_delay)
+    if not fit.adequate:
+        found.append(
+            Flag(
+                "coloured_residual",
+                f"{fit.correlation:.3g} samples of the residual count as one: disturbances, or "
+                "dynamics that the model lacks; the interval is widened by that",
+            )
+        )
+    return tuple(flag for flag in found if flag is not None)
+
+
+def model_flags(
+    fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
+) -> list[Flag | None]:
+    """List what the model itself shows."""
+    extrapolated = slow_modes(fit, length), open_gain(fit)
+    firm = "" if any(extrapolated) else _only_total(fit)
+    return [
+        _apparent(fit),
+        _bound(dt, fit, max_delay),
+        _nothing(dt, fit),
+        _many_lags(fit, firm),
+        _dispersed(fit),
+        _open_start(fit, firm),
+        *extrapolated,
+        cancelled_pair(fit),
+        _disagreement(dt, fit, firm),
+        _gain(fit, length),
+        _inverse(fit),
+    ]
+
+
+def _apparent(fit: OutputErrorFit) -> Flag | None:
+    """Say so where structures were asked for and another one rules them out."""
+    if fit.better is None:
+        return None
+    other = fit.better
+    return Flag(
+        "apparent_dead_time",
+        f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was asked "
+        f"for and is ruled out: {time_within(fit.delay, fit.low, fit.high)} is an apparent dead "
+        "time, with lags of the plant in it or left out of it, and its interval holds only if the "
+        f"structure is right; order {other.structure.order}, relative degree "
+        f"{other.structure.relative_degree} puts it at "
+        f"{time_within(other.delay, other.low, other.high)} "
+        f"({interval_in_time(other.low, other.high)})",
+    )
+
+
+def _bound(dt: float, fit: OutputErrorFit, max_delay: float | None) -> Flag | None:
+    if max_delay is None or fit.latest < max_delay * dt * (1 - 1e-9):
+        return None
+    if fit.high < 0.98 * fit.latest:
+        return None
+    return Flag(
+        "delay_at_bound",
+        f"the dead time may be larger than max_delay={max_delay:g} samples; try a larger one",
+    )
+
+
+def _misfit(fit: OutputErrorFit) -> Flag | None:
+    if fit.adequate:
+        return None
+    return Flag(
+        "structured_misfit",
+        f"no model leaves only noise (residual {fit.misfit:.2g} times the noise in means over "
+        "bins): the plant is not linear or has more dynamics than the model; "
+        + (
+            "the dead time is the median of five views and the interval spans them"
+            if fit.views
+            else "the interval holds only if the structures given are right"
+        ),
+    )
+
+
+def _disagreement(dt: float, fit: OutputErrorFit, firm: str) -> Flag | None:
+    if fit.views:
+        width = fit.high - fit.low
+        if width <= 0.3 * max(fit.delay, dt):
+            return None
+        apart = [f"{name} {in_time(delay)}" for name, delay in fit.views if not _near(fit, delay)]
+        return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
+    low, high = profile_limits(*fit.profile)
+    wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
+    if fit.open_start or not wide or fit.high - fit.low <= 2 * (high - low):
+        return None
+    return Flag(
+        "structures_disagree",
+        f"the chosen structure puts the dead time in {interval_in_time(low, high)}, others "
+        f"that the data cannot rule out in {interval_in_time(fit.low, fit.high)}: dead time and "
+        f"fast lags look alike{firm}",
+    )
+
+
+def _near(fit: OutputErrorFit, delay: float) -> bool:
+    return abs(delay - fit.delay) <= 0.15 * fit.delay
+
+
+def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
+    if fit.low > _SAMPLES_BESIDE_NOTHING * dt:
+        return None
+    return Flag(
+        "no_delay_resolved", f"a model without dead time fits as well (up to {in_time(fit.high)})"
+    )
+
+
+def _many_lags(fit: OutputErrorFit, firm: str) -> Flag | None:
+    if fit.like_flow and not fit.endless:
+        return Flag(
+            "many_lags",
+            f"the model is a {fit.chain}: a flow that disperses looks the same and begins "
+            f"{in_time(flow_lead(fit.poles))} earlier{firm}",
+        )
+    if not fit.endless:
+        return None
+    return Flag(
+        "many_lags",
+        "chains of lags fit the better the longer they are, up to the longest that was tried: any "
+        f"part of the dead time may be more of such lags{firm}",
+    )
+
+
+def _dispersed(fit: OutputErrorFit) -> Flag | None:
+    """Say so where a flow explains the response better than lags."""
+    flow = min(fit.flows, key=lambda flow: flow.excess, default=None)
+    if flow is None or (flow.excess >= 0 and not fit.follows_flow):
+        return None
+    behind = f" and a lag of {in_time(flow.lag)}" if flow.lag else ""
+    kind = (
+        f"a flow that disperses (mean residence time {in_time(flow.mean)}, Peclet number "
+        f"{flow.peclet:.2g}{behind})"
+    )
+    if fit.follows_flow:
+        return Flag(
+            "dispersed_flow",
+            f"{kind} explains the response clearly better than lags: the dead time is that "
+            "before it, and poles and zeros of the model have no meaning of their own",
+        )
+    return Flag(
+        "dispersed_flow",
+        f"{kind} behind a dead time of {in_time(flow.delay)} fits better than lags: "
+        "where something flows through the plant, that is the likelier dead time",
+    )
+
+
+def _open_start(fit: OutputErrorFit, firm: str) -> Flag | None:
+    if not fit.open_start:
+        return None
+    return Flag(
+        "onset_open",
+        "the best model has a zero, which imitates a smooth beginning: how much of the time up to "
+        f"the first motion is dead time is open, {interval_in_time(fit.low, fit.high)}"
+        f"{firm}",
+    )
+
+
+def _gain(fit: OutputErrorFit, length: float) -> Flag | None:
+    """Say so where the record does not tell the sign of the gain."""
+    low, high = fit.gain_ends
+    if fit.static is None or not low <= 0 <= high:
+        return None
+    if fit.static.resolved:
+        why = f"95 % of it lie in {low:.3g} to {high:.3g}"
+    else:
+        why = (
+            f"its slowest time constant is {in_time(float(1 / np.abs(fit.poles).min()))} in a "
+            f"record of {in_time(length)}, and the standard error {fit.static.gain_std:.3g}"
+        )
+    return Flag(
+        "gain_not_resolved",
+        f"the record does not resolve the gain, nor its sign: the model has {fit.static.gain:.4g}, "
+        f"but {why}. A longer record, or larger moves of the input, would tell",
+    )
+
+
+def _only_total(fit: OutputErrorFit) -> str:
+    """Say that the total delay is firm, where it is."""
+    firm = fit.static is None or is_firm(fit.static.total, fit.total_ends)
+    return "; only the total delay is firm" if firm else ""
+
+
+def _inverse(fit: OutputErrorFit) -> Flag | None:
+    if fit.follows_flow:
+        # Zeros on the right make the beginning late, as that of a flow is.
+        return None
+    zeros = np.roots(fit.numerator[::-1])
+    right = zeros[zeros.real > 0]
+    if not right.size or np.abs(right).min() > 3 * np.abs(fit.poles).max():
+        return None
+    return Flag(
+        "inverse_response",
+        f"the model starts in the wrong direction (zero at {right[np.argmin(abs(right))]:.3g} "
+        "rad/s): its dead time ends where that begins",
+    )
+
+
+def _disturbances(data: StepData, fit: OutputErrorFit) -> list[Flag | None]:
+    flags: list[Flag | None] = []
+    if data.edge < 8:
+        flags.append(
+            Flag(
+                "no_rest",
+                f"{data.edge} samples before the step: the noise is taken from differences of "
+                "neighbours, slow disturbances are not seen in it",
+            )
+        )
+    if fit.relaxing:
+        flags.append(
+            Flag(
+                "not_at_rest",
+                "the output was still moving before the step, as after an earlier input: the "
+                "model's free response was fitted along",
+            )
+        )
+    elif data.drift:
+        flags.append(Flag("drift", f"a drift of {data.drift / data.dt:.3g} per s was fitted along"))
+    if data.hum:
+        lines = ", ".join(f"{f / data.dt:.4g} Hz" for f in data.hum)
+        flags.append(Flag("hum", f"a line at {lines} was fitted along"))
+    if data.coarse:
+        flags.append(
+            Flag(
+                "coarse_quantisation",
+                f"the output moves in steps of {data.quantum:.3g}, more than its noise: "
+                "averaging does not remove the rounding",
+            )
+        )
+    error = data.output - fit.fitted
+    wild = float(np.mean(np.abs(error) > 5 * max(fit.residual, data.sigma)))
+    code = _code(data.output)
+    if code:
+        flags.append(Flag("outliers", code))
+    elif fit.adequate and wild > 0.002:
+        flags.append(
+            Flag("outliers", f"{100 * wild:.2g} % of the samples lie 5 sigma or more off the model")
+        )
+    return flags
+
+
+def _code(output: FloatArray) -> str:
+    """Name one value far beyond all others that a few samples have, as loggers write for none."""
+    low, high = np.percentile(output, [1, 99])
+    far = np.flatnonzero(
+        (output < low - _BEYOND * (high - low)) | (output > high + _BEYOND * (high - low))
+    )
+    if not far.size or high == low or np.ptp(output[far]) > 0:
+        return ""
+    return (
+        f"{far.size} sample(s), the first at index {far[0]}, are {output[far[0]]:g}, "
+        f"{_BEYOND:g} times the range of the others or more beyond them: if that stands for a "
+        "missing value, interpolate there before the fit, which they spoil"
+    )

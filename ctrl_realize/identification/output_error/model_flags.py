@@ -1,0 +1,92 @@
+"""What poles, zeros and rival structures of a fit say of gain and total delay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..._wording import interval_in_time
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.separable.lag_chains import lag_sum
+from ...results import Flag
+
+_GAINS_APART = 0.2  # part of gain or total delay by which structures may differ
+_AS_GOOD = 4.0  # excess of a criterion that chance explains: chi-square, one degree, 95 %
+_CANCELLED = 0.05  # of its frequency: distance of a pole from a zero that hides it
+
+INTEGRATOR = 5e-3
+"""Poles slower than this, times the length of the record, cannot be told from integrators."""
+SETTLED = 3.0
+"""Time constants after which a lag counts as settled: 95 % of its step response."""
+
+
+def slow_modes(fit: OutputErrorFit, length: float) -> Flag | None:
+    """Tell whether a record of `length` s ends before the slowest mode has died away."""
+    slowest = float(np.abs(fit.poles).min()) * length
+    if slowest < INTEGRATOR:
+        return Flag(
+            "integrating",
+            "the output goes on with a constant slope: a pole is taken as an integrator, the "
+            "total delay is that of the other lags",
+        )
+    seen = max(length - fit.delay, 0.0)
+    unseen = _not_died_away(fit.poles, seen)
+    if not unseen.size:
+        return None
+    constants = seen * float(np.min(-unseen.real))
+    pair = " of a pair of which less than a period was seen" if np.any(unseen.imag) else ""
+    return Flag(
+        "not_settled",
+        f"the record ends {constants:.2g} of the slowest time constant{pair} after the response "
+        "has begun: gain, total delay and slowest lag are extrapolated",
+    )
+
+
+def open_gain(fit: OutputErrorFit) -> Flag | None:
+    """Tell whether structures that are not ruled out differ in gain or total delay."""
+    kept = [line for line in fit.structures if line.excess <= _AS_GOOD]
+    gain, total = _gain_and_total(fit)
+    gains = np.array([gain, *(line.gain for line in kept)])
+    totals = np.array([total, *(line.total_delay for line in kept)])
+    if fit.views or not (_apart(gains) or _apart(totals)):
+        return None
+    return Flag(
+        "gain_open",
+        f"structures that the data cannot rule out have gains of {gains.min():.3g} to "
+        f"{gains.max():.3g} and total delays of {interval_in_time(totals.min(), totals.max())}: "
+        "neither is firm; a longer record, or one with less disturbance, tells them",
+    )
+
+
+def _gain_and_total(fit: OutputErrorFit) -> tuple[float, float]:
+    own = float(np.real(fit.numerator[0] / np.prod(-fit.poles)))
+    return own, fit.delay + lag_sum(fit.poles, fit.numerator)
+
+
+def _apart(values: FloatArray) -> bool:
+    """Whether values differ from the first by more than is usual between structures."""
+    return bool(np.any(np.abs(values - values[0]) > _GAINS_APART * np.abs(values[0])))
+
+
+def _not_died_away(poles: ComplexArray, seen: float) -> ComplexArray:
+    """Poles whose part of a response has not died away when the record ends.
+
+    What decays is exp(re(p) t), whatever |p| is. A pair that rings on has shown its mean, and
+    with it the gain, after a period; of one that was seen for less, the record holds a rise.
+    """
+    slow = -poles.real * seen < SETTLED
+    return poles[slow & (np.abs(poles.imag) * seen < 2 * np.pi)]
+
+
+def cancelled_pair(fit: OutputErrorFit) -> Flag | None:
+    """Tell whether the model has a pair of poles that the input does not move."""
+    zeros = np.roots(fit.numerator[::-1])
+    for pole in fit.poles[fit.poles.imag > 0]:
+        if np.any(np.abs(zeros - pole) < _CANCELLED * abs(pole)):
+            return Flag(
+                "cancelled_pair",
+                f"zeros nearly cancel a pair of poles at {abs(pole) / (2 * np.pi):.3g} Hz: the "
+                "output swings there by itself, which takes two poles from what follows the "
+                "input; dead time and lags may be wrong: take the line out of the output first",
+            )
+    return None

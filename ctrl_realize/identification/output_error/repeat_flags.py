@@ -1,0 +1,104 @@
+"""Say what several records of one plant say about each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...data import Record
+from ...numerics.arrays import FloatArray
+from ...results import Flag
+from .repeatability import Repeatability
+
+BY_CHANCE = 0.01  # one false alarm in a hundred groups of records of one plant
+SAME = 0.01  # differences of a hundredth are those of sensors, whatever the noise
+NO_COMMON_GAIN = 0.2
+"""Part by which a record's gain may lie off the common one before the model is no record's own."""
+
+
+def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
+    """List what several records say about each other."""
+    flags = []
+    if result.outlying:
+        flags.append(
+            Flag("outlying_records", "left out of the mean: " + ", ".join(result.outlying))
+        )
+    if result.p_value < 0.01:
+        flags.append(
+            Flag(
+                "records_differ",
+                f"delays differ from record to record by more than their noise (chi-square "
+                f"{result.chi_square:.3g}, p = {result.p_value:.2g}): trigger jitter, friction "
+                "or a changing plant; the interval is widened by that",
+            )
+        )
+    flags += _response_flags(result)
+    if result.trend_error > 0 and abs(result.trend) > 3 * result.trend_error:
+        flags.append(
+            Flag(
+                "amplitude_trend",
+                f"the delay changes with the amplitude ({result.trend:.2g} +- "
+                f"{result.trend_error:.2g} s per unit): the plant is not linear",
+            )
+        )
+    return tuple(flags)
+
+
+def _response_flags(result: Repeatability) -> list[Flag]:
+    """Say so where gains or time constants differ by more than their noise."""
+    flags = []
+    statistic, chance = result.gain_test
+    if chance < BY_CHANCE and result.gain_spread > NO_COMMON_GAIN:
+        followed = result.fit_percent[np.isfinite(result.fit_percent)]
+        flags.append(
+            Flag(
+                "no_common_gain",
+                f"the gain of the model is that of no record: they have {_range(result.gains)} "
+                f"times as much, and are followed to {followed.min(initial=100):.3g} to "
+                f"{followed.max(initial=0):.3g} %; fit those of one operating point by themselves",
+            )
+        )
+    if chance < BY_CHANCE and result.gain_spread > SAME:
+        flags.append(
+            Flag(
+                "gains_differ",
+                f"the gain differs from record to record by more than its noise, "
+                f"{_range(result.gains)} times the common one (chi-square {statistic:.3g}, p = "
+                f"{chance:.2g}): the plant is not linear, or not the same",
+            )
+        )
+    statistic, chance = result.lag_test
+    if chance < BY_CHANCE and np.max(np.abs(np.log(result.lags))) > SAME:
+        flags.append(
+            Flag(
+                "lags_differ",
+                f"the time constants differ from record to record by more than their noise, "
+                f"{_range(result.lags)} times the common ones (chi-square {statistic:.3g}, p = "
+                f"{chance:.2g}): the plant is not linear, or not the same",
+            )
+        )
+    return flags
+
+
+def _range(values: FloatArray) -> str:
+    return f"{values.min():.3g} to {values.max():.3g}"
+
+
+def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:
+    """Find records whose outputs agree in every digit, which noise never lets happen."""
+    first: dict[bytes, int] = {}
+    again = []
+    for i, record in enumerate(records, 1):
+        values = record.output.tobytes()
+        if values in first:
+            again.append(f"the {i}. is the {first[values]}.")
+        first.setdefault(values, i)
+    if not again:
+        return ()
+    more = f" and {len(again) - 3} more" if len(again) > 3 else ""
+    return (
+        Flag(
+            "same_records",
+            f"{len(again)} of {len(records)} records are others over again ({', '.join(again[:3])}"
+            f"{more}): the standard error counts their noise as independent",
+        ),
+    )

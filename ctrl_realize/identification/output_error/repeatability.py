@@ -1,0 +1,136 @@
+"""How much records of one plant differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._wording import in_time
+from ...numerics.arrays import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_MOST_NAMED = 8
+"""Most records that a card lists one by one; the table has all."""
+
+
+def _nothing() -> FloatArray:
+    return np.empty(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Repeatability:
+    """How much records of one plant differ, beyond the noise inside each.
+
+    ``chi_square`` is the sum over the records of ((delay - weighted mean) / standard error)^2
+    and `p_value` the chance of a larger one when records differ by noise alone; `gain_test` and
+    `lag_test` are the same two numbers for gains and (logarithms of) time constants.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the records.
+    amplitudes : ndarray, shape (R,)
+        Height of the step of each, or how far its input goes from lowest to highest.
+    delays, errors : ndarray, shape (R,)
+        Delay of each against the common model, and its standard error from the noise, in s.
+    gains, gain_errors : ndarray, shape (R,)
+        Gain of each over the common one, and its standard error.
+    lags, lag_errors : ndarray, shape (R,)
+        Time constants of each over the common ones, delay and gain being free, and the relative
+        standard error of that ratio.
+    fit_percent : ndarray, shape (R,)
+        How much of each record the common model explains, its own level and drift apart:
+        ``100 (1 - |y - model| / |y - mean y|)``.
+    trend, trend_error : float
+        Slope of the delays over the amplitudes, in s per unit of input.
+    outlying : tuple of str
+        Records that lie apart from the rest; they are not in the mean.
+    """
+
+    names: tuple[str, ...]
+    amplitudes: FloatArray
+    delays: FloatArray
+    errors: FloatArray
+    gains: FloatArray
+    chi_square: float
+    p_value: float
+    trend: float
+    trend_error: float
+    outlying: tuple[str, ...]
+    gain_errors: FloatArray = field(default_factory=_nothing)
+    lags: FloatArray = field(default_factory=_nothing)
+    lag_errors: FloatArray = field(default_factory=_nothing)
+    fit_percent: FloatArray = field(default_factory=_nothing)
+    gain_test: tuple[float, float] = (0.0, 1.0)
+    lag_test: tuple[float, float] = (0.0, 1.0)
+
+    @property
+    def gain_spread(self) -> float:
+        """Largest part by which the gain of a record lies off the common one."""
+        kept = [name not in self.outlying for name in self.names]
+        return float(np.max(np.abs(self.gains[kept] - 1.0), initial=0.0))
+
+    def table(self) -> pd.DataFrame:
+        """One row for each record: delay, gain and lags of its own, and how it is followed.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``record``; columns ``amplitude``, ``dead_time``, ``dead_time_error`` [s],
+            ``gain``, ``gain_error``, ``lags``, ``lags_error`` (over the common ones),
+            ``fit_percent`` and ``outlying``.
+        """
+        import pandas as pd
+
+        unknown = np.full(len(self.names), np.nan)
+        columns = {
+            "amplitude": self.amplitudes,
+            "dead_time": self.delays,
+            "dead_time_error": self.errors,
+            "gain": self.gains,
+            "gain_error": self.gain_errors,
+            "lags": self.lags,
+            "lags_error": self.lag_errors,
+            "fit_percent": self.fit_percent,
+        }
+        table = pd.DataFrame({name: v if v.size else unknown for name, v in columns.items()})
+        table["outlying"] = [name in self.outlying for name in self.names]
+        return table.set_index(pd.Index(self.names, name="record"))
+
+    def rows(self) -> list[tuple[str, str]]:
+        """List the numbers for a report."""
+        scatter = float(self.delays.std(ddof=1)) if self.delays.size > 1 else 0.0
+        rows = [
+            ("records", f"{len(self.names)}, {len(self.outlying)} of them left out"),
+            ("scatter of delays", f"{in_time(scatter)} between records"),
+            (
+                "chi-square",
+                f"{self.chi_square:.3g} for {len(self.names) - 1} (p = {self.p_value:.2g})",
+            ),
+        ]
+        for what, ratios, (statistic, chance) in (
+            ("gains", self.gains, self.gain_test),
+            ("time constants", self.lags, self.lag_test),
+        ):
+            if ratios.size and statistic > 0:
+                rows.append(
+                    (
+                        what,
+                        f"{ratios.min():.3g} to {ratios.max():.3g} of the common value "
+                        f"(chi-square {statistic:.3g}, p = {chance:.2g})",
+                    )
+                )
+        followed = list(zip(self.names, self.fit_percent, self.gains, strict=False))
+        rows += [
+            (f"record {name}", f"{fit:.1f} % followed, gain {gain:.3g} of the common one")
+            for name, fit, gain in followed[:_MOST_NAMED]
+        ]
+        if self.trend_error > 0:
+            rows.append(
+                ("trend over amplitude", f"{self.trend:.2g} +- {self.trend_error:.2g} s per unit")
+            )
+        return rows

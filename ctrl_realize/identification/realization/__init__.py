@@ -1,0 +1,1 @@
+"""Kung's realization, and the scan over delays and orders."""

@@ -1,0 +1,186 @@
+"""Misfit over delay, and the models behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import overload
+
+import control as ct
+import numpy as np
+
+from ..._wording import in_time
+from ...data import ImpulseResponse
+from ...delayed import DelayedStateSpace
+from ...numerics.arrays import FloatArray, read_only
+from ...results import Flag, Result
+from .result import Realization
+
+
+class Candidates(Sequence[DelayedStateSpace]):
+    """The models of a delay scan, one for each delay, built when asked for.
+
+    ``candidates[d]`` has the delay d and the direct term that the scan used.
+    """
+
+    def __init__(
+        self, A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, dt: float
+    ) -> None:
+        self._matrices = tuple(read_only(M) for M in (A, B, C, D))
+        self._dt = dt
+
+    def __len__(self) -> int:
+        return int(self._matrices[0].shape[0])
+
+    @overload
+    def __getitem__(self, delay: int) -> DelayedStateSpace: ...
+    @overload
+    def __getitem__(self, delay: slice) -> tuple[DelayedStateSpace, ...]: ...
+    def __getitem__(self, delay: int | slice) -> DelayedStateSpace | tuple[DelayedStateSpace, ...]:
+        if isinstance(delay, slice):
+            return tuple(self[d] for d in range(*delay.indices(len(self))))
+        d = range(len(self))[delay]
+        return DelayedStateSpace(ct.ss(*(M[d] for M in self._matrices), self._dt), d)
+
+    def __iter__(self) -> Iterator[DelayedStateSpace]:
+        return (self[d] for d in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"<Candidates: d = 0...{len(self) - 1}>"
+
+
+@dataclass(frozen=True, eq=False)
+class DelayScan(Result):
+    """Misfit of the best model behind every candidate delay.
+
+    ``iae[d]`` is the sum of ``|impulse.markov[k] - candidates[d].markov(n)[k]|``
+    over the fixed window ``n = samples + max_delay + 1``, all channels
+    together. ``delay`` is the smallest d whose misfit is the least but for
+    rounding; ``interval`` holds all d within 5 % of it.
+
+    Attributes
+    ----------
+    iae : ndarray, shape (max_delay + 1,)
+    delay : int
+        Best delay in samples.
+    delay_interval : tuple of int
+        Smallest and largest delay, in samples, with a misfit within 5 % of
+        the least; `interval` is the same in s. It tells how flat the curve is, and is no confidence
+        interval: the bias of the method is not in it.
+    order, samples : int
+        Order of all models; Markov parameters behind each delay used.
+    feedthrough : bool
+        Whether the candidates have the direct term G[d] (the paper), else 0.
+    singular_values : ndarray, shape (max_delay + 1, order)
+        Of the Hankel matrix behind each delay.
+    noise_floor : float or None
+        Largest singular value of a Hankel matrix of nothing but the noise
+        before the step; None where that noise is not known.
+    candidates : Candidates
+        The models, built when asked for.
+    realization : Realization
+        How the returned model was realized behind `delay`.
+    flags : tuple of Flag
+        ``"delay_at_bound"``, ``"no_delay_resolved"``, ``"several_minima"``,
+        ``"order_in_noise"``, ``"order_near_noise"``, and those of
+        `realization`.
+    choices : tuple of str
+        What was chosen for the caller, and why (`identify`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]     # 37 samples, then a lag
+    >>> scan = cr.estimate_delay(pulse, 1, max_delay=60, dt=0.01).fit
+    >>> print(scan.delay, scan.delay_interval, scan.iae[[30, 36, 38]].round(3))
+    37 (37, 38) [1.133 0.302 0.   ]
+    """
+
+    iae: FloatArray
+    delay: int
+    delay_interval: tuple[int, int]
+    order: int
+    samples: int
+    feedthrough: bool
+    singular_values: FloatArray
+    noise_floor: float | None
+    candidates: Candidates = field(repr=False)
+    realization: Realization = field(repr=False)
+    flags: tuple[Flag, ...] = ()
+    choices: tuple[str, ...] = ()
+
+    @property
+    def impulse(self) -> ImpulseResponse:
+        """The data."""
+        return self.realization.impulse
+
+    @property
+    def dt(self) -> float:
+        """Sample time in s."""
+        return self.impulse.dt
+
+    @property
+    def dead_time(self) -> float:
+        """Best delay in s."""
+        return self.delay * self.dt
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """`delay_interval` in s."""
+        return (self.delay_interval[0] * self.dt, self.delay_interval[1] * self.dt)
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float]:
+        """Interval of the dead time in s, the same as `interval`."""
+        return self.interval
+
+    @property
+    def misfit(self) -> float:
+        """Least integrated absolute error, in the unit of the output per input."""
+        return float(self.iae[self.delay])
+
+    @property
+    def max_delay(self) -> int:
+        """Largest delay that was tried, in samples."""
+        return int(self.iae.size - 1)
+
+    @property
+    def contrast(self) -> float:
+        """Misfit without delay over the least one; below 1.3 no delay is resolvable."""
+        least = float(self.iae[self.delay])
+        return float(self.iae[0]) / least if least > 0 else np.inf
+
+    @property
+    def noise_ratio(self) -> float | None:
+        """Last singular value of the model over that of the noise; above 3 the scan is reliable."""
+        if self.noise_floor is None:
+            return None
+        last = float(self.singular_values[self.delay, -1])
+        return last / self.noise_floor if self.noise_floor > 0 else np.inf
+
+    def _title(self) -> str:
+        return f"Delay scan: {self.delay} samples ({in_time(self.delay * self.dt, 5)})"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        low, high = self.delay_interval
+        rows = [
+            ("within 5 % of the least misfit", f"{low}...{high} samples"),
+            ("tried", f"0...{self.max_delay} samples of {in_time(self.dt, 6)}"),
+            ("order", f"{self.order}"),
+            ("samples behind each delay", f"{self.samples}"),
+            ("direct term", "G[d]" if self.feedthrough else "0"),
+            ("least misfit", f"{self.iae[self.delay]:.4g} (IAE)"),
+            ("misfit without delay", f"{self.contrast:.3g} times that"),
+        ]
+        if self.noise_ratio is not None:
+            rows.append((f"singular value {self.order}", f"{self.noise_ratio:.2f} times the noise"))
+        return rows
+
+    def __repr__(self) -> str:
+        flags = f", {len(self.flags)} flags" if self.flags else ""
+        low, high = self.delay_interval
+        return (
+            f"<DelayScan: d = 0...{self.max_delay}, best {self.delay} ({low}...{high}), "
+            f"order {self.order}{flags}>"
+        )

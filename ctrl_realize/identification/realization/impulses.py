@@ -1,0 +1,157 @@
+"""What realization and delay scan ask of an impulse response, checked once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import whole
+from ...data import ImpulseResponse
+from ...errors import DataError, DelayRangeError, OptionError, OrderError
+from ...numerics.arrays import FloatArray
+from ...numerics.hankel.delay_models import hankel_size
+from ...numerics.hankel.lanczos import largest_magnitude
+from ...results import Flag
+
+SETTLING_BAND = 0.02
+"""Part of its range within which a step response counts as settled."""
+
+MIN_NOISE = 32
+"""Samples at rest that are needed to say how large the noise is."""
+
+MOST_WORK = 30_000_000
+"""Delays times samples that a scan takes on by itself; twenty seconds, or a minute at most."""
+
+MAX_WINDOWS = 16
+"""Stretches of a long rest that are looked at, evenly spread."""
+
+
+def as_impulse(impulse: ImpulseResponse | ArrayLike, dt: float | None) -> ImpulseResponse:
+    """Return an impulse response as it is, or make one of an array with a sample time."""
+    if isinstance(impulse, ImpulseResponse):
+        if dt is not None and dt != impulse.dt:
+            raise OptionError(
+                f"dt={dt!r}, the impulse response has dt={impulse.dt:g}; leave dt out"
+            )
+        return impulse
+    if dt is None:
+        raise OptionError(
+            f"impulse is a {type(impulse).__name__}; give its sample time dt=, "
+            "or an ImpulseResponse"
+        )
+    return ImpulseResponse(impulse, dt)
+
+
+def channels(impulse: ImpulseResponse) -> FloatArray:
+    """Return the Markov parameters with shape (p, m, N)."""
+    return impulse.markov if impulse.markov.ndim == 3 else impulse.markov[np.newaxis, np.newaxis]
+
+
+def check_samples(
+    impulse: ImpulseResponse, samples: Any, order: int, max_delay: int, *, padded: bool, what: str
+) -> int:
+    """Return the number of samples behind the feedthrough; None: all that fit.
+
+    `what` is the name of the argument that `max_delay` came in by.
+    """
+    available = impulse.n_samples
+    if available <= max_delay + 1:
+        raise DelayRangeError(
+            f"{what}={max_delay} needs more than {max_delay + 1} samples, "
+            f"the response has {available}"
+        )
+    if samples is None:
+        samples = available - 1 - max_delay
+    else:
+        samples = whole(samples, "samples", 2)
+        if samples + max_delay + 1 > available:
+            raise DelayRangeError(
+                f"samples={samples} and {what}={max_delay} need {samples + max_delay + 1} "
+                f"samples, the response has {available}"
+            )
+    check_order(impulse, order, samples, padded=padded)
+    return int(samples)
+
+
+def check_order(impulse: ImpulseResponse, order: int, samples: int, *, padded: bool) -> None:
+    """Raise when the Hankel matrix is too small for the order."""
+    largest = hankel_size(samples, padded=padded) * min(impulse.n_inputs, impulse.n_outputs)
+    if not 1 <= order <= largest:
+        raise OrderError(
+            f"order={order}, but a Hankel matrix of {samples} samples allows "
+            f"1 <= order <= {largest}"
+        )
+
+
+def settled_samples(impulse: ImpulseResponse, order: int, max_delay: int) -> int:
+    """Return how many samples a delay scan uses by default.
+
+    Three times the settling time of the step response (2 % of its range),
+    at least 256 and 8 per order, as far as they fit. More samples hold
+    nothing but noise, and cost time for every delay: of many delays fewer
+    samples are used, such that a scan ends within a minute.
+
+    Raises
+    ------
+    DataError
+        Too few samples could be used for that many delays.
+    """
+    fits = impulse.n_samples - 1 - max_delay
+    step = np.cumsum(channels(impulse), axis=-1)
+    away = np.abs(step - step[..., -1:])
+    band = SETTLING_BAND * away.max(axis=-1, keepdims=True)
+    settled = int(np.flatnonzero((away > band).any(axis=(0, 1)))[-1:].sum())
+    affordable = MOST_WORK // (max_delay + 1)
+    if affordable < min(fits, max(3 * max_delay, 256, 8 * order)):
+        raise DataError(
+            f"a scan of {max_delay + 1} delays over {fits} samples would take hours: the response "
+            "is sampled far more finely than it moves; take every so many samples (of the record, "
+            "behind a low-pass), give max_delay= and samples=, or use fit_delay, which takes "
+            "samples together by itself"
+        )
+    return min(fits, affordable, max(3 * settled, 256, 8 * order))
+
+
+def noise_floor(impulse: ImpulseResponse, size: int) -> float | None:
+    """Return the largest singular value of a Hankel matrix of nothing but noise.
+
+    Parameters
+    ----------
+    impulse : ImpulseResponse
+        Its `noise`, cut into windows, fills Hankel matrices of the same size.
+    size : int
+        Rows of the Hankel matrix of the data.
+
+    Returns
+    -------
+    float or None
+        The largest over windows that overlap by half; filtered noise varies
+        by a third from window to window. Where the noise is shorter than a
+        window, it is scaled by the square root of the size, as white noise
+        goes. None when fewer than 32 samples at rest are known.
+    """
+    noise = impulse.noise
+    if noise is None or impulse.markov.ndim == 3 or noise.size < MIN_NOISE:
+        return None
+    rows = min(size, (noise.size + 1) // 2)
+    starts = np.arange(0, noise.size - (2 * rows - 1) + 1, max(1, rows // 2))
+    chosen = starts[np.linspace(0, starts.size - 1, min(starts.size, MAX_WINDOWS)).astype(np.intp)]
+    windows = np.lib.stride_tricks.sliding_window_view(noise, 2 * rows - 1)[chosen]
+    return float(largest_magnitude(windows, rows).max() * np.sqrt(size / rows))
+
+
+def filter_flags(impulse: ImpulseResponse) -> tuple[Flag, ...]:
+    """Say that a causal filter is still in the data, and by how much it delays."""
+    still = impulse.filter
+    if still is None or still.zero_phase:
+        return ()
+    return (
+        Flag(
+            "filter_delay",
+            f"the {still} is still in the data: it adds {still.group_delay:.1f} samples "
+            f"({1e3 * still.group_delay * impulse.dt:.3g} ms) of lag that are not the plant's; "
+            "use a zero-phase filter, or divide it out of the frequency response",
+        ),
+    )

@@ -1,0 +1,282 @@
+"""Realization of several channels that have delays of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import one_of, real, whole
+from ...data import ImpulseResponse
+from ...data.impulse_estimate import ImpulseEstimate
+from ...delayed import DelayedStateSpace
+from ...errors import DataError, DelayRangeError, OptionError
+from ...numerics.arrays import FloatArray, IntArray, read_only
+from ...numerics.blas_threads import single_threaded
+from ...numerics.state_space.delay_split import split_delays
+from ...results import Flag, Result
+from .impulses import as_impulse, channels
+from .mimo_cores import Assembly, aligned_core, cores_by_columns, cores_by_rows, misfit
+from .realize import HANKEL
+
+Structure = Literal["auto", "common", "rows", "columns"]
+NOISE_STDS = 5.0
+"""Standard deviations from which a Markov parameter counts as response: one of 2e6 by chance."""
+ALIKE, EXACT = 1.5, 1e-9
+"""Models whose misfits are within this factor, or below this level, count as equally good."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelRealization(Result):
+    """How a model of several channels was put together.
+
+    ``delays[i, j] == output_delays[i] + input_delays[j] + rest[i, j]``, where `rest` is inside
+    the core; entries without response have the delay -1. `misfit` is the sum of absolute errors
+    of each entry over the sum of its absolute Markov parameters.
+
+    Attributes
+    ----------
+    delays, rest : ndarray of int, shape (p, m)
+    output_delays, input_delays : tuple of int
+    structure : str
+        ``"common"``: one A for all channels. ``"rows"``: one model for each output behind tapped
+        input lines. ``"columns"``: one for each input in front of tapped output lines.
+    orders : tuple of int
+        Of the models that the core is made of.
+    states : int
+        Of the whole model, delays included.
+    misfit : ndarray, shape (p, m)
+    impulse : ImpulseResponse
+    flags : tuple of Flag
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
+    >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
+    >>> found = cr.realize_channels(np.array(late)[:, None, :], 1, dt=0.1).fit
+    >>> found.structure, found.delays.ravel().tolist(), found.output_delays, found.input_delays
+    ('common', [3, 7], (0, 4), (3,))
+    """
+
+    delays: IntArray
+    rest: IntArray
+    output_delays: tuple[int, ...]
+    input_delays: tuple[int, ...]
+    structure: str
+    orders: tuple[int, ...]
+    states: int
+    misfit: FloatArray
+    impulse: ImpulseResponse
+    flags: tuple[Flag, ...] = ()
+
+    def _title(self) -> str:
+        p, m = self.delays.shape
+        return f"Realization of {p} x {m} channels"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [
+            ("delays", "; ".join(" ".join(map(str, row)) for row in self.delays) + " samples"),
+            ("of the inputs", " ".join(map(str, self.input_delays))),
+            ("of the outputs", " ".join(map(str, self.output_delays))),
+            ("structure", f"{self.structure}, order {' + '.join(map(str, self.orders))}"),
+            ("states in all", str(self.states)),
+            ("largest misfit", f"{100 * float(self.misfit.max()):.3g} %"),
+        ]
+
+    def __repr__(self) -> str:
+        p, m = self.delays.shape
+        return f"<ChannelRealization: {p} x {m}, {self.structure}, {self.states} states>"
+
+
+def channel_delays(
+    impulse: ImpulseResponse | ArrayLike, *, level: float = 0.1, dt: float | None = None
+) -> IntArray:
+    """Find the delay of every channel where its response sets in.
+
+    Parameters
+    ----------
+    impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
+    level : float, default 0.1
+        Part of a channel's largest Markov parameter that counts as response. Five standard
+        deviations of the noise are asked for as well: those of `impulse_from_io`, or what the
+        second half of the data shows.
+    dt : float, optional
+        Sample time in s, where `impulse` is an array.
+
+    Returns
+    -------
+    ndarray of int, shape (p, m)
+        Samples before the last Markov parameter below the level, so that ``D = 0`` behind the
+        delay: a pulse that first shows at lag 6 has the delay 5. -1 where there is no
+        response.
+
+    Notes
+    -----
+    Differences between channels are firm where their responses look alike; of a smooth onset the
+    level cuts off the beginning, by more samples the lower the order of the plant is not. Scan a
+    channel with `estimate_delay` where that matters.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = 0.8 ** np.arange(60)
+    >>> late = [np.r_[np.zeros(d + 1), pulse][:60] for d in (3, 7)]
+    >>> cr.channel_delays(np.array(late)[:, None, :], dt=0.1)
+    array([[3],
+           [7]])
+    """
+    data = as_impulse(impulse, dt)
+    share = real(level, "level", "part of the largest Markov parameter")
+    if not 0 <= share < 1:
+        raise OptionError(f"level={level!r}; needed is a part of the largest value, 0 <= level < 1")
+    size = np.abs(channels(data))
+    top = size.max(axis=-1, keepdims=True)
+    limit = np.maximum(share * top, 1e-12 * size.max())
+    if isinstance(data, ImpulseEstimate):
+        noise = np.reshape(data.std, size.shape)
+    else:
+        # Steps from sample to sample in the second half, where a response has become smooth.
+        steps = np.diff(channels(data)[..., size.shape[-1] // 2 :], axis=-1)
+        noise = np.median(np.abs(steps), axis=-1, keepdims=True) / (0.6745 * np.sqrt(2))
+    limit = np.maximum(limit, NOISE_STDS * noise)
+    seen = size > limit
+    return np.where(seen.any(axis=-1), np.maximum(seen.argmax(axis=-1) - 1, 0), -1).astype(np.int64)
+
+
+@single_threaded
+def realize_channels(
+    impulse: ImpulseResponse | ArrayLike,
+    order: int,
+    *,
+    delays: ArrayLike | None = None,
+    level: float = 0.1,
+    structure: Structure = "auto",
+    samples: int | None = None,
+    feedthrough: bool | None = None,
+    hankel: str = "square",
+    dt: float | None = None,
+) -> DelayedStateSpace:
+    """Realize a response of several channels, each with its own delay, with few states.
+
+    The delays are split into those of inputs and of outputs, the data are aligned by them, and
+    realized with one A. Where no split leaves all channels aligned, this is compared with a model
+    of its own for every output (or every input) behind (in front of) a delay line with taps: of
+    those that explain the data about as well as the best, the one with the fewest states is
+    returned.
+
+    Parameters
+    ----------
+    impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
+    order : int
+        States of each model that the core is made of, without delays; less where the data have a
+        lower rank.
+    delays : array_like of int, shape (p, m), optional
+        Delay of every channel, -1 where there is no response. Default: `channel_delays`.
+    level : float, default 0.1
+        For `channel_delays`.
+    structure : {"auto", "common", "rows", "columns"}
+        ``"common"`` keeps one A even where channels are left with delays inside; they then count
+        in `order`.
+    samples : int, optional
+        Markov parameters behind the delays to use; default: as many as all channels have.
+    feedthrough, hankel, dt : optional
+        As for `realize`.
+
+    Returns
+    -------
+    DelayedStateSpace
+        With a delay for every input and output; its `fit` is a `ChannelRealization`.
+
+    Raises
+    ------
+    DelayRangeError
+        Delays of the wrong shape or beyond the data.
+    DataError
+        No channel has a response.
+    OrderError, OptionError
+        As for `realize`.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss(
+    ...     [[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1
+    ... )
+    >>> plant = cr.DelayedStateSpace(core, (2, 5), output_delay=(0, 9))
+    >>> sys = cr.realize_channels(plant.markov(200), 2, level=0, dt=0.1)
+    >>> sys.input_delays, sys.output_delays
+    ((2, 5), (0, 9))
+    >>> bool(np.allclose(sys.markov(200), plant.markov(200)))
+    True
+    """
+    data = as_impulse(impulse, dt)
+    count = whole(order, "order", 1)
+    choice = one_of(structure, "structure", ("auto", "common", "rows", "columns"))
+    one_of(hankel, "hankel", HANKEL)
+    markov = channels(data)
+    found = channel_delays(data, level=level) if delays is None else given_delays(delays, markov)
+    known = found >= 0
+    if not known.any():
+        raise DataError("no channel has a response; is the input connected?")
+    splits = split_delays(found, known)
+    if choice == "auto" and not np.any(known & (found != np.add.outer(*splits[0]))):
+        choice = "common"
+    options = {"samples": samples, "feedthrough": feedthrough, "hankel": hankel}
+    models: dict[str, Assembly] = {}
+    if choice in ("common", "auto"):
+        candidates = [aligned_core(data, count, *split, options) for split in splits]
+        models["common"] = min(candidates, key=lambda c: float(misfit(c, data).sum()))
+    if choice in ("rows", "auto"):
+        models["rows"] = cores_by_rows(data, count, found, options)
+    if choice in ("columns", "auto"):
+        models["columns"] = cores_by_columns(data, count, found, options)
+    misfits = {way: misfit(pieces, data) for way, pieces in models.items()}
+    # The fewest states among those that explain the data about as well as the best.
+    enough = max(ALIKE * min(m.sum() for m in misfits.values()), EXACT * len(markov))
+    way = min(
+        (way for way in models if misfits[way].sum() <= enough), key=lambda w: models[w].states
+    )
+    pieces = models[way]
+    behind, before = (np.array(d, dtype=np.int64) for d in (pieces.outputs, pieces.inputs))
+    return pieces.system(
+        data.dt,
+        ChannelRealization(
+            delays=_locked(found),
+            rest=_locked(np.where(known, found - np.add.outer(behind, before), 0)),
+            output_delays=pieces.outputs,
+            input_delays=pieces.inputs,
+            structure=way,
+            orders=pieces.orders,
+            states=pieces.states,
+            misfit=read_only(misfits[way]),
+            impulse=data,
+            flags=pieces.flags,
+        ),
+    )
+
+
+def given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
+    """Check the delays of a caller against the data."""
+    found = np.asarray(delays)
+    p, m, N = markov.shape
+    if found.shape != (p, m) or found.dtype.kind not in "iu" or np.any(found < -1):
+        raise DelayRangeError(
+            f"delays has shape {found.shape} and dtype {found.dtype}; needed are whole numbers "
+            f">= -1 of shape {(p, m)}"
+        )
+    if found.max() > N - 3:
+        raise DelayRangeError(f"a delay of {found.max()} leaves nothing of {N} samples to realize")
+    return found.astype(np.int64)
+
+
+def _locked(delays: IntArray) -> IntArray:
+    locked = np.array(delays, dtype=np.int64)
+    locked.flags.writeable = False
+    return locked

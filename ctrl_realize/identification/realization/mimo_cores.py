@@ -1,0 +1,159 @@
+"""Cores of several channels: aligned with one A, or a model for each output or input."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...data import ImpulseResponse
+from ...delayed import DelayedStateSpace
+from ...errors import OrderError
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.hankel.delay_models import realize_at
+from ...numerics.state_space.delay_split import Matrices, joined_columns, joined_rows
+from ...results import Flag
+from .impulses import channels, check_samples
+from .realize import realize
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Core of all channels, with the delays outside it and the orders of what it is made of."""
+
+    core: Matrices
+    inputs: tuple[int, ...]
+    outputs: tuple[int, ...]
+    orders: tuple[int, ...]
+    flags: tuple[Flag, ...]
+
+    @property
+    def states(self) -> int:
+        """States of the whole model, delays included."""
+        return int(self.core[0].shape[0]) + sum(self.inputs) + sum(self.outputs)
+
+    def system(self, dt: float, fit: Any = None) -> DelayedStateSpace:
+        """Attach the delays."""
+        core = ct.ss(*self.core, dt)
+        return DelayedStateSpace(core, self.inputs, output_delay=self.outputs, fit=fit)
+
+
+def misfit(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
+    """Return the sum of absolute errors of every entry over that of its data."""
+    markov = channels(data)
+    model = np.reshape(pieces.system(data.dt).markov(data.n_samples), markov.shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.abs(model - markov).sum(axis=-1)
+    sums = np.abs(markov).sum(axis=-1)
+    error = np.where(np.isfinite(error), error, np.inf)
+    share: FloatArray = np.divide(error, sums, out=np.zeros_like(sums), where=sums > 0)
+    return share
+
+
+def _aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
+    """Move every channel ahead by its delay; the length is what all channels have."""
+    p, m, N = markov.shape
+    length = N - int(delays.max())
+    return np.stack(
+        [
+            np.stack([markov[i, j, delays[i, j] : delays[i, j] + length] for j in range(m)])
+            for i in range(p)
+        ]
+    )
+
+
+def _realized(
+    data: ImpulseResponse, markov: FloatArray, order: int, options: dict[str, Any]
+) -> tuple[Matrices, tuple[Flag, ...]]:
+    """Realize aligned data with at most `order` states."""
+    moved: ImpulseResponse = ImpulseResponse(markov, data.dt, filter=data.filter, name=data.name)
+    padded = options["hankel"] == "padded"
+    samples = check_samples(moved, options["samples"], order, 0, padded=padded, what="delays")
+    try:
+        system = realize(moved, order, **options)
+    except OrderError:
+        found = realize_at(markov, 0, samples, order, padded=padded).singular_values[:order]
+        rank = int(np.count_nonzero(found))
+        if rank == 0:
+            p, m, _ = markov.shape
+            direct = np.zeros((p, m)) if options["feedthrough"] is False else markov[:, :, 0]
+            return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), direct), ()
+        system = realize(moved, rank, **options)
+    core = system.delay_free
+    return (core.A, core.B, core.C, core.D), system.fit.flags
+
+
+def aligned_core(
+    data: ImpulseResponse,
+    order: int,
+    outputs: IntArray,
+    inputs: IntArray,
+    options: dict[str, Any],
+) -> Assembly:
+    """Align all channels by delays of inputs and outputs, and realize them with one A."""
+    moved = _aligned(channels(data), np.add.outer(outputs, inputs))
+    core, flags = _realized(data, moved, order, options)
+    before, behind = (tuple(int(d) for d in share) for share in (inputs, outputs))
+    return Assembly(core, before, behind, (core[0].shape[0],), flags)
+
+
+def cores_by_rows(
+    data: ImpulseResponse,
+    order: int,
+    found: IntArray,
+    options: dict[str, Any],
+) -> Assembly:
+    """Realize every output by itself, behind tapped input lines."""
+    markov = channels(data)
+    first, full = _first_taps(found, axis=0)
+    rows = [_aligned(markov[[i]], full[[i]]) for i in range(full.shape[0])]
+    parts, flags = _each_alone(data, rows, order, options)
+    return Assembly(
+        joined_rows(parts, full - first),
+        tuple(int(d) for d in first),
+        (0,) * full.shape[0],
+        tuple(part[0].shape[0] for part in parts),
+        flags,
+    )
+
+
+def cores_by_columns(
+    data: ImpulseResponse,
+    order: int,
+    found: IntArray,
+    options: dict[str, Any],
+) -> Assembly:
+    """Realize every input by itself, in front of tapped output lines."""
+    markov = channels(data)
+    first, full = _first_taps(found, axis=1)
+    columns = [_aligned(markov[:, [j]], full[:, [j]]) for j in range(full.shape[1])]
+    parts, flags = _each_alone(data, columns, order, options)
+    return Assembly(
+        joined_columns(parts, full - first[:, None]),
+        (0,) * full.shape[1],
+        tuple(int(d) for d in first),
+        tuple(part[0].shape[0] for part in parts),
+        flags,
+    )
+
+
+def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
+    """Return where each line is tapped first, and the delay of every channel.
+
+    A channel without response follows its line as it is, and adds no tap to it.
+    """
+    known = found >= 0
+    first = np.where(known, found, found.max() + 1).min(axis=axis)
+    first = np.where(known.any(axis=axis), first, 0)
+    return first, np.where(known, found, np.expand_dims(first, axis))
+
+
+def _each_alone(
+    data: ImpulseResponse, aligned: list[FloatArray], order: int, options: dict[str, Any]
+) -> tuple[list[Matrices], tuple[Flag, ...]]:
+    """Realize rows or columns of the channels, and keep one flag of each kind."""
+    realized = [_realized(data, part, order, options) for part in aligned]
+    flags = {flag.code: flag for _, notes in realized for flag in notes}
+    return [core for core, _ in realized], tuple(flags.values())

@@ -1,0 +1,203 @@
+"""Kung's realization of an impulse response behind a known delay."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import one_of, whole
+from ...data import ImpulseResponse
+from ...delayed import DelayedStateSpace
+from ...errors import OrderError
+from ...numerics.arrays import FloatArray, read_only
+from ...numerics.blas_threads import single_threaded
+from ...numerics.hankel.delay_models import OneModel, realize_at
+from ...numerics.state_space import responses
+from ...results import Flag
+from .impulses import as_impulse, channels, check_samples, filter_flags
+from .result import Realization
+
+HANKEL = ("square", "padded")
+
+NO_GAP = 0.8
+"""Ratio of neighbouring singular values from which there is no gap between them."""
+
+DIED_AWAY = 0.2
+"""Part of a response that may be left at the end of the data."""
+
+CLEAR = 3.0
+"""Standard deviations of the noise from which a direct term is believed."""
+
+
+@single_threaded
+def realize(
+    impulse: ImpulseResponse | ArrayLike,
+    order: int,
+    *,
+    delay: int = 0,
+    samples: int | None = None,
+    feedthrough: bool | None = None,
+    hankel: str = "square",
+    dt: float | None = None,
+) -> DelayedStateSpace:
+    """Realize an impulse response as a state-space system with dead time.
+
+    Kung's algorithm on G[delay], G[delay + 1], ...; the delay itself is
+    joined to the model unchanged.
+
+    Parameters
+    ----------
+    impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
+        Markov parameters (response to a unit pulse). An array needs `dt`.
+    order : int
+        States of the model without its delay.
+    delay : int, optional
+        Delay of all channels in samples.
+    samples : int, optional
+        Markov parameters behind ``G[delay]`` to use; default all.
+    feedthrough : bool, optional
+        True: the direct term is ``D = G[delay]`` as measured (the paper).
+        False: ``D = 0``, the model is strictly proper. Default: as measured,
+        unless the noise of the data is known and ``G[delay]`` is within three
+        standard deviations of it; exact data of proper and strictly proper
+        plants both come out exact.
+    hankel : {"square", "padded"}, optional
+        The paper's square Hankel matrix of samples // 2 rows, or Kung's
+        zero-padded one, whose models are stable by construction and have an
+        error bound; it needs data that have decayed within `samples`.
+    dt : float, optional
+        Sample time in s, where `impulse` is an array.
+
+    Returns
+    -------
+    DelayedStateSpace
+        Its `fit` is a `Realization`.
+
+    Raises
+    ------
+    OrderError
+        The order is not in 1...rows of the Hankel matrix, or larger than the
+        numerical rank of the data.
+    DelayRangeError
+        Delay and samples need more data than there are.
+    DataError, OptionError
+        Data or arguments that cannot be used.
+
+    Notes
+    -----
+    Step (5) of the paper [1]_ is used with its misprints corrected:
+    ``H_a = T(2:r+1, 1:r)``, ``H_b = T(1:r, 1)``, ``H_c = T(1, 1:r)`` and
+    ``V`` without the transposes. The decomposition is truncated and
+    matrix-free, with time and memory proportional to the data.
+
+    References
+    ----------
+    .. [1] van Helvoirt et al., Approximate realization of valve dynamics with
+       time delay, IFAC 2005, section 2.1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[np.zeros(4), 0.1 * 0.9 ** np.arange(200)]   # 3 samples, then a lag
+    >>> sys = cr.realize(pulse, 1, delay=3, dt=0.01)
+    >>> sys.delay, np.round(sys.delay_free.poles().real, 12)
+    (3, array([0.9]))
+    """
+    data = as_impulse(impulse, dt)
+    order = whole(order, "order", 1)
+    delay = whole(delay, "delay", 0)
+    padded = one_of(hankel, "hankel", HANKEL) == "padded"
+    samples = check_samples(data, samples, order, delay, padded=padded, what="delay")
+    markov = channels(data)
+    model = realize_at(markov, delay, samples, order, padded=padded)
+    rank = int(np.count_nonzero(model.singular_values[:order]))
+    if rank < order:
+        raise OrderError(
+            f"order={order}, but the data behind {delay} samples have the numerical rank {rank}; "
+            + (f"use an order of at most {rank}" if rank else "they are zero: a pure gain")
+        )
+    direct = uses_feedthrough(data, delay, feedthrough)
+    D = markov[:, :, delay] if direct else np.zeros(markov.shape[:2])
+    fit = Realization(
+        order=order,
+        delay=delay,
+        samples=samples,
+        hankel=hankel,
+        feedthrough=direct,
+        singular_values=read_only(model.singular_values),
+        following=model.following,
+        error_bound=model.rest_bound if padded else None,
+        iae=_iae(markov[:, :, : delay + samples + 1], model, D, delay),
+        impulse=data,
+        flags=filter_flags(data) + _pole_flags(model.A, samples) + _gap_flags(model, order),
+    )
+    core = ct.ss(model.A, model.B, model.C, D, data.dt)
+    return DelayedStateSpace(core, delay, fit=fit)
+
+
+def uses_feedthrough(impulse: ImpulseResponse, delay: int, feedthrough: bool | None) -> bool:
+    """Decide whether the direct term is what was measured at the delay."""
+    if feedthrough is not None:
+        return bool(feedthrough)
+    noise = impulse.noise
+    if noise is None or noise.size < 2 or impulse.markov.ndim == 3:
+        return True
+    return bool(abs(impulse.markov[delay]) > CLEAR * np.std(noise, ddof=1))
+
+
+def _iae(window: FloatArray, model: OneModel, D: FloatArray, delay: int) -> float:
+    """Sum up how far the model is from the data; infinite where it grows beyond all numbers."""
+    response = np.zeros_like(window)
+    count = window.shape[2] - delay
+    with np.errstate(over="ignore", invalid="ignore"):
+        response[:, :, delay:] = responses.markov(model.A, model.B, model.C, D, count)
+        iae = float(np.abs(window - response).sum())
+    return iae if np.isfinite(iae) else np.inf
+
+
+def _pole_flags(A: FloatArray, samples: int) -> tuple[Flag, ...]:
+    poles = np.linalg.eigvals(A)
+    flags = []
+    largest = float(np.abs(poles).max())
+    if largest >= 1:
+        flags.append(
+            Flag(
+                "unstable",
+                f"the largest pole has magnitude {largest:.5f}: an integrating plant, noise, or "
+                "an order that is too high; hankel='padded' is stable by construction",
+            )
+        )
+    elif largest**samples > DIED_AWAY:
+        flags.append(
+            Flag(
+                "not_died_away",
+                f"the largest pole has magnitude {largest:.5f} and keeps "
+                f"{100 * largest**samples:.0f} % of its response at the end of the {samples} "
+                "samples: an integrating plant, or data that end too early to know the gain",
+            )
+        )
+    negative = poles[(np.abs(poles.imag) < 1e-9) & (poles.real < 0)].real
+    if negative.size:
+        flags.append(
+            Flag(
+                "negative_pole",
+                f"there is a pole at z = {negative.min():.4f}, which no sampled lag has: "
+                "the order is probably too high",
+            )
+        )
+    return tuple(flags)
+
+
+def _gap_flags(model: OneModel, order: int) -> tuple[Flag, ...]:
+    last = float(model.singular_values[order - 1])
+    if model.following < NO_GAP * last:
+        return ()
+    return (
+        Flag(
+            "no_gap",
+            f"singular values {order} and {order + 1} are {last:.4g} and {model.following:.4g}: "
+            "without a gap between them the order is not visible in the data",
+        ),
+    )

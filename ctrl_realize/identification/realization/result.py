@@ -1,0 +1,123 @@
+"""How a model was realized from an impulse response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..._checks import whole
+from ..._wording import in_time
+from ...data import ImpulseResponse
+from ...numerics.arrays import FloatArray, read_only
+from ...numerics.hankel.delay_models import hankel_size, realize_at
+from ...results import Flag, Result
+from .impulses import channels
+
+
+@dataclass(frozen=True, eq=False)
+class Realization(Result):
+    """How a model was realized from an impulse response.
+
+    ``iae`` is the sum of ``|impulse.markov[k] - sys.markov(n)[k]|`` over the
+    ``n = delay + samples + 1`` samples that the model has seen, all channels
+    together.
+
+    Attributes
+    ----------
+    order : int
+        States of the core.
+    delay : int
+        Delay in samples that was taken out of the data.
+    samples : int
+        Markov parameters behind the feedthrough that were used,
+        ``delay + 1 ... delay + samples``.
+    hankel : {"square", "padded"}
+    feedthrough : bool
+        Whether the direct term is G[delay]; else it is 0.
+    singular_values : ndarray, shape (q,), q >= order
+        Leading singular values of the Hankel matrix: all of them where it is
+        small, else the `order` ones that the model is made of.
+        `leading_singular_values` computes more.
+    following : float
+        Singular value ``order + 1``, the first that was left out; beyond a
+        Hankel matrix of 200 rows an estimate from below.
+    error_bound : float or None
+        For the padded Hankel matrix: no frequency has a larger error (2-norm)
+        against the data's own response, ``sum G[k] z^-k`` over the samples
+        used. Twice the sum of the singular values that were left out; where
+        they are not all known, its largest value that their sum of squares
+        allows. None for the square one, for which no bound is known.
+    iae : float
+        Integrated absolute error, in the unit of the output per input.
+    impulse : ImpulseResponse
+        The data.
+    flags : tuple of Flag
+        ``"unstable"``, ``"not_died_away"``, ``"negative_pole"``, ``"no_gap"``,
+        ``"filter_delay"``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[0.0, 0.9 ** np.arange(99) + 0.01 * (-0.5) ** np.arange(99)]
+    >>> found = cr.realize(pulse, 1, dt=0.1).fit
+    >>> print(found.singular_values[:1].round(2), round(found.following, 4), round(found.iae, 3))
+    [5.26] 0.0124 0.029
+    """
+
+    order: int
+    delay: int
+    samples: int
+    hankel: str
+    feedthrough: bool
+    singular_values: FloatArray
+    following: float
+    error_bound: float | None
+    iae: float
+    impulse: ImpulseResponse = field(repr=False)
+    flags: tuple[Flag, ...] = ()
+
+    @property
+    def dt(self) -> float:
+        """Sample time in s."""
+        return self.impulse.dt
+
+    def leading_singular_values(self, count: int = 30) -> FloatArray:
+        """Compute the first singular values of the Hankel matrix, as in the paper's Fig. 5.
+
+        Returns
+        -------
+        ndarray, shape (count,), or fewer where the matrix is smaller
+        """
+        count = whole(count, "count", 1)
+        padded = self.hankel == "padded"
+        size = hankel_size(self.samples, padded=padded)
+        count = min(count, size * min(self.impulse.n_inputs, self.impulse.n_outputs))
+        if count <= self.singular_values.size:
+            return self.singular_values[:count]
+        markov = channels(self.impulse)
+        model = realize_at(markov, self.delay, self.samples, count, padded=padded)
+        return read_only(model.singular_values[:count])
+
+    def _title(self) -> str:
+        return f"Realization of order {self.order} behind {self.delay} samples"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        values = ", ".join(f"{value:.4g}" for value in self.singular_values[: self.order])
+        in_samples = f"({self.delay} samples of {in_time(self.dt, 6)})"
+        rows = [
+            ("dead time", f"{in_time(self.delay * self.dt, 5)} {in_samples}"),
+            ("Hankel matrix", f"{self.hankel}, {self.samples} samples"),
+            ("direct term", f"G[{self.delay}]" if self.feedthrough else "0"),
+            ("singular values", f"{values} (next {self.following:.4g})"),
+            ("sum of |error|", f"{self.iae:.4g}"),
+        ]
+        if self.error_bound is not None:
+            rows.append(("error bound", f"{self.error_bound:.4g} at any frequency"))
+        return rows
+
+    def __repr__(self) -> str:
+        flags = f", {len(self.flags)} flags" if self.flags else ""
+        return (
+            f"<Realization: order {self.order} behind {self.delay} samples, "
+            f"IAE {self.iae:.4g}{flags}>"
+        )

@@ -1,0 +1,95 @@
+"""Reading a curve of misfit over delay: its minimum, how flat it is, what to distrust."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...numerics.arrays import FloatArray
+from ...results import Flag
+
+FLAT = 1.05
+"""Misfit over the least one up to which delays count as equally good."""
+
+CONTRAST = 1.3
+"""Misfit without delay over the least one below which there is no delay to be seen."""
+
+NOISE_CAUTION = 3.0
+NOISE_REFUSE = 1.3
+"""Last singular value over that of the noise: above 3 the scan works, below 1.3 it follows
+the noise (paper scan on simulated valves: errors of 3-5 samples between, 10 and more below)."""
+
+
+def best_delay(iae: FloatArray, rounding: float) -> int:
+    """Return the smallest delay whose misfit is the least but for rounding.
+
+    Exact data of a strictly proper plant are fitted exactly by two delays;
+    which of them wins must not depend on rounding.
+    """
+    return int(np.flatnonzero(iae <= iae.min() + rounding)[0])
+
+
+def flat_set(iae: FloatArray, delay: int, rounding: float) -> tuple[int, int]:
+    """Return the smallest and largest delay within 5 % of the least misfit."""
+    flat = np.flatnonzero(iae <= FLAT * iae[delay] + rounding)
+    return int(flat[0]), int(flat[-1])
+
+
+def local_minima(iae: FloatArray, delay: int, rounding: float) -> int:
+    """Count the separate dips of the curve that reach within 5 % of the least misfit."""
+    level = FLAT * iae[delay] + rounding
+    inside = np.concatenate([[False], iae <= level, [False]])
+    return int(np.count_nonzero(inside[1:] & ~inside[:-1]))
+
+
+def curve_flags(iae: FloatArray, delay: int, rounding: float) -> tuple[Flag, ...]:
+    """Say what the curve itself gives away."""
+    flags = []
+    last = iae.size - 1
+    least = float(iae[delay])
+    contrast = float(iae[0]) / least if least > 0 else np.inf
+    low, high = flat_set(iae, delay, rounding)
+    if high == last and last > 0:
+        best = "the best delay is" if delay == last else "delays that fit as well reach up to"
+        flags.append(Flag("delay_at_bound", f"{best} max_delay={last}; try a larger one"))
+    if contrast < CONTRAST:
+        flags.append(
+            Flag(
+                "no_delay_resolved",
+                f"the misfit without delay is only {contrast:.2f} times the least one "
+                f"(at {delay} samples): the data do not tell a delay from none",
+            )
+        )
+    minima = local_minima(iae, delay, rounding)
+    if minima > 1:
+        flags.append(
+            Flag(
+                "several_minima",
+                f"{minima} separate minima between {low} and {high} samples are within 5 % of "
+                "the least misfit; lower the order, or filter more",
+            )
+        )
+    return tuple(flags)
+
+
+def noise_flags(singular_value: float, floor: float | None, order: int) -> tuple[Flag, ...]:
+    """Compare the last singular value of the model with that of pure noise."""
+    if floor is None or floor <= 0:
+        return ()
+    ratio = singular_value / floor
+    seen = f"singular value {order} is {ratio:.2f} times the noise level"
+    if ratio < NOISE_REFUSE:
+        return (
+            Flag(
+                "order_in_noise",
+                f"{seen}: the delay follows the noise; use a lower order, a lower cut-off "
+                "frequency, or the output-error fit",
+            ),
+        )
+    if ratio < NOISE_CAUTION:
+        return (
+            Flag(
+                "order_near_noise",
+                f"{seen}: expect errors of several samples; a lower cut-off frequency helps",
+            ),
+        )
+    return ()

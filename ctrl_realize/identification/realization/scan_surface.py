@@ -1,0 +1,91 @@
+"""What delay scan and order scan share: models and misfits over order and delay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import one_of, whole
+from ...data import ImpulseResponse
+from ...numerics.arrays import FloatArray
+from ...numerics.hankel.delay_models import DelayModels, hankel_size, misfit, realize_at_delays
+from .impulses import as_impulse, channels, check_samples, noise_floor, settled_samples
+from .realize import HANKEL
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Models behind every delay, and the misfit of each order.
+
+    The model of order j is the leading part of `models`; ``iae[i]`` belongs
+    to ``orders[i]``. `feedthrough` and `hankel` are what the caller asked for.
+    """
+
+    impulse: ImpulseResponse
+    orders: tuple[int, ...]
+    samples: int
+    feedthrough: bool | None
+    hankel: str
+    models: DelayModels
+    direct: FloatArray
+    iae: FloatArray
+    noise_floor: float | None
+
+    @property
+    def rounding(self) -> float:
+        """Differences of misfits up to which delays are equally good."""
+        return 1e-11 * float(np.abs(channels(self.impulse)[:, :, : self.window]).sum())
+
+    @property
+    def window(self) -> int:
+        """Samples over which misfits are summed."""
+        return int(self.samples + self.iae.shape[1])
+
+    def row(self, order: int) -> FloatArray:
+        """Misfit over delay of one order."""
+        misfits: FloatArray = self.iae[self.orders.index(order)]
+        return misfits
+
+    def singular_value(self, order: int, delay: int) -> float:
+        """Singular value `order` of the Hankel matrix behind a delay."""
+        return float(self.models.singular_values[delay, order - 1])
+
+
+def scan_surface(
+    impulse: ImpulseResponse | ArrayLike,
+    orders: Sequence[int],
+    max_delay: Any,
+    samples: Any,
+    feedthrough: bool | None,
+    hankel: str,
+    dt: float | None,
+) -> Surface:
+    """Check the arguments, decompose behind every delay, take all misfits over one window."""
+    data = as_impulse(impulse, dt)
+    max_delay = whole(max_delay, "max_delay", 0)
+    padded = one_of(hankel, "hankel", HANKEL) == "padded"
+    highest = max(orders)
+    check_samples(data, samples, highest, max_delay, padded=padded, what="max_delay")
+    if samples is None:
+        samples = settled_samples(data, highest, max_delay)
+    markov = channels(data)[:, :, : samples + max_delay + 1]
+    delays = np.arange(max_delay + 1)
+    direct = markov[:, :, delays].transpose(2, 0, 1)
+    if feedthrough is False:
+        direct = np.zeros_like(direct)
+    models = realize_at_delays(markov, delays, samples, highest, padded=padded)
+    return Surface(
+        impulse=data,
+        orders=tuple(orders),
+        samples=samples,
+        feedthrough=feedthrough,
+        hankel=hankel,
+        models=models,
+        direct=direct,
+        iae=np.stack([misfit(markov, delays, models, order, direct) for order in orders]),
+        noise_floor=noise_floor(data, hankel_size(samples, padded=padded)),
+    )

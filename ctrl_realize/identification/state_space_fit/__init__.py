@@ -1,0 +1,1 @@
+"""Fits of general state-space models with delays."""

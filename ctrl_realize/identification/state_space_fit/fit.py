@@ -1,0 +1,338 @@
+"""Output-error fit of a model of several channels to whole records."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import whole
+from ...data import Record
+from ...delayed import DelayedStateSpace
+from ...delayed.simulation import as_delayed
+from ...errors import DataError, DataWarning, OptionError, OrderError, UnsuitableSystemError
+from ...numerics.arrays import IntArray
+from ...numerics.blas_threads import single_threaded
+from ...numerics.state_space.delay_split import split_delays
+from ...numerics.state_space.section_fit import fit_sections
+from ...numerics.state_space.sections import in_sections
+from ...results import Flag
+from ..impulse.from_io import Method, Start, as_group, impulse_from_io
+from ..long_records import lively_parts
+from ..realization.mimo import channel_delays, given_delays
+from .result import fitted_system
+from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, experiments
+
+LEVEL = 0.02
+"""Part of a channel's largest Markov parameter that counts as response, where delays are to be
+found: the search moves them further, and one that is too long costs more than one too short."""
+STARTS: tuple[tuple[Start, Method], ...] = (
+    ("unknown", "auto"),
+    ("rest", "auto"),
+    ("unknown", "okid"),
+    ("rest", "okid"),
+)
+"""Estimates of the impulse response to start from: the next one where the residual of the best
+model so far still follows the input."""
+LEAST = 1e-70
+"""Least size of a signal, in its unit."""
+STILL = 10
+"""Samples that an input stands still at the start of a record for the plant to count as at rest."""
+
+
+@single_threaded
+def fit_channels(
+    records: Record | Sequence[Record],
+    order: int | Sequence[int] | None = None,
+    *,
+    delays: ArrayLike | None = None,
+    feedthrough: bool | None = None,
+) -> DelayedStateSpace:
+    """Fit a state-space model with delays to whole records: several channels, or many modes.
+
+    The impulse response of `impulse_from_io` is realized at every order tried, and each of these
+    starts is refined until the simulated outputs are as near to the measured ones as white noise
+    of an unknown size in every output allows (output error). BIC chooses the order, the delays of
+    inputs and outputs, and whether there is a direct term.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        One or several experiments on the same plant. Inputs without gaps; outputs may have
+        missing samples.
+    order : int or sequence of int, optional
+        States without delays, or candidates. Default: from 1 up to 20, until three in a row were
+        no better.
+    delays : array_like of int, shape (p, m), optional
+        Delay of every channel, -1 where there is no response. Default: found.
+    feedthrough : bool, optional
+        Whether there is a direct term behind the delays. Default: chosen.
+
+    Returns
+    -------
+    DelayedStateSpace
+        Stable, in balanced coordinates, with a delay for every input and output; its `fit` is a
+        `ChannelFit`.
+
+    Raises
+    ------
+    DataError
+        Inputs that do not excite the plant, outputs that do not follow them, too few samples.
+    OrderError, DelayRangeError, OptionError
+        Arguments that make no sense.
+
+    See Also
+    --------
+    fit_delay : One input and output, with a delay between samples and its interval.
+    refine : The last step by itself, from any model.
+
+    Notes
+    -----
+    Of records of more than 100 000 samples together that many are fitted, from where the inputs
+    move (flag "cut").
+
+    Noise need not be white for the model to come out right, only for BIC: with noise of long
+    memory the order comes out a little high. The delays are whole samples; what does not split
+    into delays of inputs and outputs is left to the states.
+
+    References
+    ----------
+    .. [1] M. Verhaegen and V. Verdult, Filtering and System Identification, Cambridge 2007,
+       chapter 7 (output error), here in second-order sections.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss(
+    ...     [[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1
+    ... )
+    >>> plant = cr.DelayedStateSpace(core, (2, 5))
+    >>> rng = np.random.default_rng(1)
+    >>> u = rng.choice([-1.0, 1.0], (2, 600))
+    >>> y = plant.simulate(u) + 0.1 * rng.standard_normal((2, 600))
+    >>> sys = cr.fit_channels(cr.Record(0.1 * np.arange(600), u, y))
+    >>> sys.fit.order, sys.fit.input_delays, sys.fit.output_delays
+    (2, (2, 5), (0, 0))
+    """
+    group = as_group(records)
+    asked = _orders(order)
+    _check_signals(group, feedthrough)
+    parts, cut = lively_parts(group)
+    system = from_starts(parts, asked, delays, feedthrough).system
+    return system.replace(fit=replace(system.fit, flags=cut + system.fit.flags)) if cut else system
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a start has come to: criterion, model, and whether all outputs showed a response."""
+
+    bic: float
+    system: DelayedStateSpace
+    seen: bool
+    search: Search
+    best: Candidate
+
+
+def from_starts(
+    group: tuple[Record, ...],
+    asked: tuple[int, ...] | None = None,
+    delays: ArrayLike | None = None,
+    feedthrough: bool | None = None,
+    *,
+    most_starts: int = len(STARTS),
+    enough: int = ENOUGH_SAMPLES,
+) -> Outcome:
+    """Fit from one estimate of the impulse response after the other, until nothing is left."""
+    best: Outcome | None = None
+    refused: list[DataError] = []
+    at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
+    starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else list(STARTS)
+    for tried, way in enumerate(starts[:most_starts], start=1):
+        try:
+            found = _from_start(group, way, asked, delays, feedthrough, enough)
+        except DataError as error:
+            refused.append(error)
+            continue
+        if best is None or found.bic < best.bic:
+            best = found
+        # An output that a start does not see gets a second one.
+        clear = best.seen or tried > 1
+        if clear and all(check.independent for check in best.system.fit.checks):
+            break
+    if best is None:
+        raise refused[0]
+    return best
+
+
+def _from_start(
+    group: tuple[Record, ...],
+    way: tuple[Start, Method],
+    asked: tuple[int, ...] | None,
+    delays: ArrayLike | None,
+    feedthrough: bool | None,
+    enough: int,
+) -> Outcome:
+    """Fit from one estimate of the impulse response."""
+    start, method = way
+    with warnings.catch_warnings():
+        # What the prior has filled in only serves as a start.
+        warnings.simplefilter("ignore", DataWarning)
+        impulse = impulse_from_io(group, method=method, start=start)
+    markov = np.reshape(impulse.markov, (group[0].n_outputs, group[0].n_inputs, -1))
+    unseen = sum(flag.code == "no_response" for flag in impulse.flags)
+    if unseen == group[0].n_outputs:
+        raise DataError(
+            "no output shows a response to the inputs above the noise; are the channels right?"
+        )
+    search = Search(group, markov, max(asked or ORDERS), enough)
+    orders = search.orders(asked)
+    found = channel_delays(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
+    shares = _split(found)
+    fits = search.by_order(orders, shares, direct=feedthrough is not False)
+    best = min(fits, key=lambda c: c.bic)
+    moved = search.improved(best, delays=delays is None, direct=feedthrough is None)
+    if asked is None or len(asked) > 1:
+        moved = search.lowered(moved, orders, delays=delays is None)
+    bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
+    flags = _silence(moved)
+    if len(orders) > 1 and best.order == max(asked or ORDERS):
+        flags += (
+            Flag(
+                "highest_order",
+                f"the highest order that was tried, {best.order}, is the best: try higher ones",
+            ),
+        )
+    choices = _choices(moved, bic, shares)
+    system = fitted_system(search.finish(moved), group, bic, choices, flags)
+    return Outcome(moved.bic, system, unseen == 0, search, moved)
+
+
+def _silence(best: Candidate) -> tuple[Flag, ...]:
+    """Flag the outputs of which the model explains no more than its parameters would of noise."""
+    found = best.found
+    # What belongs to one output: its C, the initial state, and its row of D.
+    count = 2 * best.order + best.found.model.D.shape[1] * best.direct
+    gain = found.counts * np.log(found.spread / found.variance)
+    return tuple(
+        Flag("no_response", f"output {a} shows no response to the input above the noise")
+        for a in np.flatnonzero(gain < count * np.log(found.counts))
+    )
+
+
+def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str, ...]:
+    choices = []
+    if len(bic) > 1:
+        others = ", ".join(
+            f"{order} ({value - best.bic:+.0f})"
+            for order, value in sorted(bic.items())
+            if order != best.order
+        )
+        choices.append(f"order {best.order} has the least BIC; others: {others}")
+    if (best.inputs, best.outputs) != begun:
+        choices.append(
+            f"delays where the responses set in, {begun[0]} and {begun[1]}, moved while that "
+            "lowered BIC"
+        )
+    return tuple(choices)
+
+
+@single_threaded
+def refine(
+    system: ct.StateSpace,
+    records: Record | Sequence[Record],
+    *,
+    feedthrough: bool | None = None,
+) -> DelayedStateSpace:
+    """Fit all parameters of a model to records, and leave its order and delays as they are.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        Discrete, with the sample time of the records, from `realize` for example; poles outside
+        the unit circle are drawn inside first.
+    records : Record or sequence of Record
+        As for `fit_channels`.
+    feedthrough : bool, optional
+        Whether there is a direct term. Default: if `system` has one.
+
+    Returns
+    -------
+    DelayedStateSpace
+        Its `fit` is a `ChannelFit`.
+
+    Raises
+    ------
+    DataError, UnsuitableSystemError
+        Records and a system that do not fit each other.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> fast, slow = (ct.ss([[a]], [[1.0]], [[1.0]], [[0.0]], 1.0) for a in (0.5, 0.8))
+    >>> u = np.random.default_rng(0).choice([-1.0, 1.0], 400)
+    >>> record = cr.Record(np.arange(400.0), u, cr.delayed_ss(slow, 3).simulate(u))
+    >>> print(cr.refine(cr.delayed_ss(fast, 3), record).poles().real.max().round(6))
+    0.8
+    """
+    whole = as_group(records)
+    _check_signals(whole, feedthrough)
+    group, cut = lively_parts(whole)
+    model = as_delayed(system, group[0], stable=False)
+    core = model.delay_free
+    if core.nstates == 0:
+        raise UnsuitableSystemError("the system is a pure gain; it has no dynamics to refine")
+    direct = bool(np.any(core.D)) if feedthrough is None else bool(feedthrough)
+    shares = model.input_delays, model.output_delays
+    found = fit_sections(
+        experiments(group, shares), in_sections(core.A, core.B, core.C, core.D), direct=direct
+    )
+    return fitted_system(
+        Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), cut
+    )
+
+
+def _orders(order: int | Iterable[int] | None) -> tuple[int, ...] | None:
+    if order is None:
+        return None
+    given = order if isinstance(order, Iterable) else (order,)
+    orders = tuple(sorted({whole(n, "order", 1) for n in given}))
+    if not orders:
+        raise OrderError("order is empty; needed is at least one order")
+    return orders
+
+
+def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
+    if feedthrough not in (None, True, False):
+        raise OptionError(f"feedthrough={feedthrough!r}; needed is True, False or None")
+    for i, record in enumerate(group):
+        if np.isnan(record.input).any():
+            raise DataError(
+                f"record {i} has gaps in its input: what the plant does then is not known; use "
+                "the records between them, or impulse_from_io"
+            )
+    for name in ("input", "output"):
+        known = [np.atleast_2d(getattr(record, name)) for record in group]
+        # no copy of a long record: the largest size is that of an end of the range
+        ends = [np.fmax.reduce(x, axis=1) for x in known] + [
+            -np.fmin.reduce(x, axis=1) for x in known
+        ]
+        size = np.fmax.reduce(ends, axis=0)
+        if np.any(size < LEAST):
+            raise DataError(
+                f"{name} {int(np.argmin(size))} stays below {LEAST:g}; squares of it vanish: "
+                "choose another unit, or is it connected?"
+            )
+
+
+def _split(delays: IntArray) -> Shares:
+    """Share delays out to inputs and outputs; channels without response follow the others."""
+    outputs, inputs = split_delays(delays, delays >= 0)[0]
+    return tuple(int(d) for d in inputs), tuple(int(d) for d in outputs)

@@ -1,0 +1,214 @@
+"""A model of several channels that was fitted to records, and how it came out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+
+from ..._wording import in_percent, in_time, interval_in_time, time_within
+from ...data import Record
+from ...delayed import DelayedStateSpace
+from ...numerics.arrays import FloatArray, read_only
+from ...numerics.state_space.balancing import balanced_truncation
+from ...results import Flag, Result
+from ..output_error.result import DelayFit
+from ..validation.residuals import check_residuals
+from ..validation.residuals_result import ResidualCheck
+from .search import Candidate
+
+COLOURED, WANDERING = 0.5, 0.97
+"""Correlation of neighbouring residuals from which they are said to be coloured, and to wander
+as what an integrator makes of noise does."""
+INTEGRATES = 5.0
+"""Time constants that a record lasts, below which its slowest pole may be an integrator."""
+LAGS = 25
+"""Of the correlations in the residual checks."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelFit(Result):
+    """How a model was fitted to records of one or several channels.
+
+    Attributes
+    ----------
+    order : int
+        States of the core.
+    input_delays, output_delays : tuple of int
+        In samples.
+    direct : bool
+        Whether the core has a direct term.
+    bic : dict of int to float
+        Bayesian information criterion of every order tried; of the last one, with its final
+        delays. Smaller is better, 6 less is clear.
+    noise_std : ndarray, shape (p,)
+        Standard deviation of what the model leaves of every output.
+    steps : int
+        Gauss-Newton steps of the last fit.
+    fit_percent : ndarray, shape (p,)
+        ``100 (1 - noise_std / std y)`` of every output, over all records.
+    checks : tuple of ResidualCheck
+        Of every record without gaps.
+    dead_time : float, optional
+        In s, of one input and output that `identify` has fitted; None otherwise.
+    interval : tuple of float, optional
+        In s: dead times that the data do not rule out, of this model and of `lags` unless they
+        leave twice as much.
+    total_delay : float, optional
+        Delay at zero frequency in s.
+    lags : DelayFit, optional
+        The fit of lags behind a dead time, which left too much, and whose place this one takes.
+    records : tuple of Record
+        What was fitted.
+    choices : tuple of str
+        What was chosen, and why.
+    flags : tuple of Flag
+        Those of the checks, and ``"highest_order"``, ``"no_response"``,
+        ``"coloured_residual"``.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
+    >>> y = plant.simulate(u) + 0.05 * noise
+    >>> fit = cr.fit_channels(cr.Record(0.1 * np.arange(500), u, y), 1).fit
+    >>> fit
+    <ChannelFit: order 1, fit 85.7 %>
+    >>> fit.input_delays, fit.noise_std.round(2), fit.checks[0].independent
+    ((5,), array([0.05]), True)
+    """
+
+    order: int
+    input_delays: tuple[int, ...]
+    output_delays: tuple[int, ...]
+    direct: bool
+    bic: dict[int, float]
+    noise_std: FloatArray
+    fit_percent: FloatArray
+    steps: int
+    checks: tuple[ResidualCheck, ...]
+    records: tuple[Record, ...]
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = ()
+    dead_time: float | None = None
+    interval: tuple[float, float] | None = None
+    total_delay: float | None = None
+    lags: DelayFit | None = None
+
+    @property
+    def delay(self) -> int | None:
+        """Dead time in samples; None where `identify` has not asked for it."""
+        return None if self.dead_time is None else self.input_delays[0] + self.output_delays[0]
+
+    @property
+    def delay_interval(self) -> tuple[float, float] | None:
+        """Interval of the dead time in samples."""
+        dt = self.records[0].dt
+        return None if self.interval is None else (self.interval[0] / dt, self.interval[1] / dt)
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float] | None:
+        """Interval of the dead time in s, the same as `interval`."""
+        return self.interval
+
+    @property
+    def interval_label(self) -> str:
+        """What `interval` is: it has no probability."""
+        return "not ruled out"
+
+    def _title(self) -> str:
+        return f"Fit of {len(self.output_delays)} x {len(self.input_delays)} channels"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [
+            ("order", f"{self.order}, {'with' if self.direct else 'without'} direct term"),
+            ("delays of the inputs", " ".join(map(str, self.input_delays)) + " samples"),
+            ("delays of the outputs", " ".join(map(str, self.output_delays)) + " samples"),
+            ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
+            ("fit", in_percent(self.fit_percent)),
+            *self._rows_of_delay(),
+        ]
+
+    def _rows_of_delay(self) -> list[tuple[str, str]]:
+        if self.dead_time is None or self.interval is None:
+            return []
+        rows = [
+            ("dead time", f"{time_within(self.dead_time, *self.interval)} = {self.delay} samples"),
+            (self.interval_label, interval_in_time(*self.interval)),
+        ]
+        if self.lags is not None:
+            rows.append(
+                (
+                    "instead of",
+                    f"{self.lags.order} lags behind {in_time(self.lags.dead_time, 4)}, which leave "
+                    f"{self.lags.residual:.3g}",
+                )
+            )
+        return rows
+
+    def __repr__(self) -> str:
+        fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
+        return f"<ChannelFit: order {self.order}, fit {fit} %>"
+
+
+def fitted_system(
+    best: Candidate,
+    group: tuple[Record, ...],
+    bic: dict[int, float],
+    choices: tuple[str, ...],
+    flags: tuple[Flag, ...],
+) -> DelayedStateSpace:
+    """Make the system and say how well it follows the records."""
+    A, B, C, D = best.found.model.matrices()
+    A, B, C, _ = balanced_truncation(A, B, C, best.order)
+    core = ct.ss(A, B, C, D, group[0].dt)
+    system = DelayedStateSpace(core, best.inputs, output_delay=best.outputs)
+    complete = [r for r in group if not r.n_missing]
+    checks = tuple(
+        check_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
+    )
+    seen = {flag.code: flag for check in checks for flag in check.flags}
+    neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
+    if neighbours > COLOURED:
+        longest = max(r.n_samples for r in group)
+        slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
+        advice = "compare a lower order on other data"
+        if slow and group[0].issiso:
+            advice = (
+                "the slowest pole is slower than the record, as of an integrator: fit_delay (or "
+                "identify) fits those of one input and output"
+            )
+        elif slow or neighbours > WANDERING:
+            advice = (
+                "the output wanders like an integral: fit differences of input and output "
+                "(np.diff of both), each channel by fit_delay, or a frequency response "
+                "(spectral_frf, fit_frf)"
+            )
+        seen["coloured_residual"] = Flag(
+            "coloured_residual",
+            f"neighbouring residuals are correlated by {neighbours:.2g}: a disturbance that "
+            "drifts, or a plant that is not linear. BIC takes them for independent, so the order "
+            f"may be too high, with slow poles that follow the drift; {advice}",
+        )
+    fit = ChannelFit(
+        order=core.nstates,
+        input_delays=best.inputs,
+        output_delays=best.outputs,
+        direct=best.direct,
+        bic=bic,
+        noise_std=read_only(np.sqrt(best.found.variance)),
+        fit_percent=read_only(100 * (1 - np.sqrt(best.found.variance / best.found.spread))),
+        steps=best.found.steps,
+        checks=checks,
+        records=group,
+        choices=choices,
+        flags=(*flags, *seen.values()),
+    )
+    first = group[0]
+    labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}
+    name = {"name": first.name} if first.name else {}
+    return system.replace(fit=fit, **labels, **name)

@@ -1,0 +1,280 @@
+"""Order and delays of a model of several channels, by the likelihood of whole records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...data import Record
+from ...errors import DataError, OrderError
+from ...numerics.arrays import FloatArray
+from ...numerics.hankel.delay_models import OneModel, realize_at
+from ...numerics.regression.arx import excited_directions
+from ...numerics.regression.normal_equations import normal_equations
+from ...numerics.state_space.section_fit import MOST_STEPS, Experiment, SectionFit, fit_sections
+from ...numerics.state_space.sections import Sections, in_sections
+
+ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20)
+"""Orders that are tried, the smallest first, until three in a row were no better."""
+PATIENCE = 3
+ENOUGH_SAMPLES = 20000
+"""Samples from which order and delays are chosen; the last fit sees all."""
+PER_PARAMETER = 3
+"""Measured values that each parameter needs at least."""
+ROUGHLY = 0.1
+"""Log likelihood to which candidates are fitted; differences of BIC below 2 say nothing."""
+NEARBY = 10
+"""Steps in which a neighbour of a fitted model shows whether it is better."""
+FARTHEST = 200
+"""Moves of delays after which the search for them ends."""
+
+RULED_OUT = 10.0
+"""Excess of the criterion from which the data rule a delay out, as in `fit_delay`."""
+FARTHEST_PLAUSIBLE = 12
+"""Samples around a delay that are looked at."""
+
+Shares = tuple[tuple[int, ...], tuple[int, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A fitted model behind its delays, with the value of the criterion: smaller is better."""
+
+    found: SectionFit
+    order: int
+    inputs: tuple[int, ...]
+    outputs: tuple[int, ...]
+    direct: bool
+    bic: float
+
+
+def experiments(
+    group: Sequence[Record], shares: Shares, most: int | None = None
+) -> list[Experiment]:
+    """Align inputs and outputs by their delays, up to `most` samples of all records together.
+
+    The state behind the delays is unknown when a record begins, so what was in the delays then
+    needs no guess: the first samples, which depend on it, are left out.
+    """
+    inputs, outputs = shares
+    first = max(inputs)
+    found, left = [], most
+    for record in group:
+        u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
+        samples = record.n_samples if left is None else min(record.n_samples, left)
+        count = samples - first
+        if count < 2:
+            continue
+        v = np.stack([row[first - d : samples - d] for row, d in zip(u, inputs, strict=True)])
+        late = np.full((len(y), count), np.nan)
+        for row, mine, d in zip(late, y, outputs, strict=True):
+            row[: max(count - d, 0)] = mine[first + d : samples]
+        level = np.nanmean(y[:, :samples], axis=1, keepdims=True)
+        found.append(Experiment(v - v.mean(axis=1, keepdims=True), late - level))
+        if left is not None:
+            left -= samples
+    if not found:
+        raise DataError(f"no record is longer than the delays, {first} samples")
+    return found
+
+
+class Search:
+    """Fits of one group of records, at any order and delay, from one impulse response.
+
+    `markov` (p, m, N) is what the fits start from; channels are scaled to the same size first,
+    or the smallest would be the last to be modelled. All but the last fit see `enough` samples.
+    """
+
+    def __init__(
+        self,
+        group: Sequence[Record],
+        markov: FloatArray,
+        top: int,
+        enough: int = ENOUGH_SAMPLES,
+    ) -> None:
+        self._group = group
+        self._enough = enough
+        self._markov = markov
+        self._top = top
+        u, y = (
+            np.concatenate(
+                [
+                    np.atleast_2d(x) - np.nanmean(np.atleast_2d(x), axis=1, keepdims=True)
+                    for x in signals
+                ],
+                axis=1,
+            )
+            for signals in ([r.input for r in group], [r.output for r in group])
+        )
+        self._samples = u.shape[1]
+        self._size_in, self._size_out = u.std(axis=1), np.nanstd(y, axis=1)
+        self._starts: dict[Shares, OneModel] = {}
+        p, m, _ = markov.shape
+        per_order = p + m
+        self.highest = max((self._samples * p // PER_PARAMETER - p * m) // per_order, 0)
+
+    def orders(self, asked: Sequence[int] | None) -> tuple[int, ...]:
+        """Return the orders that the records can tell: excited, and with data enough."""
+        tried = tuple(asked) if asked is not None else ORDERS
+        possible = tuple(n for n in tried if n <= self.highest and self._excites(n))
+        missing = sorted(set(tried) - set(possible))
+        if missing and (asked is not None or not possible):
+            why = (
+                f"{self._samples} samples are too few"
+                if missing[0] > self.highest
+                else "the input does not excite enough (a sine, or inputs that move together)"
+            )
+            raise DataError(
+                f"{why} for a model of order {missing[0]}; choose a lower order or a richer input"
+            )
+        return possible
+
+    def fit(
+        self, order: int, shares: Shares, *, direct: bool, start: Candidate | None = None
+    ) -> Candidate:
+        """Fit one structure; its start is another fit, or Kung's realization."""
+        data = experiments(self._group, shares, self._enough)
+        sections = start.found.model if start is not None else self._kung(order, shares)
+        most = MOST_STEPS if start is None else NEARBY
+        found = fit_sections(data, sections, direct=direct, enough=ROUGHLY, most=most)
+        return self._judged(found, order, shares, direct)
+
+    def finish(self, best: Candidate) -> Candidate:
+        """Fit once more, to all samples."""
+        shares = best.inputs, best.outputs
+        data = experiments(self._group, shares)
+        found = fit_sections(data, best.found.model, direct=best.direct)
+        return replace(best, found=found)
+
+    def by_order(self, orders: Sequence[int], shares: Shares, *, direct: bool) -> list[Candidate]:
+        """Fit rising orders until none is better any more."""
+        fits: list[Candidate] = []
+        for order in orders:
+            try:
+                fits.append(self.fit(order, shares, direct=direct))
+            except OrderError:
+                break
+            best = min(range(len(fits)), key=lambda i: fits[i].bic)
+            if len(fits) - 1 - best >= PATIENCE:
+                break
+        if not fits:
+            raise OrderError(
+                f"the impulse response has a rank below {min(orders)}; choose a lower order"
+            )
+        return fits
+
+    def improved(self, best: Candidate, *, delays: bool, direct: bool) -> Candidate:
+        """Change one thing at a time while that is better.
+
+        A delay by a sample where `delays` are free, the direct term where `direct` is, and at the
+        end the order: with the right delays a smaller one may do.
+        """
+        for _ in range(FARTHEST):
+            shares = best.inputs, best.outputs
+            ways = [(moved, best.direct) for moved in _neighbours(*shares) if delays]
+            ways += [(shares, not best.direct)] if direct else []
+            tried = [
+                self.fit(best.order, moved, direct=own, start=best)
+                for moved, own in ways
+                if max(moved[0]) + max(moved[1]) < self._markov.shape[-1] // 2
+            ]
+            better = min(tried, key=lambda c: c.bic, default=best)
+            if better.bic >= best.bic:
+                break
+            best = better
+        return best
+
+    def lowered(self, best: Candidate, orders: Sequence[int], *, delays: bool) -> Candidate:
+        """Try lower orders behind the delays that were found.
+
+        With one input and output each of them finds its own from there: states that stand for
+        samples of the delay hold it where it is.
+        """
+        for order in (n for n in orders if n < best.order):
+            try:
+                lower = self.fit(order, (best.inputs, best.outputs), direct=best.direct)
+            except OrderError:
+                continue
+            if delays and self._markov.shape[:2] == (1, 1):
+                lower = self.improved(lower, delays=True, direct=False)
+            best = min(best, lower, key=lambda c: c.bic)
+        return best
+
+    def plausible(self, best: Candidate, independent: float) -> tuple[float, float]:
+        """Dead times in samples, of one input and output, that the data do not rule out.
+
+        Those whose model of the same order has a criterion up to `RULED_OUT` larger, when
+        `independent` samples of the residual count as one. Behind a hold, the first sample of a
+        response without direct term says that the dead time ended within the sample before it.
+        """
+        low, high = _within(best)
+        for direct in {best.direct, False}:
+            for step in (-1, 1):
+                last, missed = best, 0
+                for _ in range(FARTHEST_PLAUSIBLE):
+                    delay = last.inputs[0] + step
+                    if not 0 <= delay < self._markov.shape[-1] // 2 or missed == 2:
+                        break
+                    last = self.fit(best.order, ((delay,), last.outputs), direct=direct, start=last)
+                    missed += 1
+                    if (last.bic - best.bic) / independent <= RULED_OUT:
+                        first, end = _within(last)
+                        low, high, missed = min(low, first), max(high, end), 0
+        return low, high
+
+    def _excites(self, order: int) -> bool:
+        lags = order + 1
+        parts = [np.atleast_2d(r.input) for r in self._group if r.n_samples > lags]
+        if not parts:
+            return False
+        grams = [normal_equations(u, u[:1], lags).gram for u in parts]
+        gram = np.asarray(np.sum(grams, axis=0))
+        return excited_directions(gram) == len(gram)
+
+    def _kung(self, order: int, shares: Shares) -> Sections:
+        """Realize the scaled impulse response behind the delays; lower orders are parts of it."""
+        if shares not in self._starts:
+            reach = np.add.outer(shares[1], shares[0])
+            length = self._markov.shape[-1] - int(reach.max())
+            scaled = self._markov * self._size_in[:, None] / self._size_out[:, None, None]
+            lags = reach[:, :, None] + np.arange(length)
+            ahead = np.take_along_axis(scaled, lags, axis=-1)
+            top = min(max(self._top, order), (length - 1) * min(ahead.shape[:2]))
+            self._starts[shares] = realize_at(ahead, 0, length - 1, top, padded=True)
+        whole = self._starts[shares]
+        if order > np.count_nonzero(whole.singular_values[: whole.A.shape[0]]):
+            raise OrderError(f"order={order} is above the rank of the impulse response")
+        direct = np.zeros(self._markov.shape[:2])
+        B, C = whole.B[:order] / self._size_in, whole.C[:, :order] * self._size_out[:, None]
+        return in_sections(whole.A[:order, :order], B, C, direct)
+
+    def _judged(self, found: SectionFit, order: int, shares: Shares, direct: bool) -> Candidate:
+        p, m, _ = self._markov.shape
+        values = found.counts.sum() / p
+        used = min(self._samples, self._enough)
+        count = order * (p + m) + (p * m if direct else 0)
+        # As if all delays left the same number of samples.
+        bic = 2 * found.loss * used / values + count * np.log(used)
+        return Candidate(found, order, *shares, direct, float(bic))
+
+
+def _within(found: Candidate) -> tuple[float, float]:
+    """Bounds of the dead time, in samples, of a sampled model of one input and output."""
+    delay = found.inputs[0] + found.outputs[0]
+    return (max(delay - 1.0, 0.0), float(delay)) if found.direct else (delay, delay + 1.0)
+
+
+def _neighbours(inputs: tuple[int, ...], outputs: tuple[int, ...]) -> list[Shares]:
+    """Delays that are one sample apart in one input or output."""
+    both = inputs + outputs
+    moved = []
+    # Of one input and output only the sum counts.
+    for i in range(len(both) - (len(both) == 2)):
+        for step in (-1, 1):
+            other = [*both]
+            other[i] += step
+            if other[i] >= 0:
+                moved.append((tuple(other[: len(inputs)]), tuple(other[len(inputs) :])))
+    return moved

@@ -1,0 +1,1 @@
+"""Step records: edges, unit steps, impulse responses from steps."""

@@ -1,0 +1,132 @@
+"""Unit-pulse responses from measured steps (section 3.2 of the paper)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ..._checks import one_of, positive, whole
+from ...data import FilterSpec, ImpulseResponse, StepResponse
+from ...errors import DataError, OptionError
+from ...numerics.arrays import FloatArray
+from ...numerics.signals.filters import (
+    backward_difference,
+    central_difference,
+    low_pass,
+    settling_samples,
+)
+from ...numerics.signals.rise import rise_time
+
+BANDWIDTH_TIMES_RISE = 0.35
+"""-3 dB bandwidth in Hz times the 10-90 % rise time, for a lag of any order within 5 %."""
+
+CUTOFF_OVER_BANDWIDTH = 13.0
+"""Automatic cut-off: below 8 the filter shapes the response, above 15 it lets noise through."""
+
+
+def impulse_from_step(
+    step: StepResponse,
+    *,
+    cutoff_hz: float | Literal["auto"] | None = "auto",
+    filter_order: int = 5,
+    zero_phase: bool = True,
+    difference: Literal["backward", "central"] = "backward",
+) -> ImpulseResponse:
+    """Differentiate a step response and low-pass the result (section 3.2).
+
+    Parameters
+    ----------
+    step : StepResponse
+    cutoff_hz : float, "auto" or None, optional
+        Cut-off of the Butterworth low-pass in Hz; the paper's is 50 Hz. ``"auto"`` takes 13
+        times the bandwidth of the step response (and no filter where that is beyond 0.45 of the
+        sample rate); None filters nothing.
+    filter_order : int, optional
+        The paper's is 5.
+    zero_phase : bool, optional
+        Forward and backward, so that the filter adds no delay. A causal filter delays the
+        response by its group delay: 13.1 samples for the paper's.
+    difference : {"backward", "central"}, optional
+        ``"backward"`` is exactly step-invariant: right for simulation and control behind a hold.
+        ``"central"`` is the paper's five-point formula; it samples the continuous impulse
+        response, half a sample earlier.
+
+    Returns
+    -------
+    ImpulseResponse
+        Unit-pulse response from the step on; `.filter` is the filter that is left in it and
+        `.noise` what the samples before the step became.
+
+    Raises
+    ------
+    OptionError
+        A cut-off outside 0...half the sample rate, an order outside 1...10.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(400)
+    >>> u = np.where(t < 1.0, 0.0, 2.0)
+    >>> y = np.where(t < 1.095, 0.0, 2 * (1 - np.exp(-(t - 1.1))))
+    >>> g = cr.impulse_from_step(cr.unit_step(cr.Record(t, u, y)), cutoff_hz=None)
+    >>> print(g.markov[9:13].round(4))
+    [0.     0.     0.01   0.0099]
+    """
+    if not isinstance(step, StepResponse):
+        raise DataError(f"step is a {type(step).__name__}; needed is a StepResponse, see unit_step")
+    order = whole(filter_order, "filter_order", 1, 10)
+    one_of(difference, "difference", ("backward", "central"))
+    cutoff = _cutoff(step, cutoff_hz)
+    # The samples before the step take part, so that differentiation and filter are settled when
+    # the step comes. Where there are too few, rest is what was before: zeros.
+    lead = 4 if cutoff is None else settling_samples(cutoff, step.dt) + 4
+    zeros = np.zeros(max(lead - step.pre.size, 0))
+    joint = np.concatenate([zeros, step.pre, step.output])
+    edge = zeros.size + step.pre.size
+    pulses = _differentiate(joint, difference)
+    noise = _differentiate(step.pre, difference) if step.pre.size >= 20 else None
+    if cutoff is not None:
+        pulses = low_pass(pulses, order, cutoff, step.dt, zero_phase=zero_phase)
+        if noise is not None:
+            # Alone, so that a zero-phase filter carries nothing of the step into it.
+            noise = low_pass(noise, order, cutoff, step.dt, zero_phase=zero_phase)
+    return ImpulseResponse(
+        pulses[edge:],
+        step.dt,
+        filter=None if cutoff is None else FilterSpec(order, cutoff, zero_phase, step.dt),
+        noise=noise,
+        sampling="step-invariant" if difference == "backward" else "impulse-invariant",
+        name=step.name,
+        step=step,
+    )
+
+
+def _cutoff(step: StepResponse, cutoff_hz: float | str | None) -> float | None:
+    if cutoff_hz is None:
+        return None
+    rate = 1 / step.dt
+    if isinstance(cutoff_hz, str):
+        one_of(cutoff_hz, "cutoff_hz", ("auto",))
+        rise = rise_time(step.output, step.dt)
+        cutoff = CUTOFF_OVER_BANDWIDTH * BANDWIDTH_TIMES_RISE / rise
+        return cutoff if cutoff < 0.45 * rate else None
+    cutoff = positive(cutoff_hz, "cutoff_hz", "cut-off in Hz")
+    if cutoff >= rate / 2:
+        raise OptionError(
+            f"cutoff_hz={cutoff:g} Hz; needed is below half the sample rate, {rate / 2:g} Hz "
+            "(None filters nothing)"
+        )
+    if settling_samples(cutoff, step.dt) > 10 * (step.output.size + step.pre.size):
+        raise OptionError(
+            f"cutoff_hz={cutoff:g} Hz: this filter takes {5 / cutoff:.3g} s to settle, the step "
+            f"response is {step.output.size * step.dt:.3g} s long"
+        )
+    return cutoff
+
+
+def _differentiate(values: FloatArray, difference: str) -> FloatArray:
+    if difference == "central":
+        return central_difference(values)
+    return backward_difference(values, before=float(values[0]))

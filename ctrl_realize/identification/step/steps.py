@@ -1,0 +1,206 @@
+"""From a measured step to a unit step response: find its edge, cut it out, scale it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..._checks import real, whole
+from ..._wording import named
+from ...data import Record, StepEdge, StepResponse
+from ...data.given import as_record, check_complete
+from ...errors import DataError, NoStepError, OptionError
+from ...numerics.arrays import FloatArray
+from ...numerics.signals.baseline import rest_line
+from ...numerics.signals.edges import Edge, difference_noise, find_edges
+from ...numerics.signals.time_axis import EXTREME
+
+
+def detect_step(
+    record: Record, *, spike_samples: int | None = None, min_share: float = 0.1
+) -> StepEdge:
+    """Find the step in the input of a record.
+
+    Spikes, noise, slow drift and an offset of the input do not move the result, and no samples
+    before the step are needed. Of several edges the first large one is returned (at least half
+    as high as the highest); all of them are in its `edges`.
+
+    Parameters
+    ----------
+    record : Record
+        One input signal.
+    spike_samples : int, optional
+        Longest spike to ignore, in samples. Default: 0.1 % of the record, 3 to 50.
+    min_share : float, optional
+        Smallest edge to look for, as a part of the range of the input.
+
+    Returns
+    -------
+    StepEdge
+
+    Raises
+    ------
+    NoStepError
+        The input is constant, only noise, or its step comes with the last sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(400)
+    >>> u = np.where(t < 1.0, 4.0, 20.0)
+    >>> u[50] = 40.0  # a spike
+    >>> edge = cr.detect_step(cr.Record(t, u, 0 * t))
+    >>> edge.index, edge.rest, edge.amplitude
+    (100, 4.0, 16.0)
+    """
+    return found_step(record, spike_samples, min_share)
+
+
+def found_step(
+    record: Record,
+    spike_samples: int | None = None,
+    min_share: float = 0.1,
+    most: int | None = None,
+) -> StepEdge:
+    """As `detect_step`, with one edge more than `most` at most: there may be millions."""
+    signal = _single(as_record(record).input, "input", record)
+    if spike_samples is None:
+        spikes = int(np.clip(record.n_samples // 1000, 3, 50))
+        # A record of a few samples holds no window of that length on either side of its step.
+        spikes = min(spikes, max((record.n_samples - 3) // 6, 0))
+    else:
+        spikes = whole(spike_samples, "spike_samples", 0, record.n_samples // 3)
+    share = real(min_share, "min_share", "part of the input's range, above 0 and below 1")
+    if not 0 < share < 1:
+        raise OptionError(f"min_share={share:g}; needed is above 0 and below 1")
+    found = find_edges(signal, spikes, share, most)
+    if not found and np.ptp(signal) == 0:
+        raise NoStepError(
+            f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the record "
+            "begins with its step, put samples of the rest before it in front; if not, check which "
+            "column is the input"
+        )
+    if not found:
+        raise NoStepError(
+            f"no step in the input {_of(record)}: it runs from {signal.min():.6g} to "
+            f"{signal.max():.6g} with noise of {difference_noise(signal):.2g}, and no level holds "
+            f"for more than {spikes} samples. Check which column is the input; for other inputs "
+            "use impulse_from_io"
+        )
+    edges = tuple(_to_step_edge(edge, record) for edge in found)
+    highest = max(abs(edge.amplitude) for edge in edges)
+    if highest < 1 / EXTREME:
+        raise NoStepError(f"the largest edge {_of(record)} is {highest:g} high, which is nothing")
+    main = next(edge for edge in edges if abs(edge.amplitude) >= 0.5 * highest)
+    if main.index + main.samples >= record.n_samples:
+        raise NoStepError(
+            f"the step {_of(record)} comes at sample {main.index} of {record.n_samples}: "
+            "nothing was recorded after it"
+        )
+    return replace(main, edges=edges)
+
+
+def unit_step(
+    record: Record, edge: StepEdge | None = None, *, remove_drift: bool | None = None
+) -> StepResponse:
+    """Cut out the response to one step, take its rest level off and scale it to a unit step.
+
+    Parameters
+    ----------
+    record : Record
+        One input and one output.
+    edge : StepEdge, optional
+        Which step; default: what `detect_step` finds.
+    remove_drift : bool, optional
+        Take off the line through the samples before the step instead of their mean. Default: when
+        its slope is significant (five standard errors) over at least 50 samples.
+
+    Returns
+    -------
+    StepResponse
+        From the step up to the next edge or the end; the noise before it is kept in `.pre`.
+
+    Raises
+    ------
+    NoStepError
+        See `detect_step`.
+    DataError
+        Several channels, or fewer than five samples after the step.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.01 * np.arange(400)
+    >>> u = np.where(t < 1.0, 4.0, 20.0)
+    >>> y = 3.0 + 2.0 * (u - 4.0)
+    >>> step = cr.unit_step(cr.Record(t, u, y))
+    >>> float(step.output[-1]), step.amplitude, step.pre.size
+    (2.0, 16.0, 100)
+    """
+    u = _single(as_record(record).input, "input", record)
+    y = _single(record.output, "output", record)
+    at = detect_step(record) if edge is None else edge
+    if not isinstance(at, StepEdge):
+        raise OptionError(f"edge is a {type(at).__name__}; needed is what detect_step returns")
+    if not (0 <= at.index < at.stop <= record.n_samples and 0 <= at.start <= at.index):
+        raise DataError(
+            f"the edge lies at samples {at.start}...{at.index}...{at.stop}, the record has "
+            f"{record.n_samples} samples; is it the edge of another record?"
+        )
+    if abs(at.amplitude) < 1 / EXTREME:
+        raise DataError(f"the edge is {at.amplitude:g} high; nothing can be divided by that")
+    if at.stop - at.index < 5:
+        raise DataError(
+            f"only {at.stop - at.index} samples follow the step {_of(record)} before the next "
+            "edge or the end; at least 5 are needed"
+        )
+    before, after = y[at.start : at.index], y[at.index : at.stop]
+    level, slope = rest_line(before, after, remove_drift)
+    index = np.arange(at.start - at.index, at.stop - at.index)
+    scaled = (y[at.start : at.stop] - level - slope * index) / at.amplitude
+    return StepResponse(
+        time=np.asarray(record.dt * index[before.size :]),
+        output=scaled[before.size :],
+        input=(u[at.index : at.stop] - at.rest) / at.amplitude,
+        pre=scaled[: before.size],
+        dt=record.dt,
+        amplitude=at.amplitude,
+        rest_output=level,
+        drift=slope / record.dt,
+        edge=at,
+        name=record.name,
+        record=record,
+    )
+
+
+def _single(signal: FloatArray, what: str, record: Record) -> FloatArray:
+    check_complete(record, "a step response")
+    if signal.ndim == 2 and signal.shape[0] > 1:
+        raise DataError(
+            f"the record has {signal.shape[0]} {what}s ({', '.join(_labels(record, what))}); a "
+            "step response is taken of one, choose it when the record is made"
+        )
+    return signal if signal.ndim == 1 else signal[0]
+
+
+def _labels(record: Record, what: str) -> tuple[str, ...]:
+    return record.input_labels if what == "input" else record.output_labels
+
+
+def _of(record: Record) -> str:
+    return f"of {named('record', record.name)}"
+
+
+def _to_step_edge(edge: Edge, record: Record) -> StepEdge:
+    return StepEdge(
+        edge.index,
+        float(record.time[edge.index]),
+        edge.amplitude,
+        edge.rest,
+        edge.samples,
+        edge.start,
+        edge.stop,
+    )

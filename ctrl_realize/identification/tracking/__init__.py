@@ -1,0 +1,1 @@
+"""Dead time tracked on line."""

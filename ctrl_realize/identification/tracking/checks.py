@@ -1,0 +1,67 @@
+"""What a delay tracker can start from."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+
+from ..._checks import positive, whole
+from ...delayed.parts import check_entries
+from ...errors import DelayRangeError, OptionError, UnsuitableSystemError
+
+LONGEST = 1e12
+"""Samples of memory; beyond, the weights of single samples are lost in rounding."""
+
+
+def check_candidates(min_delay: int, max_delay: int) -> tuple[int, int]:
+    """Return the first and the last candidate."""
+    low, high = whole(min_delay, "min_delay", 0), whole(max_delay, "max_delay", 0)
+    if high <= low:
+        raise DelayRangeError(f"delays {low}...{high} leave nothing to choose from")
+    return low, high
+
+
+def check_memory(memory: float, dt: float, max_delay: int) -> float:
+    """Return the memory in samples; the largest candidate must lie well within it."""
+    span = positive(memory, "memory", "time in s") / dt
+    if span > LONGEST:
+        raise OptionError(
+            f"memory={memory:g} s is {span:.4g} samples; needed are at most {LONGEST:g}"
+        )
+    if span <= max_delay:
+        raise DelayRangeError(
+            f"memory={memory:g} s is {span:.4g} samples, and delays up to {max_delay} samples are "
+            "to be seen; needed is a longer memory"
+        )
+    return span
+
+
+def model_noise(model: ct.StateSpace, given: float | None) -> float:
+    """Return the noise that a model leaves: as given, as its `fit` has it, or 0 where unknown."""
+    if given is not None:
+        return positive(given, "noise_std", "standard deviation of the output's noise")
+    fit = getattr(model, "fit", None)
+    for name in ("residual", "noise_std"):
+        found = np.ravel(getattr(fit, name, np.nan))
+        if found.size == 1 and np.isreal(found[0]) and np.isfinite(found[0]):
+            return float(found[0])
+    return 0.0
+
+
+def check_start(core: ct.StateSpace) -> None:
+    """Refuse a model that cannot be followed by simulation."""
+    if not isinstance(core, ct.StateSpace) or not core.issiso():
+        raise UnsuitableSystemError("the model to start from must be a system of one channel")
+    if not core.isdtime(strict=True) or core.dt is True:
+        raise UnsuitableSystemError(
+            "the model to start from must be discrete, with its sample time"
+        )
+    check_entries(core)
+    worst = np.abs(core.poles()).max(initial=0.0)
+    if worst > 1 + 1e-9:
+        raise UnsuitableSystemError(
+            f"the model to start from is unstable (a pole at |z| = {worst:.6g}), so its output "
+            "cannot be followed by simulation"
+        )
+    if not np.any(core.C) and not np.any(core.D):
+        raise OptionError("the model to start from is zero")

@@ -1,0 +1,173 @@
+"""What the sums of a delay tracker say at one moment, and when they cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...numerics.arrays import FloatArray
+from ...numerics.regression.recursive import DelayBank
+from ...numerics.state_space.pole_sensitivity import Core, Direction
+
+SPEED_STD = 0.3
+"""How far a pole is expected to move: prior standard deviation of its relative speed."""
+SIGNIFICANT = 16.0
+"""Fall of the misfit in noise variances below which nothing was seen: four sigma."""
+CLEAR_GAIN = 3.0
+"""Standard deviations that the gain must be away from zero."""
+SHOWN_MOVE = 2.0
+"""Largest move of a pole that is put into numbers, as logarithm of the speed ratio."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearisedBank:
+    """A bank of delays about one set of poles, `moved` from those of the starting model.
+
+    Its sums begin at the sample `begin`.
+    """
+
+    bank: DelayBank
+    core: Core
+    directions: list[Direction]
+    moved: FloatArray
+    begin: int = 0
+
+    @property
+    def n_parameters(self) -> int:
+        """Parameters of one candidate: the gain, and a move for each direction."""
+        return 1 + len(self.directions)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Best candidate of a bank, and how sure it is.
+
+    ``theta`` holds the gain, then gain times the `moves` of the poles; `delay` is in samples and
+    `place` the same with its fraction. `reply_std` is the size of what the input explains;
+    `sees_reply` is false where the output does not follow
+    the input; `reason` says why the data cannot tell the delay, and is empty when they can.
+    """
+
+    delay: int
+    place: float
+    interval: tuple[int, int]
+    theta: FloatArray
+    offset: float
+    gain_std: float
+    move_std: FloatArray
+    speed_ratios: tuple[float, ...]
+    variance: float
+    reply_std: float
+    sees_reply: bool
+    reason: str
+
+    @property
+    def gain(self) -> float:
+        """Gain over that of the starting model."""
+        return float(self.theta[0])
+
+    @property
+    def moves(self) -> FloatArray:
+        """Moves of the poles, zero where there is no gain to see them by."""
+        return _relative(self.theta)
+
+
+def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
+    """Choose among the candidates of a bank.
+
+    Parameters
+    ----------
+    now : LinearisedBank
+    variance : float
+        Noise variance as known before; with `SPEED_STD` it weighs the prior.
+    inflation : float
+        How many samples of the residual count as one.
+    """
+    bank, q = now.bank, now.n_parameters
+    spread = np.array([1.0, *(SPEED_STD for _ in now.directions)])
+    found = bank.solve(np.eye(1, q)[0], variance / spread**2)
+    best = int(np.argmin(found.misfit))
+    theta, delay = found.theta[best], bank.low + best
+    freedom = max(bank.weight**2 / bank.weight_squared - q - 1, 1.0)
+    variance = found.misfit[best] / bank.weight * (1 + (q + 1) / freedom)
+    # Never below what sums of squares can resolve in double precision.
+    noise = max(variance * inflation, 1e-14 * found.power, 1e-300)
+    interval = _interval(found.misfit - found.misfit[best], noise, bank.low)
+    # root by root: the product overflows for an output 1e200 times as large as the input
+    std = np.sqrt(noise) * np.sqrt(np.diag(found.inverse[best]))
+    gain, gain_std = float(theta[0]), float(std[0])
+    moves = _relative(theta)
+    speeds = [i for i, (what, _, _) in enumerate(now.directions) if what == "speed"]
+    unseen = _no_reply(float(found.power - found.misfit[best]) / noise, gain, gain_std)
+    open_still = _no_choice(delay, interval, (bank.low, bank.high))
+    return Solution(
+        delay=delay,
+        place=delay + _fraction(found.misfit, best),
+        interval=interval,
+        theta=theta,
+        offset=float(found.offset[best]),
+        gain_std=gain_std,
+        move_std=std[1:] / abs(gain) if gain else np.full(q - 1, np.inf),
+        speed_ratios=tuple(
+            float(np.exp(now.moved[i] + np.clip(moves[i], -SHOWN_MOVE, SHOWN_MOVE))) for i in speeds
+        ),
+        variance=variance,
+        reply_std=float(np.sqrt(max(found.power - found.misfit[best], 0.0) / bank.weight)),
+        sees_reply=not unseen,
+        reason=unseen or open_still or _too_far(moves[speeds]),
+    )
+
+
+def _relative(theta: FloatArray) -> FloatArray:
+    return theta[1:] / theta[0] if theta[0] else np.zeros(theta.size - 1)
+
+
+def _interval(excess: FloatArray, noise: float, low: int) -> tuple[int, int]:
+    """Return the delays that hold 95 % of the probability; `low` is that of the first entry."""
+    # Beyond a thousand nothing is left of a chance, and the quotient might overflow.
+    chance = np.exp(-np.minimum(excess, 1e3 * noise) / noise / 2)
+    below = np.cumsum(chance) / chance.sum()
+    last = min(int(np.searchsorted(below, 0.975)), below.size - 1)
+    return low + int(np.searchsorted(below, 0.025)), low + last
+
+
+def _fraction(misfit: FloatArray, best: int) -> float:
+    """Return where a parabola through the least misfit and its neighbours is lowest, -0.5...0.5."""
+    if not 0 < best < misfit.size - 1:
+        return 0.0
+    before, here, after = misfit[best - 1 : best + 2]
+    bend = before - 2 * here + after
+    return float((before - after) / (2 * bend)) if bend > 0 else 0.0
+
+
+def _no_reply(explained: float, gain: float, gain_std: float) -> str:
+    """Say why the output does not follow the input; `explained` is in noise variances."""
+    if explained < SIGNIFICANT:
+        return "nothing moved within the memory that stands out of the noise"
+    if abs(gain) < CLEAR_GAIN * gain_std:
+        return "the output does not follow the input"
+    return ""
+
+
+def _no_choice(delay: int, interval: tuple[int, int], candidates: tuple[int, int]) -> str:
+    """Say why one delay does not stand out of the candidates."""
+    low, high = candidates
+    if delay == high:
+        return f"the best delay is max_delay={high}; try a larger one"
+    if delay == low > 0:
+        return f"the best delay is min_delay={low}; try a smaller one"
+    if interval[1] - interval[0] > (high - low) / 2:
+        return f"any delay from {interval[0]} to {interval[1]} samples fits"
+    return ""
+
+
+def _too_far(speeds: FloatArray) -> str:
+    """Say that the poles have left the range in which their moves count to first order."""
+    moved = float(max(speeds, key=abs, default=0.0))
+    if abs(moved) <= SPEED_STD:
+        return ""
+    return (
+        f"a pole has moved by {100 * np.expm1(moved):+.0f} %, too far for the model that "
+        "changes are counted from; it is being renewed"
+    )

@@ -1,0 +1,204 @@
+"""What a delay tracker says: at one moment, and over a record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._wording import in_time
+from ...numerics.arrays import BoolArray, FloatArray, locked, read_only
+from ...results import Result
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedDelay(Result):
+    """What the samples of the forgetting window say at one moment.
+
+    ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
+    ``interval`` to half a sample where `tells` is true. Where it is false, `reason` says what is
+    missing and the numbers are the best guess without any claim.
+
+    Attributes
+    ----------
+    time : float
+        Time of the last sample in s, from the first one.
+    delay : int
+        Best delay in samples.
+    dead_time : float
+        Best dead time in s.
+    interval : tuple of float
+        In s: dead times that hold 95 % of the probability, and the way that the delay has gone
+        within the last memory: the estimate is behind a moving delay by about that.
+    delay_interval : tuple of int
+        The same in samples.
+    lost : bool
+        The residual is much louder than the model's: the delay lies outside the candidates, the
+        dynamics have changed by more than is followed, or something else acts on the output.
+        `DelayTracker.reset` starts anew.
+    gain_ratio, gain_std : float
+        Gain relative to the starting model, and its standard deviation.
+    speed_ratios : tuple of float
+        How much faster each real pole and pole pair has become; 1 is unchanged.
+    noise_std : float
+        Standard deviation of the residual.
+    tells : bool
+    reason : str
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> for sample in zip(u, cr.DelayedStateSpace(core, 7).simulate(u)):
+    ...     tracker.update(*sample)
+    >>> now = tracker.estimate()
+    >>> print(now.delay, now.delay_interval, now.interval, round(now.gain_ratio, 3))
+    7 (6, 7) (0.06, 0.07) 0.996
+    """
+
+    time: float
+    delay: int
+    dead_time: float
+    delay_interval: tuple[int, int]
+    gain_ratio: float
+    gain_std: float
+    speed_ratios: tuple[float, ...]
+    noise_std: float
+    tells: bool
+    dt: float
+    reason: str = ""
+    lost: bool = False
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval of the dead time in s."""
+        return self.delay_interval[0] * self.dt, self.delay_interval[1] * self.dt
+
+    @property
+    def dead_time_interval(self) -> tuple[float, float] | None:
+        """The same as `interval`; None where nothing is claimed."""
+        return self.interval if self.tells else None
+
+    def _title(self) -> str:
+        return f"Tracked delay at {self.time:.6g} s"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        low, high = self.delay_interval
+        return [
+            ("delay", f"{self.delay} samples ({low} to {high}), {in_time(self.dead_time, 4)}"),
+            ("gain", f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g} of the starting model's"),
+            ("speed of poles", ", ".join(f"{s:.3g}" for s in self.speed_ratios) or "kept"),
+            ("noise left", f"{self.noise_std:.3g}"),
+            ("the data tell", "yes" if self.tells else f"no: {self.reason}"),
+        ]
+
+    def __repr__(self) -> str:
+        told = "" if self.tells else f", cannot tell: {self.reason}"
+        return f"<TrackedDelay {self.delay} {self.delay_interval} at {self.time:.6g} s{told}>"
+
+
+@dataclass(frozen=True, eq=False)
+class DelayTrack(Result):
+    """Course of a tracked delay: all arrays have one entry for each moment in `time`.
+
+    Where ``tells`` is false, nothing is claimed; `low` and `high` then only show what is left
+    open.
+
+    Attributes
+    ----------
+    time : ndarray, shape (K,)
+        From the first sample, in s.
+    dead_time : ndarray, shape (K,)
+        In s, interpolated between samples.
+    low, high : ndarray, shape (K,)
+        Ends of the 95 % interval in s; `delay_low` and `delay_high` are the same in samples.
+    gain_ratio : ndarray, shape (K,)
+        Gain over that of the starting model.
+    tells : ndarray of bool, shape (K,)
+        Whether the samples within the memory tell a delay.
+    lost : ndarray of bool, shape (K,)
+        Where the residual was much louder than the model's, see `TrackedDelay`.
+    dt : float
+        Sample time in s.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
+    >>> record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> track = tracker.run(record)
+    >>> print(track.time[[0, 20, -1]], track.tells[[0, 20, -1]], track.delay[[0, 20, -1]])
+    [0.05 1.25 9.95] [False False  True] [0.         7.8695741  6.97755342]
+    """
+
+    time: FloatArray
+    dead_time: FloatArray
+    low: FloatArray
+    high: FloatArray
+    gain_ratio: FloatArray
+    tells: BoolArray
+    lost: BoolArray
+    dt: float
+
+    @property
+    def delay_low(self) -> FloatArray:
+        """Lower end of the interval in samples."""
+        return self.low / self.dt
+
+    @property
+    def delay_high(self) -> FloatArray:
+        """Upper end of the interval in samples."""
+        return self.high / self.dt
+
+    @property
+    def delay(self) -> FloatArray:
+        """Delay in samples, with its fraction."""
+        return self.dead_time / self.dt
+
+    def _title(self) -> str:
+        return "Tracked delay"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        told = np.flatnonzero(self.tells)
+        share = f"{told.size} of {self.time.size} moments"
+        if self.lost.any():
+            share += f", the track lost at {int(self.lost.sum())}"
+        if told.size == 0:
+            return [("told", share)]
+        first, last = told[0], told[-1]
+        return [
+            ("told", share),
+            ("first", f"{self.delay[first]:.2f} samples at {self.time[first]:.6g} s"),
+            ("last", f"{self.delay[last]:.2f} samples at {self.time[last]:.6g} s"),
+            ("gain", f"{self.gain_ratio[first]:.4g} to {self.gain_ratio[last]:.4g}"),
+        ]
+
+    def __repr__(self) -> str:
+        return f"<DelayTrack: {self.time.size} moments, told at {int(self.tells.sum())}>"
+
+
+def track_of(course: Sequence[TrackedDelay], dt: float) -> DelayTrack:
+    """Put single moments into the arrays of a track."""
+
+    def along(values: Iterable[float]) -> FloatArray:
+        return read_only(np.array(list(values)))
+
+    return DelayTrack(
+        time=along(moment.time for moment in course),
+        dead_time=along(moment.dead_time for moment in course),
+        low=along(moment.interval[0] for moment in course),
+        high=along(moment.interval[1] for moment in course),
+        gain_ratio=along(moment.gain_ratio for moment in course),
+        tells=locked(np.array([moment.tells for moment in course])),
+        lost=locked(np.array([moment.lost for moment in course])),
+        dt=dt,
+    )

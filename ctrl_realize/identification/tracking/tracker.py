@@ -1,0 +1,438 @@
+"""Gain, dynamics and dead time of a running plant, followed sample by sample."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import control as ct
+import numpy as np
+
+from ..._checks import positive
+from ...data import Record
+from ...data.given import check_complete
+from ...delayed import DelayedStateSpace
+from ...errors import DataError, UnsuitableSystemError
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.blas_threads import single_threaded
+from ...numerics.regression.recursive import DelayBank, RunningResidual
+from ...numerics.signals.time_axis import EXTREME
+from ...numerics.state_space.pole_sensitivity import (
+    Core,
+    Direction,
+    moved_core,
+    pole_directions,
+    sensitivity_system,
+)
+from .checks import check_candidates, check_memory, check_start, model_noise
+from .estimate import LinearisedBank, Solution, solve
+from .results import DelayTrack, TrackedDelay, track_of
+
+MOMENTS = 50
+"""Estimates made in one memory."""
+RUN_IN, SHORT_RUN_IN = 2.0, 0.5
+"""Memories that a renewed bank takes before it is asked; the short one where nothing is told by
+the bank before it, whose poles are far off. Each renewal is a Gauss-Newton step: poles that have
+halved take five or six."""
+MOVED, LEAP = 0.04, 0.5
+"""Relative move of a pole from which the bank is renewed, and the largest that is then made."""
+CLEAR_MOVE = 4.0
+"""Standard deviations that such a move must have."""
+SAMPLES_EACH = 10
+"""Samples for each parameter, behind the largest delay, before anything is solved."""
+LOUD, LOUD_AFTER_MOVES = 3.0, 1.2
+"""Residual over the model's noise from which nothing is told: no model of the plant as it was
+leaves nine times the power. Poles that moved are taken for the plant's only where they leave no
+more than noise: slower poles stand in for a delay beyond the candidates (100 samples with 90 the
+largest leave 1.5 times the noise, or more)."""
+PENDING = 0.3
+"""Relative move of a pole that is being made from which nothing is told meanwhile. Up to there the
+interval is wider by as much of the slowest lag: so far may the delay be off."""
+NEGLIGIBLE = 0.005
+"""Residual over what the input explains that is never called loud: data without noise leave what
+the first order in the moves of poles neglects."""
+SHARE_OF_LAG = 20
+"""Part of the slowest lag over which the residual's own noise is measured, where nothing else is
+known of it: a wrong model's error hardly changes within it."""
+
+
+class DelayTracker:
+    """Follow a plant's dead time, gain and pole speeds from its samples as they come.
+
+    Starting from a model of the plant (as `identify` gives it), every candidate delay has its own
+    least squares with forgetting; gain, offset and the speeds (and dampings) of the poles are
+    free in each. The candidates share one set of regressors, so a sample costs the same
+    whatever came before, and a few operations for each candidate.
+
+    Parameters
+    ----------
+    model : control.StateSpace
+        Model to start from: one input, one output, discrete, not unstable. Its own delay does
+        not matter.
+    max_delay, min_delay : int
+        Candidates, in samples.
+    memory : float
+        Time in s after which a sample counts for 1/e. Ten settling times or more see several
+        moves of the input; the estimate trails a change by about as much.
+    dynamics : bool, default True
+        Let the poles move. A plant of fixed lags is followed more sharply without.
+    noise_std : float, optional
+        Standard deviation of what the model leaves of the output. Default: that of the model's
+        `fit`, where it carries one, else the least that it has left while it told. A residual
+        three times as large is no noise: nothing is told then, and the track counts as lost.
+    drift_time : float, optional
+        Time constant in s of a high-pass on input and output alike, for outputs under a drifting
+        disturbance (a random walk). What changes within it is kept: the sum of the plant's lags is
+        a good choice. Without it a drift as loud as three times the noise is not told from a lost
+        track.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A model with several channels, a continuous or an unstable one.
+    DelayRangeError
+        No candidates, or a memory shorter than the largest of them.
+
+    Notes
+    -----
+    Multiple-model estimation of a delay on line after Tuch, Feuer and Palmor (1994) and
+    Orlov et al. (2002). The regressors are simulated, not measured, outputs, so noise does not
+    bias the dynamics. Pole moves enter to first order about a model that is renewed when a pole
+    has moved by 4 % or more: a second bank then runs beside the first for two memories and
+    more, and takes over. Until then the delay may be off by a tenth of the lag per tenth of a
+    pole's speed, and beyond 30 % nothing is claimed. A delay outside the candidates, poles that
+    have left at once and a drifting disturbance leave a residual much louder than the model's:
+    nothing is told then, and `TrackedDelay.lost` is true. `reset` starts anew from
+    here. Probabilities of delays count exponential weights as whole samples, which is on the safe
+    side, and a residual that is slower than white as fewer of them.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
+    >>> worn = cr.DelayedStateSpace(core, 7)
+    >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> for sample in zip(u, worn.simulate(u)):
+    ...     tracker.update(*sample)
+    >>> tracker.estimate().delay, tracker.estimate().tells
+    (7, True)
+    """
+
+    def __init__(
+        self,
+        model: ct.StateSpace,
+        *,
+        max_delay: int,
+        memory: float,
+        min_delay: int = 0,
+        dynamics: bool = True,
+        noise_std: float | None = None,
+        drift_time: float | None = None,
+    ) -> None:
+        core = model.delay_free if isinstance(model, DelayedStateSpace) else model
+        check_start(core)
+        self._low, self._high = check_candidates(min_delay, max_delay)
+        self.dt = float(core.dt)
+        self._span = check_memory(memory, self.dt, self._high)
+        self._forgetting = float(np.exp(-1.0 / self._span))
+        self._stride = max(1, round(self._span / MOMENTS))
+        self._noise_std = model_noise(model, noise_std)
+        self._keep_of_drift: float | None = None
+        if drift_time is not None:
+            passed = positive(drift_time, "drift_time", "time constant in s")
+            self._keep_of_drift = float(np.exp(-self.dt / passed))
+        self._zeros = np.asarray(core.zeros(), dtype=np.complex128)
+        self._dynamics = dynamics
+        self._start = (core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]))
+        self._begin(self._start, core.poles())
+
+    def _begin(self, matrices: Core, poles: ComplexArray) -> None:
+        """Know nothing but a core."""
+        directions = pole_directions(poles, self.dt) if self._dynamics else []
+        self._now = self._linearised(matrices, directions, np.zeros(len(directions)))
+        self._next: LinearisedBank | None = None
+        self._count = 0
+        self._first = (0.0, 0.0)
+        self._before, self._passed = (0.0, 0.0), (0.0, 0.0)
+        # The least that the starting model has left of a whole memory while it told.
+        self._least = np.inf
+        slowest = float(np.abs(poles).max(initial=0.0))
+        lag = -1 / np.log(slowest) if 0 < slowest < 1 else 1.0
+        # Over one or two samples the noise itself may be correlated, by filters and converters.
+        self._lag, self._well_sampled = lag, lag >= 3 * SHARE_OF_LAG
+        self._residual = RunningResidual(
+            self._forgetting, max(1, round(min(lag, self._span) / SHARE_OF_LAG))
+        )
+        # The last moment at which the sums were solved.
+        self._variance = 0.0
+        self._solution: Solution | None = None
+        self._told = self._nothing_yet()
+        # Delays of the last memory, NaN where nothing was told.
+        self._places: deque[float] = deque(maxlen=MOMENTS)
+
+    def __repr__(self) -> str:
+        return (
+            f"<DelayTracker: delays {self._low}...{self._high}, {self._count} samples, "
+            f"{self._told!r}>"
+        )
+
+    def update(self, u: float, y: float) -> None:
+        """Take in the next sample of input and output.
+
+        Raises
+        ------
+        DataError
+            A value that is no number, not finite, or beyond 1e70.
+        """
+        try:
+            if np.ndim(u) or np.ndim(y):
+                raise TypeError
+            u, y = float(u), float(y)
+        except (TypeError, ValueError):
+            raise DataError(
+                f"sample {self._count} is u={u!r}, y={y!r}; needed is one number each (run takes "
+                "a whole record)"
+            ) from None
+        if not (np.isfinite(u) and np.isfinite(y)):
+            raise DataError(f"sample {self._count} is u={u}, y={y}; needed are finite numbers")
+        if max(abs(u), abs(y)) > EXTREME:
+            raise DataError(
+                f"sample {self._count} is u={u:g}, y={y:g}; beyond {EXTREME:g}, where squares "
+                "overflow, there is no measurement"
+            )
+        if self._count == 0:
+            # What was before is rest; large offsets would cost digits.
+            self._first = (u, y)
+        self._count += 1
+        moved, seen = u - self._first[0], y - self._first[1]
+        if self._keep_of_drift is not None:
+            moved, seen = self._high_passed(moved, seen, self._keep_of_drift)
+        self._now.bank.update(moved, seen)
+        if self._next is not None:
+            self._next.bank.update(moved, seen)
+            self._renew(self._next)
+        if self._solution is not None:
+            reply = self._now.bank.predict(self._solution.delay, self._solution.theta)
+            self._residual.add(seen - self._solution.offset - reply)
+        if self._count % self._stride == 0:
+            self._residual.close_sum()
+            self._keep(self._solve())
+
+    def _high_passed(self, u: float, y: float, keep: float) -> tuple[float, float]:
+        """Pass both signals through (1 - z^-1) / (1 - keep z^-1): their relation stays."""
+        (u_before, y_before), (u_out, y_out) = self._before, self._passed
+        self._before = u, y
+        self._passed = keep * u_out + u - u_before, keep * y_out + y - y_before
+        return self._passed
+
+    def reset(self, model: ct.StateSpace | None = None) -> None:
+        """Forget all samples and begin again, where the track is lost or the plant was changed.
+
+        Parameters
+        ----------
+        model : control.StateSpace, optional
+            To start from, of the same sample time; the one that the tracker was made with if
+            none is given. Gain and speeds are counted from it.
+
+        Raises
+        ------
+        UnsuitableSystemError
+            A model of another sample time, or one that a tracker cannot start from.
+        """
+        if model is not None:
+            core = model.delay_free if isinstance(model, DelayedStateSpace) else model
+            check_start(core)
+            if not np.isclose(core.dt, self.dt, rtol=1e-6, atol=0.0):
+                raise UnsuitableSystemError(
+                    f"the model has the sample time {core.dt:g} s, the tracker {self.dt:g} s"
+                )
+            self._noise_std = model_noise(model, None) or self._noise_std
+            self._zeros = np.asarray(core.zeros(), dtype=np.complex128)
+            self._start = (core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]))
+        self._begin(self._start, np.linalg.eigvals(self._start[0]).astype(np.complex128))
+
+    def estimate(self) -> TrackedDelay:
+        """Tell what the samples so far say; asking changes nothing."""
+        return self._latest()[1]
+
+    @property
+    def model(self) -> DelayedStateSpace:
+        """Model of the present estimate, which is its `fit`; zeros as in the starting model."""
+        found, told = self._latest()
+        core = self._now.core
+        if found is not None and found.gain:
+            made = moved_core(core, self._zeros, self._now.directions, found.moves, self.dt)
+            core = core if made is None else made[0]
+        A, B, C, D = core
+        gain = told.gain_ratio
+        return DelayedStateSpace(
+            ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt), told.delay, fit=told
+        )
+
+    @single_threaded
+    def run(self, record: Record) -> DelayTrack:
+        """Take in a whole record, and return the course of the estimate.
+
+        Raises
+        ------
+        DataError
+            A record with several channels, missing samples, or another sample time.
+        """
+        check_complete(record, "DelayTracker.run")
+        if not record.issiso:
+            raise DataError(f"{record!r} has several channels; needed is one input and one output")
+        if not np.isclose(record.dt, self.dt, rtol=1e-3, atol=0):
+            raise DataError(
+                f"the record has the sample time {record.dt:g} s, the model {self.dt:g} s"
+            )
+        course: list[TrackedDelay] = []
+        for u, y in zip(record.input.ravel(), record.output.ravel(), strict=True):
+            self.update(float(u), float(y))
+            if self._count % self._stride == 0:
+                course.append(self._told)
+        if not course:
+            raise DataError(
+                f"the record has {record.n_samples} samples, fewer than the {self._stride} "
+                "between two estimates"
+            )
+        return track_of(course, self.dt)
+
+    def _linearised(
+        self, core: Core, directions: list[Direction], moved: FloatArray
+    ) -> LinearisedBank:
+        system = sensitivity_system(*core, directions)
+        bank = DelayBank(*system, self._low, self._high, self._forgetting)
+        return LinearisedBank(bank, core, directions, moved)
+
+    def _renew(self, fresh: LinearisedBank) -> None:
+        """Let a bank that is run in count from its first whole sample, and then take over."""
+        if self._count == fresh.begin:
+            fresh.bank.restart()
+        wait = SHORT_RUN_IN if abs(self._step_made()) > PENDING else RUN_IN
+        if self._count >= fresh.begin + wait * self._span:
+            self._now, self._next, self._solution = fresh, None, None
+
+    def _solve(self) -> Solution | None:
+        """Solve for what the samples so far say; None while there are too few."""
+        if self._count < self._high + SAMPLES_EACH * self._now.n_parameters:
+            return None
+        return solve(self._now, self._variance, self._residual.inflation)
+
+    def _latest(self) -> tuple[Solution | None, TrackedDelay]:
+        """Return what holds now: what was kept, where no sample has come since."""
+        if self._count % self._stride == 0:
+            return self._solution, self._told
+        found = self._solve()
+        return found, self._tell(found)
+
+    def _keep(self, found: Solution | None) -> None:
+        """Go on from what was found, and start a bank about moved poles where they have moved."""
+        self._told = self._tell(found)
+        full = self._count >= self._span
+        if found is not None and full and self._told.tells and not np.any(self._now.moved):
+            self._least = min(self._least, float(np.sqrt(found.variance)))
+        self._places.append(self._told.dead_time / self.dt if self._told.tells else np.nan)
+        if found is None:
+            return
+        self._solution, self._variance = found, found.variance
+        if self._next is None:
+            self._follow_poles(found)
+
+    def _follow_poles(self, found: Solution) -> None:
+        """Start a bank about the moved poles, to take over when it has seen enough."""
+        now = self._now
+        clear = np.abs(found.moves) > np.maximum(MOVED, CLEAR_MOVE * found.move_std)
+        if not np.any(clear) or not found.sees_reply:
+            return
+        step = np.clip(np.where(clear, found.moves, 0.0), -LEAP, LEAP)
+        made = moved_core(now.core, self._zeros, now.directions, step, self.dt)
+        if made is None:
+            return
+        fresh = self._linearised(*made, now.moved + step)
+        wait = fresh.bank.settling()
+        if wait is not None:
+            self._next = replace(fresh, begin=self._count + wait + self._high + 1)
+
+    def _nothing_yet(self) -> TrackedDelay:
+        low = self._low
+        return TrackedDelay(
+            time=max(self._count - 1, 0) * self.dt,
+            delay=low,
+            dead_time=low * self.dt,
+            delay_interval=(low, self._high),
+            dt=self.dt,
+            gain_ratio=1.0,
+            gain_std=np.inf,
+            speed_ratios=(),
+            noise_std=np.inf,
+            tells=False,
+            reason=f"only {self._count} samples yet" if self._count else "no samples yet",
+        )
+
+    def _tell(self, found: Solution | None) -> TrackedDelay:
+        if found is None:
+            return self._nothing_yet()
+        loud, pending = self._too_loud(found), self._pending()
+        return TrackedDelay(
+            time=(self._count - 1) * self.dt,
+            delay=found.delay,
+            dead_time=found.place * self.dt,
+            delay_interval=self._with_trail(found.interval, found.place),
+            dt=self.dt,
+            gain_ratio=found.gain,
+            gain_std=found.gain_std,
+            speed_ratios=found.speed_ratios,
+            noise_std=float(np.sqrt(found.variance)),
+            tells=not (found.reason or loud or pending),
+            reason=found.reason or loud or pending,
+            lost=bool(loud),
+        )
+
+    def _too_loud(self, found: Solution) -> str:
+        """Say that the residual is no noise of the model's."""
+        left = float(np.sqrt(found.variance))
+        moved = bool(np.any(self._now.moved))
+        noise = self._noise_std or self._least
+        if moved and not np.isfinite(noise) and self._well_sampled:
+            noise = self._residual.noise_std
+        # What the tracker has seen itself may have been a quiet hour.
+        limit = LOUD_AFTER_MOVES if moved and noise != self._least else LOUD
+        if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
+            return ""
+        return (
+            f"the track is lost: the residual, {left:.3g}, is {left / noise:.2g} times the model's "
+            "noise. The delay may lie outside the candidates, the plant have changed, or a "
+            "disturbance drift; reset() starts anew"
+        )
+
+    def _step_made(self) -> float:
+        """Largest relative move of a pole in the bank that is being run in, 0 without one."""
+        if self._next is None:
+            return 0.0
+        return float(max(self._next.moved - self._now.moved, key=abs))
+
+    def _pending(self) -> str:
+        """Say that a bank about poles far from these is being run in."""
+        step = self._step_made()
+        if abs(step) <= PENDING:
+            return ""
+        return (
+            f"a pole has moved by about {100 * np.expm1(step):+.0f} %; the model that changes are "
+            "counted from is being renewed"
+        )
+
+    def _with_trail(self, interval: tuple[int, int], place: float) -> tuple[int, int]:
+        """Widen an interval by the way that the delay has gone within one memory, and by what a
+        move of the poles that is being made may take along.
+
+        Samples are one memory old on average, so while the delay moves the estimate is behind by
+        about that way.
+        """
+        before = self._places[0] if self._places else np.nan
+        way = 0.0 if np.isnan(before) else place - before
+        off = abs(self._step_made()) * self._lag
+        low = max(interval[0] + int(np.floor(min(way, 0.0) - off)), self._low)
+        return low, min(interval[1] + int(np.ceil(max(way, 0.0) + off)), self._high)

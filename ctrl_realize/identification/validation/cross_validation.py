@@ -1,0 +1,85 @@
+"""Fits of several models on several records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...data import Record
+from ...data.given import as_records
+from ...delayed.simulation import Start, simulate_record
+from ...errors import DataError
+from ...numerics.blas_threads import single_threaded
+from ...numerics.signals.correlation import fit_percent
+
+if TYPE_CHECKING:
+    import control as ct
+    import pandas as pd
+
+
+@single_threaded
+def cross_validate(
+    systems: Mapping[str, Any] | ct.StateSpace,
+    records: Record | Sequence[Record],
+    *,
+    start: Start = "estimate",
+) -> pd.DataFrame:
+    """Tabulate the fit in percent of several models on several records.
+
+    Parameters
+    ----------
+    systems : dict of str to control.StateSpace, or control.StateSpace
+        Models by name, or one; any that `check_residuals` takes.
+    records : Record or sequence of Record
+        Best those that no model has seen. Of the same name the second gets a number.
+    start : {"estimate", "rest"}
+        As for `check_residuals`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a model, one column a record; the mean over the outputs.
+
+    Raises
+    ------
+    DataError
+        No records or models, or something else among them.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> fast, slow = (ct.ss([[a]], [[1 - a]], [[1.0]], [[0.0]], 1.0) for a in (0.5, 0.8))
+    >>> u = np.random.default_rng(0).standard_normal(200)
+    >>> y = cr.DelayedStateSpace(slow).simulate(u)
+    >>> table = cr.cross_validate(
+    ...     {"fast": fast, "slow": slow}, [cr.Record(np.arange(200.0), u, y, name="day 2")]
+    ... )
+    >>> print(table["day 2"].round(1).to_dict())
+    {'fast': 2.4, 'slow': 100.0}
+    """
+    import pandas as pd
+
+    several = as_records(records)
+    models = systems if isinstance(systems, Mapping) else {_name(systems): systems}
+    if not models:
+        raise DataError("no models; needed is at least one, such as {'mine': model}")
+
+    def mean_fit(system: Any, record: Record) -> float:
+        simulated = simulate_record(system, record, start)
+        return float(fit_percent(np.atleast_2d(record.output), simulated).mean())
+
+    columns: dict[str, dict[str, float]] = {}
+    for i, record in enumerate(several):
+        name = record.name or f"record {i}"
+        if name in columns:
+            name = f"{name} ({i})"
+        columns[name] = {label: mean_fit(system, record) for label, system in models.items()}
+    return pd.DataFrame(columns)
+
+
+def _name(system: Any) -> str:
+    return str(getattr(system, "name", None) or "model")

@@ -1,0 +1,210 @@
+"""Estimate one delay in every way that the data allow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..._checks import whole
+from ...data import MeasuredFRF, Record
+from ...data.given import check_complete
+from ...errors import CtrlRealizeError, DataError
+from ...numerics.blas_threads import single_threaded
+from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
+from ...numerics.signals.onset import correlation_onset, phase_slope
+from ...results import Flag
+from ..impulse.from_io import impulse_from_io
+from ..output_error.fit import fit_delay
+from ..output_error.result import DelayFit
+from ..realization.delay_scan import estimate_delay
+from ..step.impulse import impulse_from_step
+from ..step.steps import unit_step
+from .delay_estimates_result import DelayCheck, DelayView, common_dead_time
+
+TOP_BAND = 1 / 3
+"""Part of the band, from its upper end, where the slope of the phase is taken."""
+MOST_LAGS = 1000
+"""Lags up to which a cross-correlation is looked at."""
+UNSEEN = 0.01
+"""Chance that a cross-correlation stands out where there is none."""
+NO_LEVEL = "its interval tells how flat the misfit is, not how far off the delay can be"
+"""What a scan leaves open on any record: its set holds the truth in fewer than half of them."""
+DOUBTFUL = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_leads")
+"""Flags by which a method says that its data do not carry its answer."""
+
+
+@single_threaded
+def check_delay(
+    record: Record | None = None,
+    *,
+    frf: MeasuredFRF | None = None,
+    max_delay: int | None = None,
+    order: int | None = None,
+) -> DelayCheck:
+    """Estimate a delay in every way that the data allow, and compare.
+
+    From a record: output-error fit (`fit_delay`), the paper's scan (`estimate_delay`, on the
+    differentiated step or on `impulse_from_io`), first motion after a step, and the onset of
+    the cross-correlation with a whitened input. From an FRF: fit with a free dead time
+    (`fit_frf`) and slope of the phase at the top of the band.
+
+    Parameters
+    ----------
+    record : Record, optional
+        A step or any other input; one input, one output.
+    frf : MeasuredFRF, optional
+        Of the same plant, one input, one output.
+    max_delay : int, optional
+        Largest delay of the scan in samples. Default: the total delay of the fit, and ten
+        samples.
+    order : int, optional
+        Order of the scan; default: that of the output-error fit, at most 3.
+
+    Returns
+    -------
+    DelayCheck
+
+    Raises
+    ------
+    DataError
+        Neither record nor FRF, or data from which no method finds anything.
+
+    Notes
+    -----
+    The scan has no confidence interval: its row shows the delays that fit about as well, with
+    one sample to both sides for the part of a sample that it cannot see. Where it says itself
+    that its data do not tell a delay from none, or that its order is in the noise, it is in
+    doubt and does not count; nor does a fit to an FRF whose phase leads. The others have
+    intervals of 95 %, and the one to rely on is the narrowest. First motion, onset of
+    the correlation and slope of the phase cannot be before the dead time ends (but for noise),
+    and lie after it by part of the lags: they bound it from above.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
+    >>> rng = np.random.default_rng(0)
+    >>> u = np.repeat(rng.choice([-1.0, 1.0], 100), 15)
+    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(1500)
+    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(1500), u, y))
+    >>> check.agree, [view.method for view in check.views]
+    (True, ['output error', 'scan', 'cross-correlation'])
+    """
+    if record is None and frf is None:
+        raise DataError("neither a record nor an FRF is given")
+    if max_delay is not None:
+        whole(max_delay, "max_delay", 0)
+    if order is not None:
+        whole(order, "order", 1)
+    views: list[DelayView] = []
+    flags: list[Flag] = []
+    if record is not None:
+        _from_record(record, max_delay, order, views, flags)
+    if frf is not None:
+        _from_frf(frf, views, flags)
+    if not views:
+        raise DataError("no method found a delay: " + "; ".join(map(str, flags)))
+    common, conflicts = common_dead_time(views)
+    return DelayCheck(
+        views=tuple(views),
+        agree=common is not None,
+        common=common,
+        conflicts=conflicts,
+        dt=None if record is None else record.dt,
+        flags=tuple(flags),
+    )
+
+
+def _from_record(
+    record: Record,
+    max_delay: int | None,
+    order: int | None,
+    views: list[DelayView],
+    flags: list[Flag],
+) -> None:
+    check_complete(record, "check_delay")
+    if not record.issiso:
+        raise DataError(f"{record!r} has several channels; needed is one input and one output")
+    dt = record.dt
+    total, model_order, stepped = 0.1 * record.n_samples * dt, 2, False
+    try:
+        fit: DelayFit = fit_delay(record).fit
+    except CtrlRealizeError as problem:
+        flags.append(Flag("no_output_error", f"output error: {problem}"))
+    else:
+        views.append(DelayView("output error", "record", "dead time", fit.dead_time, *fit.interval))
+        stepped = bool(np.isfinite(fit.onset))
+        if stepped:
+            # Walked back to the last sample at rest; the motion began within the sample before.
+            first = max(fit.onset, 0.0)
+            views.append(DelayView("first motion", "record", "upper bound", first, 0.0, first + dt))
+        total, model_order = max(fit.total_delay, fit.dead_time), min(fit.order, 3)
+    most = int(np.ceil(total / dt)) + 10 if max_delay is None else max_delay
+    try:
+        views.append(_scan(record, stepped, most, order or model_order, total))
+    except CtrlRealizeError as problem:
+        flags.append(Flag("no_scan", f"scan: {problem}"))
+    if not stepped:
+        _from_correlation(record, most, views, flags)
+
+
+def _from_correlation(record: Record, most: int, views: list[DelayView], flags: list[Flag]) -> None:
+    lags = int(min(MOST_LAGS, max(most, 20), record.n_samples // 4))
+    seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 1 - UNSEEN)
+    if seen.onset < 0:
+        flags.append(
+            Flag("no_correlation", f"cross-correlation: nothing stands out up to lag {lags}")
+        )
+        return
+    # Behind a hold, what is seen at lag k for the first time came within the sample before.
+    value = seen.onset * record.dt
+    views.append(DelayView("cross-correlation", "record", "upper bound", value, 0.0, value))
+
+
+def _scan(record: Record, stepped: bool, most: int, order: int, total: float) -> DelayView:
+    if stepped:
+        impulse = impulse_from_step(unit_step(record))
+    else:
+        tail = int(np.ceil(6 * total / record.dt)) + 20
+        length = min(most + max(tail, 8 * order), record.n_samples // 4)
+        impulse = impulse_from_io(record, length)
+    scan = estimate_delay(impulse, order, max_delay=min(most, impulse.n_samples // 2)).fit
+    low, high = scan.delay_interval
+    return DelayView(
+        "scan",
+        "record",
+        "dead time",
+        scan.delay * record.dt,
+        max(low - 1, 0) * record.dt,
+        (high + 1) * record.dt,
+        _doubt(scan.flags) or NO_LEVEL,
+    )
+
+
+def _doubt(flags: tuple[Flag, ...]) -> str:
+    """Return what a method says against its own answer."""
+    return "; ".join(str(flag) for flag in flags if flag.code in DOUBTFUL)
+
+
+def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> None:
+    # Not at the top: most checks have no FRF, and its fit is a large part of the package.
+    from ...frequency.fit_frf import fit_frf
+
+    try:
+        fit = fit_frf(frf).fit
+    except CtrlRealizeError as problem:
+        flags.append(Flag("no_frf_fit", f"FRF fit: {problem}"))
+    else:
+        low, high = fit.interval
+        doubt = _doubt(fit.flags)
+        views.append(DelayView("FRF fit", "FRF", "dead time", fit.dead_time, low, high, doubt))
+    omega = 2 * np.pi * np.asarray(frf.frequency_hz)
+    values = np.asarray(frf.complex, dtype=np.complex128).ravel()
+    if omega.size < 4:
+        flags.append(Flag("no_phase_slope", f"phase slope: {omega.size} lines are too few"))
+        return
+    phase = unwrap_with_dead_time(omega, values, dead_time_from_phase(omega, values))
+    slope, std = phase_slope(omega, phase, TOP_BAND)
+    low, high = max(slope - 2 * std, 0.0), slope + 2 * std
+    views.append(DelayView("phase slope", "FRF", "upper bound", slope, low, high))

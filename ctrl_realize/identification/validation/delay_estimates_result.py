@@ -1,0 +1,172 @@
+"""One delay, seen in many ways: a table, and whether they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import TYPE_CHECKING, Literal
+
+from ..._wording import interval_in_time, time_within
+from ...results import Flag, Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Kind = Literal["dead time", "upper bound"]
+
+
+@dataclass(frozen=True)
+class DelayView:
+    """One way to look at the delay, in s.
+
+    ``low <= value <= high``. A view of kind ``"dead time"`` estimates the dead time itself; an
+    ``"upper bound"`` sees the dead time and part of the lags: the dead time is not above `high`.
+    A view with a `doubt` says of itself that its data do not carry it, or, as a scan, that its
+    interval claims no level; it is shown and does not count in the verdict.
+
+    Attributes
+    ----------
+    method : str
+        How the delay was seen: ``"output error"``, for example.
+    source : str
+        What it was seen in: ``"record"`` or ``"FRF"``.
+    kind : {"dead time", "upper bound"}
+    value, low, high : float
+        Estimate and its interval.
+    doubt : str
+        Why the view does not count; empty if it does.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> view = cr.DelayView("fit", "sine sweep", "dead time", 0.0289, 0.0285, 0.0294)
+    >>> view.low, view.value, view.high
+    (0.0285, 0.0289, 0.0294)
+    """
+
+    method: str
+    source: str
+    kind: Kind
+    value: float
+    low: float
+    high: float
+    doubt: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class DelayCheck(Result):
+    """Delay from several methods side by side.
+
+    `agree` is true when one dead time lies in the interval of every dead-time view that counts and
+    not above any upper bound; `common` is then the interval of such dead times. Otherwise `common`
+    is None and `conflicts` names the pairs that cannot both be right. Where every view is in
+    doubt, nothing is agreed on and there are no conflicts.
+
+    Attributes
+    ----------
+    views : tuple of DelayView
+    agree : bool
+    common : tuple of float or None
+        In s.
+    conflicts : tuple of (str, str)
+    rely_on : str or None
+        Method of the view to take the dead time from: the narrowest interval among those that
+        count. None where they do not agree, or none sees the dead time itself.
+    dt : float or None
+        Sample time of the record in s.
+    flags : tuple of Flag
+        What could not be done, and why.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
+    >>> rng = np.random.default_rng(0)
+    >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
+    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
+    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
+    >>> print(f"{check.common[0]:.3f} to {check.common[1]:.3f} s, take that of the {check.rely_on}")
+    0.113 to 0.126 s, take that of the output error
+    """
+
+    views: tuple[DelayView, ...]
+    agree: bool
+    common: tuple[float, float] | None
+    conflicts: tuple[tuple[str, str], ...]
+    dt: float | None
+    flags: tuple[Flag, ...] = ()
+
+    @property
+    def rely_on(self) -> str | None:
+        """Method whose interval of the dead time is the narrowest of those that count."""
+        times = [view for view in counted(self.views) if view.kind == "dead time"]
+        if not self.agree or not times:
+            return None
+        return min(times, key=lambda view: view.high - view.low).method
+
+    def table(self) -> pd.DataFrame:
+        """Tabulate the views, one row each, in s and in samples."""
+        import pandas as pd
+
+        rows = pd.DataFrame([vars(view) for view in self.views]).set_index("method")
+        if self.dt is not None:
+            rows["samples"] = rows["value"] / self.dt
+        return rows
+
+    def _title(self) -> str:
+        return "Delay seen in several ways"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = [(f"{view.method} ({view.source})", self._words(view)) for view in self.views]
+        if self.common is not None:
+            agreed = f"yes, on {interval_in_time(*self.common)}"
+        elif self.conflicts:
+            agreed = "no: " + "; ".join(f"{a} against {b}" for a, b in self.conflicts)
+        else:
+            agreed = "no: every view is in doubt"
+        rows.append(("they agree", agreed))
+        if self.rely_on is not None:
+            rows.append(("rely on", f"{self.rely_on}: the narrowest interval of those that count"))
+        rows += [(f"{view.method} in doubt", view.doubt) for view in self.views if view.doubt]
+        return rows
+
+    def _words(self, view: DelayView) -> str:
+        samples = "" if self.dt is None else f" = {view.value / self.dt:.4g} samples"
+        kind = "" if view.kind == "dead time" else ", upper bound"
+        doubt = "; in doubt" if view.doubt else ""
+        ends = interval_in_time(view.low, view.high)
+        return f"{time_within(view.value, view.low, view.high)}{samples} ({ends}{kind}{doubt})"
+
+    def __repr__(self) -> str:
+        verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"
+        return f"<DelayCheck: {len(self.views)} views that {verdict}>"
+
+
+def counted(views: Sequence[DelayView]) -> list[DelayView]:
+    """Leave out the views in doubt."""
+    return [view for view in views if not view.doubt]
+
+
+def common_dead_time(
+    views: Sequence[DelayView],
+) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
+    """Find the dead times that no view rules out, or the pairs that rule each other out."""
+    views = counted(views)
+    times = [view for view in views if view.kind == "dead time"]
+    bounds = [view for view in views if view.kind == "upper bound"]
+    if not views:
+        return None, ()
+    low = max((view.low for view in times), default=0.0)
+    high = min(view.high for view in views)
+    if low <= high:
+        return (low, high), ()
+    pairs = [*combinations(times, 2), *product(times, bounds)]
+    return None, tuple((one.method, other.method) for one, other in pairs if _apart(one, other))
+
+
+def _apart(time: DelayView, other: DelayView) -> bool:
+    """Whether a dead time and another view cannot both be right."""
+    return time.low > other.high or (other.kind == "dead time" and other.low > time.high)

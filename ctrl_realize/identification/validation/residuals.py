@@ -1,0 +1,168 @@
+"""Correlations of what a model leaves of a record, with itself and with the input."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+from scipy.special import ndtri
+
+from ..._checks import real, whole
+from ...data import Record
+from ...data.given import as_record
+from ...delayed import DelayedStateSpace
+from ...delayed.simulation import Start, simulate_record
+from ...errors import DataError, OptionError
+from ...numerics.arrays import BoolArray, FloatArray, read_only
+from ...numerics.blas_threads import single_threaded
+from ...numerics.signals.correlation import correlation, cross_bound, fit_percent, whiteness
+from ...results import Flag
+from .residuals_result import ResidualCheck
+
+EXACT = 1e-8
+"""Residual, as a part of the range of the output, below which a model counts as exact."""
+
+
+@single_threaded
+def check_residuals(
+    system: ct.StateSpace,
+    record: Record,
+    *,
+    lags: int = 25,
+    confidence: float = 0.99,
+    start: Start = "estimate",
+) -> ResidualCheck:
+    """Simulate a model with the input of a record and look at what is left.
+
+    On another record than the model was made from, this is its cross-validation.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        Discrete, with the sample time of the record; a `DelayedStateSpace` as well.
+    record : Record
+    lags : int, default 25
+        Largest lag of the correlations.
+    confidence : float, default 0.99
+        Level of bounds and tests.
+    start : {"estimate", "rest"}
+        Where the simulation starts: with the offset, the state and the input within the dead
+        time before the record that fit best (a long dead time in 16 pieces of constant input), or
+        at rest with the first sample of the input and the offset that fits best.
+
+    Returns
+    -------
+    ResidualCheck
+
+    Raises
+    ------
+    DataError
+        A record that does not fit the system, has missing samples, or is too short.
+    UnsuitableSystemError
+        A system that is continuous or unstable.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+    >>> rng = np.random.default_rng(0)
+    >>> u = rng.standard_normal(2000)
+    >>> y = 7 + plant.simulate(u) + 0.05 * rng.standard_normal(2000)
+    >>> record = cr.Record(0.1 * np.arange(2000), u, y)
+    >>> cr.check_residuals(plant, record)
+    <ResidualCheck: fit 85.1 %, white True, independent True>
+    >>> cr.check_residuals(plant.replace(delay=4), record).independent
+    False
+    """
+    count = whole(lags, "lags", 1)
+    level = _level(confidence)
+    simulated = simulate_record(system, as_record(record), start)
+    y, u = np.atleast_2d(record.output), np.atleast_2d(record.input)
+    if record.n_samples < 3 * count:
+        raise DataError(
+            f"lags={count} needs {3 * count} samples, the record has {record.n_samples}"
+        )
+    e = y - simulated
+    # What rounding leaves says nothing about the model.
+    e[np.abs(e).max(axis=1) <= EXACT * np.ptp(y, axis=1)] = 0.0
+    own = np.stack([correlation(row, row, count) for row in e])
+    cross = np.stack([[_two_sided(row, drive, count) for drive in u] for row in e])
+    bounds = np.array([[cross_bound(row, drive, count, level) for drive in u] for row in e])
+    probability = np.array([whiteness(rho[1:], record.n_samples) for rho in own])
+    outside = _outside(cross, bounds, level)
+    # What a plant without direct term shows at lag 0, a controller has put there.
+    direct = _first_response(system) != 0
+    later, earlier = outside[:, :, count:].copy(), outside[:, :, : count + 1].copy()
+    later[:, :, 0] &= direct
+    earlier[:, :, -1] &= ~direct
+    return ResidualCheck(
+        fit_percent=read_only(fit_percent(y, simulated)),
+        simulated=read_only(simulated.reshape(record.output.shape)),
+        residual=read_only(e.reshape(record.output.shape)),
+        autocorrelation=read_only(own),
+        cross=read_only(cross),
+        bound=float(-ndtri((1 - level) / 2) / np.sqrt(record.n_samples)),
+        cross_bound=read_only(bounds),
+        whiteness=read_only(probability),
+        white=bool(np.all(probability > 1 - level)),
+        independent=not later.any(),
+        confidence=level,
+        record=record,
+        flags=_flags(later, earlier, cross[:, :, count:]),
+    )
+
+
+def _outside(cross: FloatArray, bounds: FloatArray, level: float) -> BoolArray:
+    """Mark the correlations beyond one bound for all lags together.
+
+    The chance of any alarm at one input and output is ``1 - level``.
+    """
+    family = 1 - (1 - level) / cross.shape[-1]
+    wider = float(ndtri((1 - family) / 2) / ndtri((1 - level) / 2))
+    return np.asarray(np.abs(cross) > wider * bounds[:, :, None])
+
+
+def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> tuple[Flag, ...]:
+    """Say what stands out: `later` belongs to `cross` at lags 0...L, `earlier` to -L...0."""
+    flags = []
+    if later.any():
+        size = np.where(later, np.abs(cross), 0.0)
+        _, _, lag = np.unravel_index(np.argmax(size), size.shape)
+        flags.append(
+            Flag(
+                "input_in_residual",
+                f"the residual still follows the input, most at lag {lag}: order or delay of the "
+                "model are not right, or the plant is not linear",
+            )
+        )
+    if earlier.any():
+        flags.append(
+            Flag(
+                "feedback",
+                "the input follows the residual: the record was made in closed loop, which moves "
+                "estimates that take the input as free",
+            )
+        )
+    return tuple(flags)
+
+
+def _first_response(system: ct.StateSpace) -> FloatArray:
+    """Return the Markov parameter at lag 0, shape (p, m), without forming chains of delays."""
+    if isinstance(system, DelayedStateSpace):
+        return system.markov(1).reshape(system.noutputs, system.ninputs)
+    return np.asarray(system.D)
+
+
+def _two_sided(residual: FloatArray, drive: FloatArray, lags: int) -> FloatArray:
+    """Correlate at lags -lags...lags; at positive ones the residual comes later."""
+    before = correlation(drive, residual, lags)[:0:-1]
+    return np.concatenate([before, correlation(residual, drive, lags)])
+
+
+def _level(confidence: float) -> float:
+    level = real(confidence, "confidence", "a probability between 0 and 1")
+    # beyond, 1 - confidence is lost among the digits, or the bound is zero
+    if not 1e-12 <= level <= 1 - 1e-12:
+        raise OptionError(f"confidence={confidence!r}; needed is a number between 0 and 1")
+    return level

@@ -1,0 +1,184 @@
+"""Parquet tables, where pyarrow is installed; a column is read when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import FileFormatError
+from ..checks import MAX_COLUMNS, MAX_NAME, check_size
+from ..tables import Column, Table
+from ..units import split_unit
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+AnyArray = np.ndarray[Any, np.dtype[Any]]
+
+_FREE_BYTES = 64 * 2**20
+_MAX_RATIO = 10_000
+"""Times its own size that a file may become. Runs of equal values take no room in a file, but no
+measurement is made of them alone: beside an input of two levels stands a noisy output."""
+_OBJECT_BYTES = 64
+"""What a cell costs that becomes an object of Python's: a pointer and a small object."""
+
+
+class LateColumn(Column):
+    """A column that is read when its cells are asked for; the first few can be seen before."""
+
+    def __init__(self, name: str, load: Callable[[int | None], AnyArray]) -> None:
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "unit", split_unit(name)[1])
+        object.__setattr__(self, "_load", load)
+
+    @cached_property
+    def cells(self) -> AnyArray:
+        """All cells."""
+        return self._load(None)  # type: ignore[attr-defined, no-any-return]
+
+    def first(self, count: int) -> AnyArray:
+        """Return the first cells without reading the others."""
+        return self._load(count)  # type: ignore[attr-defined, no-any-return]
+
+
+def read_parquet(path: Path, *, max_bytes: float) -> Table:
+    """Find the columns of a Parquet file; their cells are read when they are asked for.
+
+    What is asked for may take `max_bytes` together, and not more than ten thousand times the size
+    of the file: runs of equal values pack so well that a few kB of them fill any memory.
+
+    Raises
+    ------
+    FileFormatError
+        If pyarrow is missing, the file is damaged, or too large when unpacked.
+    """
+    try:
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise FileFormatError(
+            f"{path} is a Parquet file; reading it needs pyarrow: pip install pyarrow"
+        ) from error
+    with _said_if_damaged(path), pq.ParquetFile(path) as file:
+        fields = list(file.schema_arrow)
+        if len(fields) > MAX_COLUMNS:
+            raise FileFormatError(
+                f"{path} has {len(fields)} columns, at most {MAX_COLUMNS} are read"
+            )
+    if not fields:
+        raise FileFormatError(f"{path} has no columns")
+    limit = min(max_bytes, max(_FREE_BYTES, _MAX_RATIO * path.stat().st_size))
+    reader = _Reader(path, limit)
+    return Table(
+        path,
+        tuple(
+            LateColumn(str(field.name)[:MAX_NAME], reader.loader(position, field))
+            for position, field in enumerate(fields)
+        ),
+    )
+
+
+class _Reader:
+    """Reads columns of one file, as long as they fit into the limit together."""
+
+    def __init__(self, path: Path, limit: float) -> None:
+        self.path = path
+        self.limit = limit
+        self.taken = 0
+
+    def loader(self, position: int, field: pa.Field) -> Callable[[int | None], AnyArray]:
+        return lambda count: self.load(position, field, count)
+
+    def load(self, position: int, field: pa.Field, count: int | None) -> AnyArray:
+        """Return the first `count` cells of a column, or all."""
+        import pyarrow.parquet as pq
+
+        kind = _kind(field.type)
+        if kind == "other":
+            if count is not None:
+                return np.empty(0, dtype=object)
+            raise FileFormatError(
+                f"{self.path}: column {field.name!r} holds {str(field.type)[:60]} values; needed "
+                "are numbers or times"
+            )
+        # of texts each different one is kept once
+        once = [field.name] if kind == "text" else None
+        with _said_if_damaged(self.path), pq.ParquetFile(self.path, read_dictionary=once) as file:
+            if [one.name for one in file.schema_arrow].count(field.name) > 1:
+                raise FileFormatError(f"{self.path} has several columns {field.name!r}")
+            if count is not None:
+                return next(
+                    (_cells(part.column(0)) for part in _first(file, field, count)), _NOTHING
+                )
+            self._take(file, position, field, kind)
+            return _cells(file.read(columns=[field.name], use_threads=False).column(0))
+
+    def _take(self, file: Any, position: int, field: pa.Field, kind: str) -> None:
+        """Refuse a column that does not fit any more."""
+        groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
+        packed = sum(
+            group.column(k).total_uncompressed_size
+            for group in groups
+            for k in range(group.num_columns)
+            if group.column(k).path_in_schema.split(".")[0] == field.name
+        )
+        each = 8 if kind == "number" else _OBJECT_BYTES
+        self.taken += max(packed, each * file.metadata.num_rows)
+        check_size(self.path, self.taken, self.limit, ", unpacked,")
+
+
+_NOTHING = np.empty(0, dtype=object)
+
+
+def _first(file: Any, field: pa.Field, count: int) -> Iterator[Any]:
+    return iter(file.iter_batches(batch_size=count, columns=[field.name], use_threads=False))
+
+
+def _cells(values: Any) -> AnyArray:
+    """Turn a column of Arrow's into an array; integers with gaps become floats with NaN."""
+    import pyarrow as pa
+    import pyarrow.types as kinds
+
+    if kinds.is_decimal(values.type):
+        values = values.cast(pa.float64())
+    if not kinds.is_dictionary(values.type):
+        return np.asarray(values.to_pandas())
+    parts = [values] if isinstance(values, pa.Array) else values.chunks
+    # one object for all cells of the same text; the last entry is that of a cell without one
+    found = [
+        np.array([*part.dictionary.to_pylist(), None], dtype=object)[
+            part.indices.fill_null(len(part.dictionary)).to_numpy(zero_copy_only=False)
+        ]
+        for part in parts
+    ]
+    return np.concatenate(found) if found else _NOTHING
+
+
+def _kind(of: pa.DataType) -> str:
+    """Tell what becomes of the values of a type: a "number", an "object", "text" or "other"."""
+    import pyarrow.types as kinds
+
+    if kinds.is_dictionary(of):
+        return "object" if _kind(of.value_type) in ("number", "text") else "other"
+    if kinds.is_integer(of) or kinds.is_floating(of) or kinds.is_timestamp(of):
+        return "number"
+    if kinds.is_string(of) or kinds.is_large_string(of):
+        return "text"
+    plain = (kinds.is_boolean, kinds.is_null, kinds.is_temporal, kinds.is_decimal)
+    return "object" if any(one(of) for one in plain) else "other"
+
+
+@contextmanager
+def _said_if_damaged(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except FileFormatError:
+        raise
+    # damaged metadata end in every kind of exception, ArrowException and TypeError among them
+    except Exception as error:
+        reason = str(error).partition("\n")[0][:200]
+        raise FileFormatError(f"{path} is a damaged Parquet file: {reason}") from error

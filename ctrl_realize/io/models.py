@@ -1,0 +1,289 @@
+"""Models as JSON files: exact, checked on the way back in, and without code in them."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from .._checks import whole
+from ..delayed import DelayedStateSpace
+from ..errors import CtrlRealizeError, FileFormatError, OptionError
+from .atomic import write_text
+from .checks import usable_file
+from .json_content import boolean_free, field, matrix, texts, whole_numbers
+from .stored_fit import summary_from_json, summary_of, summary_to_json
+
+FORMAT = "ctrl_realize model"
+SCHEMA = 1
+MAX_MODEL_BYTES = 64 * 2**20
+_PACKAGES = ("ctrl-realize", "control", "numpy", "scipy")
+
+
+def save_model(
+    path: str | os.PathLike[str],
+    system: ct.StateSpace,
+    *,
+    created: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    note: str = "",
+) -> None:
+    """Write a model to a JSON file.
+
+    Core matrices, delays, sample time, names and labels are stored exactly; of `system.fit` its
+    report, flags and main numbers are. Versions of the packages are noted, and the SHA-256 of
+    all of it, so that a damaged or edited file is recognised. The file is written whole or not
+    at all.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write; an existing one is replaced.
+    system : DelayedStateSpace or control.StateSpace
+        Discrete model with a sample time; a plain one is stored with delay 0.
+    created : str, optional
+        Date to note; by default none, so that equal models make equal files.
+    settings : mapping, optional
+        Numbers, text and lists of them to note, such as how the model was found.
+    note : str, optional
+        Free text.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A system that is not a discrete state-space model with a sample time.
+    OptionError
+        Settings that are no plain numbers and text, or matrices that are not finite.
+    OSError
+        The folder is missing or cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> valve = cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 37, name="valve")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     cr.save_model(Path(folder) / "valve.json", valve)
+    ...     cr.load_model(Path(folder) / "valve.json")
+    <DelayedStateSpace 'valve': u -> y, order 1, z^-37 (0.37 s), dt = 0.01 s>
+    """
+    write_text(path, model_to_text(system, created=created, settings=settings, note=note))
+
+
+def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -> DelayedStateSpace:
+    """Read a model that `save_model` wrote.
+
+    Reading runs no code from the file. What is truncated, edited, of a later version or not a
+    model at all is refused.
+
+    Parameters
+    ----------
+    path : path-like
+    max_states : int, optional
+        Largest number of states, delays included, that is accepted; by default what a
+        `DelayedStateSpace` takes. A long delay costs nothing until a function of python-control
+        asks for the matrices, which hold the square of the number of states.
+
+    Returns
+    -------
+    DelayedStateSpace
+        As it was saved. Its `fit` is a `FitSummary` (report, flags and main numbers) if the
+        saved model had one.
+
+    Raises
+    ------
+    MissingFileError
+        There is no such file, or no permission to read it.
+    FileFormatError
+        The file is not a model, damaged, edited, of a later version, or too large.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "valve.json"
+    ...     cr.save_model(path, cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 37, name="valve"))
+    ...     valve = cr.load_model(path)
+    >>> valve.delay, valve.name
+    (37, 'valve')
+    """
+    if max_states is not None:
+        whole(max_states, "max_states", 0)
+    file = usable_file(path, MAX_MODEL_BYTES)
+    try:
+        text = file.read_bytes().decode("utf-8")
+    except ValueError as error:
+        raise FileFormatError(f"{file}: no model file: {error}") from error
+    try:
+        return model_from_text(text, max_states=max_states)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error
+
+
+def model_to_text(
+    system: ct.StateSpace,
+    *,
+    created: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    note: str = "",
+) -> str:
+    """Lay out a model as the text that `save_model` writes."""
+    model = system
+    if not isinstance(system, DelayedStateSpace):
+        model = DelayedStateSpace(system, name=getattr(system, "name", None))
+    content = {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "model": _model_content(model),
+        "fit": summary_to_json(summary_of(model.fit)),
+        "provenance": {
+            "versions": _versions(),
+            "created": created,
+            "note": note,
+            "settings": dict(settings or {}),
+        },
+    }
+    try:
+        content["sha256"] = _checksum(content)
+        text = json.dumps(content, indent=1, allow_nan=False)
+        # nothing is written that could not be read again
+        _model_from(json.loads(text))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise OptionError(f"the model cannot be stored as JSON: {error}") from error
+    return text + "\n"
+
+
+def model_from_text(text: str, *, max_states: int | None = None) -> DelayedStateSpace:
+    """Build a model from the text that `save_model` wrote; see `load_model`."""
+    try:
+        content = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(f"no model file, or cut off: {error}") from error
+    try:
+        _check_origin(content)
+        return _model_from(content, max_states=max_states)
+    except FileFormatError:
+        raise
+    # TypeError, KeyError, ...: what python-control says to names and shapes that make no sense
+    except (CtrlRealizeError, ValueError, TypeError, OverflowError, RecursionError) as error:
+        raise FileFormatError(str(error)) from error
+
+
+def _model_content(model: DelayedStateSpace) -> dict[str, Any]:
+    core = model.delay_free
+    states = core.state_labels
+    named = states != [f"x[{i}]" for i in range(core.nstates)]
+    return {
+        "name": model.name,
+        "inputs": list(model.input_labels),
+        "outputs": list(model.output_labels),
+        **({"states": states} if named else {}),
+        "order": core.nstates,
+        "dt": float(core.dt),
+        "input_delays": list(model.input_delays),
+        "output_delays": list(model.output_delays),
+        **{letter: np.asarray(getattr(core, letter)).tolist() for letter in "ABCD"},
+    }
+
+
+def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> DelayedStateSpace:
+    model = field(content, "model", dict)
+    inputs, outputs = texts(model, "inputs"), texts(model, "outputs")
+    order = boolean_free(model, "order", int)
+    if order < 0 or not inputs or not outputs:
+        raise FileFormatError("the model has no inputs or outputs, or a negative order")
+    states = texts(model, "states") if "states" in model else order
+    if isinstance(states, list) and len(states) != order:
+        raise FileFormatError(f"{len(states)} names for {order} states")
+    shapes = {
+        "A": (order, order),
+        "B": (order, len(inputs)),
+        "C": (len(outputs), order),
+        "D": (len(outputs), len(inputs)),
+    }
+    matrices = [matrix(model, letter, shape) for letter, shape in shapes.items()]
+    dt = float(boolean_free(model, "dt", int | float))
+    before = whole_numbers(model, "input_delays", len(inputs))
+    behind = whole_numbers(model, "output_delays", len(outputs))
+    n_states = order + sum(before) + sum(behind)
+    if max_states is not None and n_states > max_states:
+        raise FileFormatError(
+            f"the model has {n_states} states, delays included; max_states={max_states} allows "
+            f"fewer (the matrix takes {8e-6 * n_states**2:.0f} MB)"
+        )
+    if not 0 < dt < float("inf"):
+        raise FileFormatError(f"dt={dt} is no sample time")
+    name = field(model, "name", str)
+    if any("." in one for one in (name, *inputs, *outputs)):
+        raise FileFormatError("a name has a dot, which names of models have not")
+    return DelayedStateSpace(
+        ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False),
+        before,
+        output_delay=behind,
+        fit=summary_from_json(content.get("fit")),
+        name=name,
+        inputs=inputs,
+        outputs=outputs,
+    )
+
+
+def _check_origin(content: object) -> None:
+    """Refuse foreign, later and edited files, and say which it is."""
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise FileFormatError(f"not a model file of ctrl_realize (its format is not {FORMAT!r})")
+    schema = content.get("schema")
+    if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
+        raise FileFormatError(f"schema {schema!r} is not known")
+    if schema > SCHEMA:
+        raise FileFormatError(
+            f"written by a later version: schema {schema}, this one reads up to {SCHEMA}; "
+            "update ctrl_realize"
+        )
+    stored = content.get("sha256")
+    if stored != _checksum(content):
+        raise FileFormatError(
+            "the checksum does not fit the content: the file was edited or damaged"
+        )
+
+
+def _checksum(content: Mapping[str, Any]) -> str:
+    """SHA-256 of the content in one canonical spelling, without the checksum itself."""
+    rest = {key: value for key, value in content.items() if key != "sha256"}
+    canonical = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(canonical.encode("ascii")).hexdigest()
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    """Versions of what computed; asked once, as a campaign writes thousands of models."""
+    versions = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            versions[package] = "unknown"
+    return versions
+
+
+def _refuse_constant(text: str) -> float:
+    raise ValueError(f"{text} is no finite number")
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) != len(pairs):
+        raise ValueError("a key is there twice")
+    return content

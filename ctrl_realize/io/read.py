@@ -1,0 +1,71 @@
+"""Columns from files of any kind, before anybody knows what they mean."""
+
+from __future__ import annotations
+
+import os
+
+from ..errors import FileFormatError
+from .checks import read_head, usable_file
+from .tables import Table
+from .text_options import TextOptions
+
+_NOT_READABLE = {
+    b"\x89HDF": "an HDF5 file (MATLAB's v7.3 is one): save with save(..., '-v7') or as CSV",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook: save it as CSV",
+    b"\x1f\x8b": "compressed with gzip: unpack it first",
+    b"BZh": "compressed with bzip2: unpack it first",
+    b"\xfd7zXZ": "compressed with xz: unpack it first",
+    b"7z\xbc\xaf": "a 7z archive: unpack it first",
+    b"\x80\x04\x95": "a Python pickle: these run code when read, and are not read here",
+    b"TDSm": "a LabVIEW TDMS file: export it as CSV",
+    b"%PDF": "a PDF document",
+}
+
+
+def read_table(
+    path: str | os.PathLike[str],
+    options: TextOptions,
+    *,
+    variable: str | None,
+    max_bytes: float,
+) -> Table:
+    """Read the columns of a text table, ``.npz``, ``.mat`` or Parquet file.
+
+    What kind of file it is, is told by its first bytes; the ending of its name only matters for
+    the oldest ``.mat`` files, which have no such mark.
+
+    Parameters
+    ----------
+    path : path-like
+    options : TextOptions
+        How text is written.
+    variable : str or None
+        The variable of a ``.mat`` or ``.npz`` file (a matrix or a struct) to use alone.
+    max_bytes : float
+        Largest size, in the file and unpacked.
+
+    Raises
+    ------
+    MissingFileError, FileFormatError, DataError
+    """
+    # each reader brings its own heavy library; none is loaded before it is needed
+    file = usable_file(path, max_bytes)
+    head = read_head(file, 128)
+    for mark, what in _NOT_READABLE.items():
+        if head.startswith(mark):
+            raise FileFormatError(f"{file} is {what}")
+    if head.startswith((b"PK\x03\x04", b"\x93NUMPY")):
+        from .containers.npz import read_npz
+
+        return read_npz(file, variable=variable, max_bytes=max_bytes)
+    if head.startswith(b"PAR1"):
+        from .containers.parquet import read_parquet
+
+        return read_parquet(file, max_bytes=max_bytes)
+    if head.startswith(b"MATLAB 5.0 MAT-file") or file.suffix.lower() == ".mat":
+        from .containers.mat import read_mat
+
+        return read_mat(file, variable=variable, max_bytes=max_bytes)
+    from .text.delimited import read_delimited
+
+    return read_delimited(file, options)

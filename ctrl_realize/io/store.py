@@ -1,0 +1,187 @@
+"""Finished rows of a campaign in a folder, so that a stopped run can go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from ..errors import DataError, FileFormatError, OptionError
+from ..identification.campaign.packed_model import PackedModel
+from ..identification.campaign.rows import CampaignRow, versions
+from ..results import Flag
+from .atomic import write_text
+from .checks import usable_file
+from .json_content import field
+from .models import MAX_MODEL_BYTES, model_from_text, model_to_text
+
+FORMAT = "ctrl_realize campaign row"
+SCHEMA = 3
+_INTERVALS = ("interval", "total_delay_interval")
+_NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain", "gain_std", "total_delay")
+
+MOST_TRIES = 2
+"""Times that a process may die over a record."""
+
+
+class CampaignStore:
+    """Folder that keeps the result of each record of a campaign as it is finished.
+
+    Each row is one JSON file, written whole or not at all, named by the SHA-256 of the record's
+    samples, of the settings and of the versions of this package, NumPy and SciPy, and holding that
+    of its own content; processes and machines that share the folder can write to it at once. What
+    another version has made, or a file that is damaged, is not taken: the record is identified
+    anew. Only this package's files are ever read, and no row is deleted. A record over which the
+    process was killed twice is not tried again: its row says so.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made if it is not there.
+
+    Raises
+    ------
+    OptionError
+        The path is a file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import ctrl_realize as cr
+    >>> records = [cr.bench.valve().step_record(16.0, seed) for seed in range(2)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     store = cr.CampaignStore(folder)
+    ...     first = cr.identify_campaign(records, method="paper", store=store)
+    ...     again = cr.identify_campaign(records, method="paper", store=store)
+    ...     print(len(store), bool((first.delays == again.delays).all()))
+    2 True
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.folder = Path(folder)
+        if self.folder.exists() and not self.folder.is_dir():
+            raise OptionError(f"{self.folder} is a file; a campaign store needs a folder")
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self.folder.glob("row-*.json"))
+
+    def __repr__(self) -> str:
+        return f"<CampaignStore {str(self.folder)!r}: {len(self)} rows>"
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"row-{key}.json"
+
+    def load(self, key: str) -> CampaignRow | None:
+        """Return the row kept under `key`; None if there is none, or its file is damaged."""
+        path = self._path(key)
+        try:
+            # what it holds may be the work of others: a pipe would never end
+            file = usable_file(path, 2 * MAX_MODEL_BYTES)
+            return _row_from(json.loads(file.read_text(encoding="utf-8")), key)
+        except (OSError, ValueError, TypeError, RecursionError):
+            # FileFormatError is a ValueError: whatever is wrong, the record is identified anew.
+            return None
+
+    def save(self, key: str, row: CampaignRow) -> CampaignRow:
+        """Keep a row that has a model; return it as `load` will, with a summary for its fit."""
+        system = row.system
+        assert system is not None
+        content = {
+            "format": FORMAT,
+            "schema": SCHEMA,
+            "key": key,
+            "versions": versions(),
+            "name": row.name,
+            # Infinity and NaN have no place in JSON; their text has.
+            "numbers": {name: repr(float(getattr(row, name))) for name in _NUMBERS},
+            **{name: [repr(float(end)) for end in getattr(row, name)] for name in _INTERVALS},
+            "flags": [[flag.code, flag.message] for flag in row.flags],
+            "warnings": list(row.warnings),
+            "model": json.loads(model_to_text(system)),
+        }
+        content["sha256"] = _checksum(content)
+        write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
+        return _row_from(content, key)
+
+    @contextmanager
+    def attempt(self, key: str) -> Iterator[None]:
+        """Note that the record with this key is being identified, as long as the block lasts.
+
+        A process that is killed in the block leaves the note, so that a record which exhausts the
+        memory is not tried for ever.
+
+        Raises
+        ------
+        DataError
+            The process has died twice over this record.
+        """
+        path = self.folder / f"tried-{key}.txt"
+        count = _count(path)
+        if count >= MOST_TRIES:
+            raise DataError(
+                f"the process was killed {count} times while it identified this record (most often "
+                f"the memory is exhausted); remove {path} to try again"
+            )
+        with suppress(OSError):  # a full disk costs the note, not the result
+            write_text(path, f"{count + 1}\n")
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                path.unlink()
+
+    def forget_attempts(self) -> None:
+        """Remove the notes of records under way: a caller who stops a run has killed nobody."""
+        for path in self.folder.glob("tried-*.txt"):
+            path.unlink(missing_ok=True)
+
+
+def _count(path: Path) -> int:
+    """Number in a note; none in one that is damaged or not there."""
+    try:
+        return int(usable_file(path, 100).read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return 0
+
+
+def _row_from(content: Any, key: str) -> CampaignRow:
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise FileFormatError("not a row of a campaign")
+    if content.get("schema") != SCHEMA or content.get("key") != key:
+        raise FileFormatError("a row of another format, or under another name")
+    if content.get("versions") != versions():
+        raise FileFormatError("a row that other versions have made")
+    if content.get("sha256") != _checksum(content):
+        raise FileFormatError("the checksum does not fit the content")
+    numbers: dict[str, Any] = {
+        name: float(text)
+        for name, text in field(content, "numbers", dict).items()
+        if name in _NUMBERS
+    }
+    intervals: dict[str, Any] = {}
+    for name in _INTERVALS:
+        low, high = (float(text) for text in field(content, name, list))
+        intervals[name] = (low, high)
+    system = model_from_text(json.dumps(field(content, "model", dict)))
+    flags = tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list))
+    if system.fit is not None and system.fit.flags == flags:
+        flags = system.fit.flags  # once in memory
+    return CampaignRow(
+        name=field(content, "name", str),
+        **numbers,
+        **intervals,
+        model=PackedModel.of(system),
+        flags=flags,
+        warnings=tuple(str(text) for text in field(content, "warnings", list)),
+    )
+
+
+def _checksum(content: dict[str, Any]) -> str:
+    """SHA-256 of a row in one canonical spelling, without the checksum itself."""
+    rest = {name: value for name, value in content.items() if name != "sha256"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode("ascii")).hexdigest()

@@ -1,0 +1,1 @@
+"""Text tables: dialects, headers, cells."""

@@ -1,0 +1,165 @@
+"""Text tables: parsed by pandas, after `sniff` has found out how they are written."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import warnings
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from ...errors import DataWarning, FileFormatError
+from ..cells import NUMBER, split_line
+from ..checks import read_tail
+from ..tables import Column, Table
+from ..text_options import TextOptions
+from .sniff import TextLayout, sniff
+
+_TAIL_BYTES = 1 << 16
+_TAIL_LINES = 50
+
+
+def read_delimited(path: Path, options: TextOptions) -> Table:
+    """Read a text table (CSV, TSV, columns between blanks).
+
+    A last line that was cut off while it was written is left out with a `DataWarning`.
+
+    Raises
+    ------
+    FileFormatError
+        If it is not a table: binary, no numbers, rows longer than the others.
+    """
+    layout = sniff(path, options)
+    frame = _parse(path, layout)
+    _check_parsed(path, layout, frame)
+    cut = _cut_last_line(path, layout)
+    if cut and len(frame) > 1:
+        warnings.warn(f"{path}: the last line is left out, {cut}", DataWarning, stacklevel=4)
+        # columns that are text only because of the cut line become numbers in Table.numbers
+        frame = frame.iloc[:-1]
+    while len(frame) and _is_blank(frame.iloc[-1]):
+        frame = frame.iloc[:-1]
+    columns = [
+        Column(layout.names[k], layout.units[k], frame.iloc[:, k].to_numpy())
+        for k in range(layout.n_columns)
+    ]
+    if len(columns) > 1 and not columns[-1].name and _is_blank(columns[-1].cells):
+        # every line ends in a delimiter
+        columns.pop()
+    return Table(
+        path, tuple(columns), decimal=layout.decimal, place=lambda row: _place(path, layout, row)
+    )
+
+
+def _parse(path: Path, layout: TextLayout) -> Any:
+    import pandas as pd
+
+    separator = r"\s+" if layout.delimiter == " " else layout.delimiter
+    keywords: dict[str, Any] = {"low_memory": False}
+    if not (layout.delimiter + (layout.comment or "")).isascii():
+        # the faster parser knows signs of one byte alone
+        keywords = {"engine": "python"}
+    elif tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1):
+        # the default of later versions; before, the last digit could be wrong
+        keywords["float_precision"] = "round_trip"
+    try:
+        with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
+            # Not by skiprows: the parser counts lines in its own way, and would leave out more.
+            file.read(layout.start)
+            frame = pd.read_csv(
+                file,
+                sep=separator,
+                decimal=layout.decimal,
+                header=None,
+                comment=layout.comment,
+                # numbers are ASCII in all encodings here; a wrong letter in a name does no harm
+                skipinitialspace=True,
+                # an empty cell or a "NaN" makes its column text, and is complained about there
+                na_filter=False,
+                **keywords,
+            )
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeError, OverflowError) as error:
+        reason = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        # it counts from where we let it begin
+        reason = re.sub(
+            r"\bline (\d+)", lambda found: f"line {int(found[1]) + layout.first_line}", reason
+        )
+        raise FileFormatError(f"{path} is not a table: {reason}") from error
+    if frame.shape[1] != layout.n_columns:
+        raise FileFormatError(
+            f"{path}: line {layout.first_line + 1} has {frame.shape[1]} cells, most lines have "
+            f"{layout.n_columns}; say delimiter=, or skip_rows= if the table starts further down"
+        )
+    return frame
+
+
+def _check_parsed(path: Path, layout: TextLayout, frame: Any) -> None:
+    """Compare what was parsed with what was seen of the file: no sample is lost without a word."""
+    pattern = NUMBER[layout.decimal]
+    for column, cell in enumerate(layout.first_row[: frame.shape[1]]):
+        parsed = frame.iloc[0, column]
+        same = str(parsed).strip() == cell or not pattern.fullmatch(cell)
+        if not same and not isinstance(parsed, str):
+            same = float(parsed) == float(cell.replace(",", "."))
+        if not same:
+            raise FileFormatError(
+                f"{path}: line {layout.first_line + 1} begins the data, and its cell {cell!r} was "
+                f"read as {str(parsed)[:60]!r}; are its quotes and line ends in order?"
+            )
+    if layout.whole and len(frame) < layout.n_rows:
+        raise FileFormatError(
+            f"{path} has {layout.n_rows} lines of data, of which {len(frame)} were read; are its "
+            "quotes and line ends in order?"
+        )
+
+
+def _is_blank(cells: Any) -> bool:
+    return all(isinstance(cell, str) and not cell.strip() for cell in cells)
+
+
+def _cut_last_line(path: Path, layout: TextLayout) -> str:
+    """Say how one sees that the last line was cut off while it was written, or ``""``."""
+    raw = read_tail(path, _TAIL_BYTES)
+    # the mark at the start is not in the tail, and UTF-16 without it is told by its zeros
+    encoding = layout.encoding
+    if encoding == "utf-16":
+        encoding = "utf-16-be" if raw[:64:2].count(0) > raw[1:64:2].count(0) else "utf-16-le"
+    text = codecs.getincrementaldecoder(encoding)("replace").decode(raw)
+    lines = [line for line in re.split(r"\r\n|\n|\r", text)[-_TAIL_LINES:] if line.strip()]
+    if layout.comment:
+        lines = [line for line in lines if not line.lstrip().startswith(layout.comment)]
+    # Zeros are what a writer that was stopped leaves behind: at the end they are a cut line.
+    rows = [split_line(line.rstrip("\0"), layout.delimiter) for line in lines]
+    before, last = [row for row in rows[:-1] if any(row)], rows[-1] if rows else []
+    if not before:
+        return ""
+    if len(last) < min(layout.n_columns, len(before[-1])):
+        return f"it has {len(last)} of {layout.n_columns} cells"
+    if text.endswith(("\n", "\r")) or len(last) != layout.n_columns:
+        return ""
+    pattern = NUMBER[layout.decimal]
+    if not pattern.fullmatch(last[-1]) and pattern.fullmatch(before[-1][-1]):
+        return f"it ends in {last[-1][:20]!r} and has no line end"
+    # written with a fixed number of decimals, except here: 27.02 of 27.0223
+    ends = [row[-1] for row in before if pattern.fullmatch(row[-1])]
+    decimals = {len(end.partition(layout.decimal)[2]) for end in ends}
+    written = len(last[-1].partition(layout.decimal)[2])
+    if len(ends) >= 3 and len(decimals) == 1 and written < min(decimals):
+        return f"it ends in {last[-1]!r}, with fewer decimals than all others and no line end"
+    return ""
+
+
+def _place(path: Path, layout: TextLayout, row: int) -> str:
+    """Line of the file on which a row of the table stands."""
+    with path.open(encoding=layout.encoding, errors="replace") as file:
+        numbered = enumerate(file, start=1)
+        data = (
+            number
+            for number, line in numbered
+            if number > layout.first_line
+            and line.strip()
+            and not (layout.comment and line.lstrip().startswith(layout.comment))
+        )
+        number = next(islice(data, row, None), None)
+    return f"row {row}" if number is None else f"line {number}"

@@ -1,0 +1,109 @@
+"""Where the data of a text table begin, and what stands above them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import FileFormatError
+from ..cells import DELIMITERS, FILLED, kind_of, split_line
+from ..checks import MAX_NAME
+from ..units import is_units_line, plain_unit, split_unit
+
+
+@dataclass(frozen=True, eq=False)
+class Head:
+    """The first lines, cut into cells: ``cells[k]`` are those of physical line ``rows[k]``."""
+
+    path: Path
+    lines: list[str]
+    rows: list[int]
+    cells: list[list[str]]
+    delimiter: str
+    decimal: str
+    comment: str | None
+    width: int
+
+    def kinds(self, row: int) -> list[str]:
+        """Tell what the cells of a line look like."""
+        return [kind_of(cell, self.decimal) for cell in self.cells[row]]
+
+
+def first_data_row(head: Head, header: bool | str) -> int:
+    """Position in ``head.rows`` of the first line of data."""
+    last = len(head.rows) - 1
+    # of each line the kinds of its cells; none of one that does not fit the columns
+    lines = [
+        head.kinds(row) if len(cells) == head.width else [] for row, cells in enumerate(head.cells)
+    ]
+    lower = [line for line in lines[len(lines) // 2 :] if line]
+    numeric = [
+        column
+        for column in range(head.width)
+        if 2 * sum(line[column] in FILLED for line in lower) >= len(lower)
+    ]
+    # part of the columns of numbers in which a line has a number
+    share = [
+        sum(line[column] in FILLED for column in numeric) / max(len(numeric), 1) if line else 0.0
+        for line in lines
+    ]
+    if header is True:
+        has_units = last > 1 and share[1] == 0 and is_units_line(head.cells[1])
+        return min(2 if has_units else 1, last)
+    first = next((row for row, part in enumerate(share) if part == 1), last)
+    # a line above with some numbers is a bad line of data, to be complained about, not a header
+    while first > 0 and share[first - 1] > 0:
+        first -= 1
+    return first
+
+
+def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
+    """Names and units of the columns, from the lines above the first one of data."""
+    texts = [_header_cells(head, row, first) for row in range(first)]
+    names = texts[-1] if texts else None
+    if names is not None:
+        above = texts[-2] if len(texts) > 1 else None
+        if above is not None and is_units_line(names):
+            return above, [plain_unit(cell) for cell in names]
+    elif texts and len(head.cells[first - 1]) > 1:
+        raise FileFormatError(
+            f"line {head.rows[first - 1] + 1} of {head.path} has {len(head.cells[first - 1])} "
+            f"cells, the lines below have {head.width}; say delimiter=, decimal=, skip_rows=, "
+            "or header=False and column numbers"
+        )
+    else:
+        names = _names_in_comments(head, head.rows[first])
+    return names, [split_unit(name[:MAX_NAME])[1] for name in names]
+
+
+def _header_cells(head: Head, row: int, first: int) -> list[str] | None:
+    """Cells of a line above the data, or None if they do not fit the columns."""
+    cells = head.cells[row]
+    if len(cells) == head.width:
+        return cells
+    if len(cells) == head.width - 1 > 1 and not any(
+        line[-1] for line in head.cells[first:] if len(line) == head.width
+    ):
+        # the lines of data end in a delimiter, the header does not
+        return [*cells, ""]
+    # names with blanks in them, above columns that are split at blanks
+    apart = re.split(r"\t+|\s{2,}", head.lines[head.rows[row]].strip())
+    return apart if len(apart) == head.width else None
+
+
+def _names_in_comments(head: Head, first_line: int) -> list[str]:
+    """Take the last comment line above the data that has a name for each column."""
+    comments = [
+        line.strip().strip(head.comment).strip()
+        for line in head.lines[:first_line]
+        if head.comment and line.lstrip().startswith(head.comment)
+    ]
+    for line in reversed(comments):
+        for delimiter in (head.delimiter, *DELIMITERS):
+            cells = split_line(line, delimiter)
+            if len(cells) == head.width and not any(
+                kind_of(cell, ".") == "number" for cell in cells
+            ):
+                return cells
+    return [""] * head.width

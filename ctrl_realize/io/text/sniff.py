@@ -1,0 +1,155 @@
+"""Find out how a text table is written, from its first lines.
+
+The rules, in the order in which they are applied; every one can be overruled by the caller:
+
+1. The encoding is told by the byte order mark, by zero bytes in every other place (UTF-16), or
+   by the text being valid UTF-8; otherwise it is Latin-1.
+2. The delimiter and the decimal sign are the pair for which the largest part of the cells in
+   the lower half of the first lines are numbers or times.
+3. The data begin with the line from which on all columns that hold numbers do so.
+4. The header is the line above, if it has as many cells and no numbers in them; a line of units
+   may lie between. Without one, the last comment line above the data is tried (NumPy's
+   ``savetxt`` writes its header so).
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import FileFormatError
+from ..cells import DELIMITERS, FILLED, kind_of, refuse_thousands, split_line
+from ..checks import MAX_COLUMNS, MAX_NAME, read_head
+from ..head_lines import HEAD_BYTES, MAX_HEAD_LINES, head_lines
+from ..text_options import TextOptions
+from .header import Head, column_names, first_data_row
+
+_SAMPLE_LINES = 60
+"""Lines that every pair of delimiter and decimal sign is tried on."""
+
+_BOMS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    # before that of UTF-16, with which it begins
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """How a text table is written.
+
+    ``names`` and ``units`` have ``n_columns`` entries; the names are empty without a header.
+    The data begin with physical line ``first_line`` (0-based), behind ``start`` characters, and
+    ``first_row`` are the cells of its first line. ``n_rows`` lines of data were seen, all of them
+    where ``whole`` is true.
+    """
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    comment: str | None
+    first_line: int
+    n_columns: int
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    start: int
+    first_row: tuple[str, ...]
+    n_rows: int
+    whole: bool
+
+
+def sniff(path: Path, options: TextOptions) -> TextLayout:
+    """Find out how the text table in `path` is written.
+
+    Raises
+    ------
+    FileFormatError
+        If it is not text, or no columns of numbers are found in its first lines.
+    """
+    head_bytes = read_head(path, HEAD_BYTES)
+    encoding = _encoding(path, head_bytes) if options.encoding == "auto" else options.encoding
+    found = head_lines(path, head_bytes, encoding, options.skip_rows)
+    lines = [line.text for line in found]
+    comment = _comment(lines) if options.comment == "auto" else options.comment
+    rows = [
+        index
+        for index in range(len(lines))
+        if found[index].number >= options.skip_rows
+        and lines[index].strip()
+        and not (comment and lines[index].lstrip().startswith(comment))
+    ]
+    if not rows:
+        raise FileFormatError(f"{path} has no lines of data in its first {len(head_bytes)} bytes")
+    lower = [lines[index] for index in rows[len(rows) // 2 :]]
+    delimiter, decimal = _delimiter_and_decimal(path, lower[:_SAMPLE_LINES], options)
+    cells = [split_line(lines[index], delimiter) for index in rows]
+    width = Counter(map(len, cells[len(rows) // 2 :])).most_common(1)[0][0]
+    if width > MAX_COLUMNS:
+        raise FileFormatError(f"{path} has {width} columns, at most {MAX_COLUMNS} are read")
+    head = Head(path, lines, rows, cells, delimiter, decimal, comment, width)
+    first = first_data_row(head, options.header)
+    names, units = ([""] * width,) * 2 if options.header is False else column_names(head, first)
+    names = [re.sub(r"\s*[\r\n]\s*", " ", name)[:MAX_NAME] for name in names]
+    if decimal == "," and options.decimal == "auto":
+        refuse_thousands(path, cells[first:], delimiter)
+    begin = found[rows[first]]
+    whole = len(head_bytes) < HEAD_BYTES and len(lines) < MAX_HEAD_LINES
+    return TextLayout(
+        encoding, delimiter, decimal, comment, begin.number, width, tuple(names), tuple(units),
+        begin.start, tuple(cells[first]), len(rows) - first, whole,
+    )  # fmt: skip
+
+
+def _encoding(path: Path, head: bytes) -> str:
+    for mark, encoding in _BOMS:
+        if head.startswith(mark):
+            return encoding
+    if b"\0" in head:
+        # numbers in UTF-16 have a zero in every second byte, and nowhere else
+        for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+            if head[first::2].count(0) > 0.9 * (len(head) // 2) and 0 not in head[1 - first :: 2]:
+                return encoding
+        head_text = head.rstrip(b"\0")
+        if b"\0" in head_text or not head_text:
+            raise FileFormatError(
+                f"{path} is binary; text (CSV, TSV), .npz, .mat and Parquet can be read"
+            )
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _comment(lines: list[str]) -> str | None:
+    starts = Counter(line.lstrip()[0] for line in lines if line.strip())
+    return max("#%", key=lambda sign: starts[sign]) if starts["#"] + starts["%"] else None
+
+
+def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) -> tuple[str, str]:
+    delimiters = DELIMITERS if options.delimiter == "auto" else (options.delimiter,)
+    decimals = (".", ",") if options.decimal == "auto" else (options.decimal,)
+    best, best_score = ("", ""), (0.0, False)
+    for delimiter in delimiters:
+        rows = [split_line(line, delimiter) for line in sample]
+        width = Counter(map(len, rows)).most_common(1)[0][0]
+        for decimal in decimals:
+            kinds = [kind_of(cell, decimal) for row in rows if len(row) == width for cell in row]
+            good = sum(kind in FILLED for kind in kinds)
+            filled = sum(map(len, rows)) - kinds.count("missing")
+            # one column of whole lines counts only if no delimiter splits them into numbers
+            score = (round(good / max(filled, 1), 3), width > 1)
+            if good and score > best_score:
+                best, best_score = (delimiter, decimal), score
+    if best_score[0] < 0.3:
+        raise FileFormatError(
+            f"{path} has no columns of numbers that could be found; a line in its first ones is "
+            f"{sample[0][:60]!r}; try delimiter=, decimal= and skip_rows="
+        )
+    return best

@@ -1,0 +1,75 @@
+"""The Cramer-Rao bound of a dead time in a step experiment."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import ComplexArray, FloatArray
+from .separable.poles import parameters_from_poles
+from .separable.profile import delay_error
+from .separable.responses import MoveTrain
+from .separable.structures import Candidate
+from .separable.varpro import KnownFactor, Problem, Structure, respond
+
+
+def delay_bound(
+    poles: ComplexArray,
+    numerator: FloatArray,
+    delay: float,
+    dt: float,
+    samples: tuple[int, int],
+    sigma: float,
+    *,
+    superfluous_zeros: int = 0,
+    known: KnownFactor | None = None,
+) -> float:
+    """Smallest standard error of any unbiased estimate of the dead time, in s.
+
+    The step is ideal, the noise white; poles, numerator and offset are unknown as well.
+
+    Parameters
+    ----------
+    poles : ndarray, shape (n,)
+        Of the plant, stable.
+    numerator : ndarray, shape (m + 1,)
+        Of the plant over the monic denominator, lowest power first.
+    delay, dt : float
+        Dead time and sample time in s.
+    samples : tuple of int
+        How many before the step, and from the step on.
+    sigma : float
+        Standard deviation of the noise.
+    superfluous_zeros : int, optional
+        Zeros of the assumed model that the plant does not have. With one or more there is no
+        information on the dead time: a numerator that is freer than the plant's imitates it.
+    known : KnownFactor, optional
+        Known dynamics in cascade.
+
+    Returns
+    -------
+    float
+        Infinite where there is no information.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.cramer_rao import delay_bound
+    >>> pole = -2 * np.pi * np.array([2.0 + 0j])
+    >>> gain = np.array([2 * np.pi * 2.0])
+    >>> error = delay_bound(pole, gain, 0.03, 1 / 1280, (1000, 1100), 0.01)
+    >>> bool(0.1 < error * 1280 < 0.3)
+    True
+    >>> delay_bound(pole, gain, 0.03, 1 / 1280, (1000, 1100), 0.01, superfluous_zeros=1)
+    inf
+    """
+    before, after = samples
+    count = before + after
+    time = dt * np.arange(-before, after, dtype=np.float64)
+    single = np.ones(count, dtype=np.int64)
+    drive = MoveTrain(time, single, dt, np.zeros(1), np.ones(1))
+    factor = known or KnownFactor()
+    parameters = np.concatenate([[delay], parameters_from_poles(poles)])
+    model = respond(drive, factor, numerator, parameters)
+    structure = Structure(poles.size, poles.size - numerator.size + 1 - superfluous_zeros)
+    problem = Problem(model, np.ones(count), drive, np.ones((count, 1)), factor)
+    return delay_error(problem, Candidate(structure, parameters, 0.0), sigma**2)

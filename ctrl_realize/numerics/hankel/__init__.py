@@ -1,0 +1,1 @@
+"""Hankel matrices of Markov parameters, their singular values, and Kung's realization."""

@@ -1,0 +1,97 @@
+"""Misfit of many models at once: integrated absolute error.
+
+Model responses come from block powers: ``C A^(i + L j) B`` is the product of
+``[C; C A; ...; C A^(L-1)]`` and ``[B, A^L B, ...]``, both built by doubling.
+No eigenvectors are needed, so defective and unstable models are fine, and no
+transfer function, whose coefficients lose all digits at order 10.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+
+
+def markov_stack(A: FloatArray, B: FloatArray, C: FloatArray, count: int) -> FloatArray:
+    """Compute ``C B, C A B, ...`` for many models.
+
+    Parameters
+    ----------
+    A, B, C : ndarray, shapes (D, k, k), (D, k), (D, k)
+    count : int
+        Number of parameters.
+
+    Returns
+    -------
+    ndarray, shape (D, count)
+        Not finite where an unstable model leaves the range of floats.
+    """
+    models, order = B.shape
+    block = 1 << max(0, int(np.ceil(0.5 * np.log2(max(count, 1)))))
+    rows = np.empty((models, block, order))
+    rows[:, 0] = C
+    power = A
+    have = 1
+    while have < block:
+        np.matmul(rows[:, :have], power, out=rows[:, have : 2 * have])
+        power = np.matmul(power, power)
+        have *= 2
+    needed = -(-count // block)
+    columns = np.empty((models, order, needed))
+    columns[:, :, 0] = B
+    have = 1
+    while have < needed:
+        more = min(have, needed - have)
+        np.matmul(power, columns[:, :, :more], out=columns[:, :, have : have + more])
+        power = np.matmul(power, power)
+        have += more
+    response: FloatArray = np.matmul(columns.transpose(0, 2, 1), rows.transpose(0, 2, 1))
+    return response.reshape(models, -1)[:, :count]
+
+
+def integrated_absolute_error(
+    markov: FloatArray,
+    delays: IntArray,
+    models: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+) -> FloatArray:
+    """Sum ``|G[k] - model[k]|`` over one fixed window for models with delays.
+
+    Parameters
+    ----------
+    markov : ndarray, shape (W,)
+        Markov parameters; the window is all of them, the same for every
+        delay. (A window that starts at the delay would let a large delay
+        skip the onset, where the misfit is.)
+    delays : ndarray of int, shape (D,)
+        Delay of each model in samples.
+    models : tuple (A, B, C, D)
+        Arrays of shapes (D, k, k), (D, k), (D, k), (D,).
+
+    Returns
+    -------
+    ndarray, shape (D,)
+        Infinite for models whose response leaves the range of floats.
+    """
+    A, B, C, D = models
+    window = markov.size
+    first, last = int(delays.min()), int(delays.max())
+    count = window - 1 - first
+    padded = np.zeros(window + last)
+    padded[:window] = markov
+    shifted = np.lib.stride_tricks.sliding_window_view(padded, count)
+    in_a_row = np.array_equal(delays, np.arange(first, last + 1))
+    data = shifted[first + 1 : last + 2] if in_a_row else shifted[delays + 1]
+    with np.errstate(over="ignore", invalid="ignore"):
+        difference = markov_stack(A, B, C, count)
+        np.subtract(difference, data, out=difference)
+        np.abs(difference, out=difference)
+        # a model behind a long delay reaches beyond the window
+        end = window - 1 - last
+        beyond = np.arange(end, count) >= (window - 1 - delays)[:, np.newaxis]
+        difference[:, end:][beyond] = 0.0
+        misfit: FloatArray = difference.sum(axis=1)
+    misfit += np.concatenate([[0.0], np.cumsum(np.abs(markov))])[delays]
+    misfit += np.abs(markov[delays] - D)
+    misfit[~np.isfinite(misfit)] = np.inf
+    return misfit

@@ -1,0 +1,1 @@
+"""Closed loops: crossings of a response, and circles around points of it."""

@@ -1,0 +1,135 @@
+"""Closed-loop time responses from frequency responses, whatever the delay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+
+DAMPING = 1e6
+"""Growth of the circle's radius over the record: what wraps around is divided by this, and
+rounding multiplied."""
+
+
+def damped_circle(count: int) -> ComplexArray:
+    """Points of the z-plane for `response_on_circle`: a circle a little outside the unit one.
+
+    Returns
+    -------
+    ndarray, shape (count // 2 + 1,)
+    """
+    radius = DAMPING ** (1 / count)
+    angles = 2j * np.pi * np.arange(count // 2 + 1) / count
+    return np.asarray(radius * np.exp(angles), dtype=np.complex128)
+
+
+def response_on_circle(values: ComplexArray, count: int) -> FloatArray:
+    """Inverse z-transform of values on `damped_circle(count)`.
+
+    Right to about 1e-6 of the signal's size for every signal that does not grow faster than
+    the circle; the error is largest at the end of the record.
+
+    Parameters
+    ----------
+    values : ndarray, shape (count // 2 + 1,)
+    count : int
+
+    Returns
+    -------
+    ndarray, shape (count,)
+    """
+    growth = DAMPING ** (np.arange(count) / count)
+    return np.asarray(np.fft.irfft(values, count) * growth, dtype=np.float64)
+
+
+def step_on_circle(values: ComplexArray, z: ComplexArray, count: int) -> FloatArray:
+    """Response to a unit step at k = 0 of a system known on the circle, shape (count,)."""
+    return response_on_circle(values * z / (z - 1), count)
+
+
+def gain_gaps(shape: ComplexArray, distance: float) -> list[tuple[float, float]]:
+    """Ranges of k > 0 in which |1 + k L| >= distance holds at all frequencies.
+
+    Stability is the same all over such a range, since -1 is nowhere met.
+
+    Returns
+    -------
+    list of (low, high)
+        Rising; the last `high` is inf.
+    """
+    square = np.abs(shape) ** 2
+    real = shape.real
+    inside = real**2 - square * (1 - distance**2)
+    enters = (inside >= 0) & (real < 0) & (square > 0)
+    root = np.sqrt(inside[enters])
+    low = (1 - distance**2) / (-real[enters] + root)
+    high = (-real[enters] + root) / square[enters]
+    order = np.argsort(low)
+    low = np.append(low[order], np.inf)
+    reached = np.maximum.accumulate(np.concatenate([[0.0], high[order]]))
+    open_ = low > reached
+    return list(zip(reached[open_].tolist(), low[open_].tolist(), strict=True))
+
+
+def largest_gain(shape: ComplexArray, distance: float) -> tuple[float, int]:
+    r"""Largest K such that |1 + k L| >= distance for all 0 <= k <= K and all frequencies.
+
+    At each frequency the condition is a quadratic in k: ``|L|^2 k^2 + 2 Re(L) k + 1 - distance^2``
+    has its first positive root where the loop enters the circle around -1. A loop that is stable
+    for small gains then stays so up to K.
+
+    Parameters
+    ----------
+    shape : ndarray, shape (K,)
+        L at gain 1.
+    distance : float
+        0 < distance < 1.
+
+    Returns
+    -------
+    gain : float
+        inf if no gain reaches the circle.
+    at : int
+        Index of the frequency that decides.
+    """
+    square = np.abs(shape) ** 2
+    real = shape.real
+    inside = real**2 - square * (1 - distance**2)
+    enters = (inside >= 0) & (real < 0) & (square > 0)
+    if not enters.any():
+        return float("inf"), 0
+    gains = np.full(shape.size, np.inf)
+    # The rationalized root: no cancellation where the circle is only touched.
+    gains[enters] = (1 - distance**2) / (-real[enters] + np.sqrt(inside[enters]))
+    at = int(np.argmin(gains))
+    return float(gains[at]), at
+
+
+def smallest_on_line(
+    function: Callable[[float], float], low: float, high: float, points: int = 16
+) -> tuple[float, float]:
+    """Minimize over a logarithmic range: a scan, then golden sections around the best point.
+
+    Returns
+    -------
+    argument, value : float
+    """
+    grid = np.geomspace(low, high, points)
+    values = [function(float(x)) for x in grid]
+    best = int(np.argmin(values))
+    a, b = np.log(grid[max(best - 1, 0)]), np.log(grid[min(best + 1, points - 1)])
+    ratio = (np.sqrt(5) - 1) / 2
+    c, d = b - ratio * (b - a), a + ratio * (b - a)
+    at_c, at_d = function(float(np.exp(c))), function(float(np.exp(d)))
+    while b - a > 1e-4:
+        if at_c < at_d:
+            b, d, at_d = d, c, at_c
+            c = b - ratio * (b - a)
+            at_c = function(float(np.exp(c)))
+        else:
+            a, c, at_c = c, d, at_d
+            d = a + ratio * (b - a)
+            at_d = function(float(np.exp(d)))
+    return (float(np.exp(c)), at_c) if at_c < at_d else (float(np.exp(d)), at_d)

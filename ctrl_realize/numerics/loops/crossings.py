@@ -1,0 +1,158 @@
+"""Crossings and closest points of a frequency response that is known at any frequency.
+
+Everything works on a function of frequency, not on a polynomial: each crossing is bracketed on a
+grid that follows the curve, then found by root finding on the curve itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import elementwise
+
+from ..arrays import ComplexArray, FloatArray
+
+Curve = Callable[[FloatArray], ComplexArray]
+
+POINTS_PER_TURN = 16
+MAX_REFINEMENTS = 24
+
+
+def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: float) -> FloatArray:
+    """Place frequencies where a response can turn.
+
+    Parameters
+    ----------
+    low, top : float
+        First and last frequency in rad/s, 0 < low < top.
+    features : ndarray, shape (F,)
+        Poles and zeros in the s-plane, rad/s; points are gathered around those near the
+        imaginary axis.
+    turn_time : float
+        Delay in s that turns the phase; it gets 16 points per turn.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+        Rising frequencies from `low` to `top`.
+    """
+    decades = max(np.log10(top / low), 0.1)
+    parts = [
+        np.geomspace(low, top, int(40 * decades) + 2),
+        np.linspace(low, top, int(POINTS_PER_TURN * turn_time * top / (2 * np.pi)) + 200),
+    ]
+    spread = np.sinh(np.linspace(-4, 4, 41))
+    for s in features:
+        centre, width = abs(s.imag), abs(s.real)
+        if low < centre < top and width < centre:
+            parts.append(centre + max(width, 1e-9 * centre) * spread)
+    grid = np.unique(np.concatenate(parts))
+    grid = grid[(grid >= low) & (grid <= top)]
+    # Twins, equal up to rounding, would close the bracket of a minimum beside them.
+    apart = np.diff(grid, prepend=-np.inf) > 1e-9 * grid
+    return np.asarray(grid[apart], dtype=np.float64)
+
+
+def follow(
+    curve: Curve, grid: FloatArray, largest_turn: float = 0.5
+) -> tuple[FloatArray, ComplexArray]:
+    """Refine a grid until the curve turns by less than `largest_turn` rad between its points.
+
+    Intervals whose ends differ by more than a factor of 2 in magnitude are halved too. A curve
+    through zero would need ever more points; the refinement then stops after 24 halvings.
+
+    Returns
+    -------
+    grid : ndarray, shape (K,)
+    values : ndarray, shape (K,)
+        ``curve(grid)``.
+    """
+    values = curve(grid)
+    for _ in range(MAX_REFINEMENTS):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = values[1:] / values[:-1]
+            coarse = (np.abs(np.angle(ratio)) > largest_turn) | (
+                np.abs(np.log(np.abs(ratio))) > 0.7
+            )
+        coarse &= np.isfinite(ratio) & (np.diff(grid) > 1e-13 * grid[1:])
+        if not coarse.any():
+            break
+        middle = 0.5 * (grid[:-1] + grid[1:])[coarse]
+        at = np.flatnonzero(coarse) + 1
+        grid = np.insert(grid, at, middle)
+        values = np.insert(values, at, curve(middle))
+    return grid, values
+
+
+def half_turns(values: ComplexArray) -> float:
+    """Count half turns about 0 along a curve whose neighbours differ by less than half a turn.
+
+    The curve starts next to the real axis (where a real system is at frequency 0) and is
+    counted from there.
+    """
+    steps = np.angle(values[1:] / values[:-1])
+    start = float(np.angle(values[0]))
+    offset = start - np.pi * np.round(start / np.pi)
+    return float((offset + steps.sum()) / np.pi)
+
+
+def _roots(
+    function: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray
+) -> FloatArray:
+    if low.size == 0:
+        return np.zeros(0)
+    found = elementwise.find_root(function, (low, high), tolerances={"xatol": 0.0, "xrtol": 1e-15})
+    roots = np.asarray(found.x, dtype=np.float64)
+    # Far down, rounding alone may have made the sign change; there is no root to find then.
+    return roots[np.isfinite(roots)]
+
+
+def unit_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> FloatArray:
+    """Frequencies where the magnitude crosses 1 (gain crossovers), rising."""
+    above = np.abs(values) > 1
+    at = np.flatnonzero(above[1:] != above[:-1])
+
+    def level(omega: FloatArray) -> FloatArray:
+        return np.log(np.abs(curve(omega)))
+
+    return _roots(level, grid[at], grid[at + 1])
+
+
+def negative_axis_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> FloatArray:
+    """Frequencies where the curve crosses the negative real axis (phase crossovers), rising."""
+    below = values.imag < 0
+    unit = values / np.abs(values)
+    left = (unit[1:] + unit[:-1]).real < 0
+    at = np.flatnonzero((below[1:] != below[:-1]) & left)
+
+    def height(omega: FloatArray) -> FloatArray:
+        point = curve(omega)
+        return np.asarray(point.imag / np.abs(point), dtype=np.float64)
+
+    return _roots(height, grid[at], grid[at + 1])
+
+
+def smallest_distance(curve: Curve, grid: FloatArray) -> tuple[float, float]:
+    """Smallest magnitude of a curve, and the frequency where it is reached.
+
+    The grid is first refined until neighbours differ by less than a factor of 2; every local
+    minimum within 30 % of the smallest value is then narrowed by nested grids.
+    """
+    grid, values = follow(curve, grid)
+    size = np.abs(values)
+    padded = np.concatenate([[np.inf], size, [np.inf]])
+    lows = np.flatnonzero((size <= padded[:-2]) & (size <= padded[2:]))
+    lows = lows[size[lows] <= 1.3 * size.min()]
+    lows = lows[np.argsort(size[lows])][:64]
+    left = grid[np.maximum(lows - 1, 0)]
+    right = grid[np.minimum(lows + 1, grid.size - 1)]
+    share = np.linspace(0, 1, 9)[:, None]
+    rows = np.arange(lows.size)
+    for _ in range(11):
+        points = left + (right - left) * share
+        heights = np.abs(curve(points.ravel())).reshape(points.shape)
+        best = np.argmin(heights, axis=0)
+        left, right = points[np.maximum(best - 1, 0), rows], points[np.minimum(best + 1, 8), rows]
+    column = int(np.argmin(heights[best, rows]))
+    return float(heights[best[column], column]), float(points[best[column], column])

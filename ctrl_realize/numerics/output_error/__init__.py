@@ -1,0 +1,1 @@
+"""Output-error estimation of models with dead time from time records."""

@@ -1,0 +1,72 @@
+"""Look beyond the structures that were asked for: would another one explain the record better?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..separable.profile_ends import profile_limits
+from ..separable.structures import ALL_STRUCTURES, PLAUSIBLE, Candidate, needless_charge, search
+from ..separable.varpro import Structure, evaluate
+from ..separable.window import WindowFit
+from .result import Better, profile_of
+
+_MOST_ORDER = ALL_STRUCTURES[-1].order
+
+
+def better_structure(
+    whole: WindowFit, given: Candidate, refit: Callable[[], WindowFit]
+) -> Better | None:
+    """Find what rules a given structure out, None where nothing does.
+
+    One pole more is tried first, from the given optimum on, which costs little; only where it
+    fits better by more than noise does is everything fitted again.
+
+    Parameters
+    ----------
+    whole : WindowFit
+        Of the structures that were asked for.
+    given : Candidate
+        The best of them.
+    refit : callable
+        Fit of the structures that are tried by default.
+    """
+    if not _lacks_a_pole(whole, given):
+        return None
+    free = refit()
+    best = free.best
+    if best.structure == given.structure:
+        return None
+    cost = _cost(free, given)
+    own = free.criteria({given.structure: Candidate(given.structure, given.parameters, cost)})
+    excess = own[given.structure] + needless_charge(given.structure)
+    excess -= free.criterion[best.structure] + needless_charge(best.structure)
+    # Too many poles are no reason: they leave as little.
+    if excess <= PLAUSIBLE or cost <= best.cost + PLAUSIBLE * free.variance:
+        return None
+    low, high = profile_limits(*profile_of(free, best))
+    total = free.static(best).total
+    return Better(best.structure, best.delay, total, low, high, float(excess))
+
+
+def _lacks_a_pole(whole: WindowFit, given: Candidate) -> bool:
+    n, r = given.structure.order, given.structure.relative_degree
+    if n >= _MOST_ORDER:
+        return False
+    # Without Huber's clipping towards the given model: what that misses may be what is sought.
+    problem = whole.window.problem
+    state = evaluate(problem, given.structure, given.parameters[None])
+    start = Candidate(given.structure, given.parameters, float(state.cost[0]))
+    richer = (Structure(n + 1, r + 1), Structure(n + 1, r))
+    found = search(problem, richer, whole.scales, {given.structure: start})
+    least = min(found[s].cost for s in richer)
+    # Against what the richer ones leave: the given one may leave much, and that correlated.
+    variance = least / max(problem.data.size - 2 * n - 4, 1)
+    return bool(start.cost - least > PLAUSIBLE * variance)
+
+
+def _cost(free: WindowFit, given: Candidate) -> float:
+    """Cost of the given structure on other data, from its optimum on."""
+    state = evaluate(free.problem, given.structure, given.parameters[None])
+    return float(np.asarray(state.cost)[0])

@@ -1,0 +1,94 @@
+"""Fit structures again where the noise of a step record is coloured, and known from its rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..separable.compared_fits import converged
+from ..separable.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
+from ..separable.varpro import Problem, Structure, evaluate, fit_batch
+from ..separable.window import WindowFit
+from ..signals.noise import correlation_time, mad_sigma
+from ..signals.noise_model import noise_covariance, whitener
+from .step_data import StepData, settled_at
+
+_COLOURED = 2.0  # samples at rest that count as one, from which on the noise is coloured
+_FEWEST = 100  # samples at rest, and
+_ENOUGH = 100_000  # of a kind, where there are more
+_TIMES = 8  # correlation times, that tell its colour
+_WILD = 5.0  # standard deviations at which samples are cut
+_NEAR = np.arange(-6, 6.5, 0.5)  # samples from the delay of before, where it starts again
+_ENDS = 4  # of these starts that are followed to the bottom
+_UNLIKE = 3.0
+"""Root mean square of the whitened residual, in that of the noise, from which on the response holds
+something that the noise does not: plain least squares are safer."""
+
+
+def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
+    """Fit by generalised least squares if the noise at rest is coloured, else return `whole`.
+
+    Noise that is white at rest stays so: what is coloured in the residual then is a misfit.
+    """
+    bins = whole.window.bins
+    if data.coarse or bins is None or whole.problem.stretches is not None:
+        return whole
+    error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+    rest = error[: data.edge]
+    if rest.size < _FEWEST:
+        return whole
+    samples = correlation_time(rest)
+    if samples < max(_COLOURED, 0.5 * whole.correlation) or rest.size < _TIMES * samples:
+        return whole
+    # Not the pseudo-values of Huber's loss: they bend what is smooth in the noise.
+    limit = _WILD * max(mad_sigma(error), whole.sigma)
+    plain = whole.window.with_output(whole.window.output - error + np.clip(error, -limit, limit))
+    covariance = noise_covariance(_quiet(error, data), error.size)
+    if covariance.size == 1:
+        return whole
+    problem = replace(plain, whitener=whitener(bins, covariance))
+    candidates = _fitted_again(whole, problem)
+    candidates = converged(problem, candidates, whole.scales, whole.sigma**2, whole.independent)
+    refit = replace(whole, problem=problem, candidates=candidates, colour=1.0)
+    chosen = candidates[choose(refit.criteria(candidates))]
+    lost = 1 + chosen.structure.order + chosen.structure.zeros + whole.window.columns.shape[1]
+    colour = chosen.cost / max(problem.data.size - lost, 1) / whole.sigma**2
+    if colour > _UNLIKE**2:
+        return whole
+    refit = replace(refit, colour=max(colour, 1.0))
+    return replace(refit, criterion=refit.criteria(candidates))
+
+
+def _fitted_again(whole: WindowFit, problem: Problem) -> dict[Structure, Candidate]:
+    """Fit all structures, from their optima of before and those next to them."""
+    found: dict[Structure, Candidate] = {}
+    for structure in sorted(whole.candidates, key=lambda s: (s.order, s.zeros)):
+        starts = _delays_near(problem, whole.candidates[structure], whole.scales)
+        starts += neighbour_starts(structure, whole.scales, found)
+        bounds = parameter_bounds(structure, whole.scales)
+        parameters, cost = fit_batch(problem, structure, np.array(starts), bounds)
+        order = np.argsort(cost)
+        best = order[0]
+        found[structure] = Candidate(
+            structure, parameters[best], float(cost[best]), parameters[order[1:_ENDS]], True
+        )
+    return found
+
+
+def _delays_near(problem: Problem, old: Candidate, scales: Scales) -> list[FloatArray]:
+    """Parameters of before, and the same at the two best delays around.
+
+    Where the noise is smooth the least corner tells: between any two samples is a minimum.
+    """
+    starts = np.tile(old.parameters, (_NEAR.size, 1))
+    starts[:, 0] = np.clip(old.delay + _NEAR * scales.dt, scales.earliest, scales.latest)
+    cost = evaluate(problem, old.structure, starts).cost
+    return [old.parameters, *starts[np.argsort(cost)[:2]]]
+
+
+def _quiet(error: FloatArray, data: StepData) -> FloatArray:
+    """Residual at rest, and in the later half of what comes when the response has settled."""
+    late = error[(settled_at(data) + error.size) // 2 :]
+    return np.concatenate([error[: data.edge][-_ENOUGH:], late[:_ENOUGH]])

@@ -1,0 +1,199 @@
+r"""Long records condensed to one row for each direction of the input that they excite.
+
+An output that follows the last L samples of the input, y = Phi g + e with white e, says of g no
+more than the sums R = Phi^T Phi and r = Phi^T y: up to a constant
+
+    |y - Phi g(theta)|^2 = |z - F g(theta)|^2,   R = F^T F,   z = F^-T r.
+
+So a model of any structure is fitted to L rows or fewer instead of to millions, and nothing is
+lost. What makes the noise white, an autoregression, is applied to input and output alike, which
+leaves g as it is. What came before a record matters to its first L samples alone: they are left
+out. A level of its own for every 2^17 samples takes slow drifts along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.signal import fftconvolve, lfilter
+
+from ..arrays import ComplexArray, FloatArray
+from ..regression.normal_equations import NormalEquations, normal_equations
+from ..separable.responses import Modes, SampledInput
+from ..signals.correlation import autoregression
+from ..signals.excitation import lively_start
+from ..signals.noise import mad_sigma
+
+MOST_LAGS = 1000
+"""Longest response, in samples, that is condensed: time goes with its square."""
+PER_LAG = 20
+"""Samples for each lag that a record must have."""
+_PIECE = 2**17
+_MOST_NOISE_LAGS = 25
+_EXCITED = 1e-10  # of the strongest direction of the input; rounding is 1e-15 of it
+_HUBER = 1.345
+_RIDGE = 1e-8
+_TURNS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedInput:
+    """Factor (m, L) of the sums of products of an input with itself at L lags."""
+
+    factor: FloatArray
+    dt: float
+
+    def pieces(self) -> list[CondensedInput]:
+        """All of it."""
+        return [self]
+
+    def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
+        """Evaluate H, E and T of a unit pulse, times the factor; see `HeldInput`."""
+        pulse = np.zeros(self.factor.shape[1])
+        pulse[0] = 1.0
+        static, mode, slope = SampledInput(pulse, self.dt).modes(tau, poles)
+        parts = [static[:, :, None], mode.real, mode.imag, slope.real, slope.imag]
+        wide = np.concatenate(parts, axis=2).transpose(1, 0, 2)
+        seen = self.factor @ wide.reshape(wide.shape[0], -1)
+        seen = seen.reshape(-1, *wide.shape[1:]).transpose(1, 0, 2)
+        count = poles.shape[1]
+        real, imag, turn, twist = (
+            seen[:, :, 1 + i * count : 1 + (i + 1) * count] for i in range(4)
+        )
+        return seen[:, :, 0], real + 1j * imag, turn + 1j * twist
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """What long records say about a pulse response of L samples.
+
+    Attributes
+    ----------
+    data : ndarray, shape (m,)
+        z; its noise is white, of standard deviation `noise`.
+    drive : CondensedInput
+    noise : float
+    samples : int
+        That were condensed.
+    noise_lags : int
+        Lags of the autoregression that makes the noise white.
+    """
+
+    data: FloatArray
+    drive: CondensedInput
+    noise: float
+    samples: int
+    noise_lags: int
+
+
+def condensed(
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    dt: float,
+    lags: int,
+    *,
+    huber: bool,
+) -> Condensed | None:
+    """Condense records of one plant; None where they are too short, or excite too little.
+
+    Parameters
+    ----------
+    outputs, inputs : sequence of ndarray
+        One of each for every record.
+    dt : float
+        Sample time in s.
+    lags : int
+        Samples within which the response ends.
+    huber : bool
+        Pull outliers of the residual of the free pulse response in: one Newton step of Huber's
+        loss from there (Huber and Ronchetti, Robust Statistics, 2nd ed., section 6.7).
+    """
+    if not 1 < lags <= MOST_LAGS or sum(y.size for y in outputs) < PER_LAG * lags:
+        return None
+    whiten, pulse = _noise_and_pulse(outputs, inputs, lags, huber=huber)
+    sums: NormalEquations | None = None
+    for y, u in _pieces(outputs, inputs, lags + whiten.size - 1):
+        white_y = lfilter(whiten, [1.0], y)[whiten.size - 1 :]
+        white_u = lfilter(whiten, [1.0], u)[whiten.size - 1 :]
+        if huber:
+            error = white_y[lags - 1 :] - fftconvolve(white_u, pulse, "valid")
+            white_y[lags - 1 :] += _pulled_in(error)
+        part = normal_equations(white_u[None], white_y[None], lags)
+        sums = part if sums is None else sums + part
+    if sums is None:
+        return None
+    power, axes = eigh(sums.gram)
+    excited = power > _EXCITED * power[-1]
+    root = np.sqrt(power[excited])
+    factor = root[:, None] * axes[:, excited].T
+    data = (axes[:, excited].T @ sums.cross[:, 0]) / root
+    freedom = sums.freedom - data.size
+    left = float(sums.power[0, 0] - data @ data)
+    if freedom < data.size or left <= 0:
+        return None
+    drive = CondensedInput(factor, dt)
+    noise = float(np.sqrt(left / freedom))
+    return Condensed(data, drive, noise, sums.rows, whiten.size - 1)
+
+
+def _noise_and_pulse(
+    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], lags: int, *, huber: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Autoregression of the noise, leading 1 included, and a first pulse response.
+
+    From the longest record, where its input moves: white noise first, then the noise that shows.
+    """
+    longest = int(np.argmax([y.size for y in outputs]))
+    y, u = outputs[longest], inputs[longest]
+    count = min(y.size, _PIECE)
+    start = lively_start(u[None], count)
+    y, u = (x[start : start + count] - np.mean(x[start : start + count]) for x in (y, u))
+    pulse = _free_pulse(y, u, lags, huber=huber)
+    error = y[lags - 1 :] - fftconvolve(u, pulse, "valid")
+    limit = 3 * mad_sigma(error)
+    centred = np.clip(error - np.median(error), -limit, limit)
+    whiten = np.concatenate([[1.0], -autoregression(centred, _MOST_NOISE_LAGS)])
+    y, u = (lfilter(whiten, [1.0], x)[whiten.size - 1 :] for x in (y, u))
+    return whiten, _free_pulse(y, u, lags, huber=huber)
+
+
+def _free_pulse(y: FloatArray, u: FloatArray, lags: int, *, huber: bool) -> FloatArray:
+    """Free pulse response, by least squares, and as many of Huber's steps as outliers need."""
+    pulse: FloatArray = np.zeros(0)
+    for _ in range(_TURNS if huber else 1):
+        pulled = y
+        if pulse.size:
+            pulled = y.copy()
+            pulled[lags - 1 :] += _pulled_in(y[lags - 1 :] - fftconvolve(u, pulse, "valid"))
+        sums = normal_equations(u[None], pulled[None], lags)
+        # what the input does not excite stays small
+        ridge = _RIDGE * float(np.trace(sums.gram)) / lags
+        found = np.linalg.solve(sums.gram + ridge * np.eye(lags), sums.cross[:, 0])
+        pulse = np.asarray(found, dtype=np.float64)
+    return pulse
+
+
+def _pieces(
+    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], past: int
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Stretches of all records, each with the past that its first row needs."""
+    for y, u in zip(outputs, inputs, strict=True):
+        if y.size <= 2 * past:
+            continue
+        rows = y.size - past + 1
+        count = -(-rows // _PIECE)
+        bounds = np.linspace(0, rows, count + 1).astype(int).tolist()
+        for first, last in pairwise(bounds):
+            yield y[first : last + past - 1], u[first : last + past - 1]
+
+
+def _pulled_in(error: FloatArray) -> FloatArray:
+    """What moves an output so that its least squares are Huber's."""
+    centred = error - np.median(error)
+    limit = _HUBER * mad_sigma(centred)
+    inside = float(np.mean(np.abs(centred) <= limit))
+    return np.asarray(np.clip(centred, -limit, limit) / max(inside, 0.5) - centred)

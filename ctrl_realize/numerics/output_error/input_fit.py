@@ -1,0 +1,335 @@
+"""Output-error fit for inputs that are no steps: random, pseudo-random, sweeps, operation.
+
+One record or several of one plant: poles, numerator and delay are common, level, drift and initial
+state are each record's own (see `own_terms`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..separable.compared_fits import converged, settled
+from ..separable.poles import parameters_from_poles, poles_from_parameters
+from ..separable.structures import Candidate, Scales, neighbour_starts, parameter_bounds, search
+from ..separable.varpro import KnownFactor, Problem, Structure, fit_batch, respond
+from ..separable.window import Window, WindowFit, extended, fit_window
+from ..signals.correlation import fit_percent
+from ..signals.noise import correlation_time, quantisation_step, winsorised_sigma
+from ..signals.onset import correlation_onset
+from ..validation.own_response import OwnResponse
+from .better_structure import better_structure
+from .condensed import MOST_LAGS, Condensed, condensed
+from .input_data import SampledData, cut
+from .interval import likelihood_fit
+from .result import OutputErrorFit
+from .selection import chains_of
+
+WHITE = 3.0
+"""Correlation time of the residual, in samples, up to which a model is taken for right."""
+
+ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
+MORE_LAGS = (Structure(4, 4), Structure(5, 5))
+"""Tried as well where three poles are chosen: zeros beside them imitate further lags."""
+_RISES = (2.0, 10.0, 50.0)
+_ONSETS = (1.0, 5.0, 20.0)
+_SMALLEST = 1e-4
+_CONFIDENCE = 0.99
+_UNLIKE = 1.3  # ratio of noise levels from which records are weighted
+_BEYOND = 1.5  # of a first-order model's delay: no model's delay is later
+_SLOW = 10.0  # times delay and lag: periods from there on tell little of the plant
+_SHORTEST = 40.0  # samples in such a period, lest there be as many cosines as samples
+_CALMER = 0.5  # of the variance, colour included, that must be left for them to be fitted along
+_TURNS = 6
+_DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
+_LEAST_LAGS = 30
+_CLEARLY = 4.0  # standard deviations of a chi-square
+_STRETCH = 0.01  # of the time constants, for a slope
+_FARTHEST = 2.0  # logarithm of a stretch that is extrapolated from it
+
+
+@dataclass(frozen=True, eq=False)
+class SampledFit:
+    """Fit of records with any input.
+
+    `fitted` has one entry for each record, from its start on. `explained` is how much the input
+    lowers the sum of squares, over the variance of the residual: a chi-square. Where the records
+    are longer than `data`, `condensed` is what was fitted of them.
+    """
+
+    fit: OutputErrorFit
+    data: SampledData
+    fitted: tuple[FloatArray, ...]
+    explained: float
+    known: KnownFactor
+    condensed: Condensed | None = None
+
+    def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
+        """Shift and scale the common model to fit one record best, seen before or not."""
+        one = cut([output], [signal], self.data.dt)
+        start = min(max(self.data.starts), output.size // 2)
+        return _own_delay(replace(one, starts=(start,)), self.fit, self.known)
+
+
+def fit_sampled(
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    dt: float,
+    *,
+    structures: Sequence[Structure] | None = None,
+    latest: float | None = None,
+    known: KnownFactor | None = None,
+    huber: bool = True,
+) -> SampledFit:
+    """Estimate the dead time of one plant from records with any input that moves.
+
+    Parameters
+    ----------
+    outputs, inputs : sequence of ndarray
+        One of each for every record.
+    dt : float
+        Sample time in s.
+    structures, latest, known, huber
+        See `fit_output_error`; orders up to 3 by default, `latest` a quarter of the longest
+        record.
+
+    Notes
+    -----
+    What was before a record is an initial state, which is eliminated with level and drift. What
+    was on its way through the dead time is not known: the first samples are left out, as many as
+    one and a half delays of the first-order model that fits best, half the record at most.
+    Where the residual is coloured and slow cosines take half of it, they are own terms as well.
+    """
+    factor = known or KnownFactor()
+    data = cut(outputs, inputs, dt)
+    n = max(y.size for y in data.outputs)
+    limit = 0.25 * n * dt if latest is None else latest
+    data = replace(data, starts=tuple(y.size // 20 for y in data.outputs))
+    rough = _first_order(data.problem(factor), n, dt, limit, _seen(data, limit))
+    lag = float(-1.0 / rough.poles[0].real)
+    late = int(np.ceil(_BEYOND * rough.delay / dt))
+    data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
+    scales = Scales(max(rough.delay, 0.5 * dt), max(lag, 2 * dt), max(data.counts) * dt, dt, limit)
+    tried = ORDERS if structures is None else tuple(structures)
+    whole = _fit(data, factor, tried, scales, huber)
+    levels = _noise_levels(data, whole)
+    if levels.max() > _UNLIKE * levels.min():
+        mean = float(np.exp(np.mean(np.log(levels))))
+        data = replace(data, scales=tuple(float(level) / mean for level in levels))
+        whole = _fit(data, factor, tried, scales, huber)
+    period = _SLOW * (rough.delay + lag)
+    if whole.correlation > WHITE and period >= _SHORTEST * dt:
+        without = replace(data, period=period)
+        calm = _fit(without, factor, tried, scales, huber)
+        if calm.variance < _CALMER * whole.variance:
+            data, whole = without, calm
+    stretch = whole
+    long = any(y.size > part.size for y, part in zip(outputs, data.outputs, strict=True))
+    sums = _condensed(outputs, inputs, data, stretch, huber) if long else None
+    if sums is not None:
+        whole = _fit_condensed(sums, stretch, factor)
+    if structures is None and whole.best.structure.order == ORDERS[-1].order:
+        whole = extended(whole, MORE_LAGS)
+    chains = chains_of(whole) if structures is None else []
+    fit = likelihood_fit(whole, adequate=whole.correlation <= WHITE, chains=chains)
+    if structures is not None:
+        # On the stretch also where all samples were fitted: what is ruled out there is so at all.
+        every = partial(_fit, data, factor, ORDERS, scales, huber)
+        fit = replace(fit, better=better_structure(stretch, stretch.best, every))
+    if sums is not None:
+        fit = replace(fit, fitted=_on_stretch(data, fit, factor))
+    elif fit.chain:
+        left = correlation_time(whole.window.output - fit.fitted)
+        fit = replace(fit, correlation=left, adequate=left <= WHITE)
+    # The noise is not known from a rest; correlation is what shows in means over bins.
+    fit = replace(fit, misfit=float(np.sqrt(fit.correlation)))
+    parts = np.split(fit.fitted, data.edges[1:-1])
+    return SampledFit(
+        fit,
+        data,
+        tuple(part * scale for part, scale in zip(parts, data.scales, strict=True)),
+        _explained(stretch),
+        factor,
+        sums,
+    )
+
+
+def _fit(
+    data: SampledData,
+    known: KnownFactor,
+    structures: Sequence[Structure],
+    scales: Scales,
+    huber: bool,
+) -> WindowFit:
+    problem = data.problem(known)
+    window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
+    # behind a spike at the start nothing may be left that moves
+    whole = 1e-9 * max(float(np.ptp(y)) for y in data.outputs)
+    sigma = _SMALLEST * max(float(np.ptp(problem.data)), whole)
+    noise = sigma, max(map(quantisation_step, data.outputs))
+    return fit_window(window, structures, scales, noise, huber)
+
+
+def _condensed(
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    data: SampledData,
+    stretch: WindowFit,
+    huber: bool,
+) -> Condensed | None:
+    """All samples of records of which a stretch was fitted, where their response ends in time."""
+    best = stretch.best
+    slowest = float(1.0 / np.abs(best.poles.real).min())
+    lags = (_BEYOND * best.delay + _DIED_AWAY * slowest) / data.dt
+    if not lags <= MOST_LAGS:
+        return None
+    return condensed(
+        [y / scale for y, scale in zip(outputs, data.scales, strict=True)],
+        [u / scale for u, scale in zip(inputs, data.scales, strict=True)],
+        data.dt,
+        max(int(np.ceil(lags)), _LEAST_LAGS),
+        huber=huber,
+    )
+
+
+def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> WindowFit:
+    """Fit all structures to all samples, from where they are on a stretch of them."""
+    m = sums.data.size
+    problem = Problem(sums.data, np.ones(m), sums.drive, np.empty((m, 0)), known)
+    window = Window(0, sums.data, problem, sums.drive, problem.regressors, None)
+    window = replace(window, samples=sums.samples)
+    found: dict[Structure, Candidate] = {}
+    for structure in sorted(stretch.candidates, key=lambda s: (s.order, s.zeros)):
+        starts = [stretch.candidates[structure].parameters]
+        starts += neighbour_starts(structure, stretch.scales, found)
+        parameters, cost = fit_batch(
+            problem, structure, np.array(starts), parameter_bounds(structure, stretch.scales)
+        )
+        best = int(np.argmin(cost))
+        found[structure] = Candidate(structure, parameters[best], float(cost[best]))
+    found = converged(problem, found, stretch.scales, sums.noise**2, sums.samples)
+    first = min(found.values(), key=lambda candidate: candidate.cost)
+    freedom = max(m - 2 - first.structure.order - first.structure.zeros, 1)
+    # More than noise leaves: what no structure explains counts as noise of that size.
+    excess = first.cost / freedom / sums.noise**2
+    colour = excess if excess > 1 + _CLEARLY * np.sqrt(2 / freedom) else 1.0
+    fit = WindowFit(
+        window, problem, found, {}, stretch.scales, sums.noise, colour, float(np.sqrt(colour))
+    )
+    return replace(fit, criterion=fit.criteria(found))
+
+
+def _on_stretch(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> FloatArray:
+    """Model at the samples of the stretch, with its own level, drift and initial state."""
+    problem = data.problem(known)
+    parameters = np.concatenate([[fit.delay], parameters_from_poles(fit.poles)])
+    model = respond(problem.drive, known, fit.numerator, parameters)
+    own = problem.own_terms(poles_from_parameters(parameters[None, 1:])[0])
+    rest = (problem.data - model)[None, :, None]
+    return np.asarray(problem.data - own.without(rest)[0, :, 0])
+
+
+def _noise_levels(data: SampledData, whole: WindowFit) -> FloatArray:
+    """Residual of the best model in every record, in its own unit."""
+    error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+    floor = _SMALLEST * float(np.ptp(whole.window.output))
+    return np.array(
+        [max(winsorised_sigma(part, 0.0), floor) for part in np.split(error, data.edges[1:-1])]
+    )
+
+
+def _explained(whole: WindowFit) -> float:
+    """Chi-square of the forced response: own terms alone against own terms and input."""
+    problem, best = whole.problem, whole.best
+    assert problem.stretches is not None
+    own = problem.own_terms(best.poles[None])
+    alone = float(np.sum(own.without(problem.data[None, :, None]) ** 2))
+    return (alone - best.cost) / max(whole.variance, 1e-300)
+
+
+def _seen(data: SampledData, limit: float) -> list[float]:
+    """First lag, in samples, at which the output follows the input; empty where none is seen.
+
+    The valleys of an input that moves at every sample are as narrow as the plant is fast, and the
+    delays that are tried otherwise lie too far apart to find one.
+    """
+    found = []
+    for u, y in zip(data.inputs, data.outputs, strict=True):
+        most = int(min(limit / data.dt, u.size // 3))
+        if most > 1 and np.ptp(u) > 0:
+            found.append(correlation_onset(u, y, most, _CONFIDENCE).onset)
+    onsets = [float(lag) for lag in found if lag > 0]
+    return [float(np.median(onsets))] if onsets else []
+
+
+def _first_order(
+    problem: Problem, n: int, dt: float, limit: float, seen: Sequence[float]
+) -> Candidate:
+    """Best first-order model from a grid of delays and time constants."""
+    scales = [
+        Scales(min(onset * dt, limit), min(rise, n / 4) * dt, n * dt, dt, limit)
+        for rise in _RISES
+        for onset in (*_ONSETS, *seen)
+    ]
+    tries = [search(problem, [Structure(1, 1)], each)[Structure(1, 1)] for each in scales]
+    best = min(tries, key=lambda candidate: candidate.cost)
+    # It has converged, for samples are counted by its delay.
+    return settled(problem, replace(best, ends=None), scales[0])
+
+
+def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> OwnResponse:
+    """Gauss-Newton steps for gain and delay, everything else of the model being common."""
+    problem = data.problem(known)
+    assert problem.stretches is not None
+    own = problem.own_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
+    target = own.without(problem.data[None, :, None])[0, :, 0]
+    lost = problem.own_count(fit.poles.size)
+    h = 0.25 * data.dt
+
+    def response(delay: float, stretch: float = 1.0) -> FloatArray:
+        # The core in a slower time: poles over the stretch, and its gain as before.
+        parameters = np.concatenate([[max(delay, 0.0)], parameters_from_poles(fit.poles / stretch)])
+        powers = np.arange(fit.numerator.size) - float(fit.poles.size)
+        return respond(problem.drive, known, fit.numerator * stretch**powers, parameters)
+
+    def regression(columns: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        moved = own.without(np.stack(columns, axis=1)[None])[0]
+        solution = np.linalg.lstsq(moved, target, rcond=None)[0]
+        left = target - moved @ solution
+        freedom = max(left.size - moved.shape[1] - lost, 1)
+        variance = float(left @ left) / freedom * correlation_time(left)
+        spread = np.diag(np.linalg.pinv(moved.T @ moved))
+        return solution, np.sqrt(variance * np.maximum(spread, 0.0))
+
+    shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
+    for _ in range(_TURNS):
+        at = max(fit.delay + shift, h)
+        slope = (response(at + h) - response(at - h)) / (2 * h)
+        solution, errors = regression([response(at), slope])
+        gain, gain_error = float(solution[0]), float(errors[0])
+        size = gain or 1.0
+        move = float(solution[1]) / size
+        error = float(errors[1]) / abs(size)
+        shift = at - fit.delay + float(np.clip(move, -20 * data.dt, 20 * data.dt))
+        if abs(move) < 1e-3 * data.dt:
+            break
+    # Small stretches: the slope of the response by the log of the time constants.
+    turn = (response(at, 1 + _STRETCH) - response(at, 1 - _STRETCH)) / (2 * _STRETCH)
+    solution, errors = regression([response(at), slope, turn])
+    size = float(solution[0]) or 1.0
+    lag = float(np.exp(np.clip(solution[2] / size, -_FARTHEST, _FARTHEST)))
+    forced = own.without(response(fit.delay)[None, :, None])[0, :, 0]
+    followed = fit_percent(target[None], forced[None])
+    return OwnResponse(
+        shift,
+        max(error, 1e-12 * data.dt),
+        gain,
+        max(gain_error, 1e-12),
+        lag,
+        max(float(errors[2]) / abs(size), 1e-12),
+        float(followed[0]),
+    )

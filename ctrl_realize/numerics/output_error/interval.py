@@ -1,0 +1,166 @@
+"""Delay and interval where the residual is noise: of all explanations that are not ruled out.
+
+Point 2 of the rule in `output_error`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import ComplexArray
+from ..separable.dispersion import DispersedFlow, flow_profile
+from ..separable.lag_chains import (
+    FREE_IN_A_CHAIN,
+    LagChain,
+    chain_limits,
+    chain_profile,
+    still_improving,
+)
+from ..separable.profile_ends import profile_limits
+from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, plausible
+from ..separable.varpro import Structure
+from ..separable.window import WindowFit
+from .result import OutputErrorFit, Profile, assembled, profiles_of
+from .selection import Choice, choose_model
+
+_UNSEEN = 3.0
+"""How far before the delay a beginning that is open may lie, in times from there to the first
+motion. Diffusion behind lags and parallel paths mostly need 1 to 3."""
+
+_LIKE_A_FLOW = 6
+"""Lags of a chain from which on a flow that disperses looks the same, unless one was fitted and is
+out of the question."""
+_OUT_OF_QUESTION = 2 * PLAUSIBLE
+
+
+def flow_lead(poles: ComplexArray) -> float:
+    r"""Time by which a flow that disperses begins before a chain of lags that looks like it, in s.
+
+    n lags of T have the cumulants nT, nT^2, 2nT^3, 6nT^4 in time; a residence time with an inverse
+    Gaussian distribution of mean m and shape l has m, m^3/l, 3m^5/l^2, 15m^7/l^3. With m = 1.5 nT
+    behind half of nT less dead time the first three are equal and the fourth differs by a ninth.
+    """
+    return 0.5 * float(np.sum(1 / np.abs(poles)))
+
+
+def likelihood_fit(
+    whole: WindowFit,
+    *,
+    adequate: bool,
+    chains: Sequence[LagChain] = (),
+    flows: Sequence[DispersedFlow] = (),
+    onset: float | None = None,
+) -> OutputErrorFit:
+    """Take delay and interval from the likelihood.
+
+    `onset` is the time of the first motion; without it the structures are believed.
+    """
+    tanks = [chain for chain in chains if not chain.hidden]
+    choice = choose_model(whole, tanks, flows)
+    chosen, scales = choice.model, whole.scales
+    kept = _not_ruled_out(whole, choice, chains, flows)
+    own = kept.profile_of(choice, scales)
+    if choice.chain is not None:
+        whole = _with_chain(whole, choice.chain)
+        kept.profiles[chosen.structure] = own
+    beside = kept.beside(scales)
+    limits = [profile_limits(*profile) for profile in kept.profiles.values()]
+    limits += [(first, last) for _, first, last in beside]
+    low = min(chosen.delay, *(first for first, _ in limits))
+    high = max(chosen.delay, *(last for _, last in limits))
+    if endless := still_improving(tanks):
+        low = scales.earliest
+    if like_flow := _like_a_flow(choice, flows):
+        low = min(low, max(chosen.delay - flow_lead(chosen.poles), scales.earliest))
+    open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
+    if onset is not None and open_start:
+        low, high = _opened(low, high, chosen.delay, onset, scales)
+    first, last = profile_limits(*own)
+    interval = low, high, (last - first) / 3.92
+    found = assembled(whole, chosen, adequate, (), kept.profiles, interval, own)
+    return replace(
+        found,
+        chain=choice.chain.name if choice.chain else "",
+        beside=tuple(beside),
+        endless=endless,
+        like_flow=like_flow,
+        open_start=open_start,
+        flows=tuple(flow for flow, _ in kept.flows),
+        follows_flow=choice.flow is not None,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """What the data cannot rule out: structures and flows with their profiles, and chains."""
+
+    profiles: dict[Structure, Profile]
+    flows: list[tuple[DispersedFlow, Profile]]
+    chains: list[LagChain]
+
+    def profile_of(self, choice: Choice, scales: Scales) -> Profile:
+        """Misfit over the delay of what was chosen."""
+        if choice.chain is not None:
+            return chain_profile(choice.chain, scales)
+        for flow, profile in self.flows:
+            if flow is choice.flow:
+                return profile
+        return self.profiles[choice.model.structure]
+
+    def beside(self, scales: Scales) -> list[tuple[str, float, float]]:
+        """What is not among the structures: its name, and its interval."""
+        flows = (("a flow that disperses", *profile_limits(*profile)) for _, profile in self.flows)
+        chains = ((chain.name, *chain_limits(chain, scales)) for chain in self.chains)
+        return [*flows, *chains]
+
+
+def _not_ruled_out(
+    whole: WindowFit,
+    choice: Choice,
+    chains: Sequence[LagChain],
+    flows: Sequence[DispersedFlow],
+) -> _Kept:
+    more = max(LEAST_CHARGE - whole.penalty, 0.0)
+    charged = {s: value + more * (s.order + s.zeros) for s, value in whole.criterion.items()}
+    level = choice.level + more * choice.parameters
+    limit = level + PLAUSIBLE
+    free = plausible(whole.candidates, charged, whole.variance, choice.model, level)
+    return _Kept(
+        profiles_of(whole, free, choice.model.structure),
+        [
+            (flow, flow_profile(whole.problem, flow, whole.scales, whole.variance))
+            for flow in flows
+            if flow.criterion + more * flow.parameters <= limit
+        ],
+        [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit],
+    )
+
+
+def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:
+    """Tell whether the model is a chain so long that it may be a flow, none being ruled out."""
+    if choice.chain is None or choice.model.structure.order < _LIKE_A_FLOW:
+        return False
+    return not flows or min(flow.excess for flow in flows) <= _OUT_OF_QUESTION
+
+
+def _opened(
+    low: float, high: float, delay: float, onset: float, scales: Scales
+) -> tuple[float, float]:
+    """Widen an interval by what is open where a zero imitates the beginning."""
+    unseen = _UNSEEN * max(onset - delay, scales.dt)
+    return (
+        min(low, max(delay - unseen, scales.earliest)),
+        max(high, min(onset + scales.dt, scales.latest)),
+    )
+
+
+def _with_chain(whole: WindowFit, chain: LagChain) -> WindowFit:
+    structure = chain.candidate.structure
+    return replace(
+        whole,
+        candidates=whole.candidates | {structure: chain.candidate},
+        criterion=whole.criterion | {structure: chain.criterion},
+    )

@@ -1,0 +1,212 @@
+"""What an output-error fit has found: delay, interval, model, and the table of structures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+from ..separable.dispersion import DispersedFlow
+from ..separable.lag_chains import lag_sum
+from ..separable.profile import delay_profile
+from ..separable.profile_ends import profile_limits
+from ..separable.static_gain import StaticGain, averaged_ends
+from ..separable.structures import Candidate, needless_charge
+from ..separable.varpro import Structure, evaluate
+from ..separable.window import WindowFit
+
+_ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
+
+Profile: TypeAlias = tuple[FloatArray, FloatArray]
+"""Delays, and the misfit at each; see `delay_profile`."""
+
+
+@dataclass(frozen=True, eq=False)
+class StructureFit:
+    """One line of the table of structures; delays in s, `excess` of the criterion to the best.
+
+    `low` and `high` are the profile-likelihood interval, NaN where it was not needed.
+    """
+
+    structure: Structure
+    delay: float
+    total_delay: float
+    excess: float
+    low: float
+    high: float
+    poles: ComplexArray
+    gain: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Better:
+    """A structure that rules out the one that was asked for: its delay and 95 % interval in s.
+
+    `excess` is by how much its information criterion is smaller.
+    """
+
+    structure: Structure
+    delay: float
+    total: float
+    low: float
+    high: float
+    excess: float
+
+
+@dataclass(frozen=True, eq=False)
+class OutputErrorFit:
+    """Delay and model of one record; see the rule in `output_error`.
+
+    ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
+    The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
+    are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
+    which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
+    longer they are, so that all of the delay may be lags; `like_flow`: no step tells the chain from
+    a flow that disperses; `open_start`: how smoothly the response begins is open; `relaxing`: the
+    plant was moving before the step, and its free response was fitted along. `flows` that disperse
+    are not ruled out; with `follows_flow` the delay is that of the best of them, and the lags
+    behind it follow it. `beside` names what is not in the table of structures and not ruled out,
+    with its interval. `std` is that of the chosen structure. `whitened`: coloured noise was made
+    white, by what it is at rest. `static` is the gain of the model,
+    `alike` those of the other structures that are not ruled out and resolve one, each with its
+    evidence over the model's. `better` is a structure that rules out those that were asked for.
+    """
+
+    delay: float
+    low: float
+    high: float
+    std: float
+    structure: Structure
+    poles: ComplexArray
+    numerator: FloatArray
+    adequate: bool
+    misfit: float
+    residual: float
+    correlation: float
+    structures: tuple[StructureFit, ...]
+    views: tuple[tuple[str, float], ...]
+    fitted: FloatArray
+    profile: tuple[FloatArray, FloatArray]
+    latest: float
+    chain: str = ""
+    endless: bool = False
+    like_flow: bool = False
+    open_start: bool = False
+    relaxing: bool = False
+    flows: tuple[DispersedFlow, ...] = ()
+    beside: tuple[tuple[str, float, float], ...] = ()
+    follows_flow: bool = False
+    whitened: bool = False
+    static: StaticGain | None = None
+    alike: tuple[tuple[StaticGain, float], ...] = ()
+    better: Better | None = None
+
+    @property
+    def gain_ends(self) -> tuple[float, float]:
+        """95 % interval of the gain: of what was chosen and of structures that are not ruled out.
+
+        Without end where the record does not resolve it.
+        """
+        if self.static is None or not self.static.resolved:
+            return (-np.inf, np.inf) if self.static is None else self.static.ends
+        return averaged_ends(
+            [(one.gain, one.gain_std, weight) for one, weight in ((self.static, 1.0), *self.alike)]
+        )
+
+    @property
+    def total_ends(self) -> tuple[float, float]:
+        """95 % interval of the total delay, in s, as that of the gain."""
+        if self.static is None or not self.static.resolved:
+            return self.low, np.inf
+        every = ((self.static, 1.0), *self.alike)
+        low, high = averaged_ends([(one.total, one.total_std, weight) for one, weight in every])
+        return max(low, 0.0), high
+
+
+def profile_of(whole: WindowFit, candidate: Candidate, *, solved: bool = True) -> Profile:
+    """Misfit over the delay of one candidate of a window."""
+    return delay_profile(whole.problem, candidate, whole.variance, whole.scales, solved=solved)
+
+
+def profiles_of(
+    whole: WindowFit, structures: Sequence[Structure], chosen: Structure
+) -> dict[Structure, Profile]:
+    """Profiles of structures, solved for their ends where these may be ends of all of them.
+
+    Between the points of a profile its ends are known to a few parts in a hundred; of the chosen
+    structure, and of those that reach as far as any, they are solved for.
+    """
+    found = {s: profile_of(whole, whole.candidates[s], solved=False) for s in structures}
+    limits = {s: profile_limits(*profile) for s, profile in found.items()}
+    low = min(first for first, _ in limits.values())
+    high = max(last for _, last in limits.values())
+    for s, (first, last) in limits.items():
+        margin = _ROUGHLY * (last - first)
+        if s == chosen or first - margin <= low or last + margin >= high:
+            found[s] = profile_of(whole, whole.candidates[s])
+    return found
+
+
+def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[StructureFit, ...]:
+    best = min(whole.criterion.values())
+    lines = []
+    for s, candidate in whole.candidates.items():
+        low, high = profile_limits(*profiles[s]) if s in profiles else (np.nan, np.nan)
+        state = evaluate(whole.problem, s, candidate.parameters[None])
+        total = candidate.delay + lag_sum(candidate.poles, state.numerator[0])
+        excess = whole.criterion[s] - best
+        gain = float(np.real(state.numerator[0, 0] / np.prod(-candidate.poles)))
+        lines.append(
+            StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles, gain)
+        )
+    return tuple(sorted(lines, key=lambda line: line.excess))
+
+
+def assembled(
+    whole: WindowFit,
+    chosen: Candidate,
+    adequate: bool,
+    views: tuple[tuple[str, float], ...],
+    profiles: dict[Structure, Profile],
+    interval: tuple[float, float, float],
+    profile: Profile,
+) -> OutputErrorFit:
+    """Put a result together; `interval` is its lower and upper end and the standard error, in s.
+
+    `profiles` are those of the table of structures, `profile` that of the delay chosen.
+    """
+    state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
+    numerator = state.numerator[0]
+    low, high, std = interval
+    static = whole.static(chosen)
+    charged = {s: whole.criterion[s] + needless_charge(s) for s in profiles}
+    least = charged.get(chosen.structure, np.inf)
+    alike = [
+        (whole.static(whole.candidates[s]), float(np.exp(-max(value - least, 0.0) / 2)))
+        for s, value in charged.items()
+        if s != chosen.structure
+    ]
+    return OutputErrorFit(
+        delay=chosen.delay,
+        low=low,
+        high=high,
+        std=std,
+        structure=chosen.structure,
+        poles=chosen.poles,
+        numerator=numerator,
+        adequate=adequate,
+        misfit=whole.misfit,
+        residual=whole.sigma,
+        correlation=whole.correlation,
+        structures=_table(whole, profiles),
+        views=views,
+        fitted=whole.window.predict(whole.problem, chosen),
+        profile=profile,
+        latest=whole.scales.latest,
+        whitened=whole.colour is not None,
+        static=static,
+        alike=tuple((other, weight) for other, weight in alike if other.resolved),
+    )

@@ -1,0 +1,95 @@
+"""Choose what explains a step record whose residual is noise: lags, a chain of them, or a flow.
+
+Beside the free structures stand chains of lags and flows that disperse, of few parameters each
+(point 1 of the rule in `output_error`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..separable.dispersion import DispersedFlow, fit_flows
+from ..separable.lag_chains import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
+from ..separable.structures import PLAUSIBLE, Candidate, choose, needless_charge, search
+from ..separable.varpro import Structure
+from ..separable.window import WindowFit
+
+_LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
+"""Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
+
+_BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0, -1))
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The model that is chosen, and the criterion to which others are held.
+
+    It is a chain of lags, or lags behind the dead time of a flow, where one of these is given.
+    """
+
+    model: Candidate
+    level: float
+    chain: LagChain | None = None
+    flow: DispersedFlow | None = None
+
+    @property
+    def parameters(self) -> int:
+        """Free ones beside gain and delay."""
+        if self.flow is not None:
+            return self.flow.parameters
+        own = self.model.structure
+        return FREE_IN_A_CHAIN if self.chain is not None else own.order + own.zeros
+
+
+def chains_of(whole: WindowFit) -> list[LagChain]:
+    """Chains of lags, where so many lags show that there may be more than were tried."""
+    best = whole.best
+    setting = whole.problem, best, whole.scales, whole.variance, whole.penalty
+    tanks = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
+    diffusion = fit_diffusion(*setting) if best.structure.order >= _LAGS_OF_DIFFUSION else []
+    return tanks + diffusion
+
+
+def flows_of(whole: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
+    """Flows that disperse, where more than one lag shows."""
+    best = whole.best
+    if best.structure.order < _LAGS_OF_DIFFUSION:
+        return []
+    level = min([*whole.criterion.values(), *(chain.criterion for chain in chains)])
+    return fit_flows(whole.problem, best, whole.scales, whole.variance, whole.penalty, level)
+
+
+def choose_model(
+    whole: WindowFit, tanks: Sequence[LagChain], flows: Sequence[DispersedFlow]
+) -> Choice:
+    """Choose by the lowest criterion; of a flow, lags must be able to follow it.
+
+    Modes of diffusion are not among the chains here: friction, too, looks like them, so that they
+    widen the interval and are never the model.
+    """
+    lags = _among_lags(whole, tanks)
+    flow = min(flows, key=lambda flow: flow.criterion, default=None)
+    if flow is None or flow.criterion >= lags.level:
+        return lags
+    model = _behind(whole, flow)
+    return lags if model is None else Choice(model, flow.criterion, flow=flow)
+
+
+def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> Choice:
+    best = whole.best
+    level = whole.criterion[best.structure] + needless_charge(best.structure)
+    better = min(tanks, key=lambda chain: chain.criterion, default=None)
+    if better is not None and better.criterion < level:
+        return Choice(better.candidate, better.criterion, better)
+    return Choice(best, level)
+
+
+def _behind(whole: WindowFit, flow: DispersedFlow) -> Candidate | None:
+    """Lags and zeros behind the dead time of a flow that leave no more than it does, if any."""
+    pinned = replace(whole.scales, earliest=flow.delay, latest=flow.delay)
+    limit = flow.cost + PLAUSIBLE * whole.variance
+    found = search(whole.problem, _BEHIND_A_FLOW, pinned)
+    # They need not be worth their number: it is known what they stand for.
+    good = {structure: model for structure, model in found.items() if model.cost <= limit}
+    return good[choose(whole.criteria(good))] if good else None

@@ -1,0 +1,201 @@
+"""Output-error estimate of a dead time from a step record, with an honest interval.
+
+The rule:
+
+0. What the output does before the step is noise, hum, a drift to the end or one that ends, or the
+   plant's own free response: the lowest information criterion decides.
+1. All structures are fitted to the whole record; the one with the lowest information criterion
+   is the model, and what its residual leaves is compared with the noise before the step, or, as
+   long as that is not much louder, with what it leaves long after the step. Where it is noise that
+   was coloured before the step already, all structures are fitted again with that noise made white.
+2. Where the residual is noise, the delay is that of the model, and its interval spans the
+   95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
+   four to eight nearly equal lags, modes of diffusion and flows that disperse among them. Where
+   such a flow fits clearly better than any lags, the delay is that of the flow. A zero imitates a
+   smooth beginning: where the best structure has one, the interval reaches to a sample after the
+   first motion, and three times as far before the delay as the first motion comes after it.
+3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
+   first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
+   of up to three poles for the first 63 % and for all of it. The delay is their median.
+4. The interval then spans the views and a third-order lag on the first 15 % (more lags, less
+   delay), without the lowest: a fit that goes wrong takes delay for lag.
+5. No delay is later than the first lasting motion of the output.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..separable.compared_fits import at_delay
+from ..separable.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, needless_charge
+from ..separable.varpro import KnownFactor, Structure, evaluate
+from ..separable.window import WindowFit, fit_window
+from .better_structure import better_structure
+from .coloured import in_coloured_noise
+from .interval import likelihood_fit
+from .result import OutputErrorFit, assembled, profile_of
+from .selection import chains_of, flows_of
+from .step_data import StepData, settled_at, step_scales, stop_at, window
+
+ADEQUATE = 1.3
+"""Residual over noise, in means over bins, up to which a model is taken for right."""
+
+_WILD = 3.0  # standard deviations at which residuals are cut where explanations are compared
+
+_LOUDER = 4.0
+"""How much louder noise may be after the step than before it: slow noise shows little of itself in
+a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less)."""
+_FEWEST_LATE = 8  # bins in the later half of what comes when the response has settled
+
+
+def fit_output_error(
+    data: StepData,
+    *,
+    structures: Sequence[Structure] | None = None,
+    latest: float | None = None,
+    known: KnownFactor | None = None,
+    huber: bool = True,
+    whiten: bool = True,
+) -> OutputErrorFit:
+    """Estimate the dead time of a step record.
+
+    Parameters
+    ----------
+    data : StepData
+        With a motion.
+    structures : sequence of Structure, optional
+        Default: orders 1 to 5, relative degrees 1 to the order. With structures given, the
+        delay is that of the best of them, adequate or not.
+    latest : float, optional
+        Largest delay, in s.
+    known : KnownFactor, optional
+        Dynamics in cascade that do not belong to the plant.
+    huber : bool, optional
+        Huber's loss (k = 1.345) instead of least squares.
+    whiten : bool, optional
+        Make noise white that is coloured at rest.
+    """
+    factor = known or KnownFactor()
+    tried = ALL_STRUCTURES if structures is None else tuple(structures)
+    ways = data.explanations()
+    if len(ways) > 1:
+        few = SIMPLE_STRUCTURES if structures is None else tried
+        data = _explained(
+            [(way, _fit_until(way, way.output.size, few, latest, factor, huber)) for way in ways]
+        )
+    whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
+    adequate = _is_noise(data, whole)
+    plain = whole
+    if adequate and whiten:
+        whole = in_coloured_noise(whole, data)
+    if structures is not None:
+        found = likelihood_fit(whole, adequate=adequate)
+        found = replace(
+            found,
+            better=better_structure(
+                plain,
+                plain.best,
+                lambda: _fit_until(
+                    data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber
+                ),
+            ),
+        )
+    elif adequate:
+        assert data.motion is not None
+        onset = data.motion.onset * data.dt
+        chains = chains_of(whole)
+        found = likelihood_fit(
+            whole, adequate=True, chains=chains, flows=flows_of(whole, chains), onset=onset
+        )
+    else:
+        simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
+        chosen = whole.best_of(simple)
+        found = _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
+    return replace(found, relaxing=data.relaxing)
+
+
+def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
+    """Choose between explanations of the samples before the step, by an information criterion."""
+    closest = min((whole for _, whole in ways), key=lambda whole: whole.sigma)
+    worst = _WILD * closest.sigma
+
+    def criterion(way: tuple[StepData, WindowFit]) -> float:
+        data, whole = way
+        best = whole.best.structure
+        error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+        squares = float(np.sum(np.clip(error, -worst, worst) ** 2))
+        terms = best.order + best.zeros + (best.order if data.relaxing else bool(data.drift))
+        return squares / closest.variance + closest.penalty * terms + needless_charge(best)
+
+    return min(ways, key=criterion)[0]
+
+
+def _is_noise(data: StepData, whole: WindowFit) -> bool:
+    """Tell whether the model leaves what was there before the step, or what goes on long after."""
+    if whole.misfit <= ADEQUATE * data.colour:
+        return True
+    if whole.misfit > ADEQUATE * data.colour * _LOUDER:
+        return False
+    state = evaluate(whole.problem, whole.best.structure, whole.best.parameters[None])
+    assert whole.window.bins is not None
+    first = whole.window.bins.first
+    settled = settled_at(data)
+    late = np.asarray(state.residual[0][first >= settled])
+    moving = state.residual[0][(first >= data.edge) & (first < settled)]
+    if late.size < 2 * _FEWEST_LATE:
+        return False
+    # What a wrong model leaves dies away: it is in the first half.
+    late = late[late.size // 2 :]
+    return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
+
+
+def _robust_fit(
+    whole: WindowFit, chosen: Candidate, views: tuple[tuple[str, float], ...]
+) -> OutputErrorFit:
+    """Take delay and interval from the views (points 3 and 4 of the rule)."""
+    delay = float(np.median([at for _, at in views[:-1]]))
+    delays = np.sort([at for _, at in views])
+    low, high = float(delays[1]), float(delays[-1])
+    profiles = {chosen.structure: profile_of(whole, chosen)}
+    fixed = at_delay(whole.problem, chosen, whole.scales, delay)
+    interval = low, high, (high - low) / 3.92
+    return assembled(whole, fixed, False, views, profiles, interval, profiles[chosen.structure])
+
+
+def _fit_until(
+    data: StepData,
+    stop: int,
+    structures: Sequence[Structure],
+    latest: float | None,
+    known: KnownFactor,
+    huber: bool,
+) -> WindowFit:
+    return fit_window(
+        window(data, stop, known),
+        structures,
+        step_scales(data, stop, latest),
+        (data.sigma, data.quantum),
+        huber,
+    )
+
+
+def _views(
+    data: StepData, whole: Candidate, latest: float | None, known: KnownFactor, huber: bool
+) -> tuple[tuple[str, float], ...]:
+    """Looks at the delay that err in different ways, in s; the last serves the interval only."""
+    assert data.motion is not None
+    lags = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
+    early = _fit_until(data, stop_at(data, 0.15), lags, latest, known, huber)
+    rise = _fit_until(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, known, huber)
+    onset = data.motion.onset * data.dt
+    return (
+        ("first motion", onset if latest is None else min(onset, latest)),
+        ("first-order lag, first 15 %", early.candidates[lags[0]].delay),
+        ("second-order lag, first 15 %", early.candidates[lags[1]].delay),
+        ("best model of the first 63 %", rise.best.delay),
+        ("best model of the whole record", whole.delay),
+        ("third-order lag, first 15 %", early.candidates[lags[2]].delay),
+    )

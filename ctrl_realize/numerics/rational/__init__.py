@@ -1,0 +1,1 @@
+"""Rational models with dead time of measured frequency responses."""

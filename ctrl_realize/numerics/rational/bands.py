@@ -1,0 +1,50 @@
+"""Stretches of a frequency grid in which something holds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray
+
+
+def running_median(values: FloatArray, length: int) -> FloatArray:
+    """Smooth by the median of `length` neighbours; the ends repeat their last value.
+
+    A single bad point does not end a good stretch, and a single lucky one does not make one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> print(running_median(np.array([1.0, 1.0, 0.2, 1.0, 1.0]), 3))
+    [1. 1. 1. 1. 1.]
+    """
+    half = min(length // 2, (values.size - 1) // 2)
+    padded = np.pad(values, half, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+    return np.asarray(np.median(windows, axis=1), dtype=np.float64)
+
+
+def widest_run(good: NDArray[np.bool_], frequency: FloatArray) -> NDArray[np.bool_]:
+    """Keep the contiguous run of true entries that spans the most octaves.
+
+    Runs of equal width are decided by their number of points, then by the lower frequency.
+    At least one entry must be true.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> f = np.array([1.0, 2.0, 4.0, 8.0, 9.0, 10.0])
+    >>> print(widest_run(np.array([1, 1, 1, 0, 1, 1], bool), f))
+    [ True  True  True False False False]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
+    starts, stops = edges[::2], edges[1::2]
+    # Frequency zero has no octaves below the first positive one.
+    lowest = frequency[frequency > 0].min() if np.any(frequency > 0) else 1.0
+    octaves = np.log2(np.maximum(frequency, lowest))
+    width = octaves[stops - 1] - octaves[starts]
+    best = max(range(starts.size), key=lambda i: (width[i], stops[i] - starts[i], -starts[i]))
+    kept = np.zeros(good.size, dtype=bool)
+    kept[starts[best] : stops[best]] = True
+    return kept

@@ -1,0 +1,164 @@
+"""Search and refinement for transfer functions with dead time; see `rational`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import ComplexArray, FloatArray
+from .model import project
+
+_MAX_ITERATIONS = 60
+_FIRST_ITERATIONS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class FRFData:
+    """A frequency response with weights, in units where frequencies are around 1.
+
+    Parameters
+    ----------
+    s : ndarray, shape (K,)
+        ``j omega``.
+    response : ndarray, shape (K,)
+        Measured.
+    weight : ndarray, shape (K,)
+        One over the standard deviation of the complex response, up to a factor.
+    max_dead_time : float
+        Upper bound of the search.
+    min_dead_time : float
+        Lower bound; below 0 only to see whether the phase leads.
+    """
+
+    s: ComplexArray
+    response: ComplexArray
+    weight: FloatArray
+    max_dead_time: float
+    min_dead_time: float = 0.0
+
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """Points whose phase is known; all where the weights do not tell."""
+        clear = np.asarray(np.abs(self.response) * self.weight > 1 / 0.3)
+        return clear if clear.sum() >= 4 else np.ones(clear.size, dtype=np.bool_)
+
+    @cached_property
+    def pole_range(self) -> tuple[float, float]:
+        """Logarithms of the slowest and the fastest pole to look for, two decades off the band."""
+        omega = np.abs(self.s)
+        return float(np.log(omega.min() / 100)), float(np.log(omega.max() * 100))
+
+
+@dataclass(frozen=True, eq=False)
+class RationalFit:
+    """A local minimum of the weighted misfit.
+
+    ``cost`` is the sum of ``|weight (response - model)|^2`` at pole parameters and dead time
+    `theta` and the best `numerator`.
+    """
+
+    order: int
+    theta: FloatArray
+    numerator: FloatArray
+    cost: float
+
+
+def refine(
+    data: FRFData,
+    order: int,
+    count: int,
+    start: FloatArray,
+    *,
+    frozen_delay: bool = False,
+    iterations: int = _MAX_ITERATIONS,
+) -> RationalFit:
+    """Minimise the misfit from one start by Levenberg-Marquardt on poles and dead time.
+
+    Parameters
+    ----------
+    data : FRFData
+    order, count : int
+        Poles, and coefficients of the numerator.
+    start : ndarray, shape (order + 1,)
+    frozen_delay : bool
+        Keep the dead time of the start.
+    iterations : int
+        At most so many.
+    """
+    theta = inside_limits(start, data, order)
+    now = project(data.s, data.response, data.weight, theta, order, count)
+    cost = _cost(now.residual)
+    damping = 1e-3
+    stalled = 0
+    for _ in range(iterations):
+        J = now.jacobian.copy()
+        if frozen_delay or _pinned(theta, float(J[:, order] @ now.residual), data, order):
+            J[:, order] = 0.0
+        gram, slope = J.T @ J, J.T @ now.residual
+        size = np.maximum(np.diag(gram), 1e-30 + 1e-12 * np.diag(gram).max())
+        improved = False
+        for _ in range(8):
+            damped = gram.copy()
+            damped.flat[:: order + 2] += damping * size
+            step = np.linalg.solve(damped, -slope)
+            # A factor of e in one step is as far as the linear picture goes.
+            step[:order] = np.minimum(np.maximum(step[:order], -1.0), 1.0)
+            trial = inside_limits(theta + step, data, order)
+            moved = project(data.s, data.response, data.weight, trial, order, count)
+            trial_cost = _cost(moved.residual)
+            if trial_cost < cost:
+                improved = True
+                break
+            damping = min(damping * 6.0, 1e12)
+        if not improved:
+            break
+        drop = cost - trial_cost
+        theta, now, cost = trial, moved, trial_cost
+        damping = max(damping / 8.0, 1e-12)
+        # Two small steps in a row: one alone may be a damped step in a narrow valley.
+        stalled = stalled + 1 if drop <= 1e-9 * cost else 0
+        if stalled == 2:
+            break
+    return RationalFit(order=order, theta=theta, numerator=now.numerator, cost=cost)
+
+
+def refine_best(
+    data: FRFData, order: int, count: int, starts: list[FloatArray], kept: int
+) -> list[RationalFit]:
+    """Refine several starts: all of them a little, the best few to the end; the best first."""
+    early = [refine(data, order, count, start, iterations=_FIRST_ITERATIONS) for start in starts]
+    early.sort(key=lambda fit: fit.cost)
+    late = [refine(data, order, count, fit.theta) for fit in early[:kept]]
+    return sorted(late, key=lambda fit: fit.cost)
+
+
+def inside_limits(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
+    """Keep poles near the band, dampings sane and the dead time in its range."""
+    low, high = data.pole_range
+    kept = theta.copy()
+    pairs = order - order % 2
+    if pairs:
+        kept[0:pairs:2] = _within(kept[0:pairs:2], 2 * low, 2 * high)
+        middle = 0.5 * kept[0:pairs:2] + np.log(2.0)
+        kept[1:pairs:2] = _within(kept[1:pairs:2], middle + np.log(1e-4), middle + np.log(1e3))
+    kept[pairs:order] = _within(kept[pairs:order], low, high)
+    kept[order] = min(max(kept[order], data.min_dead_time), data.max_dead_time)
+    return kept
+
+
+def _within(values: FloatArray, low: float | FloatArray, high: float | FloatArray) -> FloatArray:
+    # half the time of numpy.clip, which is called most
+    clipped: FloatArray = np.minimum(np.maximum(values, low), high)
+    return clipped
+
+
+def _pinned(theta: FloatArray, slope: float, data: FRFData, order: int) -> bool:
+    at_zero = theta[order] <= data.min_dead_time and slope >= 0.0
+    return bool(at_zero or (theta[order] >= data.max_dead_time and slope <= 0.0))
+
+
+def _cost(residual: FloatArray) -> float:
+    return float(residual @ residual)

@@ -1,0 +1,189 @@
+"""All structures of a transfer function with dead time on one frequency response."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+from .fit import FRFData, RationalFit, refine_best
+from .model import factor_parameters, poles_of, project
+from .starts import delay_grid, grown_starts, starting_points
+
+DEFAULT_ORDERS = range(1, 5)
+"""Tried where none is given; larger ones where the largest of these is the best."""
+_LARGEST_ORDER = 10
+_LARGEST_FROM_GRID = 3
+_STEPS_OF_ONE = 8
+_KEPT = 2
+
+
+def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
+    """Bound the dead time by the steepest slope of the phase, in s.
+
+    Parameters
+    ----------
+    response : ndarray, shape (K,)
+    omega : ndarray, shape (K,)
+        Rising, in rad/s.
+    sigma : ndarray, shape (K,)
+        Standard deviation of the response; points with more than 30 % are left out.
+    """
+    clear = sigma < 0.3 * np.abs(response) if np.any(sigma < 0.3 * np.abs(response)) else sigma > 0
+    if clear.sum() < 4:
+        clear = np.ones(omega.size, dtype=bool)
+    w, phase = omega[clear], np.unwrap(np.angle(response[clear]))
+    slopes = [0.0]
+    # From low frequencies upwards: unwrapping goes wrong first where points lie far apart, and
+    # lags add to the slope there, so the steepest one bounds the dead time from above.
+    for stop in [*(w[0] * 2.0 ** np.arange(1, 1 + np.log2(w[-1] / w[0]))), w[-1]]:
+        for part in (w <= stop, (w <= stop) & (w >= 0.5 * stop)):
+            if part.sum() >= 4:
+                slopes.append(-float(np.polyfit(w[part], phase[part], 1)[0]))
+    # Half a turn at the highest frequency for noise and for phases that lead.
+    return 1.1 * max(slopes) + np.pi / float(w[-1])
+
+
+def fit_structures(
+    data: FRFData,
+    orders: Sequence[int] | None,
+    degrees: Sequence[int] | None,
+) -> dict[tuple[int, int], RationalFit]:
+    """Fit every structure, each from its own starts and from its neighbours' solutions.
+
+    Parameters
+    ----------
+    data : FRFData
+    orders : sequence of int or None
+        Rising. None: from 1 on, until an order is no longer better than the one before.
+    degrees : sequence of int or None
+        Relative degrees, rising; None: 1 to the order.
+
+    Returns
+    -------
+    dict
+        By (order, relative degree), for relative degrees up to the order.
+    """
+    ladder = _Ladder(data)
+    fits: dict[tuple[int, int], RationalFit] = {}
+    for n in orders if orders is not None else DEFAULT_ORDERS:
+        for r in degrees if degrees is not None else range(1, n + 1):
+            if r <= n:
+                fits[n, r] = _fit_one(data, ladder, fits, n, r)
+    if orders is not None:
+        return fits
+    # An order is believed when a larger one was tried and found no better.
+    points = data.s.size
+    while fits:
+        criteria = information_criteria(data, fits)
+        n, r = min(criteria, key=lambda key: criteria[key])
+        largest = max(key[0] for key in fits)
+        if n < largest or n >= _LARGEST_ORDER or 4 * n > points:
+            break
+        for near in range(max(r - 1, 0), min(r + 1, n + 1) + 1):
+            if near in (degrees if degrees is not None else range(1, n + 2)):
+                fits[n + 1, near] = _fit_one(data, ladder, fits, n + 1, near)
+    return fits
+
+
+def information_criteria(
+    data: FRFData, fits: dict[tuple[int, int], RationalFit]
+) -> dict[tuple[int, int], float]:
+    """Return the Bayesian information criterion of each structure, for noise of unknown size.
+
+    What the best fit leaves may be alike at neighbouring frequencies: then it is no noise, as
+    with a plant that is not quite linear, and so many points count for fewer. Otherwise every
+    higher order would be welcome.
+    """
+    best = min(fits.values(), key=lambda fit: fit.cost)
+    count = 2 * data.s.size / correlation_cost(data, best)
+    return {
+        (n, r): float(count * np.log(smallest_cost(data, fit)) + (2 * n + 2 - r) * np.log(count))
+        for (n, r), fit in fits.items()
+    }
+
+
+def smallest_cost(data: FRFData, fit: RationalFit) -> float:
+    """Return the misfit, or what rounding leaves of exact data."""
+    largest = float(np.max(np.abs(data.response) * data.weight))
+    return max(fit.cost, 2 * data.s.size * (1e-13 * largest) ** 2)
+
+
+def _fit_one(
+    data: FRFData,
+    ladder: _Ladder,
+    fits: dict[tuple[int, int], RationalFit],
+    n: int,
+    r: int,
+) -> RationalFit:
+    tried = list(ladder.starts(n))
+    if (n, r - 1) in fits:
+        tried.append(fits[n, r - 1].theta)
+    if (n - 1, r - 1) in fits:
+        smaller = fits[n - 1, r - 1]
+        poles = np.append(poles_of(smaller.theta, n - 1), -3.0 * np.abs(data.s).max())
+        tried.append(np.append(factor_parameters(poles), smaller.theta[n - 1]))
+    return refine_best(data, n, n + 1 - r, tried, _KEPT)[0]
+
+
+class _Ladder:
+    """Starts for every order; beyond a few, each order's grow out of the one or two below."""
+
+    def __init__(self, data: FRFData) -> None:
+        self._data = data
+        self._starts: dict[int, list[FloatArray]] = {}
+        self._fits: dict[int, list[RationalFit]] = {}
+
+    def starts(self, order: int) -> list[FloatArray]:
+        """Return what to refine for this order, whatever the relative degree."""
+        if order not in self._starts:
+            found = []
+            if order <= _LARGEST_FROM_GRID:
+                found = starting_points(self._data, order, delay_grid(self._data, order))
+            else:
+                for below in (order - 1, order - 2):
+                    if order <= _STEPS_OF_ONE or below % 2 == order % 2:
+                        for smaller in self._best(below):
+                            found += grown_starts(self._data, smaller, order)
+            self._starts[order] = found
+        return self._starts[order]
+
+    def _best(self, order: int) -> list[RationalFit]:
+        """Fit with a free numerator, the best first, of different dead times."""
+        if order not in self._fits:
+            fits = refine_best(self._data, order, order, self.starts(order), 2 * _KEPT)
+            apart = np.pi / (4 * np.abs(self._data.s).max())
+            kept: list[RationalFit] = []
+            for fit in fits:
+                if all(abs(fit.theta[order] - other.theta[order]) > apart for other in kept):
+                    kept.append(fit)
+            self._fits[order] = kept[:_KEPT]
+        return self._fits[order]
+
+
+def residual_variance(data: FRFData, fit: RationalFit, freedom: int, noise_known: bool) -> float:
+    """Return the variance of the weighted residual, with what its correlation costs.
+
+    Residuals that are alike at neighbouring frequencies count for fewer points. Known noise is
+    never scaled down: a lucky fit is no reason to trust it more.
+    """
+    scale = 2 * fit.cost / max(freedom, 1)
+    if noise_known:
+        scale = max(scale, 1.0)
+    return scale * correlation_cost(data, fit)
+
+
+def correlation_cost(data: FRFData, fit: RationalFit) -> float:
+    """Return how many neighbouring points count for one, by the residuals' correlation."""
+    stacked = project(
+        data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
+    ).residual
+    points = data.s.size
+    residual = stacked[:points] + 1j * stacked[points:]
+    power = float(np.sum(np.abs(residual) ** 2))
+    neighbours = float(np.sum((residual[1:] * residual[:-1].conj()).real))
+    correlation = float(np.clip(neighbours / power if power > 0 else 0.0, 0.0, 0.95))
+    if correlation < 2 / np.sqrt(points):
+        return 1.0
+    return (1 + correlation) / (1 - correlation)

@@ -1,0 +1,249 @@
+"""Least-squares sines: amplitude, phase, offset and, when asked, frequency.
+
+Several channels of one record share one frequency. The frequency enters nonlinearly, the
+rest linearly, so it is eliminated by variable projection: Gauss-Newton on the frequency
+alone, the linear part solved exactly in every step (Kaufman's simplification of the Jacobian).
+This is the four-parameter sine fit of IEEE Std 1057, for many records in one call.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+
+_MAX_ITERATIONS = 30
+
+
+@dataclass(frozen=True, eq=False)
+class SineFit:
+    r"""Sines of a common frequency in the channels of many records.
+
+    Channel ``c`` of record ``b`` is
+    ``real(phasor[b, c] * exp(1j * omega[b] * t)) + offset[b, c] + slope[b, c] * t + noise``,
+    with the time ``t`` as it was passed in.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (B,)
+        Frequencies in rad/s.
+    phasor : ndarray of complex, shape (B, C)
+        Amplitude and phase at ``t = 0``.
+    offset, slope : ndarray, shape (B, C)
+        Level at ``t = 0``, and drift per second (0 where not fitted).
+    noise_variance : ndarray, shape (B, C)
+        Variance of the residual, corrected for the fitted parameters.
+    omega_std : ndarray, shape (B,)
+        Standard deviation of `omega`; 0 where the frequency was given.
+    phasor_covariance : ndarray, shape (B, C, 2, 2)
+        Covariance of real and imaginary part of `phasor`, at the frequency found.
+    """
+
+    omega: FloatArray
+    phasor: ComplexArray
+    offset: FloatArray
+    slope: FloatArray
+    noise_variance: FloatArray
+    omega_std: FloatArray
+    phasor_covariance: FloatArray
+
+
+def fit_sines(
+    time: FloatArray,
+    signals: FloatArray,
+    omega: FloatArray,
+    *,
+    free_frequency: bool = True,
+    drift: bool = False,
+    mask: FloatArray | None = None,
+) -> SineFit:
+    """Fit one sine per record to all its channels by least squares.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,) or (B, N)
+        Sample times in s.
+    signals : ndarray, shape (B, C, N)
+        Records x channels x samples.
+    omega : ndarray, shape (B,)
+        Frequency in rad/s; with `free_frequency` the start value, which must be within about
+        half of ``2 pi / (length of the record)``.
+    free_frequency : bool, default True
+        Estimate the frequency that is common to the channels of a record.
+    drift : bool, default False
+        Fit a straight line instead of a constant offset.
+    mask : ndarray of 0 and 1, shape (B, N), optional
+        Samples to use; all by default.
+
+    Returns
+    -------
+    SineFit
+
+    Notes
+    -----
+    For channels with different noise the common frequency is that of weighted least squares:
+    the channels are weighted by the residuals of the first pass.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(200) / 100
+    >>> y = 0.5 + 2 * np.cos(2 * np.pi * 3.1 * t + 0.3)
+    >>> fit = fit_sines(t, y[None, None], np.array([2 * np.pi * 3.0]))
+    >>> print(np.round(fit.omega / (2 * np.pi), 9), np.round(np.angle(fit.phasor), 9))
+    [3.1] [[0.3]]
+    """
+    n_records, n_channels, n_samples = signals.shape
+    times = np.broadcast_to(time, (n_records, n_samples))
+    kept = np.ones((n_records, n_samples)) if mask is None else mask
+    count = kept.sum(axis=1)
+    # Time is centred on the samples in use: offset, drift and phase are then nearly orthogonal.
+    centre = (kept * times).sum(axis=1) / count
+    local = times - centre[:, None]
+    span = np.ptp(np.where(kept > 0, local, 0.0), axis=1)
+    data = signals * kept[:, None, :]
+
+    omega = np.array(omega, dtype=np.float64)
+    omega_std = np.zeros(n_records)
+    weights = np.ones((n_records, n_channels))
+    n_columns = 4 if drift else 3
+    freedom = np.maximum(count - n_columns - (0.5 if free_frequency else 0.0), 1.0)[:, None]
+
+    basis, coefficients, residual = _project(local, data, omega, kept, drift)
+    if free_frequency:
+        floor = np.finfo(float).eps ** 2 * (data**2).sum(axis=2) + np.finfo(float).tiny
+        for iteration in range(_MAX_ITERATIONS):
+            if iteration in (0, 2):
+                weights = 1.0 / np.maximum((residual**2).sum(axis=2) / freedom, floor)
+            step, curvature = _frequency_step(
+                local, omega, kept, basis, coefficients, residual, weights
+            )
+            # A step longer than a fraction of the line width would leave the valley.
+            limit = 1.0 / span
+            step = np.clip(step, -limit, limit)
+            omega = omega + step
+            basis, coefficients, residual = _project(local, data, omega, kept, drift)
+            if iteration > 2 and np.all(np.abs(step) * span < 1e-11):
+                break
+        weights = freedom / np.maximum((residual**2).sum(axis=2), floor)
+        _, curvature = _frequency_step(local, omega, kept, basis, coefficients, residual, weights)
+        omega_std = 1.0 / np.sqrt(curvature)
+
+    return _collect(local, omega, kept, coefficients, residual, freedom, centre, omega_std)
+
+
+def dominant_frequency(signals: FloatArray, dt: float) -> FloatArray:
+    """Find the strongest line of each record, good enough to start a sine fit.
+
+    Parameters
+    ----------
+    signals : ndarray, shape (B, N)
+        One channel of each record.
+    dt : float
+        Sample time in s.
+
+    Returns
+    -------
+    ndarray, shape (B,)
+        Frequency of the highest peak of the zero-padded, windowed spectrum in rad/s.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(500) / 100
+    >>> print(dominant_frequency(np.sin(2 * np.pi * 4.0 * t)[None], 0.01) / (2 * np.pi))
+    [4...]
+    """
+    n_samples = signals.shape[1]
+    window = np.hanning(n_samples + 2)[1:-1]
+    centred = signals - (signals @ window / window.sum())[:, None]
+    n_fft = 1 << (8 * n_samples - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(centred * window, n_fft, axis=1))
+    peak = np.clip(np.argmax(spectrum[:, 1:], axis=1) + 1, 1, spectrum.shape[1] - 2)
+    rows = np.arange(signals.shape[0])
+    left, middle, right = (spectrum[rows, peak + shift] for shift in (-1, 0, 1))
+    bend = left - 2 * middle + right
+    offset = np.where(bend < 0, 0.5 * (left - right) / np.where(bend < 0, bend, 1.0), 0.0)
+    return np.asarray((peak + np.clip(offset, -0.5, 0.5)) * 2 * np.pi / (n_fft * dt))
+
+
+def _project(
+    local: FloatArray, data: FloatArray, omega: FloatArray, kept: FloatArray, drift: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Solve for the linear parameters: orthonormal basis, coefficients (B, C, P), residual."""
+    angle = omega[:, None] * local
+    columns = [np.cos(angle), np.sin(angle), np.ones_like(angle)]
+    if drift:
+        columns.append(local)
+    design = np.stack(columns, axis=2) * kept[:, :, None]
+    basis, triangle = np.linalg.qr(design)
+    projected = data @ basis
+    coefficients = np.linalg.solve(triangle[:, None], projected[..., None])[..., 0]
+    residual = data - projected @ basis.transpose(0, 2, 1)
+    return basis, coefficients, residual
+
+
+def _frequency_step(
+    local: FloatArray,
+    omega: FloatArray,
+    kept: FloatArray,
+    basis: FloatArray,
+    coefficients: FloatArray,
+    residual: FloatArray,
+    weights: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Newton step of the common frequency, and the information on it."""
+    angle = omega[:, None] * local
+    sine, cosine = np.sin(angle) * local * kept, np.cos(angle) * local * kept
+    slope = coefficients[..., 1:2] * cosine[:, None] - coefficients[..., 0:1] * sine[:, None]
+    slope = slope - (slope @ basis) @ basis.transpose(0, 2, 1)
+    curvature = (weights * (slope**2).sum(axis=2)).sum(axis=1)
+    gradient = (weights * (slope * residual).sum(axis=2)).sum(axis=1)
+    curvature = np.maximum(curvature, np.finfo(float).tiny)
+    return gradient / curvature, curvature
+
+
+def _collect(
+    local: FloatArray,
+    omega: FloatArray,
+    kept: FloatArray,
+    coefficients: FloatArray,
+    residual: FloatArray,
+    freedom: FloatArray,
+    centre: FloatArray,
+    omega_std: FloatArray,
+) -> SineFit:
+    """Move the result from centred time back to the caller's, with its covariance."""
+    noise_variance = (residual**2).sum(axis=2) / freedom
+    phasor_local = coefficients[..., 0] - 1j * coefficients[..., 1]
+    turn = np.exp(-1j * omega * centre)
+    has_slope = coefficients.shape[2] == 4
+    slope = coefficients[..., 3] if has_slope else np.zeros(noise_variance.shape)
+    offset = coefficients[..., 2] - slope * centre[:, None]
+
+    angle = omega[:, None] * local
+    design = np.stack([np.cos(angle), -np.sin(angle)], axis=2) * kept[:, :, None]
+    others = _level_basis(local, kept, has_slope)
+    design = design - others @ (others.transpose(0, 2, 1) @ design)
+    local_covariance = np.linalg.inv(design.transpose(0, 2, 1) @ design)
+    rotation = np.stack(
+        [np.stack([turn.real, -turn.imag], -1), np.stack([turn.imag, turn.real], -1)], axis=1
+    )
+    turned = rotation @ local_covariance @ rotation.transpose(0, 2, 1)
+    return SineFit(
+        omega=omega,
+        phasor=phasor_local * turn[:, None],
+        offset=offset,
+        slope=slope,
+        noise_variance=noise_variance,
+        omega_std=omega_std,
+        phasor_covariance=noise_variance[..., None, None] * turned[:, None],
+    )
+
+
+def _level_basis(local: FloatArray, kept: FloatArray, drift: bool) -> FloatArray:
+    """Return an orthonormal basis, shape (B, N, 1 or 2), of offset and drift."""
+    columns = [np.ones_like(local), local] if drift else [np.ones_like(local)]
+    return np.linalg.qr(np.stack(columns, axis=2) * kept[:, :, None])[0]

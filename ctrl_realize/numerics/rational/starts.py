@@ -1,0 +1,229 @@
+"""Starting values of a rational fit: vector fitting, phase slope, and patterns of poles.
+
+Low orders come from a grid of dead times, at each of which the poles are found by a linear
+problem. Higher orders grow out of the lower ones by a pole or a resonance at a time, put where
+it explains most of what was left: over decades of frequency and many resonances the linear
+problem alone ends in poor local minima, above all in noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import ComplexArray, FloatArray
+from .fit import FRFData, RationalFit, inside_limits
+from .model import factor_parameters, poles_of, project, projected_cost, stacked_parts
+from .phase import phase_roughness
+
+
+def trial_poles(low: float, high: float, order: int, *, resonant: bool) -> ComplexArray:
+    """Spread stable poles logarithmically over a band in rad/s."""
+    if order == 1:
+        return np.array([-np.sqrt(low * high)], dtype=np.complex128)
+    if not resonant:
+        return -np.geomspace(low, high, order).astype(np.complex128)
+    centres = np.geomspace(low, high, order // 2 + order % 2)
+    pairs = centres[order % 2 :]
+    poles = np.ravel([(-0.05 + 1j) * pairs, (-0.05 - 1j) * pairs])
+    return np.concatenate([poles, -centres[: order % 2].astype(np.complex128)])
+
+
+def relocate_poles(
+    s: ComplexArray, response: ComplexArray, weight: FloatArray, poles: ComplexArray
+) -> ComplexArray:
+    """Move poles towards those of the response: one step of vector fitting.
+
+    The linear problem ``N(s) - sigma(s) H(s) = H(s)`` is that of Sanathanan and Koerner, written
+    in partial fractions (Gustavsen and Semlyen 1999); the zeros of ``1 + sigma`` are the new
+    poles. Unstable ones are mirrored.
+
+    Parameters
+    ----------
+    s, response : ndarray, shape (K,)
+    weight : ndarray, shape (K,)
+    poles : ndarray, shape (n,)
+        Stable; conjugates need not be adjacent.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    n = poles.size
+    real: NDArray[np.bool_] = poles.imag == 0
+    upper = poles[poles.imag > 0]
+    A = np.zeros((n, n))
+    b = np.zeros(n)
+    columns = []
+    place = 0
+    for p in poles[real]:
+        A[place, place], b[place] = p.real, 1.0
+        columns.append(1 / (s - p))
+        place += 1
+    for p in upper:
+        block = [[p.real, p.imag], [-p.imag, p.real]]
+        A[place : place + 2, place : place + 2] = block
+        b[place] = 2.0
+        columns.append(1 / (s - p) + 1 / (s - p.conjugate()))
+        columns.append(1j / (s - p) - 1j / (s - p.conjugate()))
+        place += 2
+    fractions = np.stack(columns, axis=1)
+    design = np.hstack([fractions, -response[:, None] * fractions]) * weight[:, None]
+    stacked = stacked_parts(design)
+    scale = np.linalg.norm(stacked, axis=0)
+    solution = np.linalg.lstsq(
+        stacked / scale, stacked_parts((weight * response)[:, None])[:, 0], rcond=1e-12
+    )[0]
+    sigma = (solution / scale)[n:]
+    moved = np.linalg.eigvals(A - np.outer(b, sigma)).astype(np.complex128)
+    # Keep away from the axis: a pole on it would make the next problem singular.
+    floor = 1e-4 * np.abs(moved) + 1e-12 * np.abs(s).max()
+    return np.asarray(-np.maximum(np.abs(moved.real), floor) + 1j * moved.imag)
+
+
+_RELOCATIONS = 8
+_MAX_STARTS = 4
+_MAX_DELAYS = 64
+_PER_TURN = 4
+_MAX_TRIED = 4000
+_POINTS_BELOW = 8
+_DAMPINGS = (0.01, 0.1, 0.6)
+_GRID = 16
+_PEAKS = 8
+_KEPT = 2
+
+
+def delay_grid(data: FRFData, order: int) -> FloatArray:
+    """Spread candidate dead times, close enough that no minimum is missed.
+
+    The misfit has a minimum about every half turn of the phase at the highest frequency. Where
+    the band is wide, a slow lag allows a dead time of hundreds of turns, over six decades of
+    millions; but a dead time that is wrong by many turns leaves a phase that turns far more than
+    poles and zeros can, and such candidates are left out.
+    """
+    top = float(np.abs(data.s).max())
+    count = max(int(np.ceil(_PER_TURN * data.max_dead_time * top / (2 * np.pi))), 6)
+    if count < _MAX_DELAYS:
+        return np.linspace(0.0, data.max_dead_time, count + 1)
+    clear = data.clear
+    omega, values = np.abs(data.s[clear]), data.response[clear]
+    steps, gaps = np.angle(values[1:] / values[:-1]), np.diff(omega)
+    allowed = np.pi * (2 * order + 2)
+    octaves = _octaves_below(omega, count)
+    # In the lower part of the band few candidates cover all dead times; those that it leaves are
+    # split in two for every octave more.
+    first = min(-(-count // 2**octaves), _MAX_TRIED)
+    delays, spacing = np.linspace(0.0, data.max_dead_time, first + 1), data.max_dead_time / first
+    for octave in range(octaves, 0, -1):
+        below = np.count_nonzero(omega <= top / 2**octave) - 1
+        left = phase_roughness(steps[:below], gaps[:below], delays)
+        kept = _smoothest(delays, left, allowed, _MAX_TRIED // 2)
+        spacing /= 2
+        places = np.round(kept / spacing)
+        places = np.unique(np.concatenate([places - 1, places, places + 1]))
+        delays = np.clip(spacing * places, 0.0, data.max_dead_time)
+    left = phase_roughness(steps, gaps, delays)
+    return np.sort(_smoothest(delays, left, allowed, _MAX_DELAYS))
+
+
+def longest_search(omega: FloatArray) -> float:
+    """Return the longest dead time, in s, that candidates can cover on rising frequencies."""
+    return 2 * np.pi * _MAX_TRIED / (_PER_TURN * _lowest_start(omega))
+
+
+def _octaves_below(omega: FloatArray, count: int) -> int:
+    """Return how far below the highest frequency the search among `count` dead times begins."""
+    wanted = int(np.ceil(np.log2(max(count / _MAX_TRIED, 1.0))))
+    return min(wanted, int(np.log2(omega[-1] / _lowest_start(omega))))
+
+
+def _lowest_start(omega: FloatArray) -> float:
+    """Return the frequency up to which there are enough points to tell dead times apart."""
+    return float(omega[min(_POINTS_BELOW, omega.size) - 1])
+
+
+def _smoothest(delays: FloatArray, left: FloatArray, allowed: float, most: int) -> FloatArray:
+    """Return the dead times that leave hardly more phase than the best one, the best first."""
+    possible = np.flatnonzero(left <= left.min() + allowed)
+    return np.asarray(delays[possible[np.argsort(left[possible], kind="stable")][:most]])
+
+
+def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[FloatArray]:
+    """Find poles for each candidate dead time, and keep the candidates worth refining.
+
+    With the dead time fixed the problem is linear but for a few pole relocations, which need no
+    start. The minima of the misfit over the grid of dead times come first; this is what spares
+    the maximum-likelihood fit its good initial guess.
+    """
+    omega = np.abs(data.s)
+    low, high = omega.min(), omega.max()
+    costs, found = [], []
+    for delay in delays:
+        turned = data.response * np.exp(data.s * delay)
+        best_cost, best = np.inf, np.zeros(0)
+        for resonant in (False, True):
+            poles = trial_poles(low, high, order, resonant=resonant)
+            for _ in range(_RELOCATIONS):
+                before, poles = poles, relocate_poles(data.s, turned, data.weight, poles)
+                moved = np.sort_complex(poles) - np.sort_complex(before)
+                if np.max(np.abs(moved) / np.abs(poles)) < 1e-3:
+                    break
+            theta = inside_limits(np.append(factor_parameters(poles), delay), data, order)
+            cost = projected_cost(data.s, data.response, data.weight, theta, order, order)
+            if cost < best_cost:
+                best_cost, best = cost, theta
+            if order == 1:
+                break
+        costs.append(best_cost)
+        found.append(best)
+    curve = np.array(costs)
+    padded = np.concatenate([[np.inf], curve, [np.inf]])
+    minima = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
+    ranked = minima[np.argsort(curve[minima])][:_MAX_STARTS]
+    return [found[k] for k in ranked]
+
+
+def grown_starts(data: FRFData, smaller: RationalFit, order: int) -> list[FloatArray]:
+    """Add one or two poles to a fit, where they take away most of its misfit.
+
+    Parameters
+    ----------
+    data : FRFData
+    smaller : RationalFit
+        Of one or two poles less than `order`.
+    order : int
+    """
+    omega = np.abs(data.s)
+    left = project(
+        data.s, data.response, data.weight, smaller.theta, smaller.order, smaller.numerator.size
+    ).residual
+    places = np.concatenate([np.geomspace(omega.min(), omega.max(), _GRID), _peaks(omega, left)])
+    added: list[list[complex]]
+    if order - smaller.order == 1:
+        added = [[-w] for w in places]
+    else:
+        turned = [w * complex(-z, np.sqrt(1 - z * z)) for w in places for z in _DAMPINGS]
+        added = [[p, p.conjugate()] for p in turned]
+    poles = poles_of(smaller.theta, smaller.order)
+    trials = []
+    for more in added:
+        theta = np.append(
+            factor_parameters(np.concatenate([poles, np.array(more, dtype=np.complex128)])),
+            smaller.theta[smaller.order],
+        )
+        trials.append(inside_limits(theta, data, order))
+    costs = [
+        projected_cost(data.s, data.response, data.weight, theta, order, order) for theta in trials
+    ]
+    return [trials[k] for k in np.argsort(costs, kind="stable")[:_KEPT]]
+
+
+def _peaks(omega: FloatArray, residual: FloatArray) -> FloatArray:
+    """Return the frequencies around which most of the misfit is left."""
+    power = residual[: omega.size] ** 2 + residual[omega.size :] ** 2
+    width = min(5, omega.size)
+    smooth = np.convolve(power, np.ones(width), mode="same")
+    rising = np.concatenate([[True], smooth[1:] >= smooth[:-1]])
+    falling = np.concatenate([smooth[:-1] >= smooth[1:], [True]])
+    tops = np.flatnonzero(rising & falling)
+    return np.asarray(omega[tops[np.argsort(smooth[tops])[::-1][:_PEAKS]]])

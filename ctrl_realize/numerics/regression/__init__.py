@@ -1,0 +1,1 @@
+"""Linear regression: ARX, regularised FIR models, recursive least squares."""

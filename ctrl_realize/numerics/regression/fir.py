@@ -1,0 +1,108 @@
+"""Regularised impulse responses: Gaussian priors tuned by their marginal likelihood.
+
+The priors are those of `kernel_priors`; how fast the response decays and how large it is
+`kernel_search` finds from the data.
+
+References
+----------
+T. Chen, H. Ohlsson, L. Ljung, On the estimation of transfer functions, regularizations and
+Gaussian processes - revisited, Automatica 48 (2012), 1525-1535.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag, solve_triangular
+
+from ..arrays import FloatArray
+from .kernel_prior import prior_of
+from .kernel_search import CLOSE, KernelProblem
+from .normal_equations import NormalEquations
+
+CHOSEN_FROM = ("TC", "SS")
+"""Kernels that are compared when none is asked for: a search in DC takes several times as long."""
+
+
+@dataclass(frozen=True, eq=False)
+class KernelFit:
+    """Posterior of the pulse response of one output.
+
+    ``markov`` (m, n) is the mean and ``std`` its standard deviation; `decay` (m,) holds lambda,
+    `correlation` (m,) the correlation of neighbours, `scale` (m,) c, and `evidence` the log
+    marginal likelihood up to a constant. ``effective`` is the number of parameters that the data
+    decide, trace(I - M^-1); ``kernel`` is the prior.
+    """
+
+    markov: FloatArray
+    std: FloatArray
+    noise_variance: float
+    decay: FloatArray
+    correlation: FloatArray
+    scale: FloatArray
+    evidence: float
+    effective: float
+    kernel: str
+
+
+def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
+    """Estimate the pulse responses from every input to one output.
+
+    Parameters
+    ----------
+    equations : NormalEquations
+        Of ``m * lags`` regressors, one target.
+    lags : int
+    kernel : {"TC", "DC", "SS", "auto"}
+        ``"auto"``: TC or SS, whichever has the larger marginal likelihood.
+
+    Returns
+    -------
+    KernelFit
+    """
+    problem = KernelProblem.of(equations, lags, kernel)
+    if kernel == "auto":
+        tried = [replace(problem, kernel=name) for name in CHOSEN_FROM]
+        problem = min(tried, key=lambda each: each.roughly()[1])
+    return _posterior(problem, problem.best())
+
+
+def cautious_std(equations: NormalEquations, lags: int, fit: KernelFit) -> FloatArray:
+    """Standard deviations (m, lags) that do not rest on the smoothness of the prior.
+
+    At each lag the larger one of the fit's own and that under TC, the distance of both means
+    included. Its own takes it for known how smooth a response is and how fast it decays: under SS
+    it misses the truth where the response sets in, and where it dies away more slowly than it
+    began.
+    """
+    if fit.kernel == "TC":
+        return fit.std
+    problem = KernelProblem.of(equations, lags, "TC")
+    # Tied taps make the decay too fast for the last ones.
+    other = _posterior(problem, problem.search(problem.roughly()[0], CLOSE)[0])
+    return np.maximum(fit.std, np.hypot(other.std, fit.markov - other.markov))
+
+
+def _posterior(problem: KernelProblem, x: FloatArray) -> KernelFit:
+    """Mean and standard deviation of the response, given the hyper-parameters."""
+    m, lags = problem.inputs, problem.taps
+    factors = problem.factors(x)
+    found = problem.likelihood(factors)
+    variance = found.least / problem.freedom
+    weights = solve_triangular(found.C.T, found.half, lower=False)
+    wide = block_diag(*factors)
+    spread = solve_triangular(found.C, wide.T, lower=True)
+    inverse_diagonal = solve_triangular(found.C, np.eye(m * lags), lower=True)
+    decay, correlation, scale = prior_of(x, m, problem.kernel)
+    return KernelFit(
+        markov=(wide @ weights).reshape(m, lags),
+        std=np.sqrt(variance * (spread**2).sum(axis=0)).reshape(m, lags),
+        noise_variance=variance,
+        decay=decay,
+        correlation=correlation,
+        scale=scale * variance,
+        evidence=-found.value / 2,
+        effective=float(m * lags - (inverse_diagonal**2).sum()),
+        kernel=problem.kernel,
+    )

@@ -1,0 +1,178 @@
+"""Hyper-parameters of the prior of a pulse response, by the marginal likelihood of the data.
+
+With the prior's factor F, F F^T its covariance in units of the noise, estimate, covariance and
+likelihood need one Cholesky factorization of ``M = I + F^T R F``, R the Gram matrix of the lagged
+input; the noise variance is eliminated in closed form. The inverse of a kernel, whose entries
+reach lambda^-n, is never formed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg.blas import dtrmm
+from scipy.linalg.lapack import dtrtrs
+from scipy.optimize import minimize
+
+from ..arrays import FloatArray
+from .kernel_prior import cholesky, prior_factors, shape_count
+from .normal_equations import NormalEquations
+
+FEW = 40
+"""Taps to which a response is tied where hyper-parameters are only looked for roughly."""
+
+COARSE = 100
+"""Taps up to which hyper-parameters are searched at full resolution."""
+
+FLOOR = 1e-13
+"""Least noise variance, as a share of the output's: what rounding leaves of the sums."""
+
+_WORST = 1e300
+_ROUNDING = 1e-13
+"""Part of the mean square added to the squares, so that rounding leaves none below zero."""
+
+WIDE, CLOSE = 0.7, 0.15
+"""First steps of a search from a guess, and of one that begins near its end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """What one set of hyper-parameters makes of the data.
+
+    ``value`` is -2 log marginal likelihood up to a constant, ``C`` the lower factor of M, ``half``
+    is C^-1 F^T b, and ``least`` the weighted misfit.
+    """
+
+    value: float
+    C: FloatArray
+    half: FloatArray
+    least: float
+
+
+@dataclass(frozen=True, eq=False)
+class KernelProblem:
+    """Sums over the data of one output, and the prior of its pulse responses.
+
+    ``gram`` (m n, m n) and ``cross`` (m n,) are those of m inputs with n taps each, which lie
+    `group` samples apart; ``power`` is the output's sum of squares.
+    """
+
+    gram: FloatArray
+    cross: FloatArray
+    power: float
+    freedom: int
+    inputs: int
+    taps: int
+    group: int
+    kernel: str
+
+    @classmethod
+    def of(cls, equations: NormalEquations, lags: int, kernel: str) -> KernelProblem:
+        """Take the sums as they are, but for what rounding leaves of the squares."""
+        size = equations.gram.shape[0]
+        diagonal = np.full(size, _ROUNDING * np.trace(equations.gram) / size)
+        return cls(
+            equations.gram + np.diag(diagonal),
+            equations.cross[:, 0],
+            float(equations.power[0, 0]),
+            equations.freedom,
+            size // lags,
+            lags,
+            1,
+            kernel,
+        )
+
+    def tied(self, group: int) -> KernelProblem:
+        """Tie neighbouring taps together: the same data with `group` times fewer unknowns."""
+        edges = np.arange(0, self.taps, group)
+        where = (np.arange(self.inputs)[:, None] * self.taps + edges).ravel()
+        gram = np.add.reduceat(np.add.reduceat(self.gram, where, axis=0), where, axis=1)
+        cross = np.add.reduceat(self.cross, where)
+        return replace(self, gram=gram, cross=cross, taps=edges.size, group=group)
+
+    def factors(self, x: FloatArray) -> list[FloatArray]:
+        """Lower-triangular F of every input."""
+        return prior_factors(x, self.inputs, self.taps, self.group, self.kernel)
+
+    def likelihood(self, factors: list[FloatArray]) -> Likelihood:
+        """Evaluate the likelihood of a prior with these factors."""
+        n = self.taps
+        M = np.empty_like(self.gram, order="F")
+        right = np.empty_like(self.cross)
+        for i, Fi in enumerate(factors):
+            rows = slice(i * n, (i + 1) * n)
+            right[rows] = Fi.T @ self.cross[rows]
+            for j, Fj in enumerate(factors[: i + 1]):
+                columns = slice(j * n, (j + 1) * n)
+                half = dtrmm(1.0, Fj, self.gram[rows, columns], side=1, lower=1)
+                M[rows, columns] = dtrmm(1.0, Fi, half, side=0, trans_a=1, lower=1, overwrite_b=1)
+        M[np.diag_indices(M.shape[0])] += 1.0
+        C = cholesky(M)
+        half = dtrtrs(C, right, lower=1)[0]
+        least = max(self.power - float(half @ half), FLOOR * self.power)
+        value = self.freedom * np.log(least) + 2.0 * float(np.log(np.diag(C)).sum())
+        return Likelihood(value, C, half, least)
+
+    def start(self) -> FloatArray:
+        """Guess that the response decays within a third of the window and explains the output."""
+        energy = np.diag(self.gram).reshape(self.inputs, self.taps).mean(axis=1)
+        signal = 20.0 * self.freedom / np.maximum(energy, 1e-300) / self.taps
+        shape = [np.log(6.0 / self.taps), np.log(3.0 / self.taps)][: shape_count(self.kernel)]
+        return np.concatenate([[*shape, np.log(s)] for s in signal])
+
+    def roughly(self) -> tuple[FloatArray, float]:
+        """Search on tied taps, where a likelihood costs little."""
+        return self.tied(-(-self.taps // FEW)).search(self.start(), WIDE)
+
+    def best(self) -> FloatArray:
+        """Search for the hyper-parameters of the largest likelihood."""
+        group = -(-self.taps // COARSE)
+        if group == 1:
+            return self.search(self.start(), WIDE)[0]
+        # Most of the way is gone with neighbouring taps tied, at a fraction of the cost.
+        return self.search(self.tied(group).search(self.start(), WIDE)[0], CLOSE)[0]
+
+    def search(self, start: FloatArray, size: float) -> tuple[FloatArray, float]:
+        """Minimize -2 log marginal likelihood over the logarithms of the hyper-parameters.
+
+        The simplex starts with steps of `size`, and ends with a thirtieth of that.
+        """
+        span = self.taps * self.group
+        m, shapes = self.inputs, shape_count(self.kernel)
+        low = np.tile([np.log(0.1 / span)] * shapes + [-80.0], m)
+        high = np.tile([np.log(3.0)] * shapes + [80.0], m)
+        # Where one point weighs 1e77 times as much as another, the prior is narrow from the start.
+        low[shapes :: shapes + 1] = np.minimum(-80.0, start[shapes :: shapes + 1] - 40.0)
+
+        def misfit(x: FloatArray) -> float:
+            try:
+                return self.likelihood(self.factors(x)).value
+            except np.linalg.LinAlgError:
+                # a prior so wide that the rounding of `gram` outweighs the identity: no better
+                # for it. Not infinity, which the search takes differences of.
+                return _WORST
+
+        steps = np.tile([size] * shapes + [2 * size], m)
+        inside = np.clip(start, low, high)
+        scales = slice(shapes, None, shapes + 1)
+        while misfit(inside) >= _WORST and (inside[scales] > low[scales]).any():
+            inside[scales] = np.maximum(inside[scales] - 3.0, low[scales])
+        # Steps go inward where the start lies at a bound, or the simplex would be flat there.
+        steps = np.where(inside + steps > high, -steps, steps)
+        simplex = np.vstack([inside, inside + np.diag(steps)])
+        rough = size == WIDE
+        found = minimize(
+            misfit,
+            inside,
+            method="Nelder-Mead",
+            bounds=list(zip(low, high, strict=True)),
+            # A difference of 0.1 in -2 log likelihood is far inside what the data can tell.
+            options={
+                "initial_simplex": simplex,
+                "xatol": max(size / 30, 0.02),
+                "fatol": 0.02 if rough else 0.1,
+                "maxfev": (300 if rough else 40) * m,
+            },
+        )
+        return np.asarray(found.x, dtype=np.float64), float(found.fun)

@@ -1,0 +1,1 @@
+"""Separable least squares for models with dead time."""

@@ -1,0 +1,146 @@
+"""Bring all structures that a comparison may choose, or not rule out, to their minima."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import FloatArray
+from .poles import parameters_from_poles
+from .polish import polish, settle
+from .structures import (
+    PLAUSIBLE,
+    Candidate,
+    Scales,
+    apart,
+    criteria,
+    neighbour_starts,
+    parameter_bounds,
+)
+from .varpro import Problem, Structure, evaluate
+
+REACH = 3 * PLAUSIBLE
+"""Excess of the criterion up to which structures are followed to their minima. Of measured records
+searches ended up to 21 above them; what is not ruled out is within 10, charges aside."""
+_SLOWEST, _FASTEST, _RATES = 0.01, 10.0, 8  # poles that are tried, over length and rise
+_CLOSE, _OTHERS = 1.0, 2
+"""Variances by which ends differ that are both followed to the bottom, and how many others."""
+_STARTS, _PROMISING = 3, 10.0
+"""Starts that are followed beside the best end of a search, and variances that they may be above
+it. With free initial states of records all are: there valleys are many, and flat."""
+_ALL = 4  # structures that are few enough for each to matter
+
+
+def on_new_data(
+    problem: Problem, candidates: dict[Structure, Candidate]
+) -> dict[Structure, Candidate]:
+    """Find the costs of models on data that have changed: all of them, or none are comparable."""
+    return {
+        s: replace(c, cost=float(evaluate(problem, s, c.parameters[None]).cost[0]))
+        for s, c in candidates.items()
+    }
+
+
+def converged(
+    problem: Problem,
+    candidates: dict[Structure, Candidate],
+    scales: Scales,
+    variance: float,
+    samples: float,
+    *,
+    last: bool = True,
+) -> dict[Structure, Candidate]:
+    """Follow structures within reach of the best criterion to their minima.
+
+    Parameters
+    ----------
+    problem : Problem
+    candidates : dict of Structure to Candidate
+        From a search on this problem, or on data that differ little.
+    scales : Scales
+    variance, samples : float
+        See `criteria`.
+    last : bool, optional
+        Whether the data are the last ones. Otherwise it is enough to be near, and the best ends
+        of every structure stay.
+
+    Notes
+    -----
+    Each begins at all ends that its search has met, not only at the lowest, which has not
+    converged, and at the optima of the structures next to it.
+    """
+    found = dict(candidates)
+    for structure in sorted(candidates, key=lambda s: (s.order, s.zeros)):
+        value = criteria(found, variance, samples)
+        if len(found) > _ALL and value[structure] > min(value.values()) + REACH:
+            continue
+        near = _near_minimum(problem, structure, scales, found)
+        found[structure] = settled(problem, near, scales) if last else near
+    return found
+
+
+def settled(problem: Problem, candidate: Candidate, scales: Scales) -> Candidate:
+    """Follow a candidate to its minimum, from all its ends."""
+    structure = candidate.structure
+    starts = [candidate.parameters]
+    if candidate.ends is not None:
+        starts += [*candidate.ends]
+    bounds = parameter_bounds(structure, scales)
+    fits = [settle(problem, structure, start, bounds, scales.dt) for start in starts]
+    parameters, cost = min(fits, key=lambda fit: fit[1])
+    return Candidate(structure, parameters, cost, searched=False)
+
+
+def _near_minimum(
+    problem: Problem, structure: Structure, scales: Scales, found: dict[Structure, Candidate]
+) -> Candidate:
+    old = found[structure]
+    bounds = parameter_bounds(structure, scales)
+    starts = [old.parameters] if old.ends is None else [old.parameters, *old.ends]
+    if old.searched:
+        more = np.array(
+            [
+                *starts[1:],
+                *neighbour_starts(structure, scales, found),
+                *_with_a_pole_more(structure, scales, found),
+            ]
+        ).reshape(-1, old.parameters.size)
+        if problem.stretches is None and len(more):
+            cost = evaluate(problem, structure, more).cost
+            promising = np.argsort(cost)[:_STARTS]
+            near = cost[promising] <= old.cost * (1 + _PROMISING / problem.data.size)
+            more = more[promising[near]]
+        starts = [old.parameters, *more]
+    ends, costs = polish(problem, structure, np.array(starts), bounds, scales.dt)
+    order = np.argsort(costs)
+    close = order[costs[order] <= costs[order[0]] * (1 + _CLOSE / problem.data.size)]
+    others = apart(ends[close])[:_OTHERS]
+    best = order[0]
+    return Candidate(structure, ends[best], float(costs[best]), others, searched=False)
+
+
+def at_delay(problem: Problem, candidate: Candidate, scales: Scales, delay: float) -> Candidate:
+    """Best model of the same structure with a given delay."""
+    start = candidate.parameters[None].copy()
+    start[0, 0] = delay
+    structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
+    near = polish(problem, structure, start, bounds, scales.dt, delay_fixed=True)[0][0]
+    fit = settle(problem, structure, near, bounds, scales.dt, delay_fixed=True)
+    return Candidate(structure, *fit)
+
+
+def _with_a_pole_more(
+    structure: Structure, scales: Scales, found: dict[Structure, Candidate]
+) -> list[FloatArray]:
+    """Optimum of the structure with a pole and a zero less, with a pole anywhere.
+
+    The zero may cancel it, so that none of them is worse: which is best does not hang on the
+    course of a search.
+    """
+    smaller = found.get(Structure(structure.order - 1, structure.relative_degree))
+    if smaller is None:
+        return []
+    rates = np.geomspace(_SLOWEST / scales.length, _FASTEST / scales.rise, _RATES)
+    poles = [np.append(smaller.poles, -rate) for rate in rates]
+    return [np.append(smaller.delay, parameters_from_poles(each)) for each in poles]

@@ -1,0 +1,341 @@
+"""The axial-dispersion model (inverse-Gaussian residence time): its modes and its fit.
+
+Residence times in a pipe or a packed bed have an inverse Gaussian distribution where the flow
+carries its load along and spreads it by diffusion (Levenspiel, Chemical Reaction Engineering,
+chapter 13): with a mean m and a standard deviation c m its transfer function is
+
+    exp((1 - sqrt(1 + 2 c^2 m s)) / c^2),
+
+and 2/c^2 is the Peclet number. Three or four lags and a longer dead time imitate it down to the
+noise, so that no residual shows it; fitted to the same record it needs two parameters where they
+need four, and wins. Behind it there may be one lag, as of a sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import wofz
+
+from ..arrays import ComplexArray, FloatArray
+from .lag_chains import time_moments
+from .profile_ends import solve_ends
+from .responses import MoveTrain
+from .structures import PLAUSIBLE, Candidate, Scales
+from .varpro import Problem, partial_fractions
+
+
+def flow_modes(
+    time: FloatArray, mean: float, spread: float, poles: ComplexArray
+) -> tuple[FloatArray, ComplexArray]:
+    r"""Step responses of a flow, and of modes behind it.
+
+    Parameters
+    ----------
+    time : ndarray, shape (m,)
+        Since the flow set in, in s; positive.
+    mean, spread : float
+        Mean residence time in s, and its standard deviation over the mean.
+    poles : ndarray, shape (J,)
+        In 1/s.
+
+    Returns
+    -------
+    passed : ndarray, shape (m,)
+        Part of the flow that has passed.
+    modes : ndarray, shape (m, J)
+        exp(p t) behind the flow: the integral of exp(p (t - s)) over the residence times s.
+
+    Notes
+    -----
+    With q = sqrt(1 + 2 c^2 m p), x = t/m and z = (1 -+ q x) / sqrt(2 c^2 x) a mode is
+    exp(-(1 - x)^2 / (2 c^2 x)) / 2 times the sum of both erfcx(z); ``p = 0`` is the flow itself.
+    """
+    x = time[:, None] / mean
+    rates = np.append(poles, 0.0)
+    q = np.sqrt(1 + 2 * spread**2 * mean * rates.astype(np.complex128))
+    root = 1 / (spread * np.sqrt(2 * x))
+    envelope = 0.5 * np.exp(-((root * (1 - x)) ** 2))
+    early, late = root * (1 - q * x), root * (1 + q * x)
+    behind = early.real < 0
+    # erfcx(z) = 2 exp(z^2) - erfcx(-z): of a negative z it would overflow.
+    sign = np.where(behind, -1.0, 1.0)
+    whole = np.exp(np.where(behind, rates * mean * x + (1 - q) / spread**2, -np.inf))
+    values = whole + envelope * (wofz(1j * late) + sign * wofz(1j * sign * early))
+    return values[:, -1].real, values[:, :-1]
+
+
+_CHARGE = 8.0  # what a flow must be worth in the criterion: a few lags are more common
+_SPREADS = (0.1, 1.2)
+"""Standard deviations over means: narrower is no different from many lags, wider from few."""
+_MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
+_FREE = 4  # delay, gain, mean, spread; a lag is one more
+_DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
+"""Starts: parts of a delay that is too long, and of the whole spread in time."""
+_FOLLOWED, _EVALUATIONS = 3, 40  # starts that are improved, and how far
+_SAME = 0.1  # variances by which two ends are one
+_HOPELESS = 300.0  # above what is to be beaten, after the first of them
+_REACH = 3 * PLAUSIBLE  # excess up to which a flow is followed to its minimum
+_SMALL = 1e-5  # step of the numerical derivatives
+_PROFILE = np.array([0.7, 1.2, 1.7, 2.3, 3.2])  # standard errors from the optimum
+
+
+@dataclass(frozen=True, eq=False)
+class DispersedFlow:
+    """Best fit of a flow behind a dead time; times in s.
+
+    `mean` is that of the residence time, `spread` its standard deviation over the mean, `lag` the
+    time constant behind it, 0 if there is none. `criterion` includes what a flow must be worth,
+    `excess` is it above that of the best lags.
+    """
+
+    delay: float
+    mean: float
+    spread: float
+    lag: float
+    cost: float
+    criterion: float
+    excess: float
+
+    @property
+    def parameters(self) -> int:
+        """Free ones beside gain and delay."""
+        return 3 if self.lag else 2
+
+    @property
+    def peclet(self) -> float:
+        """Peclet number of the flow, 2/c^2."""
+        return 2 / self.spread**2
+
+
+def fit_flows(
+    problem: Problem,
+    like: Candidate,
+    scales: Scales,
+    variance: float,
+    penalty: float,
+    level: float,
+) -> list[DispersedFlow]:
+    """Fit a flow with a dead time before it, with and without a lag behind it.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of a step record.
+    like : Candidate
+        A model with the delay and the spread in time at which the starts are aimed.
+    scales : Scales
+        Bounds of the delay.
+    variance, penalty : float
+        Of the noise, and what the criterion charges for a parameter.
+    level : float
+        Criterion of the best lags: what ends far above it is left alone.
+
+    Returns
+    -------
+    list of DispersedFlow
+        None of them spreads by less than half the lag behind it, where a second lag would do as
+        well. A short flow before a long lag and a long flow alone are often equally good: both are
+        told. Empty where `like` spreads in time by less than a sample, and where the record has a
+        free response, which a flow has no poles for.
+    """
+    if problem.stretches is not None or not isinstance(problem.drive, MoveTrain):
+        return []
+    mean, square = time_moments(problem, like)
+    if not square > scales.dt**2:
+        return []
+    target = like.delay, mean, float(np.sqrt(square))
+    lagging = _FlowFit(problem, problem.drive, scales, True)
+    flows = _followed(lagging, target, variance, penalty, level)
+    # Without the lag there are no fewer squares: a parameter is all that can be won.
+    if flows and flows[0].excess - penalty <= PLAUSIBLE:
+        plain = _FlowFit(problem, problem.drive, scales, False)
+        flows += _followed(plain, target, variance, penalty, level)
+    return [flow for flow in flows if flow.spread * flow.mean >= _MINOR * flow.lag]
+
+
+def _followed(
+    fit: _FlowFit,
+    target: tuple[float, float, float],
+    variance: float,
+    penalty: float,
+    level: float,
+) -> list[DispersedFlow]:
+    """Follow the most promising starts while one may get near the level; the best end, if any."""
+    best: DispersedFlow | None = None
+    for start in sorted(fit.starts(*target), key=fit.cost)[:_FOLLOWED]:
+        x = fit.improved(start)
+        cost = fit.cost(x)
+        again = best is not None and abs(cost - best.cost) < _SAME * variance
+        if best is None or cost < best.cost:
+            criterion = cost / variance + fit.count * penalty + _CHARGE
+            best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
+        if again or best.excess > _HOPELESS:
+            break
+    if best is not None and best.excess <= _REACH:
+        # What may be compared with a limit has converged.
+        x = fit.improved(fit.parameters(best), converged=True)
+        cost = fit.cost(x)
+        criterion = cost / variance + fit.count * penalty + _CHARGE
+        best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
+    return [] if best is None else [best]
+
+
+def flow_profile(
+    problem: Problem, flow: DispersedFlow, scales: Scales, variance: float
+) -> tuple[FloatArray, FloatArray]:
+    """Misfit over the delay, as `delay_profile`."""
+    assert isinstance(problem.drive, MoveTrain)
+    fit = _FlowFit(problem, problem.drive, scales, flow.lag > 0)
+    best = fit.parameters(flow)
+    low, high = (float(bound[0]) for bound in fit.bounds)
+    found = {float(best[0]): best}
+    error = fit.delay_error(best, variance)
+    for side in (-1, 1):
+        x = best
+        for distance in _PROFILE:
+            at = float(np.clip(best[0] + side * distance * error, low, high))
+            if at in found:
+                break
+            x = found[at] = fit.improved(np.append(at, x[1:]), True, True)
+    costs = {at: fit.cost(x) for at, x in found.items()}
+    least = min(costs.values())
+
+    def excess(at: float) -> float:
+        near = min(found, key=lambda other: abs(other - at))
+        found[at] = fit.improved(np.append(at, found[near][1:]), True, True)
+        costs[at] = fit.cost(found[at])
+        return (costs[at] - least) / variance
+
+    solve_ends(excess, {at: (cost - least) / variance for at, cost in costs.items()})
+    delay = np.array(sorted(costs))
+    cost = np.array([costs[at] for at in delay])
+    return delay * scales.rise, (cost - cost.min()) / variance
+
+
+@dataclass(frozen=True, eq=False)
+class _FlowFit:
+    """Least squares over x = (delay, log mean, log spread, log lag), times in rises.
+
+    The last is not there where no lag is tried.
+    """
+
+    problem: Problem
+    drive: MoveTrain
+    scales: Scales
+    lagging: bool
+
+    @property
+    def count(self) -> int:
+        """Parameters, the gain among them."""
+        return _FREE + self.lagging
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        s = self.scales
+        longest, shortest = np.log(3 * s.length / s.rise), np.log(0.1 * s.dt / s.rise)
+        low = [s.earliest / s.rise, shortest, np.log(_SPREADS[0]), shortest]
+        high = [s.latest / s.rise, longest, np.log(_SPREADS[1]), longest]
+        return np.array(low[: self.count - 1]), np.array(high[: self.count - 1])
+
+    def parameters(self, flow: DispersedFlow) -> FloatArray:
+        rise = self.scales.rise
+        lag = [flow.lag / rise] * self.lagging
+        return np.append(flow.delay / rise, np.log([flow.mean / rise, flow.spread, *lag]))
+
+    def times(self, x: FloatArray) -> tuple[float, float, float, float]:
+        """Delay, mean, spread and lag; all but the spread in s."""
+        rise = self.scales.rise
+        lag = float(np.exp(x[3])) * rise if self.lagging else 0.0
+        return float(x[0]) * rise, float(np.exp(x[1])) * rise, float(np.exp(x[2])), lag
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        """Weighted residual (m,), gain and regressors eliminated."""
+        columns = np.column_stack([self._response(x), self.problem.regressors])
+        columns = self.problem.weighted(columns)
+        q = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
+        data = self.problem.weighted_data
+        return np.asarray(data - q @ (q.T @ data))
+
+    def cost(self, x: FloatArray) -> float:
+        residual = self.residual(x)
+        return float(residual @ residual)
+
+    def starts(self, delay: float, mean: float, deviation: float) -> Iterator[FloatArray]:
+        """Share mean and variance in time out over delay, flow and lag."""
+        low, high = self.bounds
+        rise = self.scales.rise
+        for part in _DELAYS:
+            for share in _LAGS if self.lagging else (0.0,):
+                lag = share * deviation
+                residence = mean - part * delay - lag
+                if residence > 0:
+                    spread = np.sqrt(deviation**2 - lag**2) / residence
+                    logs = np.log([residence / rise, spread, *[lag / rise] * self.lagging])
+                    yield np.clip(np.append(part * delay / rise, logs), low, high)
+
+    def improved(
+        self, start: FloatArray, fixed_delay: bool = False, converged: bool = False
+    ) -> FloatArray:
+        """Follow a start towards its minimum, or down to it, the delay fixed or not."""
+        kept = start[:1] if fixed_delay else start[:0]
+        low, high = (bound[kept.size :] for bound in self.bounds)
+        inside = 1e-9 * (high - low)
+
+        def residual(x: FloatArray) -> FloatArray:
+            return self.residual(np.concatenate([kept, x]))
+
+        found = least_squares(
+            residual,
+            np.clip(start[kept.size :], low + inside, high - inside),
+            bounds=(low, high),
+            x_scale="jac",
+            jac="3-point" if converged else "2-point",
+            ftol=1e-13 if converged else 1e-4,
+            xtol=1e-10 if converged else 1e-8,
+            max_nfev=_EVALUATIONS,
+        )
+        return np.concatenate([kept, found.x])
+
+    def delay_error(self, x: FloatArray, variance: float) -> float:
+        """Standard error of the delay, in rises, from the curvature."""
+        here = self.residual(x)
+        moved = [self.residual(x + _SMALL * row) - here for row in np.eye(x.size)]
+        jacobian = np.stack(moved, axis=1) / _SMALL
+        size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+        on_delay = np.linalg.pinv(jacobian / size)[0] / size[0]
+        return float(np.sqrt(variance) * np.linalg.norm(on_delay))
+
+    def _response(self, x: FloatArray) -> FloatArray:
+        """Unit response in means over the bins, by Simpson's rule where they are wide."""
+        delay, *shape = self.times(x)
+        drive = self.drive
+        wide = drive.width > 1
+        span = (drive.width[wide] - 1) * drive.dt
+        since = np.concatenate(
+            [drive.first, drive.first[wide] + span / 2, drive.first[wide] + span]
+        )
+        since -= delay
+        every = sum(
+            size * self._step(since - move, *shape)
+            for move, size in zip(drive.moves, drive.sizes, strict=True)
+        )
+        total, middle, end = np.split(every, [wide.size, wide.size + span.size])
+        total[wide] = (total[wide] + 4 * middle + end) / 6
+        return total
+
+    def _step(self, time: FloatArray, mean: float, spread: float, lag: float) -> FloatArray:
+        """Step response of the flow, the lag and the known dynamics."""
+        known = self.problem.known
+        numerator, poles = known.numerator, known.poles
+        if lag:
+            numerator, poles = numerator / lag, np.append(poles, -1 / lag)
+        residues, gain, _ = partial_fractions(poles[None], numerator, 1)
+        values = np.zeros(time.size)
+        begun = time > 0
+        passed, modes = flow_modes(time[begun], mean, spread, poles)
+        values[begun] = gain[0, 0] * passed + (modes @ residues[0, :, 0]).real
+        return values

@@ -1,0 +1,276 @@
+"""Chains of many lags: tanks in series, and modes of diffusion, by three parameters.
+
+A response that many lags have smoothed is imitated by fewer lags and a longer dead time. The free
+structures end at five poles; the chain goes on, because its rates follow a law. In a row of tanks
+they are nearly equal, as in Strejc's evaluation of step responses: here, spread evenly around one
+rate. Where heat or matter diffuses they grow as (k - c)^2, c between 0 and 1/2 by the boundaries.
+That real lags do not keep to such a law is in the error of the delay: without it, its interval
+would be narrower than anything that is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+from .poles import parameters_from_poles
+from .structures import Candidate, Scales
+from .varpro import Problem, Structure, evaluate
+
+SHORTEST, LONGEST = 4, 8
+"""Shorter ones have few parameters when they are free; of longer ones rounding shows."""
+
+FREE_IN_A_CHAIN = 2
+"""Parameters beside delay and gain: the lag, and how many; the shape is bounded."""
+
+_DIFFUSION_CHARGE = 8.0  # two lags far apart look like diffusion, and are more common
+_UNEVEN = 0.15  # by which real lags are taken to stray from the law
+_ITERATIONS = 60
+_CONVERGED = 1e-13  # gain over the cost at which a fit ends, as rounding allows
+_GIVEN_UP = 1e9  # damping
+_SMALL = 1e-4  # step of the numerical derivatives of pole parameters
+_WORSE = 100.0  # in the criterion: a longer chain will not come back from there
+
+
+@dataclass(frozen=True, eq=False)
+class LagChain:
+    """Best fit of a chain of lags, with the standard error of its delay in s.
+
+    `criterion` includes what the kind of chain must be worth. `hidden` is the sum of the lags, in
+    s, that the law goes on with beyond those fitted: faster than anything that a record shows,
+    they are in the delay.
+    """
+
+    candidate: Candidate
+    criterion: float
+    error: float
+    hidden: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        if self.hidden:
+            return "modes of diffusion"
+        return f"chain of {self.candidate.structure.order} nearly equal lags"
+
+
+@dataclass(frozen=True)
+class _Law:
+    """How the rates of a chain grow: ``rates(order, shape)``, and the bounds of the shape."""
+
+    rates: Callable[[int, float], FloatArray]
+    low: float
+    first: float
+    high: float
+
+
+def _spread_rates(order: int, square: float) -> FloatArray:
+    # The square of half the range, for the response is even in the range itself.
+    return np.asarray(1 + np.sqrt(square) * np.linspace(-1, 1, order))
+
+
+def _diffusion_rates(order: int, shift: float) -> FloatArray:
+    return np.asarray(((np.arange(1, order + 1) - shift) / (1 - shift)) ** 2)
+
+
+_TANKS = _Law(_spread_rates, 0.08**2, 0.1**2, 0.5**2)  # partial fractions need distinct poles
+_DIFFUSION = _Law(_diffusion_rates, 0.0, 0.25, 0.5)
+
+
+def fit_chains(
+    problem: Problem, like: Candidate, scales: Scales, variance: float, penalty: float
+) -> list[LagChain]:
+    """Fit chains of four to eight lags, as long as they get better.
+
+    Parameters
+    ----------
+    problem : Problem
+    like : Candidate
+        A model whose delay and spread in time (mean and variance of the impulse response) are
+        where the chains start.
+    scales : Scales
+        Bounds of the delay.
+    variance : float
+        Of the noise.
+    penalty : float
+        What the criterion charges for a parameter.
+
+    Returns
+    -------
+    list of LagChain
+        Empty where `like` has no positive spread, as with an inverse response.
+    """
+    chains: list[LagChain] = []
+    moments = time_moments(problem, like)
+    if not moments[1] > 0:
+        return chains
+    for order in range(SHORTEST, LONGEST + 1):
+        chain = _chain(problem, order, _TANKS, moments, scales, variance, penalty)
+        if _over_within_a_sample(chain, scales):
+            break
+        if chains and chain.criterion > chains[-1].criterion + _WORSE:
+            break
+        chains.append(chain)
+    return chains
+
+
+def fit_diffusion(
+    problem: Problem, like: Candidate, scales: Scales, variance: float, penalty: float
+) -> list[LagChain]:
+    """Fit the first eight modes of diffusion; see `fit_chains`. One chain, or none."""
+    moments = time_moments(problem, like)
+    if not moments[1] > 0:
+        return []
+    chain = _chain(problem, LONGEST, _DIFFUSION, moments, scales, variance, penalty)
+    if _over_within_a_sample(chain, scales):
+        return []
+    # The sum of 1 / (k - c)^2 beyond n is that of the integral from n + 1/2 - c on.
+    slowest, second = np.sort(np.abs(chain.candidate.poles))[:2]
+    root = float(np.sqrt(second / slowest))  # (2 - c) / (1 - c)
+    first = 1 / (root - 1)  # 1 - c
+    hidden = first**2 / (LONGEST - 0.5 + first) / float(slowest)
+    return [replace(chain, criterion=chain.criterion + _DIFFUSION_CHARGE, hidden=hidden)]
+
+
+def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
+    """Tell whether no sample shows anything of the lags, so that their curvature is rounding."""
+    return float(np.sum(1 / np.abs(chain.candidate.poles))) < scales.dt
+
+
+def still_improving(chains: Sequence[LagChain]) -> bool:
+    """Tell whether the longest chain is not the end: the parabola of the last three goes down."""
+    if not chains or chains[-1].candidate.structure.order < LONGEST:
+        return False
+    first, middle, last = (chain.criterion for chain in chains[-3:])
+    bend = first - 2 * middle + last
+    return last < middle and (bend <= 0 or (middle - last) / bend > 1.0)
+
+
+def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArray]:
+    """Misfit over the delay, as `delay_profile`; with so few parameters it is a parabola."""
+    delay = chain.candidate.delay
+    # An error may be nothing or infinite where no sample shows anything of the delay.
+    error = float(
+        np.clip(chain.error, 1e-9 * scales.dt, scales.latest - scales.earliest + scales.dt)
+    )
+    grid = np.clip(delay + error * np.linspace(-3, 3, 13), scales.earliest, scales.latest)
+    grid = np.unique(np.append(grid, delay))
+    return grid, ((grid - delay) / error) ** 2
+
+
+def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
+    """Ends of the 95 % interval of the delay, what is hidden taken off the lower one."""
+    delay, half = chain.candidate.delay, 1.96 * chain.error
+    low = max(delay - half - chain.hidden, scales.earliest)
+    return low, min(delay + half, scales.latest)
+
+
+def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
+    """Delay at zero frequency of b(s)/a(s): sum of its lags less that of its leads, in s."""
+    lag = float(np.sum(-1.0 / poles).real)
+    if numerator.size > 1 and numerator[0] != 0:
+        lag -= float(numerator[1] / numerator[0])
+    return lag
+
+
+def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:
+    """Mean and variance in time of the impulse response, from the cumulants of poles and zeros."""
+    numerator = evaluate(problem, like.structure, like.parameters[None]).numerator[0]
+    zeros = np.roots(numerator[::-1])
+    mean = like.delay + lag_sum(like.poles, numerator)
+    return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)
+
+
+def _chain(
+    problem: Problem,
+    order: int,
+    law: _Law,
+    moments: tuple[float, float],
+    scales: Scales,
+    variance: float,
+    penalty: float,
+) -> LagChain:
+    mean, spread = moments
+    lags = 1 / law.rates(order, law.first)
+    lag = float(np.sqrt(spread / (lags @ lags)))
+    start = np.array([mean - lag * float(lags.sum()), np.log(lag), law.first])
+    candidate, x = _fit(problem, order, law, start, scales)
+    value = candidate.cost / variance + (FREE_IN_A_CHAIN + 2) * penalty
+    value += problem.own_count(order)
+    return LagChain(candidate, value, _error(problem, candidate, law, x, variance))
+
+
+def _fit(
+    problem: Problem, order: int, law: _Law, start: FloatArray, scales: Scales
+) -> tuple[Candidate, FloatArray]:
+    """Levenberg-Marquardt in delay, logarithm of the lag, and shape."""
+    structure = Structure(order, order)
+    low = np.array([scales.earliest, -np.inf, law.low])
+    high = np.array([scales.latest, np.inf, law.high])
+    x, damping = np.clip(start, low, high), 1e-3
+    parameters, residual, jacobian = _evaluate(problem, structure, law, x)
+    cost = float(residual @ residual)
+    for _ in range(_ITERATIONS):
+        normal, downhill = jacobian.T @ jacobian, jacobian.T @ residual
+        free = ~((x <= low) & (downhill < 0) | (x >= high) & (downhill > 0))
+        damped = normal[np.ix_(free, free)]
+        damped = damped + np.diag(damping * np.diag(damped) + 1e-300)
+        step = np.zeros(3)
+        step[free] = np.linalg.solve(damped, downhill[free])
+        trial = np.clip(x + step / max(1.0, abs(float(step[1]))), low, high)
+        moved = _evaluate(problem, structure, law, trial)
+        new = float(moved[1] @ moved[1])
+        if not new < cost:
+            damping *= 10
+            if damping > _GIVEN_UP:
+                break
+            continue
+        settled = cost - new < _CONVERGED * new
+        x, cost, damping = trial, new, 0.1 * damping
+        parameters, residual, jacobian = moved
+        if settled:
+            break
+    return Candidate(structure, parameters, cost), x
+
+
+def _error(
+    problem: Problem, candidate: Candidate, law: _Law, x: FloatArray, variance: float
+) -> float:
+    """Standard error of the delay: what noise does to it, and what uneven lags do."""
+    order = candidate.structure.order
+    state = evaluate(problem, candidate.structure, candidate.parameters[None])
+    jacobian = _evaluate(problem, candidate.structure, law, x)[2]
+    size = np.sqrt((jacobian**2).sum(axis=0))
+    if size[0] == 0:
+        return float("inf")
+    size[size == 0] = 1.0
+    on_delay = np.linalg.pinv(jacobian / size)[0] / size[0]
+    uneven = law.rates(order, x[2]) * np.exp(_SMALL * np.eye(order) - x[1])
+    moves = np.stack([_parameters(rates) for rates in uneven], axis=1)
+    moves = (moves - candidate.parameters[1:, None]) * (_UNEVEN / _SMALL)
+    by_lags = on_delay @ state.jacobian[0][:, 1:] @ moves
+    return float(np.sqrt(variance * (on_delay @ on_delay) + by_lags @ by_lags))
+
+
+def _evaluate(
+    problem: Problem, structure: Structure, law: _Law, x: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Parameters, residual, and its derivatives by delay, logarithm of the lag, and shape."""
+    order = structure.order
+    rates = law.rates(order, x[2]) * np.exp(-x[1])
+    parameters = np.append(x[:1], _parameters(rates))
+    state = evaluate(problem, structure, parameters[None])
+    by_delay, by_poles = state.jacobian[0][:, :1], state.jacobian[0][:, 1:]
+    inwards = -_SMALL if x[2] + _SMALL > law.high else _SMALL
+    slower = _parameters(rates * np.exp(-_SMALL))
+    reshaped = _parameters(law.rates(order, x[2] + inwards) * np.exp(-x[1]))
+    moves = [(slower - parameters[1:]) / _SMALL, (reshaped - parameters[1:]) / inwards]
+    columns = by_poles @ np.stack(moves, axis=1)
+    return parameters, state.residual[0], np.concatenate([by_delay, columns], axis=1)
+
+
+def _parameters(rates: FloatArray) -> FloatArray:
+    return parameters_from_poles(-rates.astype(np.complex128))

@@ -1,0 +1,216 @@
+"""Linear terms that belong to one stretch of the data only: its level, drift and initial state.
+
+Several records of one plant share poles, numerator and delay. What each of them has for itself
+enters linearly and touches only its own samples, so it is projected out of them, stretch by
+stretch; a hundred records cost no more than one of the same length.
+
+An initial state of the plant is a free response, a sum of exp(p_j t) with free amplitudes. As
+poles of a pair may be real, complex, or almost equal, its columns are
+
+    (exp(p t) + exp(q t)) / 2    and    (exp(p t) - exp(q t)) / (p - q),
+
+which are real and independent in every case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """Parts of the data with an initial state each.
+
+    Attributes
+    ----------
+    edges : ndarray of int, shape (R + 1,)
+        Stretch r has the rows ``edges[r]...edges[r + 1] - 1``.
+    clock : ndarray, shape (m,)
+        Time since the first sample of the own stretch, in s.
+    regressors : ndarray, shape (m, q)
+        Known shapes, which enter every stretch with coefficients of its own. A stretch with
+        fewer of them has zeros in its last columns.
+    """
+
+    edges: IntArray
+    clock: FloatArray
+    regressors: FloatArray
+
+    @property
+    def rows(self) -> list[slice]:
+        """Rows of every stretch."""
+        edges = [int(edge) for edge in self.edges]
+        return [slice(a, b) for a, b in pairwise(edges)]
+
+    @cached_property
+    def shapes(self) -> int:
+        """Number of known shapes of all stretches together."""
+        return sum(int(self.regressors[rows].any(axis=0).sum()) for rows in self.rows)
+
+
+class FixedTerms:
+    """What does not depend on the plant in the own terms, orthonormalised once.
+
+    Parameters
+    ----------
+    stretches : Stretches
+    root_weight : ndarray, shape (m,)
+    """
+
+    def __init__(self, stretches: Stretches, root_weight: FloatArray) -> None:
+        self.stretches = stretches
+        self.weight = root_weight
+        weighted = stretches.regressors * root_weight[:, None]
+        self.parts = [_orthonormal(weighted[rows]) for rows in stretches.rows]
+
+
+class OwnTerms:
+    """Own terms of all stretches at B sets of poles, ready to be taken out.
+
+    Parameters
+    ----------
+    fixed : FixedTerms
+    poles : ndarray, shape (B, n)
+        Of the plant; conjugates are neighbours, an odd one comes first.
+    """
+
+    def __init__(self, fixed: FixedTerms, poles: ComplexArray) -> None:
+        stretches = fixed.stretches
+        self._fixed = fixed
+        self._rows = stretches.rows
+        self._poles = poles
+        self._weight = fixed.weight
+        self._clock = stretches.clock
+        self._decay = _decay(stretches, poles)
+        self._known = stretches.regressors.shape[1]
+        columns = _free_columns(self._decay, poles) * self._weight[:, None]
+        self._bases: list[FloatArray] = []
+        self._triangles: list[FloatArray] = []
+        self._shared: list[FloatArray] = []
+        self._norms: list[FloatArray] = []
+        for rows, (q, _, _) in zip(self._rows, fixed.parts, strict=True):
+            own, norm = _normalised(columns[:, rows])
+            shared = q.T @ own
+            own = own - q @ shared
+            # Once more: what is nearly all within the fixed terms loses digits the first time.
+            again = q.T @ own
+            basis, triangle = np.linalg.qr(own - q @ again)
+            self._bases.append(basis)
+            self._triangles.append(triangle)
+            self._shared.append(shared + again)
+            self._norms.append(norm)
+
+    def without(self, columns: FloatArray) -> FloatArray:
+        """Take the own terms out of weighted columns (B, m, k)."""
+        left = np.empty_like(columns)
+        for rows, (q, _, _), basis in zip(self._rows, self._fixed.parts, self._bases, strict=True):
+            part = columns[:, rows]
+            part = part - q @ (q.T @ part)
+            left[:, rows] = part - basis @ (np.swapaxes(basis, 1, 2) @ part)
+        return left
+
+    def moved(self, rest: FloatArray, dpoles: ComplexArray) -> FloatArray:
+        """Derivative of the free responses by the pole parameters, weighted, shape (B, m, n).
+
+        Parameters
+        ----------
+        rest : ndarray, shape (B, m)
+            Weighted data less the forced response; the own terms are fitted to it.
+        dpoles : ndarray, shape (B, n, n)
+            Poles (rows) by their parameters (columns).
+        """
+        out = np.empty((*rest.shape, dpoles.shape[2]))
+        for i, rows in enumerate(self._rows):
+            amplitudes = self._amplitudes(self._weights(i, rest)[:, self._known :])
+            slope = self._clock[rows, None] * self._decay[:, rows]
+            out[:, rows] = (slope @ (amplitudes[:, :, None] * dpoles)).real
+        return out * self._weight[:, None]
+
+    def fitted(self, rest: FloatArray, where: Stretches) -> FloatArray:
+        """Own terms as they are fitted to `rest` (B, m), at the rows of other stretches (B, N).
+
+        The stretches are the same ones, looked at more or less closely.
+        """
+        columns = own_columns(where, self._poles)
+        out = np.empty(columns.shape[:2])
+        for i, rows in enumerate(where.rows):
+            out[:, rows] = np.einsum("bmk,bk->bm", columns[:, rows], self._weights(i, rest))
+        return out
+
+    def _weights(self, i: int, rest: FloatArray) -> FloatArray:
+        """Coefficients of the own terms of stretch i, fitted to weighted data (B, m)."""
+        q, r, norm = self._fixed.parts[i]
+        part = rest[:, self._rows[i]]
+        inside = np.einsum("bmk,bm->bk", self._bases[i], part - (part @ q) @ q.T)
+        free = solve_upper(self._triangles[i], inside)
+        known = part @ q - np.einsum("bqk,bk->bq", self._shared[i], free)
+        triangle = np.broadcast_to(r, (len(part), *r.shape))
+        return np.concatenate([solve_upper(triangle, known) / norm, free / self._norms[i]], axis=1)
+
+    def _amplitudes(self, weights: FloatArray) -> ComplexArray:
+        """Turn weights of the columns into amplitudes of the exponentials."""
+        n = self._poles.shape[1]
+        out = weights.astype(np.complex128)
+        for i in range(n % 2, n, 2):
+            half = weights[:, i + 1] / (self._poles[:, i] - self._poles[:, i + 1])
+            out[:, i], out[:, i + 1] = weights[:, i] / 2 + half, weights[:, i] / 2 - half
+        return out
+
+
+def own_columns(stretches: Stretches, poles: ComplexArray) -> FloatArray:
+    """Regressors, and free responses at poles (B, n); shape (B, m, q + n)."""
+    return _columns(stretches, _decay(stretches, poles), poles)
+
+
+def _decay(stretches: Stretches, poles: ComplexArray) -> ComplexArray:
+    return np.asarray(np.exp(stretches.clock[:, None] * poles[:, None, :]))
+
+
+def _columns(stretches: Stretches, decay: ComplexArray, poles: ComplexArray) -> FloatArray:
+    fixed = np.broadcast_to(stretches.regressors, (len(poles), *stretches.regressors.shape))
+    return np.concatenate([fixed, _free_columns(decay, poles)], axis=2)
+
+
+def _free_columns(decay: ComplexArray, poles: ComplexArray) -> FloatArray:
+    n = poles.shape[1]
+    free = np.empty(decay.shape)
+    if n % 2:
+        free[:, :, 0] = decay[:, :, 0].real
+    for i in range(n % 2, n, 2):
+        first, second = decay[:, :, i], decay[:, :, i + 1]
+        gap = poles[:, i] - poles[:, i + 1]
+        free[:, :, i] = (first + second).real / 2
+        free[:, :, i + 1] = ((first - second) / gap[:, None]).real
+    return free
+
+
+def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Basis (m, k) of columns of norm 1, triangle (k, k), and their norms before (k,)."""
+    single, norm = _normalised(columns[None])
+    q, r = np.linalg.qr(single[0])
+    # A column of zeros spans nothing; a direction that QR makes up for it would.
+    q[:, ~single[0].any(axis=0)[: q.shape[1]]] = 0.0
+    return q, r, norm[0]
+
+
+def _normalised(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns (B, m, k) of norm 1, zeros as they are, and their norms (B, k)."""
+    norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
+    norm[norm == 0] = 1.0
+    return columns / norm[:, None], norm
+
+
+def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve R x = b for a batch, R from columns of norm 1; what they do not resolve gets 0."""
+    x = np.zeros_like(right)
+    for i in range(right.shape[1] - 1, -1, -1):
+        rest = right[:, i] - np.einsum("bj,bj->b", r[:, i, i + 1 :], x[:, i + 1 :])
+        resolved = np.abs(r[:, i, i]) > 1e-12
+        x[:, i] = np.where(resolved, rest / np.where(resolved, r[:, i, i], 1.0), 0.0)
+    return x

@@ -1,0 +1,84 @@
+"""Stable polynomials as real and quadratic factors with logarithmic parameters.
+
+An order-n denominator is written with ``n // 2`` quadratic factors
+``s^2 + 2 zeta omega s + omega^2`` and, for odd n, one real factor ``s + lambda``.
+The parameters are ``log(lambda)`` (odd n, first), then ``log(omega), log(zeta)`` of
+every pair. A damping above 1 stands for two real poles, so that nothing has to be
+decided in advance about which poles are complex.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+
+# Partial fractions need distinct poles. A pair is kept at least this far apart
+# (relative); the response moves by the square of it, far below any noise.
+_GAP = 0.01
+
+
+def poles_from_parameters(theta: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return the poles and their derivatives with respect to the parameters.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (B, n)
+        Parameters of B denominators, in 1/s (logarithmic).
+
+    Returns
+    -------
+    poles : ndarray, shape (B, n)
+        Distinct poles; conjugates are neighbours.
+    derivative : ndarray, shape (B, n, n)
+        ``derivative[b, i, q]`` is d poles[b, i] / d theta[b, q].
+    """
+    batch, order = theta.shape
+    poles = np.empty((batch, order), dtype=np.complex128)
+    derivative = np.zeros((batch, order, order), dtype=np.complex128)
+    start = order % 2
+    if start:
+        poles[:, 0] = derivative[:, 0, 0] = -np.exp(theta[:, 0])
+    for i in range(start, order, 2):
+        omega, zeta = np.exp(theta[:, i]), np.exp(theta[:, i + 1])
+        square = zeta**2 - 1.0
+        near = np.abs(square) < _GAP**2 / 4
+        square = np.where(near, np.where(square < 0, -1, 1) * _GAP**2 / 4, square)
+        root = np.sqrt(square.astype(np.complex128))
+        for j, sign in ((i, 1.0), (i + 1, -1.0)):
+            # -omega (zeta - root) = -omega / (zeta + root): no cancellation.
+            shape = -1.0 / (zeta + root) if sign > 0 else -(zeta + root)
+            shape = np.where(square > 0, shape, -zeta + sign * root)
+            poles[:, j] = derivative[:, j, i] = omega * shape
+            derivative[:, j, i + 1] = zeta * omega * (-1.0 + sign * zeta / root)
+    return _separate(poles), derivative
+
+
+def parameters_from_poles(poles: ComplexArray) -> FloatArray:
+    """Return the parameters (n,) of one set of stable poles (n,), closed under conjugation."""
+    order = poles.size
+    upper = sorted((p for p in poles if p.imag > 1e-9 * abs(p)), key=abs)
+    real = sorted((p.real for p in poles if abs(p.imag) <= 1e-9 * abs(p)), key=abs)
+    pairs = [(abs(p), -p.real / abs(p)) for p in upper]
+    theta = []
+    if order % 2:
+        theta.append(np.log(-real.pop(0)))
+    for fast, slow in zip(real[1::2], real[0::2], strict=True):
+        omega = float(np.sqrt(fast * slow))
+        pairs.append((omega, -(fast + slow) / (2 * omega)))
+    for omega, zeta in pairs:
+        theta += [np.log(omega), np.log(zeta)]
+    return np.array(theta, dtype=np.float64)
+
+
+def _separate(poles: ComplexArray) -> ComplexArray:
+    """Move coinciding poles of different factors apart by the smallest useful amount."""
+    order = poles.shape[1]
+    for j in range(1, order):
+        for _ in range(order):
+            gap = np.abs(poles[:, :j] - poles[:, j, None]) < 0.5 * _GAP * np.abs(poles[:, j, None])
+            clash = gap.any(axis=1)
+            if not clash.any():
+                break
+            poles[clash, j] *= 1 + _GAP
+    return poles

@@ -1,0 +1,159 @@
+"""Profile-likelihood interval of the delay of one structure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import FloatArray
+from .polish import polish, solve_level
+from .profile_ends import THRESHOLD, bracket_ends, root_of
+from .structures import Candidate, Scales, parameter_bounds
+from .varpro import Bounds, Problem, evaluate
+
+_EDGE = float(np.sqrt(THRESHOLD))
+_SOLVED = 1e-6  # standard errors, and samples, to which an end is solved
+_MOST_TRIES = 12
+
+_NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])
+_FAR = 9
+_SHORT = 0.1  # samples by which the optimum of a jump may lie before the sample that it belongs to
+_LATE = 0.2  # samples before a jump is over; a lag of a twentieth of that fits noise of 1 %
+_INSIDE = np.array([-0.5, 0.02, 0.4, 1 - _LATE, 1.2])  # of the sample in which the optimum lies
+_JUMP = 4.0  # pole, in 1/samples, whose response is over within a sample
+_NOTHING = 1e-9  # part of a sensitivity that is rounding
+
+
+def delay_profile(
+    problem: Problem,
+    candidate: Candidate,
+    variance: float,
+    scales: Scales,
+    *,
+    solved: bool = True,
+) -> tuple[FloatArray, FloatArray]:
+    """Misfit of the best model with each of a range of fixed delays.
+
+    Parameters
+    ----------
+    problem : Problem
+    candidate : Candidate
+        The optimum of a structure.
+    variance : float
+        Of the noise.
+    scales : Scales
+        The profile covers ``scales.earliest`` ... ``scales.latest``, densest where the local
+        curvature puts the ends of the interval.
+    solved : bool, optional
+        Whether the ends are solved for, or lie between two points of the profile.
+
+    Returns
+    -------
+    delay : ndarray, shape (G,)
+        Sorted, in s; the ends of the 95 % interval are among them.
+    excess : ndarray, shape (G,)
+        Cost above the minimum, over the variance: chi-square of one degree of freedom.
+    """
+    half = _EDGE * delay_error(problem, candidate, variance)
+    low, high = scales.earliest, scales.latest
+    fastest = float(np.abs(candidate.poles).max()) * scales.dt
+    grid = np.linspace(low, high, _FAR)
+    if np.isfinite(half):
+        grid = np.concatenate([candidate.delay + half * _NEAR, grid])
+    if fastest > _JUMP:
+        # Nothing changes while the jump stays between the same two samples.
+        sample = np.floor(candidate.delay / scales.dt + _SHORT)
+        grid = np.concatenate([(sample + _INSIDE) * scales.dt, grid])
+    grid = np.unique(np.clip(grid, low, high))
+    starts = np.tile(candidate.parameters, (grid.size, 1))
+    starts[:, 0] = grid
+    structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
+    fitted, cost = polish(
+        problem,
+        structure,
+        starts,
+        bounds,
+        scales.dt,
+        delay_fixed=True,
+        level=candidate.cost + THRESHOLD * variance,
+    )
+    points = {
+        float(at): Candidate(structure, x, float(c))
+        for at, x, c in zip(grid, fitted, cost, strict=True)
+    }
+    points[candidate.delay] = candidate
+    level = min(point.cost for point in points.values()), variance
+    known = {at: (point.cost - level[0]) / variance for at, point in points.items()}
+    for inside, outside in bracket_ends(known) if solved else ():
+        found = _end(problem, (points[inside], points[outside]), level, bounds, scales.dt)
+        points |= {point.delay: point for point in found}
+    if fastest > _JUMP:
+        # The later the jump begins, the faster it is: up to the sample that sees it done.
+        end = min((sample + 1) * scales.dt, high)
+        late = end - _LATE * scales.dt
+        delays = np.array(sorted(points))
+        costs = np.array([points[at].cost for at in delays])
+        near = float(np.interp(late, delays, costs))
+        points[end] = replace(candidate, cost=near)
+    delay = np.array(sorted(points))
+    excess = np.array([points[at].cost for at in delay])
+    return delay, (excess - excess.min()) / variance
+
+
+def _end(
+    problem: Problem,
+    ends: tuple[Candidate, Candidate],
+    level: tuple[float, float],
+    bounds: Bounds,
+    dt: float,
+) -> list[Candidate]:
+    """Points of a profile that close in on where its excess is that of an end.
+
+    `ends` are fits inside and outside, `level` the least cost and the variance. Where the way
+    along the minima is too bent to be solved for from there, it is followed between them, by regula
+    falsi (Illinois) in the root of the excess, which is linear where the misfit is.
+    """
+    least, variance = level
+    inside, outside = ends
+    structure, goal = inside.structure, least + THRESHOLD * variance
+    below, above = (root_of((end.cost - least) / variance) - _EDGE for end in ends)
+    point = inside if -below < above else outside
+    found: list[Candidate] = []
+    side = 0
+    for _ in range(_MOST_TRIES):
+        first, last = sorted((inside.delay, outside.delay))
+        solved = solve_level(problem, structure, point.parameters, bounds, dt, goal, variance)
+        if solved is not None and first <= solved[0] <= last:
+            return [*found, Candidate(structure, solved, goal)]
+        if last - first < _SOLVED * dt:
+            break
+        starts = np.stack([inside.parameters, outside.parameters])
+        starts[:, 0] = inside.delay + below / (below - above) * (outside.delay - inside.delay)
+        x, cost = polish(problem, structure, starts, bounds, dt, delay_fixed=True)
+        best = int(np.argmin(cost))
+        point = Candidate(structure, x[best], float(cost[best]))
+        found.append(point)
+        root = root_of((point.cost - least) / variance) - _EDGE
+        if root < 0:
+            above = above / 2 if side < 0 else above
+            inside, below, side = point, root, -1
+        else:
+            below = below / 2 if side > 0 else below
+            outside, above, side = point, root, 1
+    return found
+
+
+def delay_error(problem: Problem, candidate: Candidate, variance: float) -> float:
+    """Standard error of the delay from the local curvature (infinite if there is none), in s."""
+    state = evaluate(problem, candidate.structure, candidate.parameters[None])
+    jacobian, free = state.jacobian[0], float(state.sensitivity[0, 0])
+    size = np.sqrt((jacobian**2).sum(axis=0))
+    if size[0] <= _NOTHING * free:
+        return float("inf")
+    moving = size > _NOTHING * state.sensitivity[0]
+    columns: FloatArray = (jacobian / np.where(moving, size, 1.0))[:, moving]
+    # The delay comes last, so that the corner is what the others leave of it.
+    triangle = np.linalg.qr(columns[:, ::-1])[1]
+    corner = float(np.abs(triangle[-1, -1])) * float(size[0])
+    return float(np.sqrt(variance)) / corner if corner > _NOTHING * free else float("inf")

@@ -1,0 +1,71 @@
+"""Ends of a profile-likelihood interval: where the excess of the misfit crosses a threshold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ..arrays import FloatArray
+
+THRESHOLD = 3.84
+"""Chi-square of one degree of freedom below which 95 % lie."""
+_SOLVED = 1e-6  # standard errors to which an end is solved
+_MOST_TRIES = 20
+
+
+def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
+    """Pairs of neighbours, inside and outside, at the lower and upper end, where there are any."""
+    delays = sorted(excess)
+    inside = [i for i, at in enumerate(delays) if excess[at] <= THRESHOLD]
+    first, last = inside[0], inside[-1]
+    found = [(delays[first], delays[first - 1])] if first > 0 else []
+    return found + ([(delays[last], delays[last + 1])] if last < len(delays) - 1 else [])
+
+
+def solve_ends(excess_at: Callable[[float], float], excess: Mapping[float, float]) -> None:
+    """Ask for the excess at delays that close in on both ends.
+
+    Regula falsi (Illinois) in the root of the excess, which is linear in the delay where the
+    misfit is.
+    """
+    edge = float(np.sqrt(THRESHOLD))
+    for inside, outside in bracket_ends(excess):
+        a, b = inside, outside
+        below, above = (root_of(excess[at]) - edge for at in (a, b))
+        side = 0
+        for _ in range(_MOST_TRIES):
+            at = a + below / (below - above) * (b - a)
+            if not min(a, b) < at < max(a, b):
+                break
+            root = root_of(excess_at(at)) - edge
+            if abs(root) < _SOLVED:
+                break
+            if root < 0:
+                above = above / 2 if side < 0 else above
+                a, below, side = at, root, -1
+            else:
+                below = below / 2 if side > 0 else below
+                b, above, side = at, root, 1
+
+
+def root_of(excess: float) -> float:
+    """Square root of an excess that rounding may have made negative."""
+    return float(np.sqrt(max(excess, 0.0)))
+
+
+def profile_limits(
+    delay: FloatArray, excess: FloatArray, threshold: float = THRESHOLD
+) -> tuple[float, float]:
+    """Ends of the set of delays with an excess below the threshold (95 %: 3.84)."""
+    inside = np.flatnonzero(excess <= threshold)
+    first, last = int(inside[0]), int(inside[-1])
+    root = np.sqrt(np.maximum(excess, 0.0))
+    edge = float(np.sqrt(threshold))
+    low = float(delay[0])
+    if first > 0:
+        low = float(np.interp(edge, root[[first, first - 1]], delay[[first, first - 1]]))
+    high = float(delay[-1])
+    if last < delay.size - 1:
+        high = float(np.interp(edge, root[[last, last + 1]], delay[[last, last + 1]]))
+    return low, high

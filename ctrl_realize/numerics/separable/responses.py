@@ -1,0 +1,220 @@
+"""Responses of first-order modes to a delayed, held input, and their derivatives.
+
+The response of a rational transfer function with distinct poles ``p_j`` to an input that moves
+by ``d_l`` at ``t_l`` and holds in between is a sum of
+
+    H(t)   = sum_l d_l                                   (the static part)
+    E_j(t) = sum_l d_l exp(p_j (t - t_l - tau))
+
+over the moves that have arrived, t > t_l + tau. Derivatives need dE_j/dp_j in addition:
+
+    T_j(t) = sum_l d_l (t - t_l - tau) exp(p_j (t - t_l - tau)).
+
+`MoveTrain` evaluates their means over bins of samples for a few moves (steps, ramps), many delays
+and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..arrays import ComplexArray, FloatArray, IntArray
+
+Modes: TypeAlias = tuple[FloatArray, ComplexArray, ComplexArray]
+"""H (B, m), E (B, m, J) and T (B, m, J)."""
+
+
+_TOGETHER = 1e-9  # samples by which a move and a sample may be apart and be at one time
+_PIECE = 2**16  # samples of a response that are found at a time, which bounds the memory
+
+
+class HeldInput(Protocol):
+    """An input that is constant between its moves."""
+
+    def pieces(self) -> Sequence[HeldInput]:
+        """Inputs whose responses, one after the other, are the response to this one."""
+        ...
+
+    def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
+        """Evaluate H, E and T for delays (B,) and poles (B, J)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class MoveTrain:
+    """A few moves of the input; the response is wanted as means over bins of samples.
+
+    Attributes
+    ----------
+    first : ndarray, shape (m,)
+        Time of the first sample of every bin, in s.
+    width : ndarray of int, shape (m,)
+        Number of samples in every bin; 1 for single samples.
+    dt : float
+        Sample time in s.
+    moves, sizes : ndarray, shape (L,)
+        When, and by how much, the input moves; sorted.
+
+    Notes
+    -----
+    Between two arrivals each mode is one exponential, whatever came before: the sum over the
+    moves is carried along from arrival to arrival. Means of exponentials are geometric sums, so
+    that nothing is approximated; bins during which a move arrives are taken sample by sample.
+    """
+
+    first: FloatArray
+    width: IntArray
+    dt: float
+    moves: FloatArray
+    sizes: FloatArray
+
+    def pieces(self) -> list[MoveTrain]:
+        """Cut the bins, of which every one stands for itself, into short pieces."""
+        stops = range(_PIECE, self.first.size, _PIECE)
+        parts = zip(np.split(self.first, stops), np.split(self.width, stops), strict=True)
+        return [replace(self, first=first, width=width) for first, width in parts]
+
+    def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
+        """Evaluate H, E and T for every bin; see `HeldInput`."""
+        # Real exponentials cost a third of complex ones.
+        rates = poles if np.any(poles.imag) else poles.real
+        since = self.first - tau[:, None]
+        here = self._arrived(since)
+        last = self._arrived(since + self.dt * (self.width - 1))
+        level, total, stretch = self._carried(rates)
+        start = np.concatenate([[np.inf], self.moves])
+        row = np.arange(tau.size)[:, None]
+        elapsed = np.where(here > 0, since - start[here], 0.0)[:, :, None]
+        decay = np.exp(elapsed * rates[:, None, :])
+        static, mode = level[here], total[row, here] * decay
+        slope = stretch[row, here] * decay + elapsed * mode
+        widths, kind = self._kinds
+        if widths[-1] > 1:
+            mean, turn = _geometric_mean(rates[:, None] * self.dt, widths[:, None])
+            slope = slope * mean[:, kind] + mode * (self.dt * turn)[:, kind]
+            mode = mode * mean[:, kind]
+        row, column = np.nonzero(here != last)
+        if row.size:
+            # The samples of all bins during which a move arrives, one after the other.
+            count = self.width[column]
+            ends = np.cumsum(count)
+            within = np.arange(ends[-1]) - np.repeat(ends - count, count)
+            when = np.repeat(since[row, column], count) + self.dt * within
+            owner, here = np.repeat(row, count), self._arrived(when)
+            elapsed = np.where(here > 0, when - start[here], 0.0)[:, None]
+            decay = np.exp(elapsed * rates[owner])
+            part = total[owner, here] * decay
+            parts = (level[here], part, stretch[owner, here] * decay + elapsed * part)
+            for values, samples in zip((static, mode, slope), parts, strict=True):
+                sums = np.add.reduceat(samples, ends - count, axis=0)
+                values[row, column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
+        return static, mode.astype(np.complex128), slope.astype(np.complex128)
+
+    @cached_property
+    def _kinds(self) -> tuple[IntArray, IntArray]:
+        """Different widths, and which of them every bin has."""
+        widths, kind = np.unique(self.width, return_inverse=True)
+        return widths, kind
+
+    def _arrived(self, since: FloatArray) -> IntArray:
+        """Count the moves that have arrived at delayed times (B, m)."""
+        # With a delay of whole samples rounding must not decide what has arrived.
+        return np.searchsorted(self.moves + _TOGETHER * self.dt, since, side="left").astype(
+            np.int64
+        )
+
+    def _carried(self, rates: FloatArray | ComplexArray) -> tuple[FloatArray, Any, Any]:
+        """Sum the moves up to each arrival, decayed to that time; entry 0 is before the first."""
+        count = self.moves.size + 1
+        total = np.zeros((rates.shape[0], count, rates.shape[1]), dtype=rates.dtype)
+        stretch = np.zeros_like(total)
+        before = np.concatenate([self.moves[:1], self.moves])
+        for i in range(1, count):
+            gap = before[i] - before[i - 1]
+            decay = np.exp(gap * rates)
+            stretch[:, i] = (stretch[:, i - 1] + gap * total[:, i - 1]) * decay
+            total[:, i] = total[:, i - 1] * decay + self.sizes[i - 1]
+        return np.concatenate([[0.0], np.cumsum(self.sizes)]), total, stretch
+
+
+def _geometric_mean(x: Any, count: IntArray) -> tuple[Any, Any]:
+    """Mean over k = 0...count - 1 of exp(k x), and its derivative with respect to x."""
+    small = np.abs(x * count) < 1e-4
+    ratio, power = np.expm1(x), np.expm1(x * count)
+    mean = power / (count * ratio)
+    turn = (power + 1 - mean * (ratio + 1)) / ratio
+    half, third = (count - 1) / 2, (count - 1) * (2 * count - 1) / 6
+    return np.where(small, 1 + half * x, mean), np.where(small, half + third * x, turn)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledInput:
+    """A sampled, held input (N,), rest level removed; the response is wanted at each sample."""
+
+    signal: FloatArray
+    dt: float
+
+    def pieces(self) -> list[SampledInput]:
+        """All of it: a recursion runs through."""
+        return [self]
+
+    def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
+        """Evaluate H, E and T at every sample; see `HeldInput`."""
+        n = self.signal.size
+        moves = np.diff(self.signal, prepend=0.0)
+        static = np.zeros((tau.size, n))
+        mode = np.zeros((tau.size, n, poles.shape[1]), dtype=np.complex128)
+        slope = np.zeros_like(mode)
+        for b in range(tau.size):
+            # A move at sample l is first seen at the first sample after l + tau/dt.
+            whole = int(np.ceil(tau[b] / self.dt - _TOGETHER))
+            if whole >= n:
+                continue
+            rest = max(whole * self.dt - tau[b], 0.0)
+            static[b, whole:] = self.signal[: n - whole]
+            for j, pole in enumerate(poles[b]):
+                z = np.exp(pole * self.dt)
+                sums = lfilter([1.0], [1.0, -z], moves[: n - whole].astype(np.complex128))
+                # d(z^k)/dp = k dt z^k: a second pass of the same recursion.
+                weighted = lfilter([0.0, z * self.dt], [1.0, -z], sums)
+                gain = np.exp(pole * rest)
+                mode[b, whole:, j] = gain * sums
+                slope[b, whole:, j] = gain * (weighted + rest * sums)
+        return static, mode, slope
+
+
+@dataclass(frozen=True, eq=False)
+class SeveralInputs:
+    """Sampled inputs of several records one after the other, each without its first samples.
+
+    Attributes
+    ----------
+    parts : tuple of SampledInput
+    starts : tuple of int
+        First sample of every part at which the response is wanted.
+    """
+
+    parts: tuple[SampledInput, ...]
+    starts: tuple[int, ...]
+
+    def pieces(self) -> list[SeveralInputs]:
+        """All of it: a recursion runs through."""
+        return [self]
+
+    def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
+        """Evaluate H, E and T at every sample wanted; see `HeldInput`."""
+        found = [part.modes(tau, poles) for part in self.parts]
+        static, mode, slope = (
+            np.concatenate(
+                [modes[i][:, start:] for modes, start in zip(found, self.starts, strict=True)],
+                axis=1,
+            )
+            for i in range(3)
+        )
+        return static, mode, slope

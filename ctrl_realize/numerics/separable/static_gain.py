@@ -1,0 +1,181 @@
+"""How well a record tells the gain and the total delay of a model that was fitted to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from ..arrays import ComplexArray, FloatArray
+from .lag_chains import lag_sum
+from .poles import poles_from_parameters
+from .structures import Candidate
+from .varpro import Problem, evaluate, partial_fractions, respond
+
+INTEGRATOR = 5e-3
+"""Poles slower than this, times the length of the record, cannot be told from integrators."""
+
+SIGNIFICANT = 1.96  # standard errors: a gain of less may as well be none, or have the other sign
+
+_STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
+_HALVINGS = 60
+_NOTHING = 1e-13  # part of the largest singular value that is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class StaticGain:
+    """Response to what is slow, with standard errors (delta method, structure given).
+
+    `gain` is that at zero frequency (the slope per second of a model with an integrator) and
+    `total` dead time and lags less leads, in s. `slowest` is the length of the record in units of
+    the slowest time constant that is no integrator's; `integrates`: there is one. `reached` is the
+    response to a unit step at the end of the record. `sign_known`: the sign of the gain is told if
+    poles slower than the record are taken for integrators.
+    """
+
+    gain: float
+    gain_std: float
+    total: float
+    total_std: float
+    slowest: float
+    integrates: bool
+    reached: float
+    sign_known: bool
+
+    @property
+    def extrapolated(self) -> bool:
+        """Whether the record ends before the slowest time constant, if that is no integrator."""
+        return self.slowest < 1.0
+
+    @property
+    def significant(self) -> bool:
+        """Whether the gain is told from none, and has the sign of what was seen of it."""
+        return abs(self.gain) > SIGNIFICANT * self.gain_std and self.reached * self.gain > 0
+
+    @property
+    def resolved(self) -> bool:
+        """Whether a pole as slow as the record, or an integrator, brings a significant gain."""
+        return self.significant or not (self.extrapolated or self.integrates)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """95 % interval of the gain; without end where it is extrapolated and not significant."""
+        if self.resolved:
+            reach = SIGNIFICANT * self.gain_std
+            return self.gain - reach, self.gain + reach
+        if not self.sign_known or self.reached * self.gain <= 0:
+            return -np.inf, np.inf
+        return (self.reached, np.inf) if self.gain > 0 else (-np.inf, self.reached)
+
+
+def static_gain(
+    problem: Problem, candidate: Candidate, variance: float, length: float
+) -> StaticGain:
+    """Propagate the errors of delay, poles and numerator to gain and total delay.
+
+    Parameters
+    ----------
+    problem : Problem
+    candidate : Candidate
+    variance : float
+        Of the noise, per sample.
+    length : float
+        Of the record after the input has moved, in s.
+    """
+    state = evaluate(problem, candidate.structure, candidate.parameters[None])
+    theta, numerator = candidate.parameters, state.numerator[0]
+    point = np.concatenate([theta, numerator])
+    steps = np.concatenate(
+        [
+            [_STEP * min(1 / float(np.abs(candidate.poles).max()), length)],
+            np.full(theta.size - 1, _STEP),
+            _STEP * np.maximum(np.abs(numerator), _STEP * np.abs(numerator).max()),
+        ]
+    )
+
+    def response(at: FloatArray) -> FloatArray:
+        return respond(problem.drive, problem.known, at[theta.size :], at[: theta.size])
+
+    def told(at: FloatArray) -> FloatArray:
+        return np.array(_told(at[: theta.size], at[theta.size :], length))
+
+    moves = steps * np.eye(point.size)
+    # No delay is negative: the slopes at none are those a little later.
+    inside = np.concatenate([[max(point[0], steps[0])], point[1:]])
+    slopes = np.stack([(response(inside + m) - response(inside - m)) / 2 for m in moves], axis=1)
+    gradient = np.stack([(told(point + m) - told(point - m)) / 2 for m in moves], axis=1)
+    # An integrator is taken for one: how slow a pole it is shows in rounding alone.
+    seen = np.any(gradient != 0, axis=0)
+    slopes, gradient = slopes[:, seen], gradient[:, seen]
+    columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
+    if problem.stretches is not None:
+        columns = problem.own_terms(candidate.poles[None]).without(columns[None])[0]
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0] = 1.0
+    _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
+    along = turned[:, : seen.sum()] @ (gradient / size[: seen.sum()]).T
+    along /= np.maximum(singular, _NOTHING * singular[0])[:, None]
+    gain_std, total_std, rate_std = np.sqrt(variance * np.sum(along**2, axis=0))
+    gain, total, rate = (float(value) for value in told(point))
+    slow = np.abs(candidate.poles)
+    # An integrator has no slowest time constant, but a slope that goes on.
+    slow = slow[slow * length >= INTEGRATOR]
+    return StaticGain(
+        gain=gain,
+        gain_std=float(gain_std),
+        total=total,
+        total_std=float(total_std),
+        slowest=float(slow.min(initial=np.inf)) * length,
+        integrates=slow.size < candidate.poles.size,
+        reached=_reached(candidate.poles, numerator, length),
+        sign_known=bool(abs(rate) > SIGNIFICANT * rate_std),
+    )
+
+
+def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, float]:
+    """95 % interval of what several structures tell: (estimate, standard error, evidence) each.
+
+    The middle of the mixture of their normal distributions (model averaging: Burnham and Anderson,
+    Model Selection and Multimodel Inference, 2nd ed., 2002, section 4.3): a structure with a
+    needless zero, which leaves the gain open, counts for as little as its evidence.
+
+    Examples
+    --------
+    >>> low, high = averaged_ends([(1.0, 0.1, 1.0)])
+    >>> print(round(low, 3), round(high, 3))
+    0.804 1.196
+    """
+    means, errors, weights = np.array(parts, dtype=np.float64).T
+    errors, weights = np.maximum(errors, 1e-12 * np.abs(means) + 1e-300), weights / weights.sum()
+
+    def ends(share: float) -> float:
+        # The quantiles of the parts hold that of the mixture between them.
+        parts = means + errors * ndtri(share)
+        low, high = float(parts.min()), float(parts.max())
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            below = float(weights @ ndtr((middle - means) / errors)) < share
+            low, high = (middle, high) if below else (low, middle)
+        return 0.5 * (low + high)
+
+    return ends(0.025), ends(0.975)
+
+
+def _reached(poles: ComplexArray, numerator: FloatArray, length: float) -> float:
+    """Value of the response of b(s)/a(s) to a step after a time."""
+    residues, level, _ = partial_fractions(poles[None], np.ones(1), numerator.size)
+    modes = np.exp(poles * length) @ residues[0]
+    return float((modes.real + level[0]) @ numerator)
+
+
+def _told(theta: FloatArray, numerator: FloatArray, length: float) -> tuple[float, float, float]:
+    """Gain, total delay, and the gain that poles slower than the record integrate."""
+    poles = poles_from_parameters(theta[None, 1:])[0][0]
+    pace = np.abs(poles) * length
+    moving = poles[pace >= INTEGRATOR]
+    gain, rate = (
+        float(numerator[0] / np.prod(-kept).real) for kept in (moving, poles[pace >= 1.0])
+    )
+    return gain, float(theta[0]) + lag_sum(moving, numerator), rate

@@ -1,0 +1,253 @@
+"""Fit many structures to one record: where to start each, what to keep, how to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+from .poles import parameters_from_poles, poles_from_parameters
+from .varpro import Bounds, Problem, Structure, fit_batch
+
+ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
+SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)
+NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
+"""Charged for every zero, and for every pole beyond the third, when a structure is chosen."""
+
+FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
+"""Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
+lag of half a sample at least, its delay would be known better than to the sample."""
+
+PLAUSIBLE = 10.0
+"""A structure is not ruled out while its criterion is within this of the best."""
+
+_ENDS, _SAME_END = 5, 0.02  # of a search that are followed, and parts by which two are one
+
+LEAST_CHARGE = 7.0
+"""Least charge for a parameter where structures are ruled out. Few independent samples charge less,
+and models with two zeros too many, in which a delay has no information, would never be."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What is roughly known of a response before it is fitted, in s.
+
+    `onset` is when it starts to move, `rise` the time from there to 63 % of its excursion,
+    `length` the time that was recorded after the input moved, `dt` the sample time. `latest`
+    and `earliest` bound the delay; `ringing` is an angular frequency seen in it, or 0.
+    """
+
+    onset: float
+    rise: float
+    length: float
+    dt: float
+    latest: float
+    earliest: float = 0.0
+    ringing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Best fit of one structure: ``cost`` at ``parameters`` = [tau, pole parameters...].
+
+    `ends` (B, 1 + n) is where else a search has come to; `searched` tells that none of them has
+    been followed further.
+    """
+
+    structure: Structure
+    parameters: FloatArray
+    cost: float
+    ends: FloatArray | None = None
+    searched: bool = False
+
+    @property
+    def delay(self) -> float:
+        """Delay in s."""
+        return float(self.parameters[0])
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles in 1/s."""
+        return np.asarray(poles_from_parameters(self.parameters[None, 1:])[0][0])
+
+
+def search(
+    problem: Problem,
+    structures: Iterable[Structure],
+    scales: Scales,
+    beside: dict[Structure, Candidate] | None = None,
+) -> dict[Structure, Candidate]:
+    """Find the best fit of every structure.
+
+    Each is started from two delays for every one of up to five patterns of poles, and from the
+    optima of the structures next to it (one zero less, one pole less).
+
+    Parameters
+    ----------
+    problem : Problem
+    structures : iterable of Structure
+        Smaller orders and larger relative degrees are fitted first.
+    scales : Scales
+    beside : dict of Structure to Candidate, optional
+        What was found before; it is in the answer as well.
+    """
+    found = dict(beside or {})
+    for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
+        starts = neighbour_starts(structure, scales, found)
+        if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
+            starts += _pattern_starts(structure, scales)
+        parameters, cost = fit_batch(
+            problem, structure, np.array(starts), parameter_bounds(structure, scales)
+        )
+        order = np.argsort(cost)
+        best, ends = order[0], apart(parameters[order[:_ENDS]])
+        found[structure] = Candidate(structure, parameters[best], float(cost[best]), ends, True)
+    return found
+
+
+def apart(ends: FloatArray) -> FloatArray:
+    """Leave out the first of some ends, and those that are the same as one before."""
+    size = np.maximum(np.abs(ends).max(axis=0), 1e-300)
+    kept = [ends[0]]
+    for end in ends[1:]:
+        if all(np.abs((end - other) / size).max() > _SAME_END for other in kept):
+            kept.append(end)
+    return np.array(kept[1:]).reshape(-1, ends.shape[1])
+
+
+def _worth_a_search(
+    problem: Problem, structure: Structure, found: dict[Structure, Candidate]
+) -> bool:
+    """Tell whether a rich structure may differ much from the optima next to it.
+
+    Zeros are added to the optimum without them; and where the last pole did not lower the cost
+    by more than noise does, one more will not.
+    """
+    if structure.zeros:
+        return False
+    best = [
+        min((c.cost for s, c in found.items() if s.order == order), default=np.inf)
+        for order in (structure.order - 2, structure.order - 1)
+    ]
+    return not best[1] > best[0] * (1 - 4 / problem.data.size)
+
+
+def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
+    """Box for delay and poles: time constants up to (nearly) an integrator.
+
+    Beside zeros they are half a sample at least: with more freedom such a model imitates a ringing
+    that was sampled too coarsely.
+    """
+    order = structure.order
+    fast = np.log((SLOWER_WITH_ZEROS if structure.zeros else FASTEST) / scales.dt)
+    low, high = [scales.earliest], [scales.latest]
+    if order % 2:
+        low.append(np.log(1e-4 / scales.length))
+        high.append(fast)
+    for _ in range(order // 2):
+        low += [np.log(1e-2 / scales.length), np.log(0.005)]
+        high += [fast, np.log(20.0)]
+    return Bounds(np.array(low), np.array(high))
+
+
+def criteria(
+    candidates: dict[Structure, Candidate], variance: float, samples: float
+) -> dict[Structure, float]:
+    """Information criterion of every structure: cost / variance + parameters x log(samples).
+
+    `variance` is that of the noise, colour included; `samples` how many independent ones there
+    are.
+    """
+    penalty = parameter_charge(samples)
+    return {s: c.cost / variance + (s.order + s.zeros + 2) * penalty for s, c in candidates.items()}
+
+
+def parameter_charge(samples: float) -> float:
+    """What a parameter costs in the criterion: log of the number of independent samples."""
+    return float(np.log(max(samples, 3.0)))
+
+
+def choose(criterion: dict[Structure, float]) -> Structure:
+    """Structure of the lowest criterion, where zeros and a fourth pole must be worth it."""
+    return min(criterion, key=lambda s: criterion[s] + needless_charge(s))
+
+
+def plausible(
+    candidates: dict[Structure, Candidate],
+    criterion: dict[Structure, float],
+    variance: float,
+    chosen: Candidate,
+    level: float,
+) -> list[Structure]:
+    """List what the data cannot rule out.
+
+    That is what is within 10 of the best criterion, or of `level`, that of the chosen with its
+    simplicity counted; and lags without zeros that fit no worse, up to three of them or one more
+    than were chosen, for noise hides lags, but does not remove them.
+    """
+    limit = min(*criterion.values(), level) + PLAUSIBLE
+    weighed = level + PLAUSIBLE
+    fits = chosen.cost + PLAUSIBLE * variance
+    own = chosen.structure
+    lags = max(3, own.order + 1 if own.zeros == 0 else 0)
+    return [
+        s
+        for s, value in criterion.items()
+        if value <= limit
+        or value + needless_charge(s) <= weighed
+        or candidates[s] is chosen
+        or (s.zeros == 0 and s.order <= lags and candidates[s].cost <= fits)
+    ]
+
+
+def needless_charge(structure: Structure) -> float:
+    """What zeros, and poles beyond the third, must be worth before a structure is chosen."""
+    return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
+
+
+def _pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
+    patterns = _pole_patterns(structure.order, scales)
+    # With zeros, the optimum without them is a start as well: fewer patterns do.
+    delays = (0.4, 1.0) if structure.zeros == 0 else (0.7,)
+    return [
+        np.concatenate([[part * scales.onset], parameters_from_poles(poles)])
+        for part in delays
+        for poles in patterns
+    ]
+
+
+def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
+    """Equal lags; one slow; one very slow; a ringing pair; a pair at the frequency seen."""
+    rise = 1.0 / scales.rise
+    patterns = [
+        -np.linspace(0.8, 1.2, order) * order * rise,
+        -np.concatenate([[1.2], np.geomspace(5, 8, order - 1)])[:order] * rise,
+        -np.concatenate([[0.1], np.geomspace(1.2, 6, order - 1)])[:order] * rise,
+    ]
+    found = [pattern.astype(np.complex128) for pattern in patterns]
+    if order >= 2:
+        rest = -np.geomspace(3, 5, order - 2) * rise
+        pair = 1.3 * rise * np.array([-0.2 + 0.98j, -0.2 - 0.98j])
+        found.append(np.concatenate([pair, rest]))
+        if scales.ringing > 0:
+            pair = scales.ringing * np.array([-0.1 + 0.995j, -0.1 - 0.995j])
+            found.append(np.concatenate([pair, rest]))
+    return found
+
+
+def neighbour_starts(
+    structure: Structure, scales: Scales, found: dict[Structure, Candidate]
+) -> list[FloatArray]:
+    """Optima of the structures next to one: a zero less, a pole less."""
+    n, r = structure.order, structure.relative_degree
+    starts = []
+    if Structure(n, r + 1) in found:
+        starts.append(found[Structure(n, r + 1)].parameters)
+    for smaller in (Structure(n - 1, r - 1), Structure(n - 1, r)):
+        if smaller in found:
+            old = found[smaller]
+            poles = np.append(old.poles, -10.0 / scales.rise)
+            starts.append(np.concatenate([[old.delay], parameters_from_poles(poles)]))
+    return starts

@@ -1,0 +1,324 @@
+"""Separable least squares for delayed transfer functions, many starts at once.
+
+The model of one record is
+
+    y(t) = L^-1{ exp(-tau s) b(s) K(s) U(s) / a(s) } + fixed regressors,
+
+with a monic `a` of order n (see `pole_factors`), `b` of degree n - r (r: relative degree) and
+known dynamics K in cascade. Numerator and regressors enter linearly and are eliminated; delay
+and poles are found by Levenberg-Marquardt steps on what is left, with Kaufman's Jacobian [1]_,
+for a whole batch of starts in the same array operations.
+
+.. [1] Golub and Pereyra, Separable nonlinear least squares, Inverse Problems 19 (2003) R1-R26.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import ComplexArray, FloatArray, IntArray
+from .local_terms import FixedTerms, OwnTerms, Stretches, solve_upper
+from .poles import poles_from_parameters
+from .responses import HeldInput
+
+_LONGEST_STEP = 1.5  # of a logarithmic parameter, in one iteration
+_MOST_FAILURES = 4  # in a row, before a start is given up
+_TURNS_FOR_ALL = 8  # iterations after which starts that are far behind are given up
+_HOPELESS = 1.5
+_STEEPEST = 1e145  # slope of a residual: the sum of its squares is a number still
+
+
+@dataclass(frozen=True, eq=False)
+class KnownFactor:
+    """Known dynamics: distinct stable poles (J,), numerator over the monic denominator."""
+
+    poles: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=np.complex128))
+    numerator: FloatArray = field(default_factory=lambda: np.ones(1))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted: data (m,), root weights (m,), input, fixed regressors (m, q).
+
+    With `stretches` each of them has an initial state and regressors of its own besides. Without
+    them, a `whitener` (m, m) may stand in for the weights: it makes coloured noise white.
+    """
+
+    data: FloatArray
+    root_weight: FloatArray
+    drive: HeldInput
+    regressors: FloatArray
+    known: KnownFactor
+    stretches: Stretches | None = None
+    whitener: FloatArray | None = None
+
+    def weighted(self, columns: FloatArray) -> FloatArray:
+        """Columns (..., m, k) in units of the noise."""
+        if self.whitener is not None:
+            # One product of a wide matrix is several times as fast as many of thin ones.
+            wide = np.moveaxis(columns, -2, 0)
+            white = self.whitener @ wide.reshape(wide.shape[0], -1)
+            return np.asarray(np.moveaxis(white.reshape(wide.shape), 0, -2))
+        return columns * self.root_weight[:, None]
+
+    @cached_property
+    def weighted_data(self) -> FloatArray:
+        """Data (m,) in units of the noise."""
+        return self.weighted(self.data[:, None])[:, 0]
+
+    @cached_property
+    def _fixed(self) -> FixedTerms:
+        assert self.stretches is not None
+        return FixedTerms(self.stretches, self.root_weight)
+
+    def own_terms(self, poles: ComplexArray) -> OwnTerms:
+        """Own terms of the stretches, which there must be, at poles (B, n)."""
+        return OwnTerms(self._fixed, poles)
+
+    def own_count(self, order: int) -> int:
+        """Linear terms that all stretches have for themselves, of a model of an order."""
+        if self.stretches is None:
+            return 0
+        return self.stretches.shapes + order * (int(self.stretches.edges.size) - 1)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Order n and relative degree r: n poles, n - r zeros."""
+
+    order: int
+    relative_degree: int
+
+    @property
+    def zeros(self) -> int:
+        """Number of zeros, n - r."""
+        return self.order - self.relative_degree
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Box of the parameters ``[tau, pole parameters...]``, shapes (1 + n,)."""
+
+    low: FloatArray
+    high: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The eliminated problem at B parameter sets.
+
+    ``residual`` (B, m) is weighted and orthogonal to all linear terms, ``jacobian``
+    (B, m, 1 + n) is minus its derivative (Kaufman's form), ``sensitivity`` (B, 1 + n) the norm
+    of the model's derivative before the linear terms are taken out of it. ``numerator``
+    (B, n - r + 1) has the coefficients of b, lowest power first, ``regression`` (B, q) those of
+    the regressors.
+    """
+
+    residual: FloatArray
+    jacobian: FloatArray
+    sensitivity: FloatArray
+    numerator: FloatArray
+    regression: FloatArray
+
+    @property
+    def cost(self) -> FloatArray:
+        """Weighted sums of squares, shape (B,)."""
+        return np.asarray(np.einsum("bm,bm->b", self.residual, self.residual))
+
+
+def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> Evaluation:
+    """Eliminate the linear terms at parameters (B, 1 + n)."""
+    n, count = structure.order, structure.zeros + 1
+    batch = parameters.shape[0]
+    free, dfree = poles_from_parameters(parameters[:, 1:])
+    known = problem.known
+    poles = np.concatenate([free, np.tile(known.poles, (batch, 1))], axis=1)
+    static, mode, slope = problem.drive.modes(parameters[:, 0], poles)
+    residues, gain, dresidues = partial_fractions(poles, known.numerator, count)
+    # Columns of one size: the powers of s differ by many decades.
+    size = np.abs(residues).sum(axis=1) + np.abs(gain)
+    basis = (mode @ (residues / size[:, None])).real + static[:, :, None] * (gain / size)[:, None]
+    fixed = np.broadcast_to(problem.regressors, (batch, *problem.regressors.shape))
+    columns = problem.weighted(np.concatenate([basis, fixed], axis=2))
+    data = np.tile(problem.weighted_data, (batch, 1))
+    own = None
+    if problem.stretches is not None:
+        own = problem.own_terms(free)
+        forced, whole = columns, data
+        columns, data = own.without(columns), own.without(data[:, :, None])[:, :, 0]
+    norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
+    norm[norm == 0] = 1.0
+    q, r = np.linalg.qr(columns / norm[:, None])
+    inside = np.einsum("bmk,bm->bk", q, data)
+    residual = data - np.einsum("bmk,bk->bm", q, inside)
+    linear = solve_upper(r, inside) / norm
+    numerator = linear[:, :count] / size
+
+    derivative = np.empty((batch, problem.data.size, 1 + n))
+    amplitudes = np.einsum("bjk,bk->bj", residues, numerator)
+    derivative[:, :, 0] = -(mode @ (amplitudes * poles)[:, :, None]).real[:, :, 0]
+    moved = _moved_amplitudes(poles, amplitudes, dresidues, numerator)[:, :, :n] @ dfree
+    stretch = np.zeros_like(moved)
+    stretch[:, :n] = amplitudes[:, :n, None] * dfree
+    level = np.einsum("bj,bjq->bq", -1.0 / free, dfree).real
+    level *= (gain[:, 0] * numerator[:, 0])[:, None]
+    derivative[:, :, 1:] = (mode @ moved + slope @ stretch).real
+    derivative[:, :, 1:] += static[:, :, None] * level[:, None]
+    derivative = problem.weighted(derivative)
+    if own is not None:
+        rest = whole - np.einsum("bmk,bk->bm", forced, linear)
+        derivative[:, :, 1:] += own.moved(rest, dfree)
+    sensitivity = np.sqrt(np.einsum("bmp,bmp->bp", derivative, derivative))
+    if own is not None:
+        derivative = own.without(derivative)
+    jacobian = derivative - q @ (np.swapaxes(q, 1, 2) @ derivative)
+    return Evaluation(residual, jacobian, sensitivity, numerator, linear[:, count:])
+
+
+def respond(
+    drive: HeldInput, known: KnownFactor, numerator: FloatArray, parameters: FloatArray
+) -> FloatArray:
+    """Response (m,) of one model, numerator (n - r + 1,), parameters (1 + n,)."""
+    free = poles_from_parameters(parameters[None, 1:])[0]
+    poles = np.concatenate([free, known.poles[None]], axis=1)
+    residues, gain, _ = partial_fractions(poles, known.numerator, numerator.size)
+    amplitudes, level = residues[0] @ numerator, gain[0] @ numerator
+    parts = []
+    for piece in drive.pieces():
+        static, mode, _ = piece.modes(parameters[:1], poles)
+        parts.append((mode[0] @ amplitudes).real + static[0] * level)
+    return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def fit_batch(
+    problem: Problem,
+    structure: Structure,
+    starts: FloatArray,
+    bounds: Bounds,
+    *,
+    delay_fixed: bool = False,
+    most_iterations: int = 30,
+    tolerance: float = 1e-4,
+) -> tuple[FloatArray, FloatArray]:
+    """Improve every start.
+
+    Parameters
+    ----------
+    starts : ndarray, shape (B, 1 + n)
+        Delay in s and pole parameters.
+    delay_fixed : bool
+        Keep the first column as it is (profile likelihood).
+    most_iterations : int
+        Of all starts together.
+    tolerance : float
+        A start is done when an iteration lowers its cost by less than this part.
+
+    Returns
+    -------
+    parameters : ndarray, shape (B, 1 + n)
+    cost : ndarray, shape (B,)
+    """
+    x = np.clip(starts, bounds.low, bounds.high)
+    if delay_fixed:
+        x[:, 0] = starts[:, 0]
+    state = evaluate(problem, structure, x)
+    residual, jacobian, cost = state.residual, state.jacobian, state.cost
+    damping = np.full(x.shape[0], 1e-2)
+    failures = np.zeros(x.shape[0], dtype=np.int64)
+    active: IntArray = np.arange(x.shape[0])
+    for turn in range(most_iterations):
+        step, short = _damped_step(
+            x[active], residual[active], jacobian[active], damping[active], bounds, delay_fixed
+        )
+        trial = x[active] + step
+        trial[:, 1:] = np.clip(trial[:, 1:], bounds.low[1:], bounds.high[1:])
+        if not delay_fixed:
+            trial[:, 0] = np.clip(trial[:, 0], bounds.low[0], bounds.high[0])
+        state = evaluate(problem, structure, trial)
+        new = state.cost
+        better = new < cost[active]
+        settled = better & short & (cost[active] - new < tolerance * new)
+        up, down = active[better], active[~better]
+        x[up], cost[up] = trial[better], new[better]
+        residual[up], jacobian[up] = state.residual[better], state.jacobian[better]
+        damping[up] = np.maximum(0.2 * damping[up], 1e-9)
+        damping[down] *= 8.0
+        failures[up] = 0
+        failures[down] += 1
+        late = turn >= _TURNS_FOR_ALL and not delay_fixed
+        hopeless = late & (cost[active] > _HOPELESS * cost.min())
+        active = active[~(settled | hopeless | (failures[active] >= _MOST_FAILURES))]
+        if not active.size:
+            break
+    return x, cost
+
+
+def _damped_step(
+    x: FloatArray,
+    residual: FloatArray,
+    jacobian: FloatArray,
+    damping: FloatArray,
+    bounds: Bounds,
+    delay_fixed: bool,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Levenberg-Marquardt steps in the free directions, and which of them were not cut."""
+    # The delay counts in parts of its range: any unit of time gives the same steps.
+    unit = np.ones(x.shape[1])
+    unit[0] = max(float(bounds.high[0] - bounds.low[0]), 1e-300)
+    # A response that shows in rounding alone has a gain, and slopes, whose squares overflow.
+    jacobian = np.clip(jacobian * unit, -_STEEPEST, _STEEPEST)
+    downhill = np.einsum("bmp,bm->bp", jacobian, residual)
+    free = ~((x <= bounds.low) & (downhill < 0) | (x >= bounds.high) & (downhill > 0))
+    if delay_fixed:
+        free[:, 0] = False
+    normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+    normal = normal * (free[:, :, None] & free[:, None, :])
+    diagonal = np.einsum("bii->bi", normal)
+    scale = np.maximum(diagonal, 1e-9 * diagonal.max(axis=1, keepdims=True) + 1e-300)
+    damped = normal + np.where(free, damping[:, None] * scale, 1.0)[:, :, None] * np.eye(x.shape[1])
+    step = np.linalg.solve(damped, np.where(free, downhill, 0.0)[:, :, None])[:, :, 0] * unit
+    excess = np.maximum(np.abs(step[:, 1:]).max(axis=1) / _LONGEST_STEP, 1.0)
+    return step / excess[:, None], excess <= 1.0
+
+
+def partial_fractions(
+    poles: ComplexArray, known: FloatArray, count: int
+) -> tuple[ComplexArray, FloatArray, ComplexArray]:
+    """Expand s^i K(s) / (s a(s)), i = 0...count - 1.
+
+    Returns the residues s^(i-1) K / a' at the poles (B, J, count), the static gains (B, count),
+    and d(s^(i-1) K)/ds over a' at the poles.
+    """
+    batch, n = poles.shape
+    gap = poles[:, :, None] - poles[:, None, :]
+    gap[:, np.arange(n), np.arange(n)] = 1.0
+    slope = gap.prod(axis=2)
+    i = np.arange(count)
+    value = np.polyval(known, poles)
+    power = poles[:, :, None] ** (i - 1)
+    residues = power * (value / slope)[:, :, None]
+    turn = np.polyval(np.polyder(known), poles)
+    dresidues = (i - 1) * residues / poles[:, :, None] + power * (turn / slope)[:, :, None]
+    gain = np.zeros((batch, count))
+    gain[:, 0] = known[-1] / np.prod(-poles, axis=1).real
+    return residues, gain, dresidues
+
+
+def _moved_amplitudes(
+    poles: ComplexArray,
+    amplitudes: ComplexArray,
+    dresidues: ComplexArray,
+    numerator: FloatArray,
+) -> ComplexArray:
+    """Derivatives of amplitudes (rows j) by poles (columns k), shape (B, J, J)."""
+    n = poles.shape[1]
+    own = np.eye(n, dtype=bool)
+    inverse = 1.0 / np.where(own, 1.0, poles[:, :, None] - poles[:, None, :])
+    moved = amplitudes[:, :, None] * inverse
+    crowd = np.where(own, 0.0, inverse).sum(axis=2)
+    moved[:, own] = np.einsum("bjk,bk->bj", dresidues, numerator) - amplitudes * crowd
+    return np.asarray(moved)

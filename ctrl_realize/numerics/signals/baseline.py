@@ -1,0 +1,125 @@
+"""Level and slope before a step: constant, drifting, or still settling from an earlier move."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ..arrays import FloatArray
+from .edges import difference_noise
+from .noise import correlation_time
+
+FEW = 5
+"""With fewer samples before the step, those after it that are still at rest are added."""
+
+MIN_DRIFT_SAMPLES = 50
+SIGNIFICANT = 5.0
+
+
+def rest_line(
+    before: FloatArray, after: FloatArray, remove_drift: bool | None
+) -> tuple[float, float]:
+    """Level at the step and slope per sample of an output at rest.
+
+    Parameters
+    ----------
+    before, after : ndarray, shapes (P,), (N,)
+        Output before and from the step on.
+    remove_drift : bool or None
+        None decides by the significance of the slope.
+
+    Returns
+    -------
+    level, slope : float
+        At sample 0 of `after`; the slope is 0 when no drift is removed.
+    """
+    if before.size < FEW:
+        return _level_from_start(np.concatenate([before, after])), 0.0
+    index = np.arange(-before.size, 0, dtype=np.float64)
+    if remove_drift or (remove_drift is None and before.size >= MIN_DRIFT_SAMPLES):
+        slope, level = np.polyfit(index, before, 1)
+        if remove_drift or _slope_is_real(before - level - slope * index, slope):
+            return float(level), float(slope)
+    return float(np.mean(before)), 0.0
+
+
+def _slope_is_real(residual: FloatArray, slope: float) -> bool:
+    """Compare a slope with its standard error, correlated residuals allowed for."""
+    n = residual.size
+    sigma = float(residual.std())
+    scale = float(np.abs(slope)) * n
+    if sigma <= 1e-12 * scale:
+        return scale > 0
+    # Correlation over lags makes n samples worth less: the sum of the autocorrelation up to
+    # its first zero says by how much.
+    centred = residual - residual.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[:n]
+    correlation = correlation / correlation[0]
+    negative = np.flatnonzero(correlation <= 0)
+    lags = int(negative[0]) if negative.size else n
+    inflation = max(1.0, 2 * float(correlation[:lags].sum()) - 1)
+    error = sigma * np.sqrt(12 * inflation / n**3)
+    # A drift that is lost in the noise over the record before the step does no harm.
+    return bool(abs(slope) > SIGNIFICANT * error)
+
+
+def _level_from_start(values: FloatArray) -> float:
+    """Level of a record that starts at its step: the samples that have not moved yet."""
+    start = values[:FEW]
+    noise = difference_noise(values)
+    still = [float(start[0])]
+    for value in start[1:]:
+        if abs(value - np.mean(still)) > max(3 * noise, 1e-12 * abs(float(start[0]))):
+            break
+        still.append(float(value))
+    return float(np.mean(still))
+
+
+FEWEST = 24
+"""Samples before the step from which a curve can be told from a line."""
+_SIGNIFICANT = 30.0  # chi-square by which an exponential must beat the line
+_RATES = np.geomspace(0.5, 30.0, 24)  # decay over the samples before the step
+
+
+def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
+    """Exponential on which an output comes to rest, continued over the whole record.
+
+    A plant whose input moved not long before the record goes on moving: by its free response,
+    which bends, where a drift does not.
+
+    Parameters
+    ----------
+    output : ndarray, shape (N,)
+    edge : int
+        Samples before the step.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Level and exponential; None where a line tells the samples before the step as well.
+    """
+    if edge < FEWEST:
+        return None
+    # Single wild samples are no curve, the first of a record least of all.
+    before = median_filter(output[:edge], size=5, mode="mirror")
+    time = np.arange(edge) / edge
+    line = np.stack([np.ones(edge), time], axis=1)
+    straight = before - line @ np.linalg.lstsq(line, before, rcond=None)[0]
+    best, rate, residual = np.inf, 0.0, straight
+    weights: FloatArray = np.zeros(2)
+    for tried in _RATES:
+        columns = _level_and_decay(tried, time)
+        found = np.asarray(np.linalg.lstsq(columns, before, rcond=None)[0], dtype=np.float64)
+        error = before - columns @ found
+        left = float(np.sum(error**2))
+        if left < best:
+            best, rate, weights, residual = left, float(tried), found, error
+    variance = best / (edge - 3) * correlation_time(residual)
+    if float(straight @ straight) - best <= _SIGNIFICANT * variance:
+        return None
+    return np.asarray(_level_and_decay(rate, np.arange(output.size) / edge) @ weights)
+
+
+def _level_and_decay(rate: float, time: FloatArray) -> FloatArray:
+    return np.stack([np.ones(time.size), np.exp(-rate * time)], axis=1)

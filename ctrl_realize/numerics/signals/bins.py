@@ -1,0 +1,60 @@
+"""Average a step response over bins that grow with the distance from its onset.
+
+A record of thousands of samples says little more about a smooth response than some two hundred
+averages, if they are single samples where the onset may be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+
+_GROWTH = 0.04
+BINS_AT_REST = 12
+# Few different widths: what depends on the width alone is computed once for each.
+_WIDTHS = np.unique((1.19 ** np.arange(80)).astype(np.int64))
+
+
+@dataclass(frozen=True, eq=False)
+class Bins:
+    """Bins of samples: ``first[i]`` ... ``first[i] + width[i] - 1``."""
+
+    first: IntArray
+    width: IntArray
+
+    def average(self, values: FloatArray) -> FloatArray:
+        """Mean of every bin, for values of shape (N,) or (N, q)."""
+        sums = np.add.reduceat(values[: int(self.first[-1] + self.width[-1])], self.first, axis=0)
+        return np.asarray(sums / self.width.reshape(-1, *[1] * (values.ndim - 1)))
+
+
+def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BINS_AT_REST) -> Bins:
+    """Lay bins over samples 0...stop - 1 of a record.
+
+    Parameters
+    ----------
+    stop : int
+        Number of samples.
+    edges : list of int
+        Samples at which the input has moved; every one starts a new response.
+    crossing : int
+        First lasting motion after an edge, in samples. Bins are single samples there and grow
+        by 4 % of the distance from it.
+    at_rest : int, optional
+        Bins before the first edge.
+    """
+    bounds = sorted({*np.linspace(0, edges[0], min(at_rest, edges[0]) + 1).astype(int)})
+    starts = [*edges, stop]
+    onsets = np.array(edges) + crossing
+    k = edges[0]
+    while k < stop:
+        distance = float(np.abs(onsets - k).min())
+        width = int(_WIDTHS[np.searchsorted(_WIDTHS, max(_GROWTH * distance, 1.0), "right") - 1])
+        following = min(s for s in starts if s > k)
+        k = min(k + width, following)
+        bounds.append(k)
+    limits = np.array(bounds)
+    return Bins(limits[:-1], np.diff(limits))

@@ -1,0 +1,125 @@
+"""Correlations of residuals, their bounds, and predictions of a residual from its own past."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import gammaincc, ndtri
+
+from ..arrays import FloatArray
+from ..hankel.matrix import fft_length
+
+
+def correlation(late: FloatArray, early: FloatArray, lags: int) -> FloatArray:
+    """Correlate two signals: coefficient of ``late[k + i]`` and ``early[k]`` for i = 0...lags.
+
+    Parameters
+    ----------
+    late, early : ndarray, shape (N,)
+        Means are taken out.
+    lags : int, < N
+
+    Returns
+    -------
+    ndarray, shape (lags + 1,)
+        Sums over all pairs divided by the product of the signals' norms; zero where a signal is
+        constant.
+    """
+    x, y = late - late.mean(), early - early.mean()
+    points = fft_length(x.size + lags)
+    product = np.fft.rfft(x, n=points) * np.conj(np.fft.rfft(y, n=points))
+    sums: FloatArray = np.fft.irfft(product, n=points)[: lags + 1]
+    norm = float(np.sqrt((x @ x) * (y @ y)))
+    return sums / norm if norm > 0 else np.zeros(lags + 1)
+
+
+def whiteness(rho: FloatArray, samples: int) -> float:
+    """Return the probability that white noise looks less white (Ljung and Box 1978).
+
+    Parameters
+    ----------
+    rho : ndarray, shape (L,)
+        Autocorrelation at lags 1...L.
+    samples : int
+    """
+    L = rho.size
+    Q = samples * (samples + 2) * float(np.sum(rho**2 / (samples - np.arange(1, L + 1))))
+    return float(gammaincc(L / 2, Q / 2))
+
+
+def cross_bound(residual: FloatArray, drive: FloatArray, lags: int, confidence: float) -> float:
+    """Bound the correlation of a residual with an input that it does not contain.
+
+    Both may be coloured: the variance is ``sum rho_e rho_u / N`` (Ljung, System Identification,
+    2nd ed., eq. 16.63 and after), summed over `lags` lags to both sides.
+    """
+    own = correlation(residual, residual, lags)
+    other = correlation(drive, drive, lags)
+    variance = max(1.0 + 2.0 * float(own[1:] @ other[1:]), 0.0) / residual.size
+    return float(-ndtri((1 - confidence) / 2) * np.sqrt(variance))
+
+
+def fit_percent(measured: FloatArray, modelled: FloatArray) -> FloatArray:
+    """Return ``100 (1 - |y - model| / |y - mean y|)`` for every row: 100 is perfect, 0 a mean."""
+    spread = np.linalg.norm(measured - measured.mean(axis=1, keepdims=True), axis=1)
+    miss = np.linalg.norm(measured - modelled, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(100.0 * (1.0 - miss / spread))
+
+
+def autoregression(signal: FloatArray, most: int) -> FloatArray:
+    """Fit ``e[k] = sum c_i e[k-i]`` with the order of least BIC, 0...most; shape (order,).
+
+    Burg's recursion: stable at every order, so that no prediction runs away.
+    """
+    forward = signal - signal.mean()
+    backward, N = forward, signal.size
+    power = float(forward @ forward)
+    filter_ = np.ones(1)
+    best, found, left = 0.0, np.zeros(0), 1.0
+    for order in range(1, most + 1):
+        ahead, behind = forward[1:], backward[:-1]
+        energy = float(ahead @ ahead + behind @ behind)
+        if energy <= 1e-28 * power:
+            break
+        reflection = -2.0 * float(ahead @ behind) / energy
+        forward, backward = ahead + reflection * behind, behind + reflection * ahead
+        longer = np.append(filter_, 0.0)
+        filter_ = longer + reflection * longer[::-1]
+        left *= max(1.0 - reflection**2, 1e-28)
+        bic = N * np.log(left) + order * np.log(N)
+        if bic < best:
+            best, found = bic, -filter_[1:]
+    return found
+
+
+def predict_ahead(signal: FloatArray, coefficients: FloatArray, steps: int) -> FloatArray:
+    """Predict ``e[k]`` from samples up to ``k - steps`` by an autoregression.
+
+    The first ``order + steps - 1`` samples, without a complete past, are predicted as zero: with
+    zeros in place of a past, an autoregression that rings answers with a burst.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (N,)
+    coefficients : ndarray, shape (order,)
+    steps : int, >= 1
+
+    Returns
+    -------
+    ndarray, shape (N,)
+    """
+    N = signal.size
+    # ahead[j][k]: what samples up to k say about e[k + j]; j <= 0 are the samples themselves.
+    ahead = {-i: _later(signal, i) for i in range(coefficients.size)}
+    for j in range(1, steps + 1):
+        ahead[j] = sum(
+            (c * ahead[j - i] for i, c in enumerate(coefficients, start=1)), start=np.zeros(N)
+        )
+    ahead[steps][: max(coefficients.size - 1, 0)] = 0.0
+    return _later(ahead[steps], steps)
+
+
+def _later(signal: FloatArray, samples: int) -> FloatArray:
+    out = np.zeros_like(signal)
+    out[samples:] = signal[: max(signal.size - samples, 0)]
+    return out

@@ -1,0 +1,205 @@
+"""Find the edges of a measured input signal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter, rank_filter
+
+from ..arrays import FloatArray
+
+REST_TOLERANCE = 0.02
+"""The input has left its level when it is off by this part of the step (or 5 sigma of noise)."""
+
+_PIECE = 2**18  # samples that are looked at together
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Samples index...index + samples - 1 lead from `rest` to `rest + amplitude`."""
+
+    index: int
+    amplitude: float
+    rest: float
+    samples: int
+    start: int
+    stop: int
+
+
+def difference_noise(values: FloatArray) -> float:
+    """Noise level (sigma) from first differences, unmoved by steps, drift and rare spikes.
+
+    Zero for a signal of which most neighbours are equal, such as a clean or coarse one.
+    """
+    if values.size < 3:
+        return 0.0
+    steps = np.diff(values)
+    steps -= np.median(steps)
+    np.abs(steps, out=steps)
+    return float(np.median(steps, overwrite_input=True) / (0.6745 * np.sqrt(2)))
+
+
+def despike(values: FloatArray, spike_samples: int) -> FloatArray:
+    """Remove spikes of at most `spike_samples` samples; levels and edges stay in place.
+
+    A median over 2 s + 1 samples keeps every level that lasts longer than s samples. The ends
+    are continued with their own value, so a record that holds a single sample of rest keeps it.
+    """
+    if spike_samples < 1:
+        return values
+    return np.asarray(median_filter(values, size=2 * spike_samples + 1, mode="nearest"))
+
+
+def find_edges(
+    values: FloatArray, spike_samples: int, min_share: float, most: int | None = None
+) -> list[Edge]:
+    """Find all edges whose height is at least `min_share` of the signal's range.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        Measured input; it may be noisy, drift slowly, ramp over some samples and have spikes.
+    spike_samples : int
+        Longest spike to ignore, in samples.
+    min_share : float
+        Smallest edge, as a part of the range of the input without spikes.
+    most : int, optional
+        Look no further than for one edge more than these: an input that moves all the time has
+        millions.
+
+    Returns
+    -------
+    list of Edge
+        In order of time; empty when the input holds still.
+    """
+    clean = despike(values, spike_samples)
+    # A median over w samples leaves 1.25 / sqrt(w) of white noise.
+    noise = difference_noise(values) * (
+        1.25 / np.sqrt(2 * spike_samples + 1) if spike_samples else 1.0
+    )
+    span = _significant_range(clean, noise)
+    if span == 0.0:
+        return []
+    if spike_samples and clean.size > 4 * spike_samples:
+        # At the ends a spike cannot be told from a level. Where the rest of the record has a
+        # step of its own it is taken for a spike; where not, it is the rest level of a record
+        # that starts at its step.
+        inner_span = _significant_range(clean[spike_samples:-spike_samples], noise)
+        if inner_span > 0.0:
+            span = inner_span
+            clean[:spike_samples] = clean[spike_samples]
+            clean[-spike_samples:] = clean[-spike_samples - 1]
+    # An edge of just the share counts, however it is rounded: a ramp is not cut to pieces.
+    threshold = max(min_share * span, 5 * noise) * (1 - 1e-9)
+    width = spike_samples + 1
+    # Level before and after each sample; an edge is where they differ.
+    jump = _jumps(clean, width)
+    edges: list[Edge] = []
+    for k in _peaks(jump, threshold):
+        edge = _measure(clean, jump, k, noise)
+        if edge is not None and abs(edge.amplitude) >= threshold:
+            edges.append(edge)
+            if most is not None and len(edges) > most:
+                break
+    return [
+        Edge(
+            e.index,
+            e.amplitude,
+            e.rest,
+            e.samples,
+            edges[i - 1].index + edges[i - 1].samples - 1 if i else 0,
+            edges[i + 1].index if i + 1 < len(edges) else int(clean.size),
+        )
+        for i, e in enumerate(edges)
+    ]
+
+
+def _significant_range(values: FloatArray, noise: float) -> float:
+    """Range of a signal; 0 when rounding (of a constant) or noise explains it."""
+    span = float(values.max() - values.min())
+    if span <= 1e-9 * float(np.abs(values).max()) or span <= 10 * noise:
+        return 0.0
+    return span
+
+
+def _jumps(values: FloatArray, width: int) -> FloatArray:
+    """Median of the `width` samples from each sample on, less that of those before it."""
+    jump = np.empty(values.size)
+    # in pieces, or what is between would take several times the memory of a long record
+    for start in range(0, values.size, _PIECE):
+        stop = min(start + _PIECE, values.size)
+        part = values[max(start - width, 0) : stop + width]
+        padded = np.concatenate(
+            [
+                np.full(max(width - start, 0), values[0]),
+                part,
+                np.full(max(stop + width - values.size, 0), values[-1]),
+            ]
+        )
+        before, after = _side_medians(padded, width)
+        jump[start:stop] = after - before
+    return jump
+
+
+def _side_medians(padded: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:
+    """Medians of `width` samples before each sample and from it on, `width` more on each side."""
+    # A window that begins at sample k is centred at k + width // 2.
+    low, high = (rank_filter(padded, rank, width) for rank in ((width - 1) // 2, width // 2))
+    medians = (0.5 * (low + high) if width % 2 == 0 else low)[width // 2 :]
+    count = padded.size - 2 * width
+    return medians[:count], medians[width : width + count]
+
+
+def _peaks(jump: FloatArray, threshold: float) -> Iterator[int]:
+    """Positions of the largest jump in each run of jumps of one sign."""
+    for start in range(0, jump.size, _PIECE):
+        sign = np.sign(jump[start : start + _PIECE])
+        sign[np.abs(jump[start : start + _PIECE]) < threshold] = 0.0
+        bounds = np.flatnonzero(np.diff(sign, prepend=0.0)) + start
+        for first in bounds.tolist():
+            own = np.sign(jump[first])
+            if abs(jump[first]) < threshold or (
+                # the run began in the piece before
+                first == start > 0 and own * jump[first - 1] >= threshold
+            ):
+                continue
+            end = first + 1
+            while end < jump.size and own * jump[end] >= threshold:
+                end += 1
+            run = np.abs(jump[first:end])
+            top = np.flatnonzero(run >= run.max() * (1 - 1e-12))
+            yield first + int(top[top.size // 2])
+
+
+def _quiet_after(jump: FloatArray, limit: float) -> int:
+    """First position with a jump up to a limit; the length where there is none."""
+    start, count = 0, 64
+    while start < jump.size:
+        quiet = np.flatnonzero(np.abs(jump[start : start + count]) <= limit)
+        if quiet.size:
+            return start + int(quiet[0])
+        start, count = start + count, 2 * count
+    return int(jump.size)
+
+
+def _measure(values: FloatArray, jump: FloatArray, k: int, noise: float) -> Edge | None:
+    """Find levels, first moved sample and length of the edge whose steepest point is k."""
+    # The edge reaches as far as levels before and after differ by more than noise.
+    limit = max(0.02 * abs(jump[k]), 3 * noise)
+    low = max(k - 1 - _quiet_after(jump[:k][::-1], limit), 0)
+    high = min(k + _quiet_after(jump[k:], limit), values.size - 1)
+    reach = max(20, 2 * (high - low))
+    rest = float(np.median(values[max(low - reach, 0) : low + 1]))
+    level = float(np.median(values[high : high + reach]))
+    amplitude = level - rest
+    if amplitude == 0.0:
+        return None
+    slack = min(max(REST_TOLERANCE * abs(amplitude), 5 * noise), 0.5 * abs(amplitude))
+    moved = np.sign(amplitude) * (values[low : high + 1] - rest)
+    arrived = np.flatnonzero(moved >= abs(amplitude) - slack)
+    there = int(arrived[0]) if arrived.size else moved.size - 1
+    resting = np.flatnonzero(moved[:there] <= slack)
+    first = int(resting[-1]) + 1 if resting.size else 0
+    return Edge(low + first, amplitude, rest, there - first + 1, 0, 0)

@@ -1,0 +1,57 @@
+"""Where in a long record its inputs move."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray
+
+_HOPS = 4  # starts in the length of a stretch that are looked at
+_ENOUGH = 0.5  # of the most that any stretch has
+_TOGETHER = 2**20  # samples that are looked at together
+
+
+def lively_start(inputs: FloatArray, count: int) -> int:
+    """First sample of the first stretch in which the inputs move as they do in the record.
+
+    That is, with half the variance of the stretch of `count` samples that has most of it. An
+    input that moves from the beginning gives 0.
+
+    Parameters
+    ----------
+    inputs : ndarray, shape (m, N)
+    count : int
+        Samples in a stretch.
+    """
+    samples = inputs.shape[1]
+    hop = max(count // _HOPS, 1)
+    blocks = samples // hop
+    if samples <= count or blocks < _HOPS:
+        return 0
+    moves = np.zeros((len(inputs), blocks - _HOPS + 1))
+    for row, moved in zip(inputs, moves, strict=True):
+        means, squares = _block_sums(row[: blocks * hop].reshape(blocks, hop), float(row[0]))
+        window = np.ones(_HOPS)
+        mean = np.convolve(means, window, "valid") / (_HOPS * hop)
+        variance = np.convolve(squares, window, "valid") / (_HOPS * hop) - mean**2
+        # what rounding leaves of an input at rest far from where it began
+        variance[variance < 1e-12 * mean**2] = 0.0
+        if variance.max() > 0:
+            moved[:] = variance / variance.max()
+    # all of them together where they ever do
+    together = moves.min(axis=0)
+    moved = together if together.max() > 0 else moves.max(axis=0)
+    if moved.max() == 0:
+        return int(samples - count)  # it moves at the very end, if at all
+    return int(hop * np.argmax(moved >= _ENOUGH * moved.max()))
+
+
+def _block_sums(rows: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
+    """Sums and sums of squares of the rows, from a level."""
+    sums, squares = np.empty(len(rows)), np.empty(len(rows))
+    step = max(_TOGETHER // rows.shape[1], 1)
+    for first in range(0, len(rows), step):
+        part = rows[first : first + step] - level
+        sums[first : first + step] = part.sum(axis=1)
+        squares[first : first + step] = np.einsum("bh,bh->b", part, part)
+    return sums, squares

@@ -1,0 +1,238 @@
+"""How large the noise of a measured signal is, how coarse, how coloured, and whether it hums."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..hankel.matrix import fft_length
+
+_DITHER = 0.6  # noise, rounding included, in quantisation steps, from which means are unbiased
+_MANY = 50  # samples at rest that are enough to tell the noise
+_TURNS = 3
+_MOST_OF_A_LINE = 45.0
+"""Bound of the energy of a line, in its power in a spectrum behind Hann's window over its samples:
+8 at a frequency of the spectrum, 11 between two of them, and leakage of what is beside it."""
+_BLOCK = 4096  # samples over which a phase is turned on at a time
+_TOGETHER = 2**18  # samples that are looked at together
+_FIRST_LAGS = 2**12
+_FEW = 8  # samples at rest below which the whole record must tell the noise
+
+
+def quantisation_step(values: FloatArray) -> float:
+    """Step of the quantiser, 0 where none shows.
+
+    The step is the smallest difference between two values; it is believed when the other
+    differences are multiples of it.
+    """
+    gaps = np.diff(np.unique(values))
+    gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)]
+    if gaps.size < 4:
+        return 0.0
+    step = float(gaps.min())
+    multiples = np.divide(gaps, step, out=gaps)
+    pieces = np.array_split(multiples, -(-multiples.size // _TOGETHER))
+    whole = sum(int(np.sum(np.abs(part - np.round(part)) < 0.05)) for part in pieces)
+    few = float(np.median(multiples, overwrite_input=True)) < 50
+    return step if whole > 0.9 * multiples.size and few else 0.0
+
+
+def is_coarse(sigma: float, quantum: float) -> bool:
+    """Tell whether a quantiser's steps are so high that averaging does not remove the rounding.
+
+    With less noise than half a step the mean of rounded samples depends on where between two
+    levels the signal lies (dither).
+    """
+    return quantum > 0 and sigma < _DITHER * quantum
+
+
+def mad_sigma(values: FloatArray) -> float:
+    """Standard deviation of Gaussian noise from the median absolute deviation."""
+    away = values - np.median(values)
+    np.abs(away, out=away)
+    return 1.4826 * float(np.median(away, overwrite_input=True))
+
+
+def winsorised_sigma(values: FloatArray, quantum: float, lost: int = 0) -> float:
+    """Standard deviation with values beyond two median absolute deviations moved to that limit.
+
+    `lost` degrees of freedom are counted off. The limit is at least half a quantisation step,
+    else a signal that mostly rests on one level would have no noise at all.
+    """
+    limit = 2 * max(mad_sigma(values), 0.5 * quantum)
+    clipped = np.clip(values - np.median(values), -limit, limit)
+    # Two-sigma clipping leaves 0.921 of a Gaussian's variance.
+    return float(np.sqrt(np.sum(clipped**2) / max(values.size - lost, 1))) / 0.96
+
+
+def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[float, float]:
+    """Noise level and significant drift of an output at rest.
+
+    Parameters
+    ----------
+    before : ndarray, shape (P,)
+        Samples before the step. With fewer than 8 the third differences of the record tell the
+        noise: they are blind to anything smooth.
+    record : ndarray, shape (N,)
+        The whole record.
+    quantum : float
+        Quantisation step; the noise is never taken below ``quantum / sqrt(12)``.
+
+    Returns
+    -------
+    sigma : float
+    drift : float
+        Slope per sample, 0 unless it is five standard errors, which slow noise has larger ones
+        of.
+    """
+    floor = quantum / np.sqrt(12)
+    if before.size < _FEW:
+        third = np.diff(record, 3) / np.sqrt(20)
+        return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0
+    slope, left = _robust_line(before, quantum)
+    sigma = max(winsorised_sigma(left, quantum, lost=2), floor)
+    if before.size < _MANY:
+        # A dozen samples tell sigma to a factor of two: the settled half of the record helps.
+        settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
+        if settled.size:
+            sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
+    error = sigma * np.sqrt(12 * correlation_time(left) / before.size**3)
+    return sigma, float(slope) if abs(slope) > 5 * error else 0.0
+
+
+def _robust_line(values: FloatArray, quantum: float) -> tuple[float, FloatArray]:
+    """Slope per sample, and what the line leaves; wild values count as four standard deviations."""
+    index = np.arange(values.size, dtype=np.float64)
+    tamed = values
+    for _ in range(_TURNS):
+        line = np.polyval(np.polyfit(index, tamed, 1), index)
+        left = values - line
+        limit = 4 * max(mad_sigma(left), 0.5 * quantum)
+        tamed = line + np.clip(left, -limit, limit)
+    return float(line[1] - line[0]), left
+
+
+def correlation_time(residual: FloatArray) -> float:
+    """Samples that one independent sample is worth: 1 + 2 x the sum of the autocorrelation.
+
+    The sum ends where a pair of neighbouring terms turns negative (Geyer's initial positive
+    sequence); what white noise scatters to, 1.5, counts as 1.
+    """
+    time = 2 * float(_correlation(residual).sum(axis=1).sum()) - 1.0
+    return time if time > 1.5 else 1.0
+
+
+def kept_in_blocks(residual: FloatArray, length: int) -> float:
+    """Part of the variance of slow means that blocks of `length` samples keep.
+
+    Blocks that are drawn one by one know nothing of each other: the autocorrelation at lag k is
+    left in ``1 - k / length`` of the pairs. 1 for white noise.
+    """
+    time = correlation_time(residual)
+    if time == 1.0:
+        return 1.0
+    correlation = _correlation(residual).ravel()
+    pairs_inside = np.clip(1 - np.arange(correlation.size) / length, 0.0, None)
+    return float(np.clip((2 * pairs_inside @ correlation - 1.0) / time, 0.0, 1.0))
+
+
+def _correlation(residual: FloatArray) -> FloatArray:
+    """Autocorrelation from lag 0 to where a pair turns negative, in pairs: shape (K, 2)."""
+    n = residual.size
+    centred = residual - residual.mean()
+    energy = float(centred @ centred)
+    if n < 8 or energy == 0:
+        return np.zeros((0, 2))
+    # The sum mostly ends after a few lags: of a long record these are looked at first.
+    for lags in (_FIRST_LAGS, n // 2):
+        if lags < n // 8 or lags == n // 2:
+            correlation = _lagged_products(centred, lags) / energy
+            pairs = correlation[: 2 * (correlation.size // 2)].reshape(-1, 2)
+            negative = np.flatnonzero(pairs.sum(axis=1) <= 0)
+            if negative.size:
+                return np.asarray(pairs[: negative[0]])
+    return np.asarray(pairs)
+
+
+def _lagged_products(values: FloatArray, lags: int) -> FloatArray:
+    """Sums of ``values[k] values[k + i]`` for i = 0...lags - 1, piece by piece."""
+    total = np.zeros(lags)
+    size = max(8 * lags, _TOGETHER)
+    for start in range(0, values.size, size):
+        late = values[start : start + size + lags]
+        points = fft_length(late.size + lags)
+        product = np.fft.rfft(late, n=points)
+        product *= np.conj(np.fft.rfft(values[start : start + size], n=points))
+        total += np.fft.irfft(product, n=points)[:lags]
+    return total
+
+
+def colouring(rest: FloatArray, sigma: float) -> float:
+    """How much larger means of 4 and 16 samples at rest are than white noise would leave them.
+
+    1 for white noise and where there are too few samples to tell.
+    """
+    worst = 1.0
+    for width in (4, 16):
+        count = rest.size // width
+        if count >= 12 and sigma > 0:
+            means = rest[: count * width].reshape(count, width).mean(axis=1)
+            worst = max(worst, float(means.std()) * np.sqrt(width) / sigma)
+    return worst if worst > 1.4 else 1.0
+
+
+def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
+    """Frequencies, in cycles per sample, of the lines in a signal at rest.
+
+    A line carries at least a third of the variance and stands 20 times above its neighbours in
+    the spectrum, over three and a half periods or more.
+    """
+    found: list[float] = []
+    left = rest - rest.mean()
+    n = left.size
+    while n >= 64 and len(found) < most:
+        power = np.abs(np.fft.rfft(left * np.hanning(n))) ** 2
+        power[:4] = 0
+        peak = int(np.argmax(power[:-2]))
+        low, high = max(peak - 12, 4), peak + 13
+        around = np.delete(power[low:high], np.s_[max(peak - 2 - low, 0) : peak + 3 - low])
+        if peak < 4 or around.size < 6 or power[peak] < 20 * np.median(around) / np.log(2):
+            break
+        if _MOST_OF_A_LINE * power[peak] / n < float(left @ left) / 3:
+            break  # far too weak, wherever its frequency lies between those of the spectrum
+        frequency = _refine(left, peak / n)
+        if frequency * n < 3.5:
+            break  # slower than it looked: too few periods to go on like this
+        wave = sine_pair(np.arange(n), frequency)
+        fitted = wave @ np.linalg.lstsq(wave, left, rcond=None)[0]
+        if float(fitted @ fitted) < float(left @ left) / 3:
+            break
+        found.append(frequency)
+        left = left - fitted
+    return found
+
+
+def sine_pair(index: FloatArray, frequency: float) -> FloatArray:
+    """Cosine and sine, shape (N, 2), at a frequency in cycles per sample."""
+    phase = 2 * np.pi * frequency * index
+    return np.stack([np.cos(phase), np.sin(phase)], axis=1)
+
+
+def _refine(values: FloatArray, frequency: float) -> float:
+    """Improve the frequency of a line by golden steps on its least-squares power."""
+    # Turned to the frequency within blocks, and then from block to block.
+    whole = values.size // _BLOCK * _BLOCK
+    blocks, rest = values[:whole].reshape(-1, _BLOCK), values[whole:]
+
+    def power(f: float) -> float:
+        turn = np.exp(-2j * np.pi * f * np.arange(_BLOCK))
+        sums = blocks @ turn.real + 1j * (blocks @ turn.imag)
+        starts = np.exp(-2j * np.pi * f * _BLOCK * np.arange(len(sums) + 1))
+        return float(np.abs(starts[:-1] @ sums + starts[-1] * (turn[: rest.size] @ rest)))
+
+    width = 1.0 / values.size
+    for _ in range(14):
+        trials = frequency + width * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+        frequency = float(trials[np.argmax([power(f) for f in trials])])
+        width /= 2
+    return frequency

@@ -1,0 +1,116 @@
+"""Autoregressive noise models, and records made white with them.
+
+Least squares weigh all errors alike. Noise that is slow, or that rings as the ripple of a motor
+does, is much weaker where a delay shows, in fast motions, than a count of independent samples
+makes of it: means over bins are decorrelated first (Aitken), by the autoregression that the
+output follows where the plant stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.signal import lfilter
+
+from ..arrays import FloatArray, IntArray
+from .bins import Bins
+from .correlation import autoregression
+from .noise import mad_sigma
+
+MOST_LAGS = 25
+_SAMPLES_PER_LAG = 20
+
+
+def noise_lags(samples: int) -> int:
+    """Lags of autoregressive noise that so many samples can tell."""
+    return max(min(MOST_LAGS, samples // _SAMPLES_PER_LAG), 1)
+
+
+def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
+    """Bayesian information criterion of stretches of one noise, and the lags that it takes.
+
+    ``e[k] = a_1 e[k-1] + ... + a_r e[k-r] + w[k]`` with white w: r is the one with the least
+    ``n log(mean w^2) + r log n``, and that is returned. Whatever is tried, the same n samples
+    count, those behind `noise_lags` others of their stretch. Means are taken out.
+    """
+    most = noise_lags(min(e.size for e in residuals))
+    rows, targets = [], []
+    for e in residuals:
+        centred = e - e.mean()
+        rows.append(np.stack([centred[most - i : e.size - i] for i in range(most + 1)]))
+        targets.append(rows[-1][0])
+    sums = np.sum([lagged @ lagged.T for lagged in rows], axis=0)
+    n = sum(target.size for target in targets)
+    floor = 1e-300
+    found = [(n * float(np.log(max(sums[0, 0] / n, floor))), 0)]
+    scale = max(float(np.trace(sums)) / (most + 1), floor)
+    for r in range(1, most + 1):
+        own = sums[1 : r + 1, 1 : r + 1] + 1e-13 * scale * np.eye(r)
+        left = float(sums[0, 0] - sums[0, 1 : r + 1] @ np.linalg.solve(own, sums[0, 1 : r + 1]))
+        found.append((n * float(np.log(max(left / n, 1e-13 * scale / n))) + r * np.log(n), r))
+    return min(found)
+
+
+_WILD = 4.0  # median absolute deviations at which samples are cut before they tell the colour
+_NOTHING = 1e-6  # of a response that has died away
+_JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singular
+
+
+def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
+    """Autocovariance of noise over its variance, from lag 0 until it has died away.
+
+    That of white noise has lag 0 alone.
+
+    Parameters
+    ----------
+    quiet : ndarray
+        Noise alone. Its autoregression (Burg, least BIC) goes on where sample covariances would
+        be noise themselves.
+    longest : int
+        Lags at most.
+    """
+    limit = _WILD * mad_sigma(quiet)
+    tamed = np.clip(quiet - np.median(quiet), -limit, limit)
+    coefficients = autoregression(tamed, noise_lags(tamed.size))
+    if not coefficients.size:
+        return np.ones(1)
+    denominator = np.concatenate([[1.0], -coefficients])
+    slowest = float(np.abs(np.roots(denominator)).max(initial=0.0))
+    alive = np.log(_NOTHING) / np.log(min(max(slowest, 1e-3), 1 - 1e-9))
+    pulse = np.zeros(int(min(alive, longest)) + 1 + coefficients.size)
+    pulse[0] = 1.0
+    power = np.abs(np.fft.rfft(lfilter([1.0], denominator, pulse), 2 * pulse.size)) ** 2
+    covariance: FloatArray = np.fft.irfft(power)[: pulse.size]
+    return np.asarray(covariance / covariance[0])
+
+
+def whitener(bins: Bins, covariance: FloatArray) -> FloatArray:
+    """Lower triangle (m, m) that makes means over bins independent, of unit variance.
+
+    Parameters
+    ----------
+    bins : Bins
+        Of m bins.
+    covariance : ndarray
+        Of single samples over their variance, from lag 0 until it has died away.
+    """
+    # Variance of a sum of k samples, less what it grows by at last: bounded, however long bins are.
+    lag = np.arange(covariance.size + 1)
+    plain = np.concatenate([[0.0], np.cumsum(covariance)])
+    moment = np.concatenate([[0.0], np.cumsum(lag[:-1] * covariance)])
+    spread = 2 * lag * (plain - plain[-1]) - 2 * moment
+    growth = 2 * plain[-1] - 1
+    start, stop = bins.first[:, None], (bins.first + bins.width)[:, None]
+
+    def apart(one: IntArray, other: IntArray) -> FloatArray:
+        gap: IntArray = np.abs(one - other.T)
+        return np.asarray(spread[np.minimum(gap, covariance.size)])
+
+    # The covariance of two sums follows from the four gaps between their ends.
+    among = apart(stop, start) + apart(start, stop) - apart(stop, stop) - apart(start, start)
+    among = 0.5 * among + np.diag(growth * bins.width)
+    among = among / (bins.width[:, None] * bins.width) + _JITTER * np.eye(bins.width.size)
+    lower = cholesky(among, lower=True)
+    return np.asarray(solve_triangular(lower, np.eye(len(lower)), lower=True))

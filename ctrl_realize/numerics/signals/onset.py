@@ -1,0 +1,206 @@
+"""Where a response first leaves the noise: thresholds on records and on impulse responses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.special import ndtri
+
+from ..arrays import FloatArray, IntArray
+from .correlation import autoregression, correlation
+from .filters import moving_mean
+
+
+@dataclass(frozen=True, eq=False)
+class CorrelationOnset:
+    """Cross-correlation of the whitened input with the output, filtered alike.
+
+    ``onset`` is the first lag where ``|rho| > bound`` (-1 if there is none) and `peak` the lag of
+    the largest; `rho` and `bound` have shape (lags + 1,).
+    """
+
+    rho: FloatArray
+    bound: FloatArray
+    onset: int
+    peak: int
+
+
+def correlation_onset(
+    drive: FloatArray, output: FloatArray, lags: int, confidence: float
+) -> CorrelationOnset:
+    """Correlate input and output after the input is made white.
+
+    Whitened, the correlation is the pulse response up to a factor (Box and Jenkins, Time Series
+    Analysis, chapter 11); the bound holds for all lags together.
+
+    Parameters
+    ----------
+    drive, output : ndarray, shape (N,)
+    lags : int
+        Lags 0...lags.
+    confidence : float
+        Chance that nothing is seen where nothing is.
+    """
+    c = autoregression(drive, min(20, drive.size // 20))
+    whiten = np.concatenate([[1.0], -c])
+    white = lfilter(whiten, [1.0], drive - drive.mean())[c.size :]
+    alike = lfilter(whiten, [1.0], output - output.mean())[c.size :]
+    rho = correlation(alike, white, lags)
+    # An input that is held for samples on end is silent between its moves when whitened: then few
+    # products make up a lag, and their own squares tell how far it scatters (White 1980).
+    drive2, output2 = (white - white.mean()) ** 2, (alike - alike.mean()) ** 2
+    pairs = np.array([drive2[: white.size - k] @ output2[k:] for k in range(lags + 1)])
+    total = float(drive2.sum() * output2.sum())
+    spread = np.sqrt(np.maximum(pairs / total if total > 0 else 0.0, 1 / white.size))
+    bound = -ndtri((1 - confidence) / 2 / (lags + 1)) * spread
+    # What whitening has left of the input's own correlation shows a late response early as well.
+    left = np.abs(correlation(white, white, lags))
+    left[left < 4 / np.sqrt(white.size)] = 0.0
+    bound += [left[1 : lags + 1 - k] @ np.abs(rho[k + 1 :]) for k in range(lags + 1)]
+    seen = np.flatnonzero(np.abs(rho) > bound)
+    onset = int(seen[0]) if seen.size else -1
+    return CorrelationOnset(rho, bound, onset, int(np.abs(rho).argmax()))
+
+
+def phase_slope(omega: FloatArray, phase: FloatArray, share: float) -> tuple[float, float]:
+    """Fit a line to the phase over the top of the band: its negative slope in s, and the std.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (K,), K >= 3
+        Rising, rad/s.
+    phase : ndarray, shape (K,)
+        Unwrapped, rad.
+    share : float
+        Part of the band, counted from its upper end in rad/s; at least three points are taken.
+    """
+    count = max(int(np.count_nonzero(omega >= omega[-1] - share * np.ptp(omega))), 3)
+    x, y = omega[-count:], phase[-count:]
+    x0 = x - x.mean()
+    slope = float(x0 @ y / (x0 @ x0))
+    rest = y - y.mean() - slope * x0
+    variance = float(rest @ rest) / max(count - 2, 1) / float(x0 @ x0)
+    return -slope, float(np.sqrt(variance))
+
+
+_PIECE = 2**18  # samples that are looked at together
+_SMOOTHINGS = (1, 8, 64)  # samples; a small step in much noise shows only in means
+
+
+@dataclass(frozen=True)
+class FirstMotion:
+    """Where an output leaves its rest level, in samples after the input's edge.
+
+    `crossing` is the first sample of a lasting excursion beyond 5 sigma (1.5 quantisation
+    steps, 0.5 % of the whole excursion); `onset` extrapolates the rise from there back to the
+    rest level, not further than to the last sample that is still inside one sigma.
+    """
+
+    crossing: int
+    onset: float
+    rest: float
+    sign: float
+    span: float
+
+
+def first_motion(
+    output: FloatArray, edge: int, sigma: float, quantum: float, drift: float
+) -> FirstMotion | None:
+    """Find the first motion of a record; None if the output stays where it is.
+
+    Parameters
+    ----------
+    output : ndarray, shape (N,)
+    edge : int
+        Sample at which the input has moved.
+    sigma, quantum : float
+        Noise level and quantisation step of the output.
+    drift : float
+        Slope before the step, per sample. It is continued for as long as it was seen.
+    """
+    n = output.size
+    if edge >= 8:
+        level = output - drift * _clipped_index(n, edge) if drift else output
+        rest = float(np.median(level[max(edge - 200, 0) : edge]))
+    else:
+        level = output
+        rest = float(np.median(output[: edge + 5]))
+    moved = level - rest
+    end = max(5, (n - edge) // 50)
+    size = np.abs(moved[edge:])
+    span = float(np.percentile(size, 80, overwrite_input=True))
+    span = max(abs(float(np.median(moved[-end:]))), span)
+    del size, level  # of a long record every array counts
+    single, noise = moved, sigma
+    for smoothing in _SMOOTHINGS:
+        if smoothing > 1:
+            moved = moving_mean(single, smoothing)
+            sigma = noise / np.sqrt(smoothing)
+        threshold = max(5 * sigma, 1.5 * quantum, 0.005 * span)
+        crossing = _lasting_excursion(moved[edge:], threshold, smoothing)
+        if crossing is not None:
+            break
+    else:
+        return None
+    lasting = int(_lasting(np.array(crossing), smoothing))
+    stretch = moved[edge + crossing : edge + crossing + lasting]
+    sign = float(np.sign(np.mean(stretch)))
+    rise = np.multiply(moved, sign, out=moved)
+    width = max(1, round(0.03 * crossing))
+    if width > 1:
+        rise = moving_mean(rise, width)
+    inside = max(sigma, 0.5 * quantum) / np.sqrt(width)
+    still = np.flatnonzero(rise[edge : edge + crossing + 1] <= inside)
+    last = float(still[-1]) if still.size else 0.0
+    return FirstMotion(
+        crossing, max(_extrapolate(rise[edge:], crossing, threshold), last), rest, sign, span
+    )
+
+
+def _clipped_index(n: int, edge: int) -> FloatArray:
+    """Samples from the edge on, not further from it than the record's start."""
+    index = np.arange(-edge, n - edge, dtype=np.float64)
+    return np.clip(index, -edge, edge, out=index)
+
+
+def _lasting(crossing: IntArray, smoothing: int) -> IntArray:
+    """How long an excursion must last: a quarter of the time that it took to come."""
+    return np.asarray(np.maximum(3 * smoothing, np.ceil(0.25 * crossing).astype(np.int64)))
+
+
+def _lasting_excursion(moved: FloatArray, threshold: float, smoothing: int) -> int | None:
+    size = np.abs(moved)
+    over = size > threshold
+    if not over.any():
+        return None
+    # Sums up to every sample, so that many short excursions cost no more than a few.
+    outside = np.cumsum(size > 0.6 * threshold, dtype=np.int32)
+    del size
+    upward = np.cumsum(np.sign(moved).astype(np.int8), dtype=np.int32)
+    for start in range(0, moved.size, _PIECE):
+        beyond = start + np.flatnonzero(over[start : start + _PIECE])
+        last = np.minimum(beyond + _lasting(beyond, smoothing), moved.size) - 1
+        count = last + 1 - beyond
+        # The first of them is outside, and the sign is not zero there.
+        part = (outside[last] - outside[beyond] + 1) / count
+        balance = np.abs(upward[last] - upward[beyond] + np.sign(moved[beyond])) / count
+        lasting = beyond[(part > 0.8) & (balance > 0.7)]
+        if lasting.size:
+            return int(lasting[0])
+    return None
+
+
+def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:
+    """Continue the line through one and three thresholds back to the rest level."""
+    higher = np.flatnonzero(rise[crossing:] > 3 * threshold)
+    if not higher.size:
+        return float(crossing)
+    second = crossing + max(int(higher[0]), 1)
+    if second >= rise.size:
+        return float(crossing)
+    low, high = float(rise[crossing]), float(rise[second])
+    if high <= low:
+        return float(crossing)
+    return crossing - low * (second - crossing) / (high - low)

@@ -1,0 +1,84 @@
+"""Write a measured input as a short list of moves."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ..arrays import FloatArray, IntArray
+from .edges import difference_noise
+
+MOST_MOVES = 24
+_SEGMENT_GROWTH = 0.5
+
+
+def input_moves(
+    signal: FloatArray, edges: list[tuple[int, int]], stop: int
+) -> tuple[IntArray, FloatArray]:
+    """Moves of an input that holds between its edges, up to noise and slow variation.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (N,)
+        Measured input.
+    edges : list of (index, samples)
+        First sample of every edge, and how many samples it takes.
+    stop : int
+        Samples from here on do not matter.
+
+    Returns
+    -------
+    index : ndarray, shape (L,)
+        Samples at which the input moves.
+    size : ndarray, shape (L,)
+        By how much.
+
+    Notes
+    -----
+    A clean input is returned exactly. A noisy one keeps its edges sample by sample; between
+    them it is replaced by means over segments that grow from the edge on, as far as these
+    means differ by more than their noise: a drooping amplifier is followed, its noise is not.
+    Spikes of a few samples are those of the measurement or the drive, too short to move the
+    plant, and are left out.
+    """
+    signal = signal[:stop]
+    moves = np.diff(signal, prepend=signal[0])
+    exact = np.flatnonzero(moves)
+    if exact.size <= MOST_MOVES:
+        return exact, moves[exact]
+    noise = difference_noise(signal)
+    level = np.empty_like(signal)
+    bounds = [0, *[i for i, _ in edges if i < stop], stop]
+    lengths = [0, *[n for i, n in edges if i < stop]]
+    for start, end, ramp in zip(bounds[:-1], bounds[1:], lengths, strict=True):
+        settled = min(start + max(ramp - 1, 0), end)
+        level[start:settled] = signal[start:settled]
+        if settled < end:
+            level[settled:end] = _steady(signal[settled:end], noise, grow=start > 0)
+    moves = np.diff(level, prepend=level[0])
+    index = np.flatnonzero(moves)
+    return index, moves[index]
+
+
+def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
+    """Piecewise means; one mean where they do not differ significantly."""
+    values = _without_spikes(values, noise)
+    n = values.size
+    mean = np.full(n, float(np.median(values)))
+    if not grow or n < 16:
+        return mean
+    bounds = [0]
+    while bounds[-1] < n:
+        bounds.append(min(n, bounds[-1] + max(8, int(_SEGMENT_GROWTH * bounds[-1]))))
+    widths = np.diff(bounds)
+    means = np.add.reduceat(values, bounds[:-1]) / widths
+    off = np.abs(means - mean[0])
+    if np.all(off <= 6 * noise / np.sqrt(widths)):
+        return mean
+    return np.repeat(means, widths)
+
+
+def _without_spikes(values: FloatArray, noise: float) -> FloatArray:
+    """Replace what stands out of a running median of seven samples, so up to three of them."""
+    middle = median_filter(values, size=7, mode="nearest")
+    return np.where(np.abs(values - middle) > 6 * noise, middle, values)

@@ -1,0 +1,1 @@
+"""State-space models: responses, sampling, balancing, sections, dead time approximations."""

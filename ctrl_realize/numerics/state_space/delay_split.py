@@ -1,0 +1,119 @@
+"""Delays of several channels: split into those of inputs and outputs, and lines that hold the rest.
+
+A line is a chain of delays with taps: one line per input serves all outputs, one per output all
+inputs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from ..arrays import FloatArray, IntArray
+
+Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+
+def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntArray, IntArray]]:
+    """Share delays out to outputs and inputs: ``outputs[i] + inputs[j] <= delays[i, j]``.
+
+    Parameters
+    ----------
+    delays : ndarray of int, shape (p, m)
+    known : ndarray of bool, shape (p, m)
+        Entries that have a delay; the others put no limit.
+
+    Returns
+    -------
+    list of (outputs, inputs)
+        Whole numbers >= 0 of shapes (p,) and (m,). The first leaves the least sum inside the
+        entries. Where that leaves nothing it is the only one; else it is followed by the two that
+        serve the inputs first, or the outputs, whose rest lies in other entries.
+
+    Notes
+    -----
+    The least rest is a linear program whose constraints are the edges of a bipartite graph:
+    totally unimodular, so that its corners are whole numbers.
+    """
+    p, m = delays.shape
+    rows, columns = np.nonzero(known)
+    limits = np.zeros((rows.size, p + m))
+    limits[np.arange(rows.size), rows] = 1.0
+    limits[np.arange(rows.size), p + columns] = 1.0
+    # How many entries each delay serves, less a trifle for the samples that it takes.
+    gain = np.concatenate([known.sum(axis=1), known.sum(axis=0)]) - 0.5 / (p + m)
+    top = float(delays[known].max(initial=0))
+    found = linprog(-gain, A_ub=limits, b_ub=delays[known], bounds=(0.0, top), method="highs")
+    shares = np.rint(np.asarray(found.x)).astype(np.int64)
+    ways = [_balanced(shares[:p], shares[p:])]
+    if np.any(known & (delays != np.add.outer(*ways[0]))):
+        first = _least(delays, known)
+        ways.append(_balanced(_least((delays - first).T, known.T), first))
+        second = _least(delays.T, known.T)
+        ways.append(_balanced(second, _least(delays - second[:, None], known)))
+    return ways
+
+
+def _least(delays: IntArray, known: NDArray[np.bool_]) -> IntArray:
+    """Return the least known entry of each column; 0 where none is."""
+    least = np.where(known, delays, np.iinfo(np.int64).max).min(axis=0)
+    return np.where(known.any(axis=0), least, 0)
+
+
+def _balanced(outputs: IntArray, inputs: IntArray) -> tuple[IntArray, IntArray]:
+    """Move what all have in common to the side with fewer signals; to the inputs where equal."""
+    p, m = outputs.size, inputs.size
+    common = int(outputs.min()) if m <= p else -int(inputs.min())
+    return outputs - common, inputs + common
+
+
+def joined_rows(parts: list[Matrices], taps: IntArray) -> Matrices:
+    """Join one model per output, all inputs each, behind tapped input lines.
+
+    Parameters
+    ----------
+    parts : list of (A, B, C, D)
+        Shapes (n, n), (n, m), (1, n), (1, m).
+    taps : ndarray of int, shape (p, m)
+        Delay of input j on its way to model i.
+
+    Returns
+    -------
+    A, B, C, D : ndarray
+        Of order ``sum n + sum_j max_i taps[i, j]``.
+    """
+    p, m = taps.shape
+    orders = [part[0].shape[0] for part in parts]
+    lengths = taps.max(axis=0)
+    size = sum(orders) + int(lengths.sum())
+    A, B = np.zeros((size, size)), np.zeros((size, m))
+    C, D = np.zeros((p, size)), np.zeros((p, m))
+    starts = sum(orders) + np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    for j in range(m):
+        if lengths[j]:
+            B[starts[j], j] = 1.0
+        for k in range(1, lengths[j]):
+            A[starts[j] + k, starts[j] + k - 1] = 1.0
+    at = 0
+    for i, (Ai, Bi, Ci, Di) in enumerate(parts):
+        own = slice(at, at + orders[i])
+        A[own, own], C[i, own] = Ai, Ci[0]
+        for j in range(m):
+            if taps[i, j]:
+                source = starts[j] + taps[i, j] - 1
+                A[own, source], C[i, source] = Bi[:, j], Di[0, j]
+            else:
+                B[own, j], D[i, j] = Bi[:, j], Di[0, j]
+        at += orders[i]
+    return A, B, C, D
+
+
+def joined_columns(parts: list[Matrices], taps: IntArray) -> Matrices:
+    """Join one model per input, all outputs each, in front of tapped output lines.
+
+    The transpose of `joined_rows`: `parts` have shapes (n, n), (n, 1), (p, n), (p, 1).
+    """
+    turned = [(A.T, C.T, B.T, D.T) for A, B, C, D in parts]
+    A, B, C, D = joined_rows(turned, taps.T)
+    return A.T, C.T, B.T, D.T

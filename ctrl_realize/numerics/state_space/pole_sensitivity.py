@@ -1,0 +1,185 @@
+"""Small changes of a model: how its poles can move, what each move does, and the moved model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+from .responses import markov
+
+Core = tuple[FloatArray, FloatArray, FloatArray, float]
+"""A (n, n), B (n,), C (n,) and D of a discrete system of one channel."""
+Direction = tuple[str, complex, complex]
+"""What moves (``"speed"`` or ``"damping"``), the pole, and its change per unit of the move."""
+FAITHFUL = 1e-6
+"""Error of the factored form, as a share of the largest Markov parameter, that is still used."""
+ON_CIRCLE = 1e-9
+"""A pole that has moved this close to the unit circle has no damping left."""
+
+
+def pole_directions(poles: FloatArray | ComplexArray, dt: float) -> list[Direction]:
+    """Name the ways in which stable poles can move: (what, pole, change of the pole per unit).
+
+    A real pole has its ``"speed"`` (relative change of its time constant's inverse); a pair has
+    ``"speed"`` and ``"damping"`` (change of the damping ratio), stated for the member with
+    positive imaginary part. Poles at 1, at 0 and on the negative axis have no such direction.
+    """
+    found: list[Direction] = []
+    for p in np.asarray(poles, dtype=np.complex128):
+        if abs(p) < 1e-6 or abs(p - 1) < 1e-9 or p.imag < -1e-12:
+            continue
+        if abs(p.imag) <= 1e-12:
+            if p.real > 0:
+                found.append(("speed", complex(p.real), complex(p.real * np.log(p.real))))
+            continue
+        s = np.log(p) / dt
+        w, zeta = abs(s), -s.real / abs(s)
+        found.append(("speed", complex(p), complex(p * s * dt)))
+        if abs(zeta) < 1:
+            slope = -w - 1j * w * zeta / np.sqrt(1 - zeta**2)
+            found.append(("damping", complex(p), complex(p * slope * dt)))
+    return found
+
+
+def sensitivity_system(
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    D: float,
+    directions: list[Direction],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Build the system from u to the core's output w and to its change along each direction.
+
+    Moving a pole p of the factored transfer function by dp, gain at frequency 0 kept, multiplies
+    it by ``1 + dp / (z - p) - dp / (1 - p)``; a pair moves together.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n,), (n,), and float
+        Core.
+    directions : list
+        From `pole_directions`.
+
+    Returns
+    -------
+    A, B, C, D : ndarray, shapes (N, N), (N,), (q, N), (q,)
+        q = 1 + number of directions.
+    """
+    n = A.shape[0]
+    blocks = [2 if p.imag else 1 for _, p, _ in directions]
+    size = n + sum(blocks)
+    big, inward = np.zeros((size, size)), np.zeros(size)
+    out, direct = np.zeros((1 + len(directions), size)), np.zeros(1 + len(directions))
+    big[:n, :n], inward[:n] = A, B
+    out[0, :n], direct[0] = C, D
+    at = n
+    for row, ((_, p, dp), width) in enumerate(zip(directions, blocks, strict=True), start=1):
+        own = slice(at, at + width)
+        big[own, own] = [[p.real, -p.imag], [p.imag, p.real]] if width == 2 else [[p.real]]
+        big[at, :n] = C
+        inward[at] = D
+        both = float(width)  # the conjugate pole adds the conjugate
+        out[row, own] = both * np.array([dp.real, -dp.imag])[:width]
+        level = -both * (dp / (1 - p)).real
+        out[row, :n] += level * C
+        direct[row] = level * D
+        at += width
+    return big, inward, out, direct
+
+
+def moved_core(
+    core: Core, zeros: ComplexArray, directions: list[Direction], moves: FloatArray, dt: float
+) -> tuple[Core, list[Direction]] | None:
+    """Move the poles of a core along their directions; zeros and gain at frequency 0 stay.
+
+    Parameters
+    ----------
+    core : (A, B, C, D)
+    zeros : ndarray
+        Finite zeros of the core.
+    directions : list
+        From `pole_directions`, of this core.
+    moves : ndarray, shape (len(directions),)
+        Logarithm of the speed ratio, or change of the damping ratio.
+    dt : float
+        Sample time in s.
+
+    Returns
+    -------
+    core, directions
+        The moved ones, directions in the same order; None where the core has no sum of simple
+        poles that reproduces it, and where a pole has gone where it cannot move from.
+    """
+    A, B, C, D = core
+    poles = np.linalg.eigvals(A).astype(np.complex128)
+    count = 4 * A.shape[0] + 50
+    first = markov(A, B[:, None], C[None], np.array([[D]]), count)[0, 0]
+    leading = first[poles.size - zeros.size]
+    own = _modal(zeros, poles, leading)
+    if own is None or not _alike(own, first):
+        return None
+    moved = poles.copy()
+    fresh: list[Direction] = []
+    for (what, pole, _), move in zip(directions, moves, strict=True):
+        for k, near in enumerate(poles):
+            if np.isclose(near, pole, rtol=1e-9, atol=0):
+                moved[k] = _moved_pole(moved[k], what, float(move), dt)
+            elif pole.imag and np.isclose(near, np.conj(pole), rtol=1e-9, atol=0):
+                moved[k] = np.conj(_moved_pole(np.conj(moved[k]), what, float(move), dt))
+    # A pole that nothing moves may lie on the circle: an integrator's stays there.
+    if np.abs(moved[moved != poles]).max(initial=0.0) >= 1 - ON_CIRCLE:
+        return None
+    for what, pole, _ in directions:
+        at = moved[int(np.abs(poles - pole).argmin())]
+        same = [found for found in pole_directions(np.array([at]), dt) if found[0] == what]
+        if not same:
+            # It has come to 0, or a pair to the real axis.
+            return None
+        fresh.append(same[0])
+    free = np.abs(1 - poles) > 1e-9
+    gain = leading * np.prod((1 - moved[free]) / (1 - poles[free])).real
+    made = _modal(zeros, moved, float(gain))
+    return None if made is None else (made, fresh)
+
+
+def _moved_pole(pole: complex, what: str, move: float, dt: float) -> complex:
+    if pole in (0, 1):
+        # where no speed and no damping moves it from
+        return pole
+    s = np.log(complex(pole)) / dt
+    if what == "speed":
+        # e^100 times as fast is as good as at once
+        return complex(np.exp(s * np.exp(min(move, 100.0)) * dt))
+    w = abs(s)
+    zeta = min(max(-s.real / w + move, 0.0), 0.999)
+    return complex(np.exp(w * complex(-zeta, np.sqrt(1 - zeta**2)) * dt))
+
+
+def _modal(zeros: ComplexArray, poles: ComplexArray, gain: float) -> Core | None:
+    """Realize ``gain prod(z - zeros) / prod(z - poles)`` as a real sum of simple poles."""
+    n = poles.size
+    apart = poles[:, None] - poles[None] + np.eye(n)
+    if zeros.size > n or np.abs(apart).min(initial=1.0) < 1e-9:
+        return None
+    residues = gain * np.prod(poles[:, None] - zeros[None], axis=1) / np.prod(apart, axis=1)
+    blocks = [k for k in range(n) if poles[k].imag >= -1e-12]
+    A, B, C = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    at = 0
+    for k in blocks:
+        p, r = poles[k], residues[k]
+        if abs(p.imag) <= 1e-12:
+            A[at, at], B[at], C[at] = p.real, 1.0, r.real
+            at += 1
+        elif at + 2 <= n:
+            A[at : at + 2, at : at + 2] = [[p.real, -p.imag], [p.imag, p.real]]
+            B[at], C[at : at + 2] = 1.0, [2 * r.real, -2 * r.imag]
+            at += 2
+    if at != n:
+        return None
+    return A, B, C, gain if zeros.size == n else 0.0
+
+
+def _alike(core: Core, expected: FloatArray) -> bool:
+    A, B, C, D = core
+    found = markov(A, B[:, None], C[None], np.array([[D]]), expected.size)[0, 0]
+    return bool(np.abs(found - expected).max() <= FAITHFUL * np.abs(expected).max())

@@ -1,0 +1,220 @@
+"""Responses of discrete state-space models, without their delay chain.
+
+The transfer-function polynomial is never formed: with poles that crowd at z = 1, as those of
+oversampled records do, its coefficients lose all digits from order 10 on. Frequency responses
+go through the complex Schur form, time responses through block powers; both need no
+eigenvectors, so defective and unstable A are fine.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from scipy.linalg import matrix_balance, schur
+
+from ..arrays import ComplexArray, FloatArray
+
+BLOCK = 64
+"""Samples that are computed together; block powers are built by doubling up to here."""
+
+
+Schur: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
+"""T, V and W with A = V T W and W = V^-1."""
+
+
+def schur_form(A: FloatArray) -> Schur:
+    """Return T, V and W with A = V T W, W = V^-1, T upper triangular.
+
+    A is balanced first (Parlett and Reinsch, Numerische Mathematik 13, 1969): the Schur form is
+    exact to rounding of the largest entry of A, and series of controllers and plants in
+    companion form have entries from 1e-7 to 1e4, of which all count. Unbalanced the response of
+    such a loop is wrong by 7e-3.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n, n)
+
+    Returns
+    -------
+    T, V, W : ndarray, shape (n, n)
+    """
+    if A.shape[0] == 0:
+        empty = np.zeros((0, 0), dtype=np.complex128)
+        return empty, empty, empty
+    balanced, scale = matrix_balance(A)
+    T, Q = schur(balanced, output="complex")
+    # The scale is a permuted diagonal matrix of powers of two: all of this is exact.
+    back = np.divide(1.0, scale, where=scale != 0, out=np.zeros_like(scale)).T
+    V, W = scale @ Q, Q.conj().T @ back
+    return np.asarray(T, dtype=np.complex128), np.asarray(V), np.asarray(W)
+
+
+def frequency_response(
+    form: Schur,
+    B: FloatArray,
+    C: FloatArray,
+    D: FloatArray,
+    points: ComplexArray,
+) -> ComplexArray:
+    """Evaluate C (x I - A)^-1 B + D at many points by back substitution.
+
+    Parameters
+    ----------
+    form : (T, V, W)
+        Schur form of A, from `schur_form`.
+    B, C, D : ndarray, shapes (n, m), (p, n), (p, m)
+    points : ndarray, shape (K,)
+        Points x in the complex plane. At a pole the result is not finite.
+
+    Returns
+    -------
+    ndarray, shape (p, m, K)
+    """
+    T, V, W = form
+    n, m = B.shape
+    K = points.size
+    if n == 0:
+        return np.repeat(D[:, :, None].astype(np.complex128), K, axis=2)
+    right = W @ B
+    left = C @ V
+    states = np.empty((n, m * K), dtype=np.complex128)
+    for i in range(n - 1, -1, -1):
+        row = np.repeat(right[i], K)
+        if i + 1 < n:
+            row += T[i, i + 1 :] @ states[i + 1 :]
+        states[i] = (row.reshape(m, K) / (points - T[i, i])).ravel()
+    return (left @ states).reshape(left.shape[0], m, K) + D[:, :, None]
+
+
+def _observability_blocks(
+    A: FloatArray, C: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Stack C, CA, ..., CA^(count-1) by doubling; also return A^count. Count: a power of two."""
+    p, n = C.shape
+    stack = np.empty((count * p, n))
+    stack[:p] = C
+    power = A
+    have = p
+    while have < count * p:
+        np.matmul(stack[:have], power, out=stack[have : 2 * have])
+        power = power @ power
+        have *= 2
+    return stack.reshape(count, p, n), power
+
+
+def _reachability_blocks(A: FloatArray, B: FloatArray, count: int) -> FloatArray:
+    """Stack B, AB, ..., A^(count-1)B by doubling, shape (m, count, n)."""
+    n, m = B.shape
+    stack = np.empty((m, count, n))
+    stack[:, 0] = B.T
+    power = A.T
+    have = 1
+    while have < count:
+        more = min(have, count - have)
+        np.matmul(stack[:, :more], power, out=stack[:, have : have + more])
+        power = power @ power
+        have += more
+    return stack
+
+
+def markov(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: int) -> FloatArray:
+    """Compute the Markov parameters D, CB, CAB, ....
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+    count : int
+        How many.
+
+    Returns
+    -------
+    ndarray, shape (p, m, count)
+    """
+    n, m = B.shape
+    p = C.shape[0]
+    if n == 0 or count < 2:
+        out = np.zeros((p, m, count))
+        out[:, :, :1] = D[:, :, None]
+        return out
+    # About as many rows as columns: the product of both then is nearly all of the work.
+    block = 1 << (((count - 2).bit_length() + 1) // 2)
+    rows, jump = _observability_blocks(A, C, block)
+    columns = _reachability_blocks(jump, B, -(-(count - 1) // block))
+    padded = np.empty((p, m, 1 + columns.shape[1] * block))
+    padded[:, :, 0] = D
+    for i in range(p):
+        for j in range(m):
+            target = padded[i, j, 1:].reshape(-1, block)
+            np.matmul(columns[j], rows[:, i].T, out=target)
+    return padded[:, :, :count]
+
+
+def step_response(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: int
+) -> FloatArray:
+    """Compute the response to a unit step at k = 0 on each input.
+
+    Returns
+    -------
+    ndarray, shape (p, m, count)
+    """
+    n, m = B.shape
+    # [[A, B], [0, I]] carries the held input: its Markov parameters are the step response,
+    # without the running sum that would lose digits in long records.
+    held = np.eye(n + m)
+    held[:n, :n], held[:n, n:] = A, B
+    start = np.eye(n + m)[:, n:]
+    seen = np.concatenate([C, D], axis=1)
+    return markov(held, start, seen, np.zeros_like(D), count + 1)[:, :, 1:]
+
+
+def simulate(
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    D: FloatArray,
+    inputs: FloatArray,
+    initial_state: FloatArray | None = None,
+) -> FloatArray:
+    """Compute the response to any input, block by block.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+    inputs : ndarray, shape (m, N)
+    initial_state : ndarray, shape (n,), optional
+        Zero when absent.
+
+    Returns
+    -------
+    ndarray, shape (p, N)
+    """
+    n, m = B.shape
+    p = C.shape[0]
+    N = inputs.shape[1]
+    if n == 0:
+        return D @ inputs
+    L = BLOCK
+    blocks = -(-N // L)
+    padded = np.zeros((m, blocks * L))
+    padded[:, :N] = inputs
+    U = padded.reshape(m, blocks, L).transpose(1, 2, 0).reshape(blocks, L * m)
+
+    rows, jump = _observability_blocks(A, C, L)
+    pulses = markov(A, B, C, D, L).transpose(2, 0, 1)  # (L, p, m)
+    inside = np.zeros((L, p, L, m))
+    for lag in range(L):
+        index = np.arange(L - lag)
+        inside[index + lag, :, index, :] = pulses[lag]
+    reach, _ = _observability_blocks(A.T, B.T, L)  # (B^T (A^T)^l) = (A^l B)^T
+    into = reach[::-1].transpose(2, 0, 1).reshape(n, L * m)
+
+    kicks = U @ into.T
+    states = np.empty((blocks, n))
+    state = np.zeros(n) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
+    for b in range(blocks):
+        states[b] = state
+        state = jump @ state + kicks[b]
+    out = states @ rows.reshape(L * p, n).T + U @ inside.reshape(L * p, L * m).T
+    return out.reshape(blocks, L, p).transpose(2, 0, 1).reshape(p, -1)[:, :N]

@@ -1,0 +1,193 @@
+"""Sampling of continuous systems under a zero-order hold, and its inverse."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import brentq, minimize_scalar
+
+from ..arrays import FloatArray
+from .matrix_logarithm import principal_logarithm
+
+
+def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+    """Sample x' = A x + B u with u held over each sample.
+
+    Parameters
+    ----------
+    A, B : ndarray, shapes (n, n), (n, m)
+    dt : float
+        Sample time in s.
+
+    Returns
+    -------
+    Phi, Gamma : ndarray, shapes (n, n), (n, m)
+        exp(A dt) and the integral of exp(A s) B over 0..dt.
+    """
+    n, m = B.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n] = A
+    block[:n, n:] = B
+    grown = expm(block * dt)
+    return grown[:n, :n], grown[:n, n:]
+
+
+def split_dead_time(dead_time: float, dt: float) -> tuple[int, float]:
+    """Split a dead time into whole samples and a rest in 0..1 (a fraction of dt).
+
+    A rest closer to a whole sample than rounding can tell is that whole sample.
+
+    Examples
+    --------
+    >>> from ctrl_realize.numerics.state_space.sampling import split_dead_time
+    >>> split_dead_time(0.3, 0.1)
+    (3, 0.0)
+    """
+    samples = dead_time / dt
+    whole = math.floor(samples)
+    rest = samples - whole
+    tolerance = 1e-9 * max(1.0, samples)
+    if rest < tolerance:
+        rest = 0.0
+    elif rest > 1 - tolerance:
+        whole, rest = whole + 1, 0.0
+    return whole, rest
+
+
+def sample_with_dead_time(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, dt: float, dead_time: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, int]:
+    """Sample a continuous model whose input is held and then delayed by any dead time.
+
+    With dead time (d + f) dt, 0 < f < 1, the held input that acts during a sample changes
+    once, after f dt. With Gamma0 the integral of exp(A s) B over the rest (1-f) dt, the state
+    x[k] - Gamma0 u[k-d-1] makes the model order n again, with feedthrough C Gamma0 and
+    delay d + 1.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+        Continuous model; D must be zero when the dead time is no multiple of `dt`.
+    dt, dead_time : float
+        In s.
+
+    Returns
+    -------
+    A, B, C, D : ndarray
+        Sampled core.
+    delay : int
+        Whole samples that stand before it.
+    """
+    whole, rest = split_dead_time(dead_time, dt)
+    if rest == 0.0:
+        Phi, Gamma = zero_order_hold(A, B, dt)
+        return Phi, Gamma, C, D, whole
+    if np.any(D):
+        raise AssertionError("a fractional delay of a direct term is no state-space model")
+    early, Gamma0 = zero_order_hold(A, B, (1 - rest) * dt)
+    late, partial = zero_order_hold(A, B, rest * dt)
+    Phi = late @ early
+    Gamma1 = early @ partial
+    return Phi, Phi @ Gamma0 + Gamma1, C, C @ Gamma0, whole + 1
+
+
+def inverse_zero_order_hold(
+    A: FloatArray, B: FloatArray, dt: float
+) -> tuple[FloatArray, FloatArray]:
+    """Find F, G with x' = F x + G u, held over `dt`, giving x[k+1] = A x[k] + B u[k].
+
+    The principal logarithm is taken: of all models with the same samples, the one whose poles lie
+    below the Nyquist frequency. No eigenvalue of A may be zero or real and negative.
+
+    Parameters
+    ----------
+    A, B : ndarray, shapes (n, n), (n, m)
+    dt : float
+        In s.
+
+    Returns
+    -------
+    F, G : ndarray, shapes (n, n), (n, m)
+    """
+    n = A.shape[0]
+    if n == 0:
+        return A.copy(), B.copy()
+    F = principal_logarithm(A) / dt
+    _, spread = zero_order_hold(F, np.eye(n), dt)
+    return F, np.asarray(np.linalg.solve(spread, B), dtype=np.float64)
+
+
+def split_fraction(
+    A: FloatArray, B: FloatArray, C: FloatArray, direct: float, dt: float
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Read a fraction of a sample out of the direct term of a sampled model.
+
+    A strictly proper model behind a dead time of (d + f) samples has, sampled, the delay d + 1
+    and the direct term C Gamma0, with Gamma0 the integral of exp(F s) G over the last (1 - f) dt
+    of a sample. This finds f in 0...1 from that.
+
+    Parameters
+    ----------
+    A, B, C : ndarray, shapes (n, n), (n, 1), (1, n)
+    direct : float
+    dt : float
+
+    Returns
+    -------
+    F, G, f
+        None where no fraction explains the direct term.
+    """
+    n = A.shape[0]
+    F = principal_logarithm(A) / dt
+
+    def held(seconds: float) -> FloatArray:
+        return zero_order_hold(F, np.eye(n), seconds)[1]
+
+    def inputs(f: float) -> FloatArray:
+        # B = exp(F (1-f) dt) (integral over dt) G
+        moved = expm(F * (1 - f) * dt) @ held(dt)
+        return np.asarray(np.linalg.solve(moved, B), dtype=np.float64)
+
+    def misfit(f: float) -> float:
+        return float((C @ held((1 - f) * dt) @ inputs(f))[0, 0]) - direct
+
+    roots = _roots_in_unit_interval(misfit, abs(direct))
+    if not roots:
+        return None
+
+    def direct_slope(f: float) -> float:
+        # Of several exact answers the one whose response starts most smoothly is meant.
+        return abs(float((C @ inputs(f))[0, 0]))
+
+    best = min(roots, key=direct_slope)
+    return F, inputs(best), best
+
+
+def _roots_in_unit_interval(function: Callable[[float], float], scale: float) -> list[float]:
+    """Roots in 0...1, pairs that nearly touch included."""
+    grid = np.linspace(0, 1, 33)
+    values = np.array([function(float(x)) for x in grid])
+    nodes = list(zip(grid.tolist(), values.tolist(), strict=True))
+    size = np.abs(values)
+    for i in np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1:
+        sign = np.sign(values[i])
+        low, high = float(grid[i - 1]), float(grid[i + 1])
+        found = minimize_scalar(
+            lambda x, s=sign: s * function(float(x)),
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 1e-12},
+        )
+        nodes.append((float(found.x), function(float(found.x))))
+    nodes.sort()
+    roots = []
+    for (a, at_a), (b, at_b) in pairwise(nodes):
+        if abs(at_a) <= 1e-13 * scale:
+            roots.append(a)
+        elif at_a * at_b < 0:
+            roots.append(float(brentq(function, a, b, xtol=1e-15)))
+    return roots

@@ -1,0 +1,190 @@
+r"""Models of several channels in second-order sections, and their derivatives as filtered signals.
+
+A model is a sum of sections with two states each,
+
+    x_i[k+1] = A_i x_i[k] + B_i v[k],   y[k] = sum_i C_i x_i[k] + D v[k],
+    A_i = [[0, 1], [-a2, -a1]],
+
+which holds two real poles as well as a complex pair, and lets one become the other. Every
+derivative of the output is a signal behind ``1 / (z^2 + a1 z + a2)``: a few filters of second
+order, where derivatives in all entries of A would take n^2 simulations. Of an odd order the last
+section has one state: its a2, the first row of its B and the first column of its C are zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.signal import lfilter
+
+from ..arrays import ComplexArray, FloatArray
+
+Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+_SHAKEN = 1e-8
+"""Part of A by which it is changed where it has no full set of eigenvectors, or equal poles."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """Denominators `a` (q, 2), `B` (q, 2, m), `C` (p, q, 2), `D` (p, m).
+
+    `single` tells that the last section has one state.
+    """
+
+    a: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    single: bool
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles, two for each section and one for a single one."""
+        middle = -self.a[:, 0] / 2
+        root = np.sqrt((middle**2 - self.a[:, 1]).astype(np.complex128))
+        found = np.stack([middle + root, middle - root], axis=1).ravel()
+        if self.single:
+            found = np.append(found[:-2], -self.a[-1, 0])
+        return np.asarray(found, dtype=np.complex128)
+
+    def matrices(self) -> Matrices:
+        """Return A, B, C, D, without the states that a single section does not have."""
+        p, q, _ = self.C.shape
+        A = block_diag(*[np.array([[0.0, 1.0], [-a2, -a1]]) for a1, a2 in self.a])
+        B, C = self.B.reshape(2 * q, -1), self.C.reshape(p, 2 * q)
+        kept = self._states()
+        return A[np.ix_(kept, kept)], B[kept], C[:, kept], self.D
+
+    def moved(self, step: FloatArray) -> Sections:
+        """Add a step in the parameters, in the order of `free`."""
+        parts = np.split(step, np.cumsum([self.a.size, self.B.size, self.C.size]))
+        a, B, C, D = (
+            old + new.reshape(old.shape)
+            for old, new in zip((self.a, self.B, self.C, self.D), parts, strict=True)
+        )
+        return Sections(a, B, C, D, self.single)
+
+    def free(self, *, direct: bool, poles: bool = True) -> NDArray[np.bool_]:
+        """Mark the parameters that may move: a, B, C, D; without `poles` B and D alone."""
+        a, B, C = (np.ones(x.shape, dtype=np.bool_) for x in (self.a, self.B, self.C))
+        if self.single:
+            a[-1, 1], B[-1, 0], C[:, -1, 0] = False, False, False
+        if not poles:
+            a[:], C[:] = False, False
+        D = np.full(self.D.shape, direct)
+        return np.concatenate([x.ravel() for x in (a, B, C, D)])
+
+    def _states(self) -> NDArray[np.bool_]:
+        kept = np.ones(2 * self.a.shape[0], dtype=np.bool_)
+        if self.single:
+            kept[-2] = False
+        return kept
+
+
+def in_sections(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> Sections:
+    """Take a model apart, poles in pairs: complex ones, and neighbours on the real axis."""
+    poles, vectors = np.linalg.eig(A)
+    apart = np.abs(poles[:, None] - poles + 9 * np.eye(len(A)))
+    if apart.min(initial=1.0) < _SHAKEN or np.linalg.cond(vectors) > 1 / _SHAKEN:
+        change = np.random.default_rng(0).standard_normal(A.shape)
+        poles, vectors = np.linalg.eig(A + _SHAKEN * max(np.abs(A).max(), 1.0) * change)
+    left, right = np.linalg.solve(vectors, B), C @ vectors
+    p, m = D.shape
+    a, rows, columns = [], [], []
+    order = np.argsort(poles.real)
+    real = [int(i) for i in order if poles[i].imag == 0]
+    pairs = [
+        (int(i), int(np.argmin(np.abs(poles - poles[i].conj()))))
+        for i in order
+        if poles[i].imag > 0
+    ]
+    pairs += zip(real[0::2], real[1::2], strict=False)
+    for i, j in pairs:
+        one, two = poles[i], poles[j]
+        basis = np.array([[1.0, 1.0], [one, two]])
+        a.append([-(one + two).real, (one * two).real])
+        rows.append((basis @ left[[i, j]]).real)
+        columns.append((right[:, [i, j]] @ np.linalg.inv(basis)).real)
+    single = len(real) % 2 == 1
+    if single:
+        last = real[-1]
+        a.append([-poles[last].real, 0.0])
+        rows.append(np.vstack([np.zeros(m), left[last].real]))
+        columns.append(np.column_stack([np.zeros(p), right[:, last].real]))
+    gains = np.reshape(columns, (-1, p, 2)).swapaxes(0, 1)
+    return Sections(np.reshape(a, (-1, 2)), np.reshape(rows, (-1, 2, m)), gains, D, single)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Signals of a model that starts at rest, and what its derivatives are made of.
+
+    `states` (q, 2, T); `driven` (q, 2, 2, m, T): states for an entry (row, input) of B;
+    `bent` (q, 2, 2, T): states by a1 and a2; `free` (q, 2, 2, T): states for an initial one.
+    """
+
+    states: FloatArray
+    driven: FloatArray
+    bent: FloatArray
+    free: FloatArray
+
+    def output(self, model: Sections, v: FloatArray) -> FloatArray:
+        """Output (p, T)."""
+        return np.asarray(np.tensordot(model.C, self.states, 2) + model.D @ v)
+
+    def slopes(self, model: Sections, v: FloatArray, output: int, part: slice) -> FloatArray:
+        """Derivatives of one output in all parameters, (parameters, samples of the part)."""
+        c = model.C[output]
+        p = model.C.shape[0]
+        count = self.states[..., part].shape[-1]
+        bent = np.einsum("qs,qsat->qat", c, self.bent[..., part])
+        driven = np.einsum("qs,qsrjt->qrjt", c, self.driven[..., part])
+        own = np.zeros((p, c.size, count))
+        own[output] = self.states[..., part].reshape(-1, count)
+        direct = np.zeros((p, v.shape[0], count))
+        direct[output] = v[:, part]
+        return np.concatenate([x.reshape(-1, count) for x in (bent, driven, own, direct)])
+
+    def starts(self, model: Sections) -> FloatArray:
+        """Outputs (p, 2 q, T) for every initial state."""
+        p, q, _ = model.C.shape
+        found = np.einsum("pqs,qsrt->pqrt", model.C, self.free).reshape(p, 2 * q, -1)
+        # Products of what has died away would be denormal numbers, on which processors are slow.
+        found[np.abs(found) < 1e-100] = 0.0
+        return np.asarray(found)
+
+
+def motion(model: Sections, v: FloatArray) -> Motion:
+    """Filter the inputs (m, T) through every section."""
+    T = v.shape[1]
+    pulse = np.zeros(T + 1)
+    pulse[0] = 1.0
+    driven, states, bent, free = [], [], [], []
+    for (a1, a2), B in zip(model.a, model.B, strict=True):
+        mine = _resolvent(a1, a2, v)
+        x = np.einsum("srjt,rj->st", mine, B)
+        back = _resolvent(a1, a2, x)[:, 1]  # what enters the second state
+        driven.append(mine)
+        states.append(x)
+        bent.append(-back[:, ::-1])
+        # An initial state is a pulse one sample before the record.
+        free.append(_resolvent(a1, a2, pulse)[:, :, 1:])
+    shape = (0, 2, 2)
+    return Motion(
+        np.array(states).reshape(-1, 2, T),
+        np.array(driven).reshape(-1, 2, 2, v.shape[0], T),
+        np.array(bent).reshape(*((-1,) if bent else (0,)), *shape[1:], T),
+        np.array(free).reshape(*((-1,) if free else (0,)), *shape[1:], T),
+    )
+
+
+def _resolvent(a1: float, a2: float, signal: FloatArray) -> FloatArray:
+    """Signals (..., T) behind ``(z I - A_i)^-1``, shape (2, 2, ..., T): state, entry."""
+    late = np.asarray(lfilter([0.0, 1.0], [1.0, a1, a2], signal, axis=-1))
+    later = np.zeros_like(late)
+    later[..., 1:] = late[..., :-1]
+    return np.stack([np.stack([late + a1 * later, later]), np.stack([-a2 * later, late])])

@@ -1,0 +1,1 @@
+"""Tests of a fitted model on its record: innovations, changes of parameters, held outputs."""

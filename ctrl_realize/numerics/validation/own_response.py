@@ -1,0 +1,140 @@
+"""One record against the response of a model that is common to several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from ..arrays import FloatArray
+from ..signals.correlation import fit_percent
+from ..signals.noise import correlation_time
+
+_TURNS = 6
+_LARGEST_STRETCH = 0.5  # of the logarithm, in one turn
+_SETTLED = 1e-3  # samples, and part of the lags
+
+
+@dataclass(frozen=True, eq=False)
+class OwnResponse:
+    """One record against the common model, with standard errors.
+
+    `shift` in s and `gain` (a ratio) are found together, the lags being common; `lag` is the ratio
+    of all time constants where delay and gain are the record's own too, and its error is relative.
+    `followed` is how much of the record the common model explains as it is, in percent.
+    """
+
+    shift: float
+    error: float
+    gain: float
+    gain_error: float
+    lag: float = 1.0
+    lag_error: float = float("inf")
+    followed: float = float("nan")
+
+
+def homogeneity(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+    """Chi-square of estimates about their weighted mean, and the chance of a larger one.
+
+    Estimates whose error is not finite say nothing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> chi_square, chance = homogeneity(np.array([1.0, 1.1, 0.9]), np.full(3, 0.1))
+    >>> print(round(chi_square, 2), round(chance, 2))
+    2.0 0.37
+    """
+    known = np.isfinite(errors) & np.isfinite(values)
+    if known.sum() < 2:
+        return 0.0, 1.0
+    values, weight = values[known], errors[known] ** -2.0
+    centre = float(np.sum(weight * values) / np.sum(weight))
+    statistic = float(np.sum(weight * (values - centre) ** 2))
+    return statistic, float(chdtrc(values.size - 1, statistic))
+
+
+def own_step_response(
+    output: FloatArray, model: FloatArray, start: float, own: FloatArray, dt: float
+) -> OwnResponse:
+    """Shift, scale and stretch the common response of a step until it fits one record best.
+
+    Parameters
+    ----------
+    output : ndarray, shape (n,)
+        The record, per unit of input.
+    model : ndarray, shape (N,), N >= n
+        Response of the common model.
+    start : float
+        Sample at which it begins to move.
+    own : ndarray, shape (N, q)
+        What every record has for itself beside a drift: a level, hum, a free response.
+    dt : float
+        Sample time in s.
+    """
+    n = output.size
+    line = np.arange(n) / n  # drifts of the records may cancel in their mean
+    beside = np.column_stack([line, own[:n]])
+    reach = 0.2 * start + 20
+    shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
+    for _ in range(_TURNS):
+        columns = np.column_stack([*_moved(model, n, start, shift, 1.0)[:2], beside])
+        solution, errors = _regression(columns, output)
+        gain, gain_error = float(solution[0]) or 1.0, float(errors[0])
+        move = float(solution[1]) / gain
+        shift += float(np.clip(move, -reach, reach))
+        error = float(errors[1]) / abs(gain)
+        if abs(move) < _SETTLED:
+            break
+    lag, lag_error = _own_lags(output, model, start, beside, shift)
+    level = np.linalg.lstsq(beside, output - model[:n], rcond=None)[0]
+    followed = float(fit_percent(output[None], (model[:n] + beside @ level)[None])[0])
+    return OwnResponse(
+        shift * dt, max(error, 1e-12) * dt, gain, max(gain_error, 1e-12), lag, lag_error, followed
+    )
+
+
+def _own_lags(
+    output: FloatArray, model: FloatArray, start: float, beside: FloatArray, shift: float
+) -> tuple[float, float]:
+    """Ratio of the time constants and its relative error, delay and gain being free as well."""
+    stretch, error = 1.0, np.inf
+    reach = 0.2 * start + 20
+    for _ in range(_TURNS):
+        columns = np.column_stack([*_moved(model, output.size, start, shift, stretch), beside])
+        solution, errors = _regression(columns, output)
+        gain = float(solution[0]) or 1.0
+        moves = solution[1:3] / gain
+        shift += float(np.clip(moves[0], -reach, reach))
+        stretch *= float(np.exp(np.clip(moves[1], -_LARGEST_STRETCH, _LARGEST_STRETCH)))
+        error = float(errors[2]) / abs(gain)
+        if abs(moves[0]) < _SETTLED and abs(moves[1]) < _SETTLED:
+            return stretch, max(error, 1e-12)
+    return stretch, np.inf  # delay, gain and lags cannot be told apart
+
+
+def _moved(
+    model: FloatArray, n: int, start: float, shift: float, stretch: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Later and slower response, and its slopes by the shift and by the log of the stretch."""
+    index = np.arange(n, dtype=np.float64)
+    behind = (index - start - shift) / stretch
+    at = np.where(behind > 0, start + behind, index - shift)
+    everywhere = np.arange(model.size)
+    steep = np.interp(at, everywhere, np.gradient(model))
+    by_shift = np.where(behind > 0, -steep / stretch, -steep)
+    return np.interp(at, everywhere, model), by_shift, -np.maximum(behind, 0.0) * steep
+
+
+def _regression(columns: FloatArray, output: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least squares and standard errors, correlation of the residual included."""
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0] = 1.0
+    scaled = columns / size
+    solution = np.linalg.lstsq(scaled, output, rcond=None)[0]
+    left = output - scaled @ solution
+    freedom = max(output.size - columns.shape[1], 1)
+    variance = float(left @ left) / freedom * correlation_time(left)
+    spread = np.diag(np.linalg.pinv(scaled.T @ scaled))
+    return solution / size, np.sqrt(variance * np.maximum(spread, 0.0)) / size

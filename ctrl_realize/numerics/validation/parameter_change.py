@@ -1,0 +1,106 @@
+"""Are gain and dead time the same in all of a record? A test on what a model leaves.
+
+What is left is regressed on the derivatives of the model by its gain and its dead time, for
+groups of samples: of one time, one level, one direction. Where one model holds for all of them
+the groups do not differ but by noise. (Lagrange multiplier test against parameters that change:
+Godfrey, Misspecification Tests in Econometrics, Cambridge 1988, chapter 4; with a transition
+variable: Terasvirta, J. Am. Stat. Ass. 89 (1994) 208-218.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.special import fdtrc
+
+from ..arrays import FloatArray, IntArray
+from ..signals.correlation import autoregression
+
+_MOST_LAGS = 20
+"""Of the autoregression that makes the residual white; BIC takes fewer."""
+_LEAST_SHARE = 0.05
+"""Part of the motion that a group must have for its dead time to be asked for."""
+_LEAST_FREEDOM = 40
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterChange:
+    """How much later and larger the response of each group is than the common model.
+
+    ``shifts`` (g,) in samples and ``gains`` (g,) as a part of the common gain, with `errors` and
+    `gain_errors`; `chance` is that of groups of one plant differing as much.
+    """
+
+    shifts: FloatArray
+    errors: FloatArray
+    gains: FloatArray
+    gain_errors: FloatArray
+    chance: float
+
+
+def parameter_change(
+    residual: FloatArray, fitted: FloatArray, groups: IntArray
+) -> ParameterChange | None:
+    """Test whether gain and dead time are the same in all groups of samples.
+
+    Parameters
+    ----------
+    residual, fitted : ndarray, shape (N,)
+        What a model leaves, and its response.
+    groups : ndarray of int, shape (N,)
+        Group of each sample, 0 ... g - 1.
+
+    Returns
+    -------
+    ParameterChange
+        None where fewer than two groups move enough, or samples are too few.
+    """
+    slope, size = _derivatives(fitted)
+    energy = np.bincount(groups, slope**2)
+    used = np.flatnonzero(energy > _LEAST_SHARE * energy.sum())
+    if used.size < 2 or not np.any(residual):
+        return None
+    members = [(groups == g).astype(np.float64) for g in used]
+    blocks = [np.stack([m, m * slope, m * size], axis=1) for m in members]
+    columns, target, used_up = whitened(np.concatenate(blocks, axis=1), residual)
+    common = sum(columns[:, 3 * i : 3 * i + 3] for i in range(used.size))
+    freedom = target.size - columns.shape[1] - used_up
+    if freedom < _LEAST_FREEDOM:
+        return None
+    scale = np.linalg.norm(columns, axis=0)
+    if not np.all(scale > 0):
+        return None
+    solution, _, rank, _ = np.linalg.lstsq(columns / scale, target, rcond=1e-9)
+    if rank < columns.shape[1]:
+        return None
+    solution = solution / scale
+    left = target - columns @ solution
+    alone = target - common @ np.linalg.lstsq(common, target, rcond=None)[0]
+    variance = float(left @ left) / freedom
+    if variance <= 0:
+        return None
+    ratio = (float(alone @ alone) - float(left @ left)) / (3 * (used.size - 1)) / variance
+    spread = np.linalg.inv((columns / scale).T @ (columns / scale)).diagonal() / scale**2
+    errors = np.sqrt(variance * spread)
+    return ParameterChange(
+        solution[1::3],
+        errors[1::3],
+        solution[2::3],
+        errors[2::3],
+        float(fdtrc(3 * (used.size - 1), freedom, max(ratio, 0.0))),
+    )
+
+
+def _derivatives(fitted: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of a response by its delay in samples and by its relative gain."""
+    return -np.gradient(fitted), fitted - np.mean(fitted)
+
+
+def whitened(columns: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+    """Columns and residual behind the filter that makes the residual white, and its size."""
+    whitener = np.concatenate([[1.0], -autoregression(residual, _MOST_LAGS)])
+    both = np.column_stack([columns, residual])
+    white = lfilter(whitener, [1.0], both, axis=0)[whitener.size - 1 :]
+    return white[:, :-1], white[:, -1], whitener.size

@@ -1,0 +1,159 @@
+"""One step of generalised least squares from an output-error fit.
+
+Output error weighs all errors alike and stays consistent in coloured noise, but far from the
+best: a slow disturbance may move a delay by many of its standard errors. One Gauss-Newton step on
+data that the residual's own autoregression has made white is as good as the maximum of the
+likelihood (one-step estimator: Lehmann and Casella, Theory of Point Estimation, 2nd ed., section
+6.4); where it differs from least squares by more than noise, one of them is wrong (Hausman,
+Econometrica 46 (1978) 1251-1271).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from ..arrays import ComplexArray, FloatArray
+from .parameter_change import whitened
+
+_LEAST_FREEDOM = 40
+
+
+@dataclass(frozen=True)
+class WhiteStep:
+    """Delay (s), gain and total delay (s) behind the step, with their standard errors."""
+
+    delay: float
+    delay_error: float
+    gain: float
+    gain_error: float
+    total: float
+    total_error: float
+
+
+def white_step(
+    measured: FloatArray,
+    drive: FloatArray,
+    dt: float,
+    delay: float,
+    poles: ComplexArray,
+    numerator: FloatArray,
+) -> WhiteStep | None:
+    """Take one step from exp(-delay s) b(s) / a(s) to the model of generalised least squares.
+
+    Parameters
+    ----------
+    measured, drive : ndarray, shape (N,)
+        Output, and the input, held from sample to sample.
+    dt, delay : float
+        In s.
+    poles : ndarray of complex, shape (n,)
+        Roots of the monic a, none of them zero.
+    numerator : ndarray
+        b from the lowest power on.
+
+    Returns
+    -------
+    WhiteStep
+        None where samples are too few or leave nothing.
+    """
+    a = np.real(np.poly(poles))[:0:-1]
+    n, m = a.size, numerator.size
+    scale = float(np.abs(poles).max())
+    states = _states(drive, a, dt, delay, first=float(drive[0]))
+    time = np.linspace(0, 1, drive.size)
+    own = np.column_stack([np.ones(time.size), time, _free(a, dt, drive.size)])
+    response = states[:, :m] @ numerator
+    # What the first samples owe to an input before the record is a free response, and not much.
+    residual = measured - response
+    residual = residual - own @ np.linalg.lstsq(own, residual, rcond=None)[0]
+    if not np.any(residual):
+        return None
+    middle = np.append(0.5 * (response[1:] + response[:-1]), response[-1])
+    by_pole = -_states(middle, a, dt, 0.0, first=float(response[0]))
+    slope = -np.gradient(response) / dt
+    columns = np.column_stack([slope, by_pole, states[:, :m], own])
+    size = np.linalg.norm(columns, axis=0)
+    white, target, used_up = whitened(columns / np.where(size > 0, size, 1.0), residual)
+    freedom = target.size - white.shape[1] - used_up
+    if freedom < _LEAST_FREEDOM or not np.all(size > 0) or scale * dt > np.pi:
+        return None
+    solution, _, rank, _ = np.linalg.lstsq(white, target, rcond=1e-10)
+    if rank < white.shape[1]:
+        return None
+    left = target - white @ solution
+    inverse = np.linalg.inv(white.T @ white) * float(left @ left) / freedom
+    step = (solution / size)[: 1 + n + m]
+    covariance = (inverse / np.outer(size, size))[: 1 + n + m, : 1 + n + m]
+    gradients = _gradients(a, numerator)
+    gain = numerator[0] / a[0]
+    total = delay + (a[1] if n > 1 else 1.0) / a[0]
+    total -= numerator[1] / numerator[0] if m > 1 else 0.0
+    moved = gradients @ step
+    errors = np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
+    return WhiteStep(
+        delay + float(moved[0]),
+        float(errors[0]),
+        float(gain + moved[1]),
+        float(errors[1]),
+        float(total + moved[2]),
+        float(errors[2]),
+    )
+
+
+def _gradients(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Derivatives of delay, gain and total delay by (delay, a, b), shape (3, 1 + n + m)."""
+    n, m = a.size, b.size
+    out = np.zeros((3, 1 + n + m))
+    out[0, 0] = out[2, 0] = 1.0
+    out[1, 1], out[1, 1 + n] = -b[0] / a[0] ** 2, 1 / a[0]
+    second = a[1] if n > 1 else 1.0
+    out[2, 1] = -second / a[0] ** 2
+    if n > 1:
+        out[2, 2] = 1 / a[0]
+    if m > 1:
+        out[2, 1 + n], out[2, 2 + n] = b[1] / b[0] ** 2, -1 / b[0]
+    return out
+
+
+def _states(
+    drive: FloatArray, a: FloatArray, dt: float, delay: float, *, first: float
+) -> FloatArray:
+    """Response of s^i / a(s), i = 0 ... n - 1, to a held and delayed input, shape (N, n).
+
+    At rest at the input `first`; a fraction of a sample as by Astrom and Wittenmark,
+    Computer-Controlled Systems, 3rd ed., section 2.3.
+    """
+    n = a.size
+    whole = int(np.floor(delay / dt))
+    part = delay - whole * dt
+    system = np.zeros((n + 1, n + 1))
+    system[: n - 1, 1:n] = np.eye(n - 1)
+    system[n - 1, :n], system[n - 1, n] = -a, 1.0
+    full, later, early = (expm(system * time) for time in (dt, dt - part, part))
+    transition = full[:n, :n]
+    now = later[:n, n]
+    before = later[:n, :n] @ early[:n, n]
+    late = np.concatenate([np.full(whole + 1, first), drive])[: drive.size + 1]
+    x = np.zeros((drive.size, n))
+    x[0, 0] = first / a[0]
+    for k in range(1, drive.size):
+        x[k] = transition @ x[k - 1] + now * late[k] + before * late[k - 1]
+    return x
+
+
+def _free(a: FloatArray, dt: float, count: int) -> FloatArray:
+    """Free responses of 1 / a(s) from n initial states, shape (N, n)."""
+    n = a.size
+    system = np.eye(n, k=1)
+    system[-1] = -a
+    transition = expm(system * dt)
+    out = np.zeros((count, n))
+    row = np.eye(n)[0]
+    for k in range(count):
+        out[k] = row
+        row = row @ transition
+    size = np.abs(out).max(axis=0)
+    return np.asarray(out / np.where(size > 0, size, 1.0))

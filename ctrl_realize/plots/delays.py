@@ -1,0 +1,177 @@
+"""Plots of dead times: estimates side by side, and their distributions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from .._wording import in_time, interval_in_time, number_within, time_unit, time_within
+from ..delayed import DelayedStateSpace
+from ..identification.validation.bootstrap import Bootstrap
+from ..identification.validation.delay_estimates_result import DelayCheck
+from . import style
+from .style import axis_time_unit
+
+
+def estimate_of(system: DelayedStateSpace) -> float:
+    """Return the dead time in s: that of the fit, which may be no whole number of samples."""
+    wait = getattr(system.fit, "dead_time", None)
+    return float(wait) if isinstance(wait, float) else float(np.max(system.dead_time))
+
+
+def interval_of(system: DelayedStateSpace) -> tuple[float, float] | None:
+    """Return the interval of a model's dead time in s, None where its fit knows none."""
+    interval = getattr(system.fit, "dead_time_interval", None)
+    if interval is None:
+        return None
+    low, high = (float(bound) for bound in interval)
+    return (low, high) if np.isfinite(low) and np.isfinite(high) else None
+
+
+def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None:
+    """Draw the dead time as a line, its interval as a band; `factor` is in units per s."""
+    wait = estimate_of(system)
+    interval = interval_of(system)
+    text = f"dead time\n{in_time(wait)} = {wait / system.dt:.3g} samples"
+    if interval is not None:
+        samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
+        text = f"dead time\n{time_within(wait, *interval)} = {samples} samples"
+        text += f"\n{interval_in_time(*interval)}"
+        if interval[1] > interval[0]:
+            low, high = (factor * bound for bound in interval)
+            axes.axvspan(low, high, color=style.BAND, alpha=0.22, linewidth=0)
+    axes.axvline(factor * wait, color=style.MODEL, linewidth=1.5)
+    axes.annotate(
+        text, (factor * wait, 0.97), (6, 0), xycoords=("data", "axes fraction"),
+        textcoords="offset points", va="top", color=style.INK,
+        bbox={"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
+    )  # fmt: skip
+
+
+def delay_check_plot(
+    check: DelayCheck, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the intervals of a delay that was seen in several ways, and what they agree on.
+
+    Parameters
+    ----------
+    check : DelayCheck
+    ax : Axes or Figure, optional
+    title : str, optional
+    **kwargs
+        Line properties of the intervals.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
+    >>> rng = np.random.default_rng(0)
+    >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
+    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
+    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
+    >>> cplt = plots.delay_check_plot(check)
+    >>> cplt.figure.axes[0].get_xlabel()
+    'dead time, or bound ◂ [ms]'
+    """
+    size = (8.0, 1.6 + 0.5 * len(check.views))
+    factor, unit = time_unit(max(view.high for view in check.views))
+    with style.canvas(ax, title=title, size=size) as (axes,):
+        lines: list[Line2D] = []
+        for place, view in enumerate(reversed(check.views)):
+            bound = view.kind == "upper bound"
+            looks = {"color": style.NOISE if bound else style.MODEL, "linewidth": 3.0, **kwargs}
+            if view.doubt:  # it does not count
+                looks = {**looks, "alpha": 0.35}
+            lines += axes.plot(factor * np.array([view.low, view.high]), [place, place], **looks)
+            mark = "<" if bound else "o"
+            points = {"color": looks["color"], "alpha": looks.get("alpha"), "markersize": 8}
+            axes.plot(factor * view.value, place, mark, **points)
+        if check.common is not None:
+            low, high = (factor * edge for edge in check.common)
+            axes.axvspan(low, high, color=style.BAND, alpha=0.3, label="all agree", linewidth=0)
+        names = [
+            f"{view.method}\n({view.source}{', in doubt' if view.doubt else ''})"
+            for view in reversed(check.views)
+        ]
+        axes.set_yticks(range(len(names)), names)
+        axes.set_ylim(-0.6, len(names) - 0.4)
+        axes.set_xlabel(f"dead time, or bound ◂ [{unit}]")
+        return style.finished([axes], [lines], loc="above")
+
+
+def bootstrap_plot(
+    result: Bootstrap,
+    *,
+    ax: style.AxesLike = None,
+    samples: int | None = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the dead times of all draws and the band of their unit step responses.
+
+    Parameters
+    ----------
+    result : Bootstrap
+    ax : sequence of two Axes, or Figure, optional
+    samples : int, optional
+        Length of the step responses; default: until the model has settled.
+    title : str, optional
+    **kwargs
+        Line properties of the step response of the data's own model.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> from functools import partial
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> t = 0.01 * np.arange(300)
+    >>> u = np.where(t < 0.5, 0.0, 2.0)
+    >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
+    >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
+    >>> again = cr.bootstrap(record, partial(cr.fit_delay, structures=[(1, 1)]), repeats=30)
+    >>> cplt = plots.bootstrap_plot(again)
+    >>> [axes.get_xlabel() for axes in cplt.figure.axes]
+    ['time [s]', 'dead time [ms]']
+    """
+    count = _settled(result) if samples is None else samples
+    low, high = result.step_band(count)
+    own = np.cumsum(np.ravel(result.system.markov(count)))
+    dt = float(result.system.dt)
+    with style.canvas(ax, 2, title=title, size=(8.0, 6.0), sharex=False) as (upper, lower):
+        factor, unit = axis_time_unit(count * dt, upper)
+        time = factor * dt * np.arange(count)
+        upper.fill_between(time, low, high, color=style.BAND, alpha=0.4, label="95 % of the draws")
+        looks = {"color": style.MODEL, "label": "model of the data", **kwargs}
+        lines = upper.plot(time, own, **looks)
+        upper.set_xlabel(f"time [{unit}]")
+        upper.set_ylabel("unit step\nresponse")
+        factor, unit = axis_time_unit(float(result.dead_times.max()), lower)
+        lower.hist(factor * result.dead_times, bins="auto", color=style.MEASURED, alpha=0.6)
+        for limit in result.interval:
+            lower.axvline(factor * limit, color=style.INK, linewidth=1.0)
+        lower.set_xlabel(f"dead time [{unit}]")
+        lower.set_ylabel("draws")
+        return style.finished([upper, lower], [lines, []], loc="lower right")
+
+
+def _settled(result: Bootstrap) -> int:
+    """Samples until the slowest mode has decayed to 1 %, at most 20 000."""
+    slowest = float(np.abs(np.linalg.eigvals(result.system.delay_free.A)).max())
+    lasting = np.log(0.01) / np.log(min(max(slowest, 1e-6), 0.9998))
+    return int(np.clip(result.system.delay + lasting, 10, 20_000))

@@ -1,0 +1,187 @@
+"""A model beside a measured frequency response."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from .._checks import numbers
+from ..errors import DataError, UnsuitableSystemError
+from ..frequency.comparison import FRFComparison
+from ..frequency.points import check_single_channel, measured_points
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
+from ..numerics.rational.spectra import unwrapped_phase
+from . import style
+from .style import frequency_axis
+
+TRUSTED_COHERENCE = 0.95
+"""Points of less coherence are drawn pale."""
+_POINTS = 600
+"""Frequencies at which a model is drawn."""
+FITTED = "fit, order"
+"""How the name of a fitted response begins."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One frequency response, ready to draw."""
+
+    label: str
+    frequency_hz: FloatArray
+    response: ComplexArray
+    phase_deg: FloatArray
+    coherence: FloatArray | None
+    measured: bool
+
+    @property
+    def good(self) -> BoolArray:
+        """Which points are coherent; all of them where none is, or where nobody knows."""
+        if self.coherence is None:
+            return np.ones(self.frequency_hz.size, dtype=np.bool_)
+        good = self.coherence >= TRUSTED_COHERENCE
+        return good if good.any() else np.ones_like(good)
+
+
+def curves_of(
+    items: Sequence[Any], frequency_hz: Sequence[float] | None, dead_time: float | None
+) -> list[Curve]:
+    """Evaluate systems and FRFs, with phases that agree; `dead_time` is taken out to unwrap."""
+    for item in items:
+        if not isinstance(item, ct.LTI):
+            raise UnsuitableSystemError(
+                f"got a {type(item).__name__}; needed are systems of python-control or FRFs"
+            )
+        check_single_channel(item, str(item.name))
+    if not items:
+        raise DataError("no frequency response to draw")
+    data = [item for item in items if isinstance(item, ct.FrequencyResponseData)]
+    grid = _grid(items, data) if frequency_hz is None else numbers(frequency_hz, "frequency_hz")
+    delays = [float(np.max(item.dead_time)) for item in items if hasattr(item, "dead_time")]
+    delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
+    curves = [_curve(item, grid, delay) for item in items]
+    nameless = [curve for curve in curves if re.fullmatch(r"sys\[\d+\]", curve.label)]
+    if len(nameless) == 1:  # python-control's own name says nothing
+        place = curves.index(nameless[0])
+        curves[place] = replace(nameless[0], label="model")
+    return _aligned(curves)
+
+
+def _grid(items: Sequence[Any], data: Sequence[Any]) -> FloatArray:
+    """Span the measurements; without any, three decades up to where the models end."""
+    if data:
+        ends = np.concatenate([np.asarray(one.omega) for one in data]) / (2 * np.pi)
+        positive = ends[ends > 0]
+        return np.geomspace(positive.min(), positive.max(), _POINTS)
+    sampled = [item for item in items if item.isdtime(strict=True) and item.dt is not True]
+    if sampled:
+        top = min(0.5 / float(item.dt) for item in sampled)
+        return np.geomspace(1e-4 * top, top, _POINTS)
+    poles = np.concatenate([np.abs(item.poles()) for item in items])
+    middle = float(np.median(poles[poles > 0])) / (2 * np.pi) if np.any(poles > 0) else 1.0
+    return np.geomspace(middle / 100, middle * 30, _POINTS)
+
+
+def _curve(item: Any, grid: FloatArray, delay: float) -> Curve:
+    if isinstance(item, ct.FrequencyResponseData):
+        points = measured_points(item)
+        frequency, response, coherence = points.frequency_hz, points.response, points.coherence
+    else:
+        step = float(item.dt) if item.isdtime(strict=True) else 0.0
+        frequency = grid if step == 0 else grid[grid <= 0.5 / step]
+        response = np.asarray(item(_points(frequency, step))).reshape(-1)
+        coherence = None
+    phase = np.degrees(unwrapped_phase(response, 2 * np.pi * frequency, delay))
+    # A fitted curve is a model, though only its response may be known.
+    measured = isinstance(item, ct.FrequencyResponseData) and not item.name.startswith(FITTED)
+    return Curve(item.name or "measured", frequency, response, phase, coherence, measured)
+
+
+def _points(frequency_hz: FloatArray, step: float) -> ComplexArray:
+    s = 2j * np.pi * frequency_hz
+    return np.asarray(np.exp(s * step) if step else s, dtype=np.complex128)
+
+
+def _aligned(curves: list[Curve]) -> list[Curve]:
+    """Move phases by whole turns, so that they agree with the first model's where it is good."""
+    reference = next((curve for curve in curves if not curve.measured), curves[0])
+    moved = []
+    for curve in curves:
+        first = int(np.argmax(curve.good))
+        at = curve.frequency_hz[first]
+        there = float(np.interp(at, reference.frequency_hz, reference.phase_deg))
+        turns = round((float(curve.phase_deg[first]) - there) / 360)
+        moved.append(replace(curve, phase_deg=curve.phase_deg - 360 * turns))
+    return moved
+
+
+def comparison_plot(
+    comparison: FRFComparison,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw how far a model's gain and phase are from the measured ones, and the trusted band.
+
+    Parameters
+    ----------
+    comparison : FRFComparison
+    ax : sequence of two Axes, or Figure, optional
+    title : str, optional
+        Default: the names of model and measurement, in a new figure.
+    **kwargs
+        Line properties of both curves.
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=0.001)
+    >>> f = np.geomspace(0.1, 10, 40)
+    >>> s = 2j * np.pi * f
+    >>> frf = cr.MeasuredFRF(1.02 * np.exp(-0.03 * s) / (0.08 * s + 1), f)
+    >>> cplt = plots.comparison_plot(cr.compare_frf(model, frf))
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['gain error [dB]', 'phase error [deg]']
+    """
+    errors = (comparison.gain_error_db, comparison.phase_error_deg)
+    spread: tuple[FloatArray | None, FloatArray | None] = (None, None)
+    if comparison.std is not None:
+        relative = comparison.std / np.abs(comparison.measured)
+        # Of a complex error, half the power is in the gain and half in the phase.
+        half = relative / np.sqrt(2)
+        spread = (20 / np.log(10) * half, np.degrees(half))
+    looks = {"color": style.MODEL, "linewidth": 1.5, "label": "model - measured", **kwargs}
+    with style.canvas(ax, 2, title=title, default_title=comparison.name, size=(8.0, 5.2)) as axes:
+        lines = []
+        for one, error, std in zip(axes, errors, spread, strict=True):
+            one.axvspan(*comparison.band_hz, color=style.TRUTH, alpha=0.10, linewidth=0,
+                        label="trusted band")  # fmt: skip
+            if std is not None:
+                one.fill_between(
+                    comparison.frequency_hz, -2 * std, 2 * std, color=style.NOISE, alpha=0.35,
+                    linewidth=0, label="noise of the FRF (2 std)",
+                )  # fmt: skip
+            one.axhline(0.0, color=style.INK, linewidth=1.0)
+            trusted = np.where(comparison.trusted, error, np.nan)
+            one.plot(comparison.frequency_hz, error, **{**looks, "alpha": 0.3, "label": None})
+            lines.append(list(one.plot(comparison.frequency_hz, trusted, **looks)))
+            inside = np.abs(error[comparison.trusted])
+            limit = 1.6 * max(float(inside.max()), 1e-9)
+            one.set_ylim(-limit, limit)
+        axes[0].set_ylabel("gain error [dB]")
+        axes[1].set_ylabel("phase error [deg]")
+        for one in axes:
+            frequency_axis(one, label=one is axes[-1])
+        return style.finished(axes, lines, loc="upper left")

@@ -1,0 +1,225 @@
+"""Plots of loops: margins and time responses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import control as ct
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+
+from .._checks import positive
+from .._wording import in_time
+from ..delayed import DelayedStateSpace
+from ..design.loops.margin_result import Margins
+from ..design.loops.performance import lasting, loop_time, settled_responses, step_responses
+from ..errors import DataError
+from . import style
+from .names import plain
+from .style import HERTZ, axis_time_unit, decibel
+
+NYQUIST_SPAN = 2.5
+"""Half width of the Nyquist plot, in units of the distance from 0 to -1."""
+LOWEST_GAIN = -60.0
+"""Gain in dB below which nothing is shown."""
+
+
+def margins_plot(
+    found: Margins, *, ax: style.AxesLike = None, title: str | None = None
+) -> ct.ControlPlot:
+    """Draw gain, phase and Nyquist curve of a loop with its margins marked.
+
+    The phase is that of the curve as the count followed it: unwrapped right at any delay.
+
+    Parameters
+    ----------
+    found : Margins
+    ax : sequence of three Axes or Figure, optional
+    title : str, optional
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> cplt = plots.margins_plot(cr.design.margins(plant, cr.design.pid(plant)))
+    >>> [axes.get_title() or axes.get_ylabel() for axes in cplt.figure.axes]
+    ['loop gain [dB]', 'loop phase [deg]', 'imaginary part']
+    """
+    if not isinstance(found, Margins):
+        raise DataError(
+            f"got a {type(found).__name__}; needed are the margins of a loop, such as "
+            "design.margins(plant, controller)"
+        )
+    omega, values = found.response
+    frequency = omega / HERTZ
+    gain = decibel(np.abs(values))
+    phase = np.degrees(np.unwrap(np.angle(values)))
+    with style.context():
+        gain_ax, phase_ax, nyquist = _three(ax)
+        drawn = [gain_ax.semilogx(frequency, gain, color=style.MODEL)]
+        drawn.append(phase_ax.semilogx(frequency, phase, color=style.MODEL))
+        gain_ax.axhline(0, color=style.INPUT, linewidth=1)
+        _mark_gain_margin(gain_ax, found)
+        _mark_phase_margin(phase_ax, found, frequency, phase)
+        drawn.append(_nyquist(nyquist, found, values))
+        gain_ax.set(xlabel="frequency [Hz]", ylabel="loop gain [dB]")
+        phase_ax.set(xlabel="frequency [Hz]", ylabel="loop phase [deg]")
+        low, high = _shown_band(found)
+        for axes in (gain_ax, phase_ax):
+            axes.set_xlim(low / HERTZ, high / HERTZ)
+        gain_ax.set_ylim(bottom=max(LOWEST_GAIN, float(gain.min())))
+        shown = phase[omega <= high]
+        phase_ax.set_ylim(float(shown.min()) - 20, float(shown.max()) + 20)
+        verdict = "stable" if found.stable else "UNSTABLE"
+        style.put_title(gain_ax, ax, title, f"Closed loop {verdict}")
+        return style.finished(
+            [gain_ax, phase_ax, nyquist], drawn, columns=3, legends=(0, 1, 2), loc="lower left"
+        )
+
+
+def _shown_band(found: Margins) -> tuple[float, float]:
+    """Choose the frequencies to show in rad/s.
+
+    Far above the crossovers the delay turns on and on; the picture is about the rest.
+    """
+    omega = found.response[0]
+    ends = np.array([found.gain_crossover, found.phase_crossover, found.modulus_crossover])
+    ends = ends[np.isfinite(ends) & (ends > 0)]
+    top = 4 * float(ends.max()) if ends.size else float(omega[-1])
+    return max(float(omega[0]), top / 1e4), min(top, float(omega[-1]))
+
+
+def _three(ax: style.AxesLike) -> list[Axes]:
+    """Put gain above phase and the Nyquist curve beside them; axes that are given stay."""
+    if ax is not None and not isinstance(ax, FigureBase):
+        return style.axes_for(ax, 3)
+    figure = plt.figure(figsize=(9.6, 5.4), layout="constrained") if ax is None else ax
+    grid = figure.add_gridspec(2, 2)
+    return [figure.add_subplot(place) for place in (grid[0, 0], grid[1, 0], grid[:, 1])]
+
+
+def _mark_gain_margin(axes: Any, found: Margins) -> None:
+    if np.isfinite(found.phase_crossover) and found.phase_crossover > 0:
+        at = found.phase_crossover / HERTZ
+        level = float(decibel(np.array([1 / found.gain_margin]))[0])
+        label = f"gain margin {found.gain_margin:.3g}"
+        axes.plot([at, at], [0, level], color=style.TRUTH, marker="o", label=label)
+
+
+def _mark_phase_margin(axes: Any, found: Margins, frequency: Any, phase: Any) -> None:
+    if not np.isfinite(found.gain_crossover):
+        return
+    at = found.gain_crossover / HERTZ
+    here = float(np.interp(at, frequency, phase))
+    level = here - found.phase_margin
+    label = f"phase margin {found.phase_margin:.3g}°"
+    if np.isfinite(found.delay_margin):
+        label += f"\ndelay margin {in_time(found.delay_margin)}"
+    axes.axhline(level, color=style.INPUT, linewidth=1)
+    axes.plot([at, at], [level, here], color=style.TRUTH, marker="o", label=label)
+
+
+def _nyquist(axes: Any, found: Margins, values: Any) -> Any:
+    lines = axes.plot(values.real, values.imag, color=style.MODEL)
+    axes.plot(values.real, -values.imag, color=style.MODEL, alpha=0.35, linewidth=1)
+    axes.plot([-1], [0], marker="+", markersize=12, color=style.INK, linestyle="none")
+    angle = np.linspace(0, 2 * np.pi, 200)
+    axes.plot(
+        -1 + found.modulus_margin * np.cos(angle),
+        found.modulus_margin * np.sin(angle),
+        color=style.TRUTH,
+        linestyle=style.DASHES[1],
+        label=f"modulus margin {found.modulus_margin:.3g}",
+    )
+    axes.set(
+        xlim=(-NYQUIST_SPAN, NYQUIST_SPAN - 1),
+        ylim=(-NYQUIST_SPAN + 0.5, NYQUIST_SPAN - 0.5),
+        xlabel="real part",
+        ylabel="imaginary part",
+    )
+    axes.set_aspect("equal", adjustable="box")
+    return lines
+
+
+def closed_loop_plot(
+    plant: DelayedStateSpace,
+    controllers: Mapping[str, Any],
+    *,
+    span: float | None = None,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+) -> ct.ControlPlot:
+    """Draw the output after a step of set-point and of load for several controllers.
+
+    Parameters
+    ----------
+    plant : DelayedStateSpace
+    controllers : mapping of str to system
+        Name -> controller of the plant's sample time; each must make a stable loop.
+    span : float, optional
+        Time to show in s. Default: a quarter more than all responses take to stay within 2 % of
+        where they end.
+    ax : sequence of two Axes or Figure, optional
+    title : str, optional
+
+    Returns
+    -------
+    control.ControlPlot
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Without `span`, a loop that is not stable.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import plots
+    >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    >>> loops = {rule: cr.design.pid(plant, rule) for rule in ("simc", "amigo")}
+    >>> cplt = plots.closed_loop_plot(plant, loops)
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['output, set-point step', 'output, load step']
+    """
+    if span is None:
+        span = _span(plant, controllers)
+    count = int(np.ceil(positive(span, "span", "time in s") / plant.dt)) + 1
+    # Twice the span is computed: what wraps around shows at the end.
+    length = 2 ** int(np.ceil(np.log2(2 * count)))
+    drawn: list[list[Any]] = [[], []]
+    with style.canvas(ax, 2, title=title, default_title="Closed loop", size=(8.0, 6.5)) as axes:
+        factor, unit = axis_time_unit(span, axes[1])
+        time = np.arange(count) * plant.dt * factor
+        for number, (name, controller) in enumerate(controllers.items()):
+            for where, response in enumerate(step_responses(plant, controller, length)):
+                drawn[where] += axes[where].plot(
+                    time,
+                    response[:count],
+                    color=style.model_colour(number),
+                    linestyle="-" if number == 0 else style.DASHES[number % len(style.DASHES)],
+                    label=plain(name),
+                )
+        axes[0].axhline(1, color=style.INPUT, linewidth=1)
+        axes[1].axhline(0, color=style.INPUT, linewidth=1)
+        axes[0].set_ylabel("output, set-point step")
+        axes[1].set(ylabel="output, load step", xlabel=f"time [{unit}]")
+        # The set-point response ends at 1: the corner below it is free.
+        return style.finished(axes, drawn, loc="lower right")
+
+
+def _span(plant: DelayedStateSpace, controllers: Mapping[str, Any]) -> float:
+    """Time in s until the slowest of the loops has settled, and a quarter more."""
+    samples = 8
+    for name, controller in controllers.items():
+        time = loop_time(plant, controller, name)
+        setpoint, load, _ = settled_responses(plant, controller, time)
+        samples = max(samples, lasting(setpoint, load))
+    return 1.25 * samples * float(plant.dt)
