@@ -40,7 +40,7 @@ CASES = {
     "a gain without states": lambda: STATIC,
     "a continuous gain": lambda: cr.design.to_continuous(STATIC),
     "an integrating process": lambda: cr.design.reduce_fopdt(INTEGRATING),
-    "an output that rests": lambda: cr.check_residuals(PLANT, constant()),
+    "an output that rests": lambda: cr.analyse_residuals(PLANT, constant()),
     "a prediction of it": lambda: cr.predict(PLANT, constant(), 3),
     "a tracker without news": untold,
     "a bound that is too large": lambda: cr.design.uncertainty_bound(
@@ -63,7 +63,7 @@ def driven():
 
 
 def one_lag(record):
-    return cr.fit_delay(record, structures=[(1, 1)])
+    return cr.fit_output_error(record, structures=[(1, 1)])
 
 
 RESULTS = {
@@ -72,14 +72,14 @@ RESULTS = {
     "a realization": lambda: cr.realize(IMPULSE, 1, delay=30).fit,
     "a scan of delays": lambda: cr.estimate_delay(IMPULSE, 1, max_delay=60).fit,
     "a scan of orders": lambda: cr.scan_orders(IMPULSE, 2, max_delay=60),
-    "a fit of channels": lambda: cr.fit_channels(driven(), 1, delays=[[30]]).fit,
+    "a fit of channels": lambda: cr.fit_state_space(driven(), 1, delays=[[30]]).fit,
     "an impulse response": lambda: cr.impulse_from_io(driven(), 60, method="least_squares"),
     "a frequency response": lambda: FRF,
     "a fit of it": lambda: cr.fit_frf(FRF, order=1).fit,
     "a comparison": lambda: cr.compare_frf(PLANT, FRF),
     "margins": lambda: cr.design.margins(PLANT, cr.design.pid(PLANT)),
-    "a check of residuals": lambda: cr.check_residuals(PLANT, driven()),
-    "a check of the delay": lambda: cr.check_delay(frf=FRF),
+    "a check of residuals": lambda: cr.analyse_residuals(PLANT, driven()),
+    "a check of the delay": lambda: cr.compare_delay_estimates(frf=FRF),
     "a bootstrap": lambda: cr.bootstrap(STEP, one_lag, repeats=3),
     "a record": lambda: STEP,
     "a step response": lambda: cr.unit_step(STEP),

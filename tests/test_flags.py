@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.honesty import runs
 
-RESULTS = ("fit_delay", "estimate_delay", "realize", "identify_campaign", "bootstrap")
+RESULTS = ("fit_output_error", "estimate_delay", "realize", "identify_campaign", "bootstrap")
 CASES = {}
 for case in runs.FLAG_CASES:
     if case.result.startswith(RESULTS):

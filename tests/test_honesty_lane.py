@@ -81,7 +81,7 @@ CHEAP = [
     ("pulses", "coloured", "two lags", 0.01, 0),
     ("sines", "quantised", "two lags", 0.01, 0),
     ("noise spectra", "white", "two lags", 0.01, 0),
-    *(task for task in runs.flag_tasks(1) if runs.family(task) == "check_residuals"),
+    *(task for task in runs.flag_tasks(1) if runs.family(task) == "analyse_residuals"),
 ]
 
 

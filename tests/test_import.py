@@ -17,7 +17,7 @@ SUBMODULES = {"bench", "design", "errors", "io", "paper", "plots", "report"}
 PROMISED = """
 Record ImpulseResponse MeasuredFRF StepResponse read_record read_frf detect_step
 unit_step impulse_from_step impulse_from_io impulse_from_frf fit_frf realize estimate_delay
-fit_delay scan_orders identify Campaign identify_campaign DelayedStateSpace delayed_ss
+fit_output_error scan_orders identify Campaign identify_campaign DelayedStateSpace delayed_ss
 save_model load_model stepped_sine_frf spectral_frf compare_frf design plots
 bench paper
 """

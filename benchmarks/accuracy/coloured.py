@@ -43,7 +43,7 @@ def one(plant: ct.TransferFunction, noise: float, colour: str, way: str, *, seed
     rng = np.random.default_rng([seed, 77])
     height = noise * float(np.ptp(clean.input))
     y = clean.output + height * noise_of(NOISES[colour], clean.n_samples, rng)
-    fit = cr.fit_delay(cr.Record(clean.time, clean.input, y), noise=way).fit
+    fit = cr.fit_output_error(cr.Record(clean.time, clean.input, y), noise=way).fit
     low, high = fit.delay_interval
     return fit.delay - truth, bool(low <= truth <= high), high - low
 

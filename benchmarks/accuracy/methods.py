@@ -24,14 +24,14 @@ Method = Callable[[cr.Record, int], Estimate]
 
 
 def output_error(record: cr.Record, order: int) -> Estimate:
-    """fit_delay as it comes: the structure is chosen from the data."""
-    fit = cr.fit_delay(record).fit
+    """fit_output_error as it comes: the structure is chosen from the data."""
+    fit = cr.fit_output_error(record).fit
     return Estimate(fit.delay, *fit.delay_interval)
 
 
 def structure_given(record: cr.Record, order: int) -> Estimate:
-    """fit_delay with the structure of the plant."""
-    fit = cr.fit_delay(record, structures=[(order, order)]).fit
+    """fit_output_error with the structure of the plant."""
+    fit = cr.fit_output_error(record, structures=[(order, order)]).fit
     return Estimate(fit.delay, *fit.delay_interval)
 
 

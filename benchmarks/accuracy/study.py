@@ -36,7 +36,7 @@ def one(
 def with_known_sensor(noise: float, *, seed: int) -> Shown:
     """Estimate the delay of R4 with its sensor's pole given."""
     record, truth = plants.record(plants.RIGS["R4"], noise, seed)
-    fit = cr.fit_delay(record, known=plants.SENSOR, structures=[(3, 3)]).fit
+    fit = cr.fit_output_error(record, known=plants.SENSOR, structures=[(3, 3)]).fit
     return shown(Estimate(fit.delay, *fit.delay_interval), truth)
 
 
@@ -111,7 +111,7 @@ def factorial_table(seeds: int, jobs: int) -> list[str]:
 
 
 def measured_table(folder: Path) -> list[str]:
-    """Tabulate what `fit_delay` makes of measured step records, with its defaults."""
+    """Tabulate what `fit_output_error` makes of measured step records, with its defaults."""
     lines = [
         "| record | delay [samples] | interval | first motion | structure | residual / noise |",
         "|---|---|---|---|---|---|",
@@ -122,7 +122,7 @@ def measured_table(folder: Path) -> list[str]:
             continue
         data = np.loadtxt(path, delimiter=",", skiprows=1)
         stamps = data[0, 0] + np.arange(len(data)) * np.ptp(data[:, 0]) / (len(data) - 1)
-        fit = cr.fit_delay(cr.Record(stamps, data[:, 1], data[:, 2])).fit
+        fit = cr.fit_output_error(cr.Record(stamps, data[:, 1], data[:, 2])).fit
         low, high = fit.delay_interval
         level = "noise level" if fit.at_noise_level else f"{fit.misfit:.2g}"
         lines.append(

@@ -94,7 +94,7 @@ def caption(made: dict[str, list[Seen]], note: str) -> list[str]:
 
 def sections(made: dict[str, list[Seen]]) -> list[str]:
     tables: list[tuple[str, str, Callable[[list[Seen]], list[str]], str]] = [
-        ("fit", "fit_delay, one step record", fit_tables, explanation()),
+        ("fit", "fit_output_error, one step record", fit_tables, explanation()),
         ("fit", "Its flags in these worlds", fit_flag_table, ""),
         ("intervals", "Every other interval", interval_table, OTHERS),
         ("flags", "Flags where they are due and where they are not", flag_table, ""),

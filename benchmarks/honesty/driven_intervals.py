@@ -36,20 +36,20 @@ def pulses(kind: str, plant: str, noise: float, seed: int) -> Seen:
 
 
 def any_input(kind: str, plant: str, noise: float, seed: int) -> Seen:
-    """fit_delay and check_delay behind an input that moves all the time."""
+    """fit_output_error and compare_delay_estimates behind an input that moves all the time."""
     case = driven_case(kind, noise, seed)
     truth = case.delay * DRIVEN_DT
     with quietly():
-        model = cr.fit_delay(case.record)
+        model = cr.fit_output_error(case.record)
         # The check would fit the same record once more.
-        with patch.object(delay_estimates, "fit_delay", lambda record: model):
-            check = cr.check_delay(case.record)
+        with patch.object(delay_estimates, "fit_output_error", lambda record: model):
+            check = cr.compare_delay_estimates(case.record)
     fit = model.fit
     reach = 1.96 * fit.std_given_structure
     near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {
-        "fit_delay, moving input: interval": inside(fit.interval, truth),
-        "fit_delay, moving input: -+ 1.96 std": inside(near, truth),
+        "fit_output_error, moving input: interval": inside(fit.interval, truth),
+        "fit_output_error, moving input: -+ 1.96 std": inside(near, truth),
     }
     for name, value in view_coverage(check, truth).items():
         covered[f"{name}, moving input"] = value
@@ -64,13 +64,13 @@ def joined(kind: str, plant: str, noise: float, seed: int) -> Seen:
     delay = float(np.random.default_rng([seed, 8]).uniform(5, 12))
     cases = [driven_case(kind, noise, 3 * seed + i, samples=600, delay=delay) for i in range(3)]
     with quietly():
-        fit = cr.fit_delay([case.record for case in cases]).fit
+        fit = cr.fit_output_error([case.record for case in cases]).fit
     truth = delay * DRIVEN_DT
     reach = 1.96 * fit.std_given_structure
     near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {
-        "fit_delay, three records of moving input: interval": inside(fit.interval, truth),
-        "fit_delay, three records of moving input: -+ 1.96 std": inside(near, truth),
+        "fit_output_error, three records of moving input: interval": inside(fit.interval, truth),
+        "fit_output_error, three records of moving input: -+ 1.96 std": inside(near, truth),
     }
     flags = [flag.code for flag in fit.flags]
     return Seen("joined", kind, plant, noise, seed, covered, {}, flags)

@@ -24,7 +24,7 @@ def driven(seed: int, kind: str = "white", **options: object) -> DrivenCase:
 
 
 def fit(case: DrivenCase, **options: object) -> Codes:
-    return codes(cr.fit_delay(case.record, **options).fit)
+    return codes(cr.fit_output_error(case.record, **options).fit)
 
 
 def ordinary(seed: int) -> Codes:
@@ -38,7 +38,7 @@ def together(seed: int, *, gains: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Codes:
         cr.Record(c.record.time, c.record.input, gain * np.ravel(c.record.output), name=f"r{i}")
         for i, (c, gain) in enumerate(zip(cases, gains, strict=True))
     ]
-    return codes(cr.fit_delay(records).fit)
+    return codes(cr.fit_output_error(records).fit)
 
 
 def pulses(case: DrivenCase, length: int = 120) -> Codes:
@@ -46,7 +46,7 @@ def pulses(case: DrivenCase, length: int = 120) -> Codes:
 
 
 def channels(case: DrivenCase, orders: tuple[int, ...] = (1, 2, 3, 4, 5)) -> Codes:
-    return codes(cr.fit_channels(case.record, orders).fit)
+    return codes(cr.fit_state_space(case.record, orders).fit)
 
 
 def half_silent(seed: int) -> Codes:
@@ -54,7 +54,7 @@ def half_silent(seed: int) -> Codes:
     case = driven(seed, held=3)
     noise = np.random.default_rng([seed, 36]).standard_normal(case.record.n_samples)
     both = np.stack([np.ravel(case.record.output), noise])
-    return codes(cr.fit_channels(cr.Record(case.record.time, case.record.input, both), 2).fit)
+    return codes(cr.fit_state_space(cr.Record(case.record.time, case.record.input, both), 2).fit)
 
 
 def unmoved(seed: int, method: str) -> Codes:
@@ -158,7 +158,7 @@ def residuals(seed: int, *, shift: int = 0, kind: str = "white") -> Codes:
     """Check the plant itself, its delay off by `shift` samples, on a record of its own."""
     case = driven(seed, kind)
     model = case.plant.replace(delay=case.plant.delay + shift)
-    return codes(cr.check_residuals(model, case.record))
+    return codes(cr.analyse_residuals(model, case.record))
 
 
 def closed_loop(seed: int, *, integral: float) -> Codes:
@@ -175,11 +175,11 @@ def closed_loop(seed: int, *, integral: float) -> Codes:
         u[k] = gain * (target[k] - y[k]) + total
     record = cr.Record(DRIVEN_DT * np.arange(n), u, y)
     core = ct.ss([[pole]], [[1 - pole]], [[pole]], [[1 - pole]], DRIVEN_DT)
-    return codes(cr.check_residuals(cr.DelayedStateSpace(core, 3), record))
+    return codes(cr.analyse_residuals(cr.DelayedStateSpace(core, 3), record))
 
 
 def check(seed: int, **options: object) -> Codes:
-    return codes(cr.check_delay(driven(seed).record, **options))
+    return codes(cr.compare_delay_estimates(driven(seed).record, **options))
 
 
 def unrelated(seed: int) -> Codes:
@@ -187,23 +187,25 @@ def unrelated(seed: int) -> Codes:
     case = driven(seed)
     rng = np.random.default_rng([seed, 36])
     noise = noise_of("white", case.record.n_samples, rng)
-    return codes(cr.check_delay(cr.Record(case.record.time, case.record.input, noise)))
+    return codes(cr.compare_delay_estimates(cr.Record(case.record.time, case.record.input, noise)))
 
 
 def hardly_moving(seed: int) -> Codes:
     """A step at the end of which the output has just begun to move."""
     made = rigs.step_record(rigs.R3, noise=0.01, seed=seed, before=20, after=30, delay=40)
     frf = frf_of(rigs.R2, seed, _noise(seed))
-    return codes(cr.check_delay(made, frf=frf))
+    return codes(cr.compare_delay_estimates(made, frf=frf))
 
 
 def few_lines(seed: int) -> Codes:
     frf = frf_of(rigs.R1, seed, _noise(seed), points=3)
-    return codes(cr.check_delay(driven(seed).record, frf=frf))
+    return codes(cr.compare_delay_estimates(driven(seed).record, frf=frf))
 
 
 def many_lines(seed: int) -> Codes:
-    return codes(cr.check_delay(driven(seed).record, frf=frf_of(rigs.R2, seed, _noise(seed))))
+    return codes(
+        cr.compare_delay_estimates(driven(seed).record, frf=frf_of(rigs.R2, seed, _noise(seed)))
+    )
 
 
 def compared(highest: float) -> Run:
@@ -231,7 +233,7 @@ FRF = "R2, 0.1 to 40 Hz, noise 0.1 to 2 %"
 def _driven(
     code: str, due: str, raising: Run, not_due: str = DRIVEN, quiet: Run = ordinary
 ) -> FlagCase:
-    return FlagCase("fit_delay, moving input", code, due, raising, not_due, quiet)
+    return FlagCase("fit_output_error, moving input", code, due, raising, not_due, quiet)
 
 
 def _fit_frf(
@@ -246,7 +248,7 @@ def _pulse(code: str, due: str, raising: Run) -> FlagCase:
 
 
 def _check(code: str, due: str, raising: Run, not_due: str, quiet: Run) -> FlagCase:
-    return FlagCase("check_delay", code, due, raising, not_due, quiet)
+    return FlagCase("compare_delay_estimates", code, due, raising, not_due, quiet)
 
 
 def _r2(seed: int, noise: float, **options: object) -> cr.MeasuredFRF:
@@ -270,9 +272,10 @@ CASES: list[FlagCase] = [
     _driven("inverse_response", "zero at +1 Hz",
             lambda s: fit(driven(s, core=rigs.lag(0.8) * rigs.lag(4.0)
                                  * ct.tf([-1 / (2 * np.pi), 1], [1])))),
-    FlagCase("fit_delay, moving inputs", "gains_differ", "gains of three records 0.9, 1 and 1.1",
+    FlagCase("fit_output_error, moving inputs", "gains_differ",
+             "gains of three records 0.9, 1 and 1.1",
              lambda s: together(s, gains=(0.9, 1.0, 1.1)), "three records alike", together),
-    FlagCase("fit_delay, moving input", "cut", "6000 samples of a response of 1600",
+    FlagCase("fit_output_error, moving input", "cut", "6000 samples of a response of 1600",
              lambda s: fit(driven(s, samples=6000, core=rigs.lag(0.1) * rigs.lag(4.0))),
              DRIVEN, ordinary),
     FlagCase("impulse_from_io", "not_died_away", "30 lags of a response of 100",
@@ -286,13 +289,13 @@ CASES: list[FlagCase] = [
                lambda s, method=method: codes(
                    cr.impulse_from_io(driven(s, held=3).record, 60, method=method)))
       for method in ("regularized", "least_squares", "okid")),
-    FlagCase("fit_channels", "highest_order", "orders 1 and 2 of four lags",
+    FlagCase("fit_state_space", "highest_order", "orders 1 and 2 of four lags",
              lambda s: channels(driven(s, core=FOUR_LAGS, held=3), (1, 2)),
              "orders 1 to 5 of one lag", lambda s: channels(driven(s, core=rigs.lag(0.8)))),
-    FlagCase("fit_channels", "coloured_residual", "AR(1) noise",
+    FlagCase("fit_state_space", "coloured_residual", "AR(1) noise",
              lambda s: channels(driven(s, "coloured", held=3)), DRIVEN,
              lambda s: channels(driven(s, held=3))),
-    FlagCase("fit_channels", "no_response", "one output of two is noise", half_silent, DRIVEN,
+    FlagCase("fit_state_space", "no_response", "one output of two is noise", half_silent, DRIVEN,
              lambda s: channels(driven(s, held=3))),
     _fit_frf("misfit", "R3 with 10 % ripple, noise 0.1 and 0.5 %",
              lambda s: frf_fit(frf_of(rigs.R3, s, _noise(s, LOW), bend=0.1))),
@@ -329,14 +332,14 @@ CASES: list[FlagCase] = [
              loop_data(1.5, 50.0), "0.05 to 50 Hz", loop_data(0.05, 50.0)),
     FlagCase("margins of data", "within_noise", "0.98 of the critical gain, noise 2 %",
              noisy_loop(0.98, 0.02), "0.7 of it, noise 2 %", noisy_loop(0.7, 0.02)),
-    FlagCase("check_residuals", "input_in_residual", "delay two samples off",
+    FlagCase("analyse_residuals", "input_in_residual", "delay two samples off",
              lambda s: residuals(s, shift=2), DRIVEN, residuals),
-    FlagCase("check_residuals", "input_in_residual", "delay two samples off",
+    FlagCase("analyse_residuals", "input_in_residual", "delay two samples off",
              lambda s: residuals(s, shift=2),
              "two lags, AR(1) noise", lambda s: residuals(s, kind="coloured")),
-    FlagCase("check_residuals", "feedback", "noise comes back through a PI controller",
+    FlagCase("analyse_residuals", "feedback", "noise comes back through a PI controller",
              lambda s: closed_loop(s, integral=0.1), DRIVEN, residuals),
-    FlagCase("check_residuals", "feedback", "noise comes back through gain alone",
+    FlagCase("analyse_residuals", "feedback", "noise comes back through gain alone",
              lambda s: closed_loop(s, integral=0.0), "two lags, AR(1) noise",
              lambda s: residuals(s, kind="coloured")),
     _check("no_correlation", "output that knows nothing of the input", unrelated, DRIVEN, check),

@@ -16,17 +16,17 @@ def fitted(world: World) -> Run:
 
     def run(seed: int) -> Codes:
         record = world(np.random.default_rng([seed, 41])).records
-        return codes(cr.fit_delay(record).fit)
+        return codes(cr.fit_output_error(record).fit)
 
     return run
 
 
-def _case(code: str, due: World, not_due: World, result: str = "fit_delay") -> FlagCase:
+def _case(code: str, due: World, not_due: World, result: str = "fit_output_error") -> FlagCase:
     names = [f"worlds: {world.__name__}" for world in (due, not_due)]
     return FlagCase(result, code, names[0], fitted(due), names[1], fitted(not_due))
 
 
-MOVING = "fit_delay, moving input"
+MOVING = "fit_output_error, moving input"
 CASES = [
     _case("gain_open", steps.ends_while_rising, described.one_lag),
     _case("not_settled", steps.ends_while_rising, described.two_lags),

@@ -41,7 +41,7 @@ def _span(record: cr.Record) -> float:
 
 
 def fit(record: cr.Record, **options: object) -> Codes:
-    return codes(cr.fit_delay(record, **options).fit)
+    return codes(cr.fit_output_error(record, **options).fit)
 
 
 def ordinary(seed: int) -> Codes:
@@ -164,7 +164,7 @@ def repeats(
 
 
 def together(seed: int, **what: object) -> Codes:
-    return codes(cr.fit_delay(repeats(seed, **what)).fit)
+    return codes(cr.fit_output_error(repeats(seed, **what)).fit)
 
 
 def unlike(
@@ -182,7 +182,7 @@ def unlike(
 
 
 def unlike_fit(seed: int, **what: tuple[float, ...]) -> Codes:
-    return codes(cr.fit_delay(unlike(seed, **what), structures=[(1, 1)]).fit)
+    return codes(cr.fit_output_error(unlike(seed, **what), structures=[(1, 1)]).fit)
 
 
 def unlike_campaign(seed: int, **what: tuple[float, ...]) -> Codes:
@@ -290,12 +290,12 @@ def bootstrap(seed: int, *, fails: bool = False, steps: float = 0.0) -> Codes:
     def estimator(drawn: cr.Record) -> cr.DelayedStateSpace:
         if fails and next(calls) % 5 == 3:
             raise cr.errors.DataError("made to fail")
-        return cr.fit_delay(drawn, structures=[(1, 1)])
+        return cr.fit_output_error(drawn, structures=[(1, 1)])
 
     return codes(cr.bootstrap(record, estimator, repeats=8))
 
 
-_FIT = FlagCase("fit_delay", "", "", ordinary, "R1 to R4, white noise 0.1 to 2 %", ordinary)
+_FIT = FlagCase("fit_output_error", "", "", ordinary, "R1 to R4, white noise 0.1 to 2 %", ordinary)
 
 
 def _fit(code: str, due: str, raising: Run, **quiet: Run) -> FlagCase:
@@ -304,7 +304,7 @@ def _fit(code: str, due: str, raising: Run, **quiet: Run) -> FlagCase:
 
 def _several(code: str, due: str, **what: object) -> FlagCase:
     return FlagCase(
-        "fit_delay, six records",
+        "fit_output_error, six records",
         code,
         due,
         lambda seed: together(seed, **what),
@@ -361,14 +361,16 @@ CASES: list[FlagCase] = [
     *(
         FlagCase(f"{result}, three records", code, due, partial(run, **what),
                  "three records alike, white noise 0.1 and 0.5 %", run)
-        for result, run in (("fit_delay", unlike_fit), ("identify_campaign", unlike_campaign))
+        for result, run in (
+            ("fit_output_error", unlike_fit), ("identify_campaign", unlike_campaign)
+        )
         for code, due, what in (
             ("gains_differ", "gains of 0.95, 1 and 1.05", {"gains": (0.95, 1.0, 1.05)}),
             ("no_common_gain", "gains of 1, 0.5 and 0.25", {"gains": (1.0, 0.5, 0.25)}),
             ("lags_differ", "lags of 0.8, 1 and 1.2", {"lags": (0.8, 1.0, 1.2)}),
         )
     ),
-    FlagCase("fit_delay", "apparent_dead_time", "one lag asked for of R2",
+    FlagCase("fit_output_error", "apparent_dead_time", "one lag asked for of R2",
              partial(forced, plant="R2"), "one lag asked for of R1", partial(forced, plant="R1")),
     _fit("gain_not_resolved", "a response that dies away again", washed_out),
     _scan("delay_at_bound", "max_delay=20, delay 30 to 45", lambda s: scan(plain(s), max_delay=20),

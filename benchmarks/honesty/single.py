@@ -1,4 +1,4 @@
-"""fit_delay of one step record as it comes: the main study."""
+"""fit_output_error of one step record as it comes: the main study."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fit_once(kind: str, plant: str, noise: float, seed: int) -> Seen:
     truth = case.delay * DT
     with quietly():
         try:
-            fit = cr.fit_delay(case.record).fit
+            fit = cr.fit_output_error(case.record).fit
         except cr.CtrlRealizeError as error:
             return Seen("fit", kind, plant, noise, seed, failed=str(error))
     reach = 1.96 * fit.std_given_structure

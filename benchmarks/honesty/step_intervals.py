@@ -17,20 +17,20 @@ SENSOR = rigs.lag(30.0)
 
 
 def given(kind: str, plant: str, noise: float, seed: int) -> Seen:
-    """fit_delay with the plant's structure given, and with its sensor given where it has one."""
+    """Fit with the structure of the plant given, and with its sensor where it has one."""
     case = step_case(kind, plant, noise, seed)
     truth = case.delay * DT
     structure = STRUCTURES.get(plant, (3, 3))
-    fit = cr.fit_delay(case.record, structures=[structure]).fit
+    fit = cr.fit_output_error(case.record, structures=[structure]).fit
     reach = 1.96 * fit.std_given_structure
     near = (fit.dead_time - reach, fit.dead_time + reach)
     covered = {
-        "fit_delay, structure given: interval": inside(fit.interval, truth),
-        "fit_delay, structure given: -+ 1.96 std": inside(near, truth),
+        "fit_output_error, structure given: interval": inside(fit.interval, truth),
+        "fit_output_error, structure given: -+ 1.96 std": inside(near, truth),
     }
     if plant == "R4":
-        fit = cr.fit_delay(case.record, known=SENSOR).fit
-        covered["fit_delay, sensor known: interval"] = inside(fit.interval, truth)
+        fit = cr.fit_output_error(case.record, known=SENSOR).fit
+        covered["fit_output_error, sensor known: interval"] = inside(fit.interval, truth)
     return Seen("given", kind, plant, noise, seed, covered)
 
 
@@ -50,10 +50,10 @@ def scans(kind: str, plant: str, noise: float, seed: int) -> Seen:
 
 
 def views(kind: str, plant: str, noise: float, seed: int) -> Seen:
-    """Views of check_delay on a step."""
+    """Views of compare_delay_estimates on a step."""
     case = step_case(kind, plant, noise, seed)
     with quietly():
-        check = cr.check_delay(case.record)
+        check = cr.compare_delay_estimates(case.record)
     return Seen(
         "views",
         kind,
@@ -65,17 +65,17 @@ def views(kind: str, plant: str, noise: float, seed: int) -> Seen:
     )
 
 
-def view_coverage(check: cr.DelayCheck, truth: float) -> dict[str, float]:
+def view_coverage(check: cr.DelayComparison, truth: float) -> dict[str, float]:
     """Whether each view, and what they have in common, holds the truth."""
     covered = {
-        f"check_delay: {view.method}": float(
+        f"compare_delay_estimates: {view.method}": float(
             (view.kind == "upper bound" or view.low <= truth) and truth <= view.high
         )
         for view in check.views
         if view.method != "output error"
     }
     if check.common is not None:
-        covered["check_delay: what all views share"] = inside(check.common, truth)
+        covered["compare_delay_estimates: what all views share"] = inside(check.common, truth)
     return covered
 
 
@@ -92,21 +92,21 @@ def several(kind: str, plant: str, noise: float, seed: int) -> Seen:
     ]
     truth = _shared_delay(seed) * DT
     with quietly():
-        fit = cr.fit_delay(records).fit
+        fit = cr.fit_output_error(records).fit
         campaign = cr.identify_campaign(records, method="scan")
     reach = 1.96 * fit.std_given_structure
     near = (fit.dead_time - reach, fit.dead_time + reach)
     repeats = fit.repeatability
     deviation = np.abs(repeats.delays - np.mean(repeats.delays)) / repeats.errors
     covered = {
-        "fit_delay, six records: interval": inside(fit.interval, truth),
-        "fit_delay, six records: -+ 1.96 std": inside(near, truth),
-        "fit_delay, six records: delay of each -+ 1.96 errors, about their mean": float(
+        "fit_output_error, six records: interval": inside(fit.interval, truth),
+        "fit_output_error, six records: -+ 1.96 std": inside(near, truth),
+        "fit_output_error, six records: delay of each -+ 1.96 errors, about their mean": float(
             np.mean(deviation <= 1.96 * np.sqrt(5 / 6))
         ),
     }
     if repeats.trend_error > 0:
-        covered["fit_delay, six records: no trend within 1.96 errors"] = float(
+        covered["fit_output_error, six records: no trend within 1.96 errors"] = float(
             abs(repeats.trend) <= 1.96 * repeats.trend_error
         )
     if len(campaign.good) == 6:
@@ -123,7 +123,7 @@ def redrawn(kind: str, plant: str, noise: float, seed: int) -> Seen:
     """Bootstrap of the residual of one record, structure given."""
     case = step_case(kind, plant, noise, seed)
     structure = STRUCTURES.get(plant, (3, 3))
-    estimator = partial(cr.fit_delay, structures=[structure])
+    estimator = partial(cr.fit_output_error, structures=[structure])
     with quietly():
         # The fewest draws whose outermost hold one more with 95 %.
         drawn = cr.bootstrap(case.record, estimator, repeats=39, seed=seed)

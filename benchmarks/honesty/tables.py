@@ -104,7 +104,7 @@ def _fit_cells(group: list[Seen]) -> list[str]:
 
 
 def fit_tables(seen: list[Seen]) -> list[str]:
-    """Coverage of fit_delay by world and noise level, then by plant."""
+    """Coverage of fit_output_error by world and noise level, then by plant."""
     lines = _head("world", "noise", *FIT_TITLES)
     by_noise, by_plant = _groups(seen, "kind", "noise"), _groups(seen, "kind", "plant")
     for kind in KINDS:
@@ -122,10 +122,10 @@ def fit_tables(seen: list[Seen]) -> list[str]:
 
 
 def fit_flag_table(seen: list[Seen]) -> list[str]:
-    """How often each flag of fit_delay came up in the worlds of the main study."""
+    """How often each flag of fit_output_error came up in the worlds of the main study."""
     groups = {kind: [s for s in seen if s.kind == kind and not s.failed] for kind in KINDS}
     codes = sorted({code for one in seen for code in one.flags})
-    lines = _head("flag of fit_delay", *KINDS)
+    lines = _head("flag of fit_output_error", *KINDS)
     for code in codes:
         cells = [rate(sum(code in s.flags for s in g), len(g)) for g in groups.values()]
         lines.append(_line([f"`{code}`", *cells]))

@@ -48,7 +48,7 @@ class UnfitRecordError(Exception):
 
 def scanned(record: cr.Record, _: int) -> ct.StateSpace:
     """Impulse response, and the order and delay that its standard deviations ask for."""
-    if record.n_outputs > 1:
+    if record.noutputs > 1:
         raise UnfitRecordError
     impulse = cr.impulse_from_io(record)
     return cr.scan_orders(impulse, 8, max_delay=10).system()
@@ -87,7 +87,7 @@ def sippy(method: str) -> Model:
 
 WAYS: dict[str, tuple[Model, Iterable[int]]] = {
     "ctrl_realize: identify": (lambda record, _: cr.identify(record), (0,)),
-    "ctrl_realize: fit_channels": (lambda record, _: cr.fit_channels(record), (0,)),
+    "ctrl_realize: fit_state_space": (lambda record, _: cr.fit_state_space(record), (0,)),
     "ctrl_realize: impulse_from_io, scan_orders": (scanned, (0,)),
     "nfoursid: N4SID": (nfoursid, ORDERS),
     "SIPPY: N4SID": (sippy("N4SID"), ORDERS),
@@ -102,7 +102,7 @@ def predicted(way: Model, order: int, first: cr.Record, second: cr.Record) -> fl
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             model = way(first, order)
-            return float(cr.check_residuals(model, second).fit_percent.mean())
+            return float(cr.analyse_residuals(model, second).fit_percent.mean())
     except ImportError:
         return "not installed"
     except UnfitRecordError:

@@ -48,7 +48,8 @@ def lines() -> Iterator[Line]:
     short = record(1, 2e-3).between(2.69, 5.04)
     yield Line(
         f"output-error fit of a record of {short.n_samples} samples, all structures",
-        seconds(cpu_seconds(lambda: cr.fit_delay(short), runs=3)), "", None, "0.5 s", "0.15 s",
+        seconds(cpu_seconds(lambda: cr.fit_output_error(short), runs=3)),
+        "", None, "0.5 s", "0.15 s",
         "no peer fits the dead time in one go",
     )  # fmt: skip
     base = import_seconds("import control")

@@ -236,6 +236,6 @@ def _python(result: DemoResult) -> str:
         "records = valve.step_campaign(rng)\n"
         "frf = cr.stepped_sine_frf(valve.stepped_sine(rng))\n"
         'campaign = cr.identify_campaign(records, method="paper")\n'
-        "sys = cr.fit_delay(records)\n"
+        "sys = cr.fit_output_error(records)\n"
         "print(cr.compare_frf(sys, frf).report())"
     )

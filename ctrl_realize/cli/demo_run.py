@@ -16,7 +16,7 @@ from ..errors import DataError
 from ..frequency import FRFComparison, compare_frf, stepped_sine_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
-from ..identification.output_error.fit import fit_delay
+from ..identification.output_error.fit import fit_output_error
 from .terminal import progress
 
 
@@ -79,7 +79,7 @@ def _stages(seed: int, jobs: int) -> Iterator[DemoResult | None]:
         raise DataError(f"{campaign.failed[0].name}: {campaign.failed[0].error}")
     printed = campaign.system.replace(name="as the paper makes it")
     yield None
-    fitted = fit_delay(records).replace(name="output-error fit")
+    fitted = fit_output_error(records).replace(name="output-error fit")
     yield None
     unfiltered = _without_filter(printed, frf)
     comparisons = {

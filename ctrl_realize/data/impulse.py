@@ -153,12 +153,12 @@ class ImpulseResponse:
         return int(self.markov.shape[-1])
 
     @property
-    def n_inputs(self) -> int:
+    def ninputs(self) -> int:
         """Number of inputs."""
         return 1 if self.markov.ndim == 1 else int(self.markov.shape[1])
 
     @property
-    def n_outputs(self) -> int:
+    def noutputs(self) -> int:
         """Number of outputs."""
         return 1 if self.markov.ndim == 1 else int(self.markov.shape[0])
 
@@ -174,7 +174,7 @@ class ImpulseResponse:
 
     def __repr__(self) -> str:
         name = f" {self.name!r}" if self.name else ""
-        channels = "" if self.markov.ndim == 1 else f", {self.n_outputs} x {self.n_inputs} channels"
+        channels = "" if self.markov.ndim == 1 else f", {self.noutputs} x {self.ninputs} channels"
         still = f", {self.filter}" if self.filter is not None else ""
         return (
             f"<ImpulseResponse{name}: {self.n_samples} samples of {self.dt:g} s{channels}{still}>"

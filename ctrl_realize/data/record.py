@@ -40,7 +40,7 @@ class Record:
     ----------
     dt : float
         Sample time in s.
-    n_samples, n_inputs, n_outputs : int
+    n_samples, ninputs, noutputs : int
     n_missing : int
         Samples of `input` and `output` that are NaN.
 
@@ -117,8 +117,8 @@ class Record:
         fix(self, "dt", sample_time(stamps))
         fix(self, "name", spelled_out(str(name)))
         fix(self, "missing", str(missing))
-        fix(self, "input_labels", labelled(input_labels, self.n_inputs, "u", "input_labels"))
-        fix(self, "output_labels", labelled(output_labels, self.n_outputs, "y", "output_labels"))
+        fix(self, "input_labels", labelled(input_labels, self.ninputs, "u", "input_labels"))
+        fix(self, "output_labels", labelled(output_labels, self.noutputs, "y", "output_labels"))
 
     def __setattr__(self, attribute: str, value: Any) -> None:
         raise AttributeError(f"a Record does not change; make a new one with another {attribute}")
@@ -141,7 +141,7 @@ class Record:
         name = f" {self.name!r}" if self.name else ""
         return (
             f"<Record{name}: {self.n_samples} samples of {self.dt:g} s, "
-            f"{_count(self.n_inputs, 'input')}, {_count(self.n_outputs, 'output')}>"
+            f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}>"
         )
 
     @property
@@ -150,12 +150,12 @@ class Record:
         return int(self.time.size)
 
     @property
-    def n_inputs(self) -> int:
+    def ninputs(self) -> int:
         """Number of input signals."""
         return 1 if self.input.ndim == 1 else int(self.input.shape[0])
 
     @property
-    def n_outputs(self) -> int:
+    def noutputs(self) -> int:
         """Number of output signals."""
         return 1 if self.output.ndim == 1 else int(self.output.shape[0])
 
@@ -167,7 +167,7 @@ class Record:
     @property
     def issiso(self) -> bool:
         """One input and one output."""
-        return self.n_inputs == 1 and self.n_outputs == 1
+        return self.ninputs == 1 and self.noutputs == 1
 
     def between(self, start: float, stop: float) -> Record:
         """Cut out the samples with start <= time <= stop, in s.

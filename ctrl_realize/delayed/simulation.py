@@ -111,9 +111,9 @@ def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedSt
         raise DataError(
             f"the record has the sample time {record.dt:g} s, the system {model.dt:g} s"
         )
-    if (model.ninputs, model.noutputs) != (record.n_inputs, record.n_outputs):
+    if (model.ninputs, model.noutputs) != (record.ninputs, record.noutputs):
         raise DataError(
-            f"the record has {record.n_inputs} inputs and {record.n_outputs} outputs, the system "
+            f"the record has {record.ninputs} inputs and {record.noutputs} outputs, the system "
             f"{model.ninputs} and {model.noutputs}"
         )
     delayed = model if isinstance(model, DelayedStateSpace) else DelayedStateSpace(model)

@@ -1,4 +1,4 @@
-"""Points of a frequency response: frequencies, values, deviations, and the hold of a sampled input."""
+"""Points of a frequency response: values, deviations, and the hold of a sampled input."""
 
 from __future__ import annotations
 

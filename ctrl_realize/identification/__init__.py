@@ -1,1 +1,1 @@
-"""identification"""
+"""From records to models: the estimators, one wing a method."""

@@ -17,10 +17,10 @@ from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
 from .model_class import with_modes_judged
-from .output_error.fit import MOST_ORDER, fit_delay
+from .output_error.fit import MOST_ORDER, fit_output_error
 from .realization.delay_scan import estimate_delay
 from .realization.order_scan import scan_orders
-from .state_space_fit.fit import fit_channels
+from .state_space_fit.fit import fit_state_space
 from .step.impulse import impulse_from_step
 from .step.steps import unit_step
 
@@ -57,8 +57,8 @@ def identify(
     ----------
     record : Record or sequence of Record
         The scan and the paper's method need one record with one output and a step in its one
-        input; the output-error fit takes several records, any input (see `fit_delay`), and
-        several channels (these go to `fit_channels`).
+        input; the output-error fit takes several records, any input (see `fit_output_error`), and
+        several channels (these go to `fit_state_space`).
     method : {"output_error", "scan", "paper"}, optional
         ``"output_error"``: fit of the raw record with a continuous delay; the most accurate, and
         the only one whose interval is a confidence interval. ``"scan"``: the realization scan
@@ -68,18 +68,18 @@ def identify(
         Order of the model without delay. Default: chosen from the data (``"paper"``: 3).
     max_delay : int, optional
         Largest delay in samples. Default: ``"scan"`` where the step response has risen by half,
-        ``"paper"`` 100, ``"output_error"`` see `fit_delay`.
+        ``"paper"`` 100, ``"output_error"`` see `fit_output_error`.
     known, loss, noise, structures, include_known : optional
-        For ``"output_error"``, see `fit_delay`.
+        For ``"output_error"``, see `fit_output_error`.
     cutoff_hz, samples, feedthrough : optional
         For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
 
     Returns
     -------
     DelayedStateSpace
-        Its `.fit` is a `DelayFit`, a `DelayScan`, or a `ChannelFit` for several channels and where
-        lags behind a dead time are not enough (see Notes); `.fit.report()` says what was chosen
-        and why.
+        Its `.fit` is an `OutputErrorFit`, a `DelayScan`, or a `StateSpaceFit` for several channels
+        and where lags behind a dead time are not enough (see Notes); `.fit.report()`
+        says what was chosen and why.
         The steps before it hang on the fit: ``.fit.impulse.step.record`` for the scans,
         ``.fit.records`` for the fit.
 
@@ -94,7 +94,7 @@ def identify(
     -----
     A record of one channel whose input is no step is fitted with lags behind a dead time. Where
     their residual still follows the input, states with any zeros behind whole samples of delay
-    (`fit_channels`) are fitted to it too. They are taken where the information criterion is
+    (`fit_state_space`) are fitted to it too. They are taken where the information criterion is
     smaller by 10 or more: on the same samples, and with autoregressive noise of its own for each.
     Their `fit` has `dead_time`, `interval` and `total_delay`; the interval spans the delays that
     are not ruled out at their order and the interval of the lags (``fit.lags``), but for lags
@@ -135,9 +135,9 @@ def identify(
         strange = [name for name, given in fit_only.items() if given]
         if strange:
             raise OptionError(
-                f"{', '.join(strange)}: not for records of several channels; see fit_channels"
+                f"{', '.join(strange)}: not for records of several channels; see fit_state_space"
             )
-        return fit_channels(record, order)
+        return fit_state_space(record, order)
     if method == "output_error":
         system = fit_records(
             record,
@@ -166,7 +166,7 @@ def identify(
 
 
 def _of_several_channels(records: Record | Sequence[Record]) -> bool:
-    return any(record.n_inputs * record.n_outputs > 1 for record in as_records(records))
+    return any(record.ninputs * record.noutputs > 1 for record in as_records(records))
 
 
 def fit_records(
@@ -182,7 +182,7 @@ def fit_records(
             raise OptionError("give order or structures, not both")
         order = whole(order, "order", 1, MOST_ORDER)
         structures = [(order, degree) for degree in range(1, order + 1)]
-    return fit_delay(records, structures=structures, **options)
+    return fit_output_error(records, structures=structures, **options)
 
 
 def _scan(

@@ -1,8 +1,8 @@
 """Lags behind a dead time, or any modes and zeros: which of two models a record asks for.
 
 A record of one input and one output is fitted with lags first. Where their residual still follows
-the input, a model of sampled sections is fitted as well (`fit_channels`), and both are compared on
-the same samples under the same noise: autoregressive, its lags chosen for each by BIC.
+the input, a model of sampled sections is fitted as well (`fit_state_space`), and both are compared
+on the same samples under the same noise: autoregressive, its lags chosen for each by BIC.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from ..numerics.signals.noise_model import coloured_criterion
 from ..results import Flag
 from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
-from .output_error.result import DelayFit
+from .output_error.result import OutputErrorFit
 from .state_space_fit.fit import Outcome, from_starts
-from .state_space_fit.result import ChannelFit
-from .validation.residuals import check_residuals
+from .state_space_fit.result import StateSpaceFit
+from .validation.residuals import analyse_residuals
 
 LAGS = 25
 """Samples after the dead time within which a residual is asked whether it follows the input."""
@@ -62,7 +62,7 @@ def with_modes_judged(
 
     With `asked`, the structure is what the user wants: its residual is judged, nothing is tried.
     """
-    fit: DelayFit = system.fit
+    fit: OutputErrorFit = system.fit
     records, cut = lively_parts(fit.records)
     try:
         follows, left = _left(system, records)
@@ -73,7 +73,7 @@ def with_modes_judged(
     why = "nothing else could be fitted"
     outlying = fit.repeatability is not None and fit.repeatability.outlying
     if asked:
-        why = "identify without order and structures, or fit_channels, tries any modes and zeros"
+        why = "identify without order and structures, or fit_state_space, tries any modes and zeros"
     elif outlying:
         why = "the records are not of one plant, so that no other model was tried"
     else:
@@ -86,7 +86,7 @@ def with_modes_judged(
             why = (
                 f"a model of {found.system.fit.order} states starts after max_delay"
                 if late
-                else f"a model of {found.system.fit.order} states (fit_channels) is no better"
+                else f"a model of {found.system.fit.order} states (fit_state_space) is no better"
             )
         except (DataError, OrderError) as refused:
             why = f"for modes and zeros, {refused}"
@@ -104,7 +104,7 @@ def _left(system: DelayedStateSpace, records: Sequence[Record]) -> tuple[list[bo
     """Tell which residuals follow the input, at any lag of a response, and return them."""
     late = int(np.ceil(np.max(system.delay)))
     checks = [
-        check_residuals(system, record, lags=min(late + LAGS, record.n_samples // 3))
+        analyse_residuals(system, record, lags=min(late + LAGS, record.n_samples // 3))
         for record in records
     ]
     return [not check.independent for check in checks], [np.ravel(c.residual) for c in checks]
@@ -115,7 +115,7 @@ def _delay(system: DelayedStateSpace) -> int:
 
 
 def _gain(
-    fit: DelayFit, records: Sequence[Record], left: Residuals | None, found: Outcome
+    fit: OutputErrorFit, records: Sequence[Record], left: Residuals | None, found: Outcome
 ) -> float:
     """How much smaller the criterion of the modes is than that of the lags."""
     if left is None:
@@ -132,11 +132,11 @@ def _gain(
 
 
 def _chosen(
-    found: Outcome, lags: DelayFit, following: int, gain: float, cut: tuple[Flag, ...]
+    found: Outcome, lags: OutputErrorFit, following: int, gain: float, cut: tuple[Flag, ...]
 ) -> DelayedStateSpace:
     """Give the modes their dead time, its interval, and the reasons."""
     system = found.system
-    modes: ChannelFit = system.fit
+    modes: StateSpaceFit = system.fit
     dt = lags.dt
     independent = max(correlation_time(np.ravel(c.residual)) for c in modes.checks)
     own = found.search.plausible(found.best, independent)
@@ -168,7 +168,7 @@ def _chosen(
             )
         )
     reasons = (
-        f"{modes.order} states with zeros (fit_channels) instead of {lags.order} lags behind a "
+        f"{modes.order} states with zeros (fit_state_space) instead of {lags.order} lags behind a "
         f"dead time: the residual of the lags follows the input in {following} of "
         f"{len(lags.records)} record(s), and on the same samples, with autoregressive noise for "
         f"both, BIC is {gain:.0f} smaller",

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from .._wording import in_time, interval_in_time, number_within, time_unit, time_within
 from ..delayed import DelayedStateSpace
 from ..identification.validation.bootstrap import Bootstrap
-from ..identification.validation.delay_estimates_result import DelayCheck
+from ..identification.validation.delay_estimates_result import DelayComparison
 from . import style
 from .style import axis_time_unit
 
@@ -53,13 +53,13 @@ def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None
 
 
 def delay_check_plot(
-    check: DelayCheck, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+    check: DelayComparison, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
     """Draw the intervals of a delay that was seen in several ways, and what they agree on.
 
     Parameters
     ----------
-    check : DelayCheck
+    check : DelayComparison
     ax : Axes or Figure, optional
     title : str, optional
     **kwargs
@@ -79,7 +79,7 @@ def delay_check_plot(
     >>> rng = np.random.default_rng(0)
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
+    >>> check = cr.compare_delay_estimates(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
     >>> cplt = plots.delay_check_plot(check)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time, or bound ◂ [ms]'
@@ -144,7 +144,7 @@ def bootstrap_plot(
     >>> u = np.where(t < 0.5, 0.0, 2.0)
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
-    >>> again = cr.bootstrap(record, partial(cr.fit_delay, structures=[(1, 1)]), repeats=30)
+    >>> again = cr.bootstrap(record, partial(cr.fit_output_error, structures=[(1, 1)]), repeats=30)
     >>> cplt = plots.bootstrap_plot(again)
     >>> [axes.get_xlabel() for axes in cplt.figure.axes]
     ['time [s]', 'dead time [ms]']

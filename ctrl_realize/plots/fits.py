@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from .._wording import interval_in_time, time_within
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
-from ..identification.output_error.result import DelayFit
+from ..identification.output_error.result import OutputErrorFit
 from ..identification.step.steps import unit_step
 from . import style
 from .names import plain, wrapped
@@ -25,7 +25,7 @@ _MOST_RECORDS = 40  # drawn behind their mean
 
 
 def fit_plot(
-    fit: DelayFit | DelayedStateSpace,
+    fit: OutputErrorFit | DelayedStateSpace,
     *,
     ax: style.AxesLike = None,
     title: str | None = None,
@@ -37,7 +37,7 @@ def fit_plot(
 
     Parameters
     ----------
-    fit : DelayFit, or model with one as its `fit`
+    fit : OutputErrorFit, or model with one as its `fit`
     ax : sequence of three Axes, or Figure, optional
     title : str, optional
     **kwargs
@@ -61,7 +61,7 @@ def fit_plot(
     >>> u = np.where(t < 1.0, 0.0, 2.0)
     >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
     >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
-    >>> sys = cr.fit_delay(cr.Record(t, u, y + noise), structures=[(1, 1)])
+    >>> sys = cr.fit_output_error(cr.Record(t, u, y + noise), structures=[(1, 1)])
     >>> cplt = plots.fit_plot(sys)
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['output', 'residual', '']
@@ -81,7 +81,7 @@ def fit_plot(
 
 
 def dead_time_plot(
-    fit: DelayFit | DelayedStateSpace,
+    fit: OutputErrorFit | DelayedStateSpace,
     *,
     ax: style.AxesLike = None,
     title: str | None = None,
@@ -91,7 +91,7 @@ def dead_time_plot(
 
     Parameters
     ----------
-    fit : DelayFit, or model with one as its `fit`
+    fit : OutputErrorFit, or model with one as its `fit`
     ax : Axes or Figure, optional
     title : str, optional
     **kwargs
@@ -115,7 +115,7 @@ def dead_time_plot(
     >>> u = np.where(t < 1.0, 0.0, 2.0)
     >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
     >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
-    >>> sys = cr.fit_delay(cr.Record(t, u, y + noise), structures=[(1, 1), (2, 2)])
+    >>> sys = cr.fit_output_error(cr.Record(t, u, y + noise), structures=[(1, 1), (2, 2)])
     >>> cplt = plots.dead_time_plot(sys)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time [ms]'
@@ -126,21 +126,22 @@ def dead_time_plot(
         return style.finished([axes], [_evidence(axes, result, **kwargs)], legends=())
 
 
-def _delay_fit(given: Any) -> DelayFit:
+def _delay_fit(given: Any) -> OutputErrorFit:
     result = given.fit if isinstance(given, DelayedStateSpace) else given
-    if not isinstance(result, DelayFit):
+    if not isinstance(result, OutputErrorFit):
         raise OptionError(
-            f"got {given!r}, which holds no output-error fit; use fit_delay or identify(record)"
+            f"got {given!r}, which holds no output-error fit; "
+            "use fit_output_error or identify(record)"
         )
     return result
 
 
-def _name(result: DelayFit) -> str:
+def _name(result: OutputErrorFit) -> str:
     return result.records[0].name if result.records else ""
 
 
 def _data_and_model(
-    upper: Axes, lower: Axes, result: DelayFit, **kwargs: Any
+    upper: Axes, lower: Axes, result: OutputErrorFit, **kwargs: Any
 ) -> list[list[Line2D]]:
     factor, unit = axis_time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
     time = factor * result.time
@@ -168,7 +169,7 @@ def _data_and_model(
     return [data, rest]
 
 
-def _each_record(axes: Axes, result: DelayFit, factor: float) -> list[Line2D]:
+def _each_record(axes: Axes, result: OutputErrorFit, factor: float) -> list[Line2D]:
     """Draw every record behind their mean, each per unit of its own step."""
     lines: list[Line2D] = []
     every = max(1, -(-len(result.records) // _MOST_RECORDS))
@@ -183,32 +184,32 @@ def _each_record(axes: Axes, result: DelayFit, factor: float) -> list[Line2D]:
     return lines
 
 
-def _first_motion(result: DelayFit) -> int:
+def _first_motion(result: OutputErrorFit) -> int:
     """Start the picture a little before the model moves."""
     moved = np.abs(result.fitted - result.fitted[0]) > 0.01 * float(np.ptp(result.fitted))
     first = int(np.argmax(moved)) if moved.any() else 0
     return max(0, first - max((result.time.size - first) // 8, round(1.5 * result.delay)))
 
 
-def _averaged(result: DelayFit) -> bool:
+def _averaged(result: OutputErrorFit) -> bool:
     """Steps are averaged; records of other inputs have no first motion and follow each other."""
     return len(result.records) > 1 and not np.isnan(result.onset)
 
 
-def _output_label(result: DelayFit) -> str:
+def _output_label(result: OutputErrorFit) -> str:
     if _averaged(result):  # records of different steps are scaled before they are averaged
         return "unit step\nresponse"
     label = result.records[0].output_labels[0] if result.records else "y"
     return "output" if label == "y" else wrapped(label, 18)
 
 
-def evidence_height(result: DelayFit) -> float:
+def evidence_height(result: OutputErrorFit) -> float:
     """Return the height in inches that the rows of `_evidence` need."""
     return 0.75 + 0.23 * len(_evidence_rows(result))
 
 
 def _evidence_rows(
-    result: DelayFit,
+    result: OutputErrorFit,
 ) -> list[tuple[str, float, tuple[float, float] | None, str]]:
     """List who sees which dead time, with which interval: structures not ruled out, then views."""
     rows: list[tuple[str, float, tuple[float, float] | None, str]] = []
@@ -221,7 +222,7 @@ def _evidence_rows(
     return rows or [("estimate", result.dead_time, result.interval, style.MODEL)]
 
 
-def _evidence(axes: Axes, result: DelayFit, **kwargs: Any) -> list[Line2D]:
+def _evidence(axes: Axes, result: OutputErrorFit, **kwargs: Any) -> list[Line2D]:
     """Draw one row for each structure that is not ruled out, and one for each view."""
     rows = _evidence_rows(result)
     low, high = result.interval

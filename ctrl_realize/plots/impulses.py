@@ -14,7 +14,7 @@ from ..data import ImpulseResponse
 from ..data.impulse_estimate import ImpulseEstimate
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
-from ..identification.realization.mimo import ChannelRealization
+from ..identification.realization.mimo import MimoRealization
 from ..numerics.arrays import FloatArray
 from . import style
 from .names import plain
@@ -65,12 +65,12 @@ def impulse_plot(
         )
     models = [systems] if isinstance(systems, DelayedStateSpace) else list(systems)
     for model in models:
-        if (model.noutputs, model.ninputs) != (impulse.n_outputs, impulse.n_inputs):
+        if (model.noutputs, model.ninputs) != (impulse.noutputs, impulse.ninputs):
             raise DataError(
                 f"the model has {model.noutputs} x {model.ninputs} channels, the impulse "
-                f"response {impulse.n_outputs} x {impulse.n_inputs}"
+                f"response {impulse.noutputs} x {impulse.ninputs}"
             )
-    rows, columns = impulse.n_outputs, impulse.n_inputs
+    rows, columns = impulse.noutputs, impulse.ninputs
     size = (8.0, 4.6) if rows * columns == 1 else (4.0 * columns + 1, 2.6 * rows + 1)
     density = impulse.density.reshape(rows * columns, -1)
     last = _settled(density) if until is None else int(until / impulse.dt) + 1
@@ -98,13 +98,13 @@ def impulse_plot(
 
 
 def channels_plot(
-    fit: ChannelRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+    fit: MimoRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
     """Draw the responses of all channels, with a line where the delay of each ends.
 
     Parameters
     ----------
-    fit : ChannelRealization
+    fit : MimoRealization
     ax : array of Axes (outputs x inputs) or Figure, optional
     title : str, optional
     **kwargs
@@ -121,7 +121,7 @@ def channels_plot(
     >>> from ctrl_realize import plots
     >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
     >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
-    >>> cplt = plots.channels_plot(cr.realize_channels(np.array(late)[:, None, :], 1, dt=0.1).fit)
+    >>> cplt = plots.channels_plot(cr.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1).fit)
     >>> [axes.get_title(loc="right") for axes in cplt.figure.axes]
     ['input 0 to output 0', 'input 0 to output 1']
     """

@@ -68,7 +68,7 @@ def record_plot(
         upper.set_ylabel(_axis_label(record.output_labels, "output"))
         lower.set_ylabel(_axis_label(record.input_labels, "input", 16))
         lower.set_xlabel(f"time [{unit}]")
-        several = [row for row, n in enumerate((record.n_outputs, record.n_inputs)) if n > 1]
+        several = [row for row, n in enumerate((record.noutputs, record.ninputs)) if n > 1]
         return style.finished([upper, lower], [measured, driven], legends=several)
 
 

@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 from .._checks import whole
 from ..data import Record
 from ..errors import OptionError
-from ..identification.state_space_fit.result import ChannelFit
+from ..identification.state_space_fit.result import StateSpaceFit
 from ..identification.validation.prediction import Prediction
-from ..identification.validation.residuals_result import ResidualCheck
+from ..identification.validation.residuals_result import ResidualAnalysis
 from ..numerics.arrays import FloatArray
 from . import style
 from .names import wrapped
@@ -22,7 +22,7 @@ from .style import axis_time_unit
 
 
 def residual_plot(
-    check: ResidualCheck,
+    check: ResidualAnalysis,
     *,
     output: int = 0,
     input: int = 0,
@@ -34,7 +34,7 @@ def residual_plot(
 
     Parameters
     ----------
-    check : ResidualCheck
+    check : ResidualAnalysis
     output, input : int, optional
         Channels to show.
     ax : sequence of three Axes, or Figure, optional
@@ -55,7 +55,7 @@ def residual_plot(
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
     >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.residual_plot(cr.check_residuals(plant, record))
+    >>> cplt = plots.residual_plot(cr.analyse_residuals(plant, record))
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
@@ -76,12 +76,12 @@ def residual_plot(
         return style.finished(axes, [above, own, cross], loc="above")
 
 
-def channel_fit_plot(fit: ChannelFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
+def channel_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
     """Draw how a fitted model follows one of its records, and the correlations of what is left.
 
     Parameters
     ----------
-    fit : ChannelFit
+    fit : StateSpaceFit
     record : int, optional
         Which of the records without gaps.
     **kwargs
@@ -100,7 +100,7 @@ def channel_fit_plot(fit: ChannelFit, *, record: int = 0, **kwargs: Any) -> ct.C
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
     >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.channel_fit_plot(cr.fit_channels(record, 1).fit)
+    >>> cplt = plots.channel_fit_plot(cr.fit_state_space(record, 1).fit)
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """

@@ -8,19 +8,19 @@ import control as ct
 import numpy as np
 
 from .. import _wording
-from ..identification.tracking.results import DelayTrack
+from ..identification.tracking.results import TrackHistory
 from . import style
 from .style import axis_time_unit
 
 
 def track_plot(
-    track: DelayTrack, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+    track: TrackHistory, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
     """Draw the course of a tracked dead time and gain; where nothing is claimed, a gap.
 
     Parameters
     ----------
-    track : DelayTrack
+    track : TrackHistory
     ax : sequence of two Axes, or Figure, optional
     title : str, optional
     **kwargs

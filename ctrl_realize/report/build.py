@@ -310,8 +310,8 @@ def _write(
 
 def _kind(system: DelayedStateSpace) -> str:
     names = {
-        "DelayFit": "output-error fit of the raw record",
-        "ChannelFit": "output-error fit of all channels",
+        "OutputErrorFit": "output-error fit of the raw record",
+        "StateSpaceFit": "output-error fit of all channels",
         "DelayScan": "delay scan by approximate realization",
         "Realization": "approximate realization",
     }

@@ -122,7 +122,7 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     fit = system.fit
     kind = type(fit).__name__
     sketches = []
-    if kind == "DelayFit":
+    if kind == "OutputErrorFit":
         sketches.append(
             Sketch(
                 "fit",
@@ -142,7 +142,7 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
                 lambda figure: plots.step_plot(step, system, ax=figure),
             )
         )
-    if kind == "ChannelFit" and fit.checks:
+    if kind == "StateSpaceFit" and fit.checks:
         labels = fit.records[0].output_labels
         sketches += [_output_sketch(fit, i, label) for i, label in enumerate(labels)]
     if kind == "DelayScan":

@@ -109,7 +109,7 @@ def test_a_handful_of_samples_is_not_fitted(samples):
     # a division by zero at four samples, arrays that do not fit at three
     t = np.arange(float(samples))
     with pytest.raises(DataError, match="at least 20"):
-        cr.fit_delay(cr.Record(t, np.cos(9 * t), np.sin(t)))
+        cr.fit_output_error(cr.Record(t, np.cos(9 * t), np.sin(t)))
 
 
 @pytest.mark.parametrize(("samples", "length"), [(12, 2), (20, 2), (20, 5), (22, 7), (52, 15)])

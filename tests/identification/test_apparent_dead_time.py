@@ -78,8 +78,8 @@ def test_records_of_other_inputs_are_looked_at_too():
     core = cr.design.ProcessModel(1.0, 12.0, 3.0, second_lag=6.0).system(1.0).delay_free
     y = cr.delayed_ss(core, 3).simulate(u) + 0.01 * rng.standard_normal(u.size)
     record = cr.Record(np.arange(u.size) * 1.0, u, y)
-    fit = cr.fit_delay(record, structures=[(1, 1)]).fit
+    fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
     assert fit.dead_time > 4
     assert fit.better is not None
     assert fit.better.dead_time == pytest.approx(3.0, abs=0.5)
-    assert cr.fit_delay(record, structures=[(2, 2)]).fit.better is None
+    assert cr.fit_output_error(record, structures=[(2, 2)]).fit.better is None

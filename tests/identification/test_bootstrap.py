@@ -15,7 +15,7 @@ from ctrl_realize.identification.validation.bootstrap import bootstrap
 from tests import rigs
 
 TS = rigs.TS
-R1_FIT = partial(cr.fit_delay, structures=[(1, 1)])
+R1_FIT = partial(cr.fit_output_error, structures=[(1, 1)])
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +107,7 @@ def test_five_records_are_drawn_as_records():
 def test_a_bootstrap_does_not_see_bias():
     # One lag too few: that of the sensor is read as delay, by every draw alike.
     record = rigs.step_record(rigs.R4, noise=0.002, before=200, after=900)
-    result = bootstrap(record, partial(cr.fit_delay, structures=[(3, 3)]), repeats=10)
+    result = bootstrap(record, partial(cr.fit_output_error, structures=[(3, 3)]), repeats=10)
     assert result.interval[0] > 39 * TS  # truth: 37; off by 5.4 for a long record
     assert "bias" in result.report()
 
@@ -116,6 +116,6 @@ def test_unusable_choices_are_refused(record):
     with pytest.raises(cr.errors.OptionError, match="repeats"):
         bootstrap(record, repeats=1)
     with pytest.raises(cr.errors.OptionError, match="function"):
-        bootstrap(record, "fit_delay")
+        bootstrap(record, "fit_output_error")
     with pytest.raises(cr.errors.DataError, match="no records"):
         bootstrap([])

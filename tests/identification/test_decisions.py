@@ -45,7 +45,7 @@ def random_levels(seed, n=600, held=5):
 
 @pytest.fixture(scope="module")
 def forty():
-    return [cr.fit_delay(lag_record(seed), **ONE).fit for seed in range(40)]
+    return [cr.fit_output_error(lag_record(seed), **ONE).fit for seed in range(40)]
 
 
 def test_the_standard_deviation_is_the_scatter_over_forty_records(forty):
@@ -63,7 +63,10 @@ def test_intervals_of_95_percent_hold_the_truth_in_35_of_forty_records_or_more(f
 
 def test_structures_that_the_data_do_not_rule_out_widen_the_interval():
     record = rigs.step_record(rigs.R3, noise=0.01, seed=1, before=800, after=1200)
-    free, given = cr.fit_delay(record).fit, cr.fit_delay(record, structures=[(3, 3)]).fit
+    free, given = (
+        cr.fit_output_error(record).fit,
+        cr.fit_output_error(record, structures=[(3, 3)]).fit,
+    )
     for fit in (free, given):
         assert fit.interval[0] <= 37 * rigs.TS <= fit.interval[1]
     assert np.diff(free.interval) > 1.5 * np.diff(given.interval)
@@ -76,7 +79,7 @@ def test_zeros_and_lags_that_are_not_there_are_not_chosen():
         record = rigs.step_record(
             rigs.R2, noise=0.005, seed=seed, before=100, after=150, dt=6e-3, delay=8
         )
-        fit = cr.fit_delay(record).fit
+        fit = cr.fit_output_error(record).fit
         chosen.append((fit.order, fit.relative_degree))
     assert chosen.count((2, 2)) >= 4
 
@@ -87,7 +90,7 @@ def test_a_short_record_does_not_lose_its_interval_to_models_that_know_no_delay(
         record = rigs.step_record(
             rigs.R1, noise=0.02, seed=seed, before=30, after=40, dt=1e-2, delay=8
         )
-        low, high = np.array(cr.fit_delay(record).fit.interval) / 1e-2
+        low, high = np.array(cr.fit_output_error(record).fit.interval) / 1e-2
         assert low <= 8 <= high
         widths.append(high - low)
     assert np.mean(widths) < 3
@@ -99,14 +102,16 @@ def test_where_no_model_leaves_noise_the_delay_is_the_median_of_five_views():
     for k in range(1, slew.size):  # a valve that moves by so much in a sample and no more
         slew[k] = slew[k - 1] + np.clip(record.output[k] - slew[k - 1], -0.05, 0.05)
     slew += 0.03 * np.random.default_rng(0).standard_normal(slew.size)
-    fit = cr.fit_delay(cr.Record(record.time, record.input, slew)).fit
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, slew)).fit
     assert "structured_misfit" in codes(fit)
     views = list(fit.views.values())
     assert len(views) == 6
     assert fit.dead_time == pytest.approx(np.median(views[:5]), rel=1e-9)
     # the earliest is left out of the interval, which one wrong view would open to nothing
     assert fit.interval == pytest.approx((sorted(views)[1], max(views)), rel=1e-9)
-    believed = cr.fit_delay(cr.Record(record.time, record.input, slew), structures=[(2, 2)]).fit
+    believed = cr.fit_output_error(
+        cr.Record(record.time, record.input, slew), structures=[(2, 2)]
+    ).fit
     assert not believed.views
 
 
@@ -118,7 +123,7 @@ def test_wild_samples_move_least_squares_more_than_the_usual_loss():
         wild = np.where(rng.random(120) < 0.05, 1.5 * rng.standard_normal(120), 0.0)
         spoilt = cr.Record(record.time, record.input, record.output + wild)
         for loss, found in errors.items():
-            found.append(cr.fit_delay(spoilt, loss=loss, **ONE).fit.dead_time - 0.73)
+            found.append(cr.fit_output_error(spoilt, loss=loss, **ONE).fit.dead_time - 0.73)
     rms = {loss: np.sqrt(np.mean(np.square(found))) for loss, found in errors.items()}
     assert rms["huber"] < 0.08
     assert rms["least_squares"] > 1.3 * rms["huber"]
@@ -129,7 +134,9 @@ def test_slow_noise_at_rest_is_no_drift():
         rng = np.random.default_rng(seed)
         slow = lfilter([0.05], [1.0, -0.8], rng.standard_normal(1000))[200:]
         clean = lag_record(noise=0.0, n=800, edge=300)
-        fit = cr.fit_delay(cr.Record(clean.time, clean.input, clean.output + slow), **ONE).fit
+        fit = cr.fit_output_error(
+            cr.Record(clean.time, clean.input, clean.output + slow), **ONE
+        ).fit
         assert "drift" not in codes(fit)
         assert np.diff(fit.interval)[0] < 0.15
         assert fit.dead_time == pytest.approx(0.73, abs=4 * fit.std_given_structure)
@@ -139,7 +146,9 @@ def test_noise_that_is_coloured_at_rest_is_weighed_unless_that_is_not_wanted():
     noise = lfilter([0.02], [1.0, -1.6, 0.9], np.random.default_rng(1).standard_normal(1100))[200:]
     clean = lag_record(noise=0.0, n=900, edge=400)
     record = cr.Record(clean.time, clean.input, clean.output + noise)
-    made_white, plain = (cr.fit_delay(record, noise=way, **ONE).fit for way in ("auto", "white"))
+    made_white, plain = (
+        cr.fit_output_error(record, noise=way, **ONE).fit for way in ("auto", "white")
+    )
     assert made_white.std_given_structure < 0.7 * plain.std_given_structure
     assert made_white.interval[0] <= 0.73 <= made_white.interval[1]
 
@@ -150,7 +159,7 @@ def test_noise_that_is_coloured_at_rest_is_weighed_unless_that_is_not_wanted():
 @pytest.mark.parametrize(("edges", "stepped"), [(1, True), (12, True), (13, False)])
 def test_an_input_of_more_than_twelve_edges_is_any_input(edges, stepped):
     u = np.repeat(np.arange(edges + 1) % 2, 40).astype(float)
-    fit = cr.fit_delay(driven(u), **ONE).fit
+    fit = cr.fit_output_error(driven(u), **ONE).fit
     assert np.isfinite(fit.onset) == stepped
     assert fit.delay == pytest.approx(5, abs=0.3)
 
@@ -160,7 +169,7 @@ def test_an_input_that_does_not_hold_its_level_is_any_input():
     # an edge of 4, and half a unit of noise at every sample: an eighth; or a whole one: a quarter
     for size, stepped in ((0.2, True), (1.0, False)):
         u = np.repeat([0.0, 4.0], 150) + size * rng.standard_normal(300)
-        fit = cr.fit_delay(driven(u, noise=0.05), **ONE).fit
+        fit = cr.fit_output_error(driven(u, noise=0.05), **ONE).fit
         assert np.isfinite(fit.onset) == stepped
         assert fit.delay == pytest.approx(5, abs=0.5)
 
@@ -168,16 +177,16 @@ def test_an_input_that_does_not_hold_its_level_is_any_input():
 def test_steps_that_follow_before_the_first_one_is_seen_are_any_input():
     for second, stepped in ((100, True), (48, False)):
         u = 1.0 * (np.arange(200) >= 40) + 1.0 * (np.arange(200) >= second)
-        fit = cr.fit_delay(driven(u), **ONE).fit
+        fit = cr.fit_output_error(driven(u), **ONE).fit
         assert np.isfinite(fit.onset) == stepped
         assert fit.delay == pytest.approx(5, abs=0.3)
 
 
 def test_an_input_that_moves_in_its_last_five_samples_alone_is_no_experiment():
     with pytest.raises(NoStepError, match="nothing was recorded after it"):
-        cr.fit_delay(driven(1.0 * (np.arange(60) >= 59)))
+        cr.fit_output_error(driven(1.0 * (np.arange(60) >= 59)))
     with pytest.raises(DataError, match="does not leave its rest level"):
-        cr.fit_delay(driven(1.0 * (np.arange(60) >= 56)))
+        cr.fit_output_error(driven(1.0 * (np.arange(60) >= 56)))
 
 
 # --- several records
@@ -185,17 +194,19 @@ def test_an_input_that_moves_in_its_last_five_samples_alone_is_no_experiment():
 
 def test_a_record_that_comes_late_is_named_and_does_not_move_the_mean():
     records = [lag_record(k, name=f"r{k}") for k in range(4)]
-    alone = cr.fit_delay(records, **ONE).fit
+    alone = cr.fit_output_error(records, **ONE).fit
     late = lag_record(9, delay=8.4, name="late")
-    together = cr.fit_delay([*records, late], **ONE).fit
+    together = cr.fit_output_error([*records, late], **ONE).fit
     assert together.repeatability.outlying == ("late",)
     assert together.dead_time == pytest.approx(alone.dead_time, abs=alone.std_given_structure)
 
 
 def test_delays_that_differ_from_record_to_record_widen_the_interval():
     jitter = np.linspace(-0.5, 0.5, 6)
-    alike = cr.fit_delay([lag_record(k) for k in range(6)], **ONE).fit
-    apart = cr.fit_delay([lag_record(k, delay=7.3 + d) for k, d in enumerate(jitter)], **ONE).fit
+    alike = cr.fit_output_error([lag_record(k) for k in range(6)], **ONE).fit
+    apart = cr.fit_output_error(
+        [lag_record(k, delay=7.3 + d) for k, d in enumerate(jitter)], **ONE
+    ).fit
     assert "records_differ" in codes(apart) - codes(alike)
     assert apart.std_given_structure > 1.5 * alike.std_given_structure
     # the standard error of a mean of delays that scatter by 0.37 samples
@@ -207,15 +218,17 @@ def test_delays_that_differ_from_record_to_record_widen_the_interval():
 def test_a_noisy_record_of_any_input_weighs_little_beside_a_quiet_one():
     quiet = driven(random_levels(1), 1, noise=0.02)
     noisy = driven(random_levels(2), 2, noise=1.0)
-    alone = cr.fit_delay(quiet, **ONE).fit
-    both = cr.fit_delay([quiet, noisy], **ONE).fit
+    alone = cr.fit_output_error(quiet, **ONE).fit
+    both = cr.fit_output_error([quiet, noisy], **ONE).fit
     assert both.std_given_structure < 1.2 * alone.std_given_structure
     assert both.delay == pytest.approx(5, abs=5 * both.std_given_structure / DT)
 
 
 def test_a_record_of_any_input_with_another_delay_is_left_out():
     records = [driven(random_levels(k), k, name=f"r{k}") for k in range(5)]
-    fit = cr.fit_delay([*records, driven(random_levels(7), 7, delay=9, name="late")], **ONE).fit
+    fit = cr.fit_output_error(
+        [*records, driven(random_levels(7), 7, delay=9, name="late")], **ONE
+    ).fit
     assert fit.repeatability.outlying == ("late",)
     assert fit.delay == pytest.approx(5, abs=0.1)
 
@@ -224,8 +237,8 @@ def test_gains_that_scatter_by_more_than_their_noise_are_an_alarm():
     gains = (0.9, 1.0, 1.1)
     alike = [driven(random_levels(k), k) for k in range(3)]
     apart = [driven(random_levels(k), k, core=g * LAG) for k, g in enumerate(gains)]
-    assert "gains_differ" not in codes(cr.fit_delay(alike, **ONE).fit)
-    assert "gains_differ" in codes(cr.fit_delay(apart, **ONE).fit)
+    assert "gains_differ" not in codes(cr.fit_output_error(alike, **ONE).fit)
+    assert "gains_differ" in codes(cr.fit_output_error(apart, **ONE).fit)
 
 
 # --- lags, or modes and zeros
@@ -300,7 +313,7 @@ def test_delays_of_channels_move_to_where_the_responses_begin():
     plant = cr.DelayedStateSpace(core, 6)
     u = random_levels(6, 800, 1)
     y = plant.simulate(u) + 0.1 * np.random.default_rng(2).standard_normal(u.size)
-    found = cr.fit_channels(cr.Record(DT * np.arange(u.size), u, y), 1)
+    found = cr.fit_state_space(cr.Record(DT * np.arange(u.size), u, y), 1)
     assert found.delay == 6
     assert found.delay_free.poles()[0] == pytest.approx(0.9, abs=0.03)
 
@@ -310,7 +323,7 @@ def test_an_output_of_noise_is_named_and_the_other_one_is_fitted():
     u = random_levels(7, 300, 2)
     good = cr.delayed_ss(LAG, delay=3, dt=DT).simulate(u) + 0.02 * rng.standard_normal(u.size)
     record = cr.Record(DT * np.arange(u.size), u, np.stack([good, rng.standard_normal(u.size)]))
-    fit = cr.fit_channels(record, 1, delays=[[3], [3]], feedthrough=False).fit
+    fit = cr.fit_state_space(record, 1, delays=[[3], [3]], feedthrough=False).fit
     silent = [flag.message for flag in fit.flags if flag.code == "no_response"]
     assert len(silent) == 1
     assert silent[0].startswith("output 1")

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ctrl_realize.identification.validation.delay_estimates_result import (
-    DelayCheck,
-    DelayView,
+    DelayComparison,
+    DelayEstimate,
     common_dead_time,
 )
 
 
 def view(method, low, high, kind="dead time", doubt=""):
-    return DelayView(method, "record", kind, (low + high) / 2, low, high, doubt)
+    return DelayEstimate(method, "record", kind, (low + high) / 2, low, high, doubt)
 
 
 def bound(method, high):
@@ -24,7 +24,7 @@ DOUBTED = replace(view("c", 2.0, 2.1), doubt="of noise")
 
 
 def check(views, common=(2.5, 3.0), conflicts=(), dt=0.5, flags=()):
-    return DelayCheck(tuple(views), common is not None, common, tuple(conflicts), dt, flags)
+    return DelayComparison(tuple(views), common is not None, common, tuple(conflicts), dt, flags)
 
 
 def test_intervals_that_touch_agree_on_where_they_touch():
@@ -56,5 +56,7 @@ def test_the_narrowest_dead_time_that_counts_is_relied_on():
 
 
 def test_an_estimate_is_rounded_as_its_interval_is():
-    shown = check([DelayView("a", "FRF", "dead time", 0.0123456, 0.012, 0.013)], dt=0.01).report()
+    shown = check(
+        [DelayEstimate("a", "FRF", "dead time", 0.0123456, 0.012, 0.013)], dt=0.01
+    ).report()
     assert "12.3 ms = 1.235 samples (12.0 to" in shown

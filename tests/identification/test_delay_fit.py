@@ -1,4 +1,4 @@
-"""fit_delay: right on simulated plants, honest where the model is wrong."""
+"""fit_output_error: right on simulated plants, honest where the model is wrong."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def changed(record: cr.Record, output) -> cr.Record:
 
 @pytest.fixture(scope="module")
 def valve() -> cr.DelayedStateSpace:
-    return cr.fit_delay(rigs.step_record(noise=0.001, delay=36.4))
+    return cr.fit_output_error(rigs.step_record(noise=0.001, delay=36.4))
 
 
 def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(valve):
@@ -59,9 +59,9 @@ def test_the_table_lists_all_structures_best_first(valve):
 
 def test_gain_offset_and_time_unit_do_not_matter():
     record = rigs.step_record(noise=0.002, seed=3, before=400, after=1200)
-    fit = cr.fit_delay(record).fit
+    fit = cr.fit_output_error(record).fit
     other = cr.Record(1000 * record.time, record.input, 7.0 - 300 * record.output)
-    same = cr.fit_delay(other).fit
+    same = cr.fit_output_error(other).fit
     # Thresholds of the iterations are relative; what is left is rounding in the start values.
     assert same.delay == pytest.approx(fit.delay, abs=2e-3)
     assert same.dead_time == pytest.approx(1000 * fit.dead_time, abs=2e-3 * 1000 * TS)
@@ -72,9 +72,9 @@ def test_gain_offset_and_time_unit_do_not_matter():
 @pytest.mark.parametrize("unit", [1e-9, 1e6])
 def test_any_unit_of_time_gives_the_same_answer_in_samples(unit):
     record = rigs.step_record(noise=0.002, seed=3, before=300, after=900)
-    fit = cr.fit_delay(record, structures=[(3, 3)]).fit
+    fit = cr.fit_output_error(record, structures=[(3, 3)]).fit
     scaled = cr.Record(unit * record.time, record.input, record.output)
-    same = cr.fit_delay(scaled, structures=[(3, 3)]).fit
+    same = cr.fit_output_error(scaled, structures=[(3, 3)]).fit
     # nothing but rounding: all thresholds are relative
     assert same.delay == pytest.approx(fit.delay, rel=1e-6)
     assert_allclose(same.delay_interval, fit.delay_interval, rtol=1e-4)
@@ -87,9 +87,9 @@ def test_an_unknown_sensor_widens_the_interval_and_a_known_one_narrows_it():
     sensor = rigs.lag(30.0)
     for seed in range(2):
         record = rigs.step_record(rigs.R4, noise=0.005, seed=seed, before=600, after=1500)
-        blind = cr.fit_delay(record).fit
+        blind = cr.fit_output_error(record).fit
         assert covers(blind, 37)  # the order chosen is 3, which alone would be off by 5.4
-        told = cr.fit_delay(record, known=sensor, structures=[(3, 3)]).fit
+        told = cr.fit_output_error(record, known=sensor, structures=[(3, 3)]).fit
         assert abs(told.delay - 37) < 3 * told.std_given_structure / TS
         assert told.std_given_structure < 1.2 * 0.48 * TS  # the Cramer-Rao bound is 0.48 samples
         assert_allclose(np.sort(told.poles.real), np.sort(rigs.R3.poles().real), rtol=0.1)
@@ -98,8 +98,8 @@ def test_an_unknown_sensor_widens_the_interval_and_a_known_one_narrows_it():
 def test_known_dynamics_stay_out_of_the_model_unless_asked_for():
     sensor = rigs.lag(30.0)
     record = rigs.step_record(rigs.R4, noise=0.001, before=400, after=1200)
-    without = cr.fit_delay(record, known=sensor, structures=[(3, 3)])
-    within = cr.fit_delay(record, known=sensor, structures=[(3, 3)], include_known=True)
+    without = cr.fit_output_error(record, known=sensor, structures=[(3, 3)])
+    within = cr.fit_output_error(record, known=sensor, structures=[(3, 3)], include_known=True)
     assert (without.delay_free.nstates, within.delay_free.nstates) == (3, 4)
     s = 2j * np.pi * 5.0
     ratio = within(np.exp(s * TS)) / without(np.exp(s * TS))
@@ -109,10 +109,10 @@ def test_known_dynamics_stay_out_of_the_model_unless_asked_for():
 def test_hum_and_drift_before_the_step_are_fitted_along():
     record = rigs.step_record(noise=0.001)
     hum = 0.005 * 16 * np.sin(2 * np.pi * 50 * record.time + 1)
-    fit = cr.fit_delay(changed(record, record.output + hum)).fit
+    fit = cr.fit_output_error(changed(record, record.output + hum)).fit
     assert abs(fit.delay - 37) < 0.5
     assert "hum" in codes(fit)
-    drifting = cr.fit_delay(changed(record, record.output + 0.02 * 16 * record.time)).fit
+    drifting = cr.fit_output_error(changed(record, record.output + 0.02 * 16 * record.time)).fit
     assert abs(drifting.delay - 37) < 0.5
     assert "drift" in codes(drifting)
 
@@ -128,7 +128,7 @@ def after_an_earlier_step(rest: float, before: float) -> cr.Record:
 
 @pytest.mark.parametrize("rest", [1.5, 3.0, 4.0])
 def test_a_plant_still_moving_before_the_step_is_seen_to_move(rest):
-    fit = cr.fit_delay(after_an_earlier_step(rest, before=6)).fit
+    fit = cr.fit_output_error(after_an_earlier_step(rest, before=6)).fit
     assert "not_at_rest" in codes(fit)
     assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
     # known to 0.1 s from rest; 0.2 s where a second and a half tell what the plant was doing
@@ -140,7 +140,7 @@ def test_a_plant_still_moving_before_the_step_is_seen_to_move(rest):
 @pytest.mark.parametrize("rest", [2.0, 6.0])
 def test_a_drift_is_told_from_a_plant_that_moves(rest):
     settled = after_an_earlier_step(rest, before=60)
-    fit = cr.fit_delay(changed(settled, settled.output + 0.02 * settled.time)).fit
+    fit = cr.fit_output_error(changed(settled, settled.output + 0.02 * settled.time)).fit
     assert "drift" in codes(fit)
     assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
     assert fit.total_delay == pytest.approx(6.6, rel=0.02)
@@ -149,7 +149,7 @@ def test_a_drift_is_told_from_a_plant_that_moves(rest):
 def test_eight_bit_quantisation_is_seen_and_the_interval_covers():
     clean = rigs.step_record(noise=0.0)
     step = 16 * 1.2 / 128
-    fit = cr.fit_delay(changed(clean, np.round(clean.output / step) * step)).fit
+    fit = cr.fit_output_error(changed(clean, np.round(clean.output / step) * step)).fit
     assert "coarse_quantisation" in codes(fit)
     assert covers(fit, 37)
 
@@ -162,7 +162,7 @@ def test_the_standard_error_knows_that_neighbours_are_rounded_alike():
         y = rigs.exact_step(rigs.R1, (k - 600 - delay) * TS) + 0.001 * rng.standard_normal(1600)
         step = 1.25 / 256
         y = step * np.round(y / step + rng.uniform())  # eight bits, five times the noise
-        fit = cr.fit_delay(cr.Record(k * TS, 1.0 * (k >= 600), y), structures=[(1, 1)]).fit
+        fit = cr.fit_output_error(cr.Record(k * TS, 1.0 * (k >= 600), y), structures=[(1, 1)]).fit
         scores.append((fit.delay - delay) / (fit.std_given_structure / TS))
     # chi-square of forty: 55.8 is exceeded once in 20; 67 with the residual alone
     assert np.sum(np.square(scores)) < 55.8
@@ -174,7 +174,7 @@ def test_a_lag_of_a_tenth_of_a_sample_leaves_its_sample_open_and_one_of_two_samp
     intervals = []
     for lag in (0.1, 2.0):
         y = -np.expm1(-np.maximum(k - 25.4, 0) / lag) + noise
-        fit = cr.fit_delay(cr.Record(0.01 * k, (k >= 0).astype(float), y)).fit
+        fit = cr.fit_output_error(cr.Record(0.01 * k, (k >= 0).astype(float), y)).fit
         assert covers(fit, 25.4)
         intervals.append(fit.delay_interval)
     assert intervals[0][1] == pytest.approx(26.0, abs=0.01)
@@ -183,7 +183,7 @@ def test_a_lag_of_a_tenth_of_a_sample_leaves_its_sample_open_and_one_of_two_samp
 
 def test_an_inverse_response_is_found_with_its_zero():
     w = 2 * np.pi * 5.0
-    fit = cr.fit_delay(rigs.step_record(rigs.R3 * ct.tf([-1, w], [w]), noise=0.001)).fit
+    fit = cr.fit_output_error(rigs.step_record(rigs.R3 * ct.tf([-1, w], [w]), noise=0.001)).fit
     assert fit.structure == (3, 2)
     assert abs(fit.delay - 37) < 1
     assert "inverse_response" in codes(fit)
@@ -195,7 +195,7 @@ def test_an_integrating_plant_gets_an_exact_integrator():
     record = rigs.step_record(rigs.R2, noise=0.0, before=1000, after=1500)
     ramp = np.cumsum(record.output - record.output[0]) * TS
     ramp = ramp + 0.002 * np.random.default_rng(0).standard_normal(ramp.size)
-    system = cr.fit_delay(changed(record, ramp))
+    system = cr.fit_output_error(changed(record, ramp))
     fit = system.fit
     assert "integrating" in codes(fit)
     assert np.any(fit.poles == 0)
@@ -208,7 +208,7 @@ def test_an_integrating_plant_gets_an_exact_integrator():
 
 @pytest.mark.parametrize("before", [1, 12])
 def test_few_or_no_samples_before_the_step_suffice(before):
-    fit = cr.fit_delay(rigs.step_record(noise=0.002, before=before)).fit
+    fit = cr.fit_output_error(rigs.step_record(noise=0.002, before=before)).fit
     assert abs(fit.delay - 37) < 4 * 0.19
     assert ("no_rest" in codes(fit)) == (before < 8)
 
@@ -219,8 +219,8 @@ def test_correlated_noise_widens_the_interval():
     noise = np.zeros(record.n_samples)
     for k in range(1, noise.size):
         noise[k] = 0.9 * noise[k - 1] + 0.016 * 2 * np.sqrt(1 - 0.81) * rng.standard_normal()
-    coloured = cr.fit_delay(changed(record, record.output + noise), structures=[(3, 3)]).fit
-    white = cr.fit_delay(rigs.step_record(noise=0.002), structures=[(3, 3)]).fit
+    coloured = cr.fit_output_error(changed(record, record.output + noise), structures=[(3, 3)]).fit
+    white = cr.fit_output_error(rigs.step_record(noise=0.002), structures=[(3, 3)]).fit
     # (1 + 0.9) / (1 - 0.9) = 19 samples count as one: 4.4 times the standard error
     assert coloured.correlation == pytest.approx(19, rel=0.4)
     assert 3 < coloured.std_given_structure / white.std_given_structure < 6
@@ -236,14 +236,14 @@ def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_mat
         for i in range(1, 1800):
             noise[i] = 0.9 * noise[i - 1] + np.sqrt(1 - 0.81) * white[i]
         y = rigs.exact_step(rigs.R3, (k - 637) * TS) + 0.005 * noise[200:]
-        fit = cr.fit_delay(cr.Record(k * TS, 1.0 * (k >= 600), y)).fit
+        fit = cr.fit_output_error(cr.Record(k * TS, 1.0 * (k >= 600), y)).fit
         assert covers(fit, 37)
         flags.append(codes(fit))
         widths.append((fit.interval[1] - fit.interval[0]) / TS)
     # 84 independent samples; where a parameter is charged no more than their log: 48 and all four
     assert np.median(widths) < 40
     assert sum("no_delay_resolved" in found for found in flags) <= 1
-    white = [cr.fit_delay(rigs.step_record(noise=n, seed=1)).fit for n in (0.005, 0.03)]
+    white = [cr.fit_output_error(rigs.step_record(noise=n, seed=1)).fit for n in (0.005, 0.03)]
     assert ["structures_disagree" in codes(fit) for fit in white] == [False, True]
 
 
@@ -255,7 +255,7 @@ def test_slow_noise_that_a_short_rest_hides_is_noise_all_the_same():
     for seed in range(4):
         e = 0.02 * np.random.default_rng(seed).standard_normal(t.size + 500)
         slow = lfilter([1.0], [1.0, -0.95], e)[500:]
-        fit = cr.fit_delay(cr.Record(t, u, plant.simulate(u) + slow)).fit
+        fit = cr.fit_output_error(cr.Record(t, u, plant.simulate(u) + slow)).fit
         assert fit.at_noise_level
         assert fit.interval[0] <= 1.3 <= fit.interval[1]
 
@@ -267,7 +267,7 @@ def test_a_ramped_edge_and_a_noisy_input_are_taken_as_measured():
     rng = np.random.default_rng(5)
     y = y + 0.002 * rng.standard_normal(2500)
     for signal in (u, u + 0.01 * rng.standard_normal(2500)):
-        fit = cr.fit_delay(cr.Record(k * TS, signal, y), structures=[(3, 3)]).fit
+        fit = cr.fit_output_error(cr.Record(k * TS, signal, y), structures=[(3, 3)]).fit
         assert abs(fit.delay - 37) < 4 * 0.19
 
 
@@ -286,17 +286,17 @@ def test_a_ramped_edge_and_a_noisy_input_are_taken_as_measured():
 )
 def test_unusable_choices_are_refused(kwargs, error, match):
     with pytest.raises(error, match=match):
-        cr.fit_delay(rigs.step_record(before=50, after=200), **kwargs)
+        cr.fit_output_error(rigs.step_record(before=50, after=200), **kwargs)
 
 
 def test_a_code_for_missing_samples_is_told_by_its_value():
     record = rigs.step_record(noise=0.005)
     y = record.output.copy()
     y[[700, 2300]] = -9999.0
-    fit = cr.fit_delay(cr.Record(record.time, record.input, y)).fit
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y)).fit
     message = next(str(flag) for flag in fit.flags if flag.code == "outliers")
     assert "2 sample(s), the first at index 700, are -9999" in message
     # One wild sample of each kind is no code.
     y[2300] = 8888.0
-    fit = cr.fit_delay(cr.Record(record.time, record.input, y)).fit
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y)).fit
     assert not any("missing value" in str(flag) for flag in fit.flags)

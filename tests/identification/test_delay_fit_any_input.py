@@ -30,7 +30,7 @@ def cut_from_operation(kind, plant, seed, n=1200, skip=300):
 
 @pytest.mark.parametrize(("kind", "plant"), [("prbs", R1), ("prbs", R3), ("chirp", R3)])
 def test_the_dead_time_is_found_from_operation_with_unknown_start(kind, plant):
-    fit = cr.fit_delay(cut_from_operation(kind, plant, seed=1)).fit
+    fit = cr.fit_output_error(cut_from_operation(kind, plant, seed=1)).fit
     error = fit.dead_time / DT - DELAY
     assert abs(error) < 4 * fit.std_given_structure / DT
     assert fit.std_given_structure / DT < 0.2
@@ -43,16 +43,16 @@ def test_an_input_that_never_holds_is_no_step(shared_data):
     table = np.loadtxt(shared_data / "exchanger" / "record.csv", delimiter=",", skiprows=1)
     whole = cr.Record(*table.T)
     first, second = whole.between(0, 2000), whole.between(2001, 4000)
-    model = cr.fit_delay(first)
+    model = cr.fit_output_error(first)
     assert np.isnan(model.fit.onset)
     assert model.fit.dead_time <= 1.0  # s, one sample: the delay is 0
-    assert cr.check_residuals(model, second).fit_percent[0] > 35
+    assert cr.analyse_residuals(model, second).fit_percent[0] > 35
 
 
 @pytest.mark.parametrize(("plant", "structure"), [(pair(1.5, 0.05), (2, 2)), (lag(0.05), (1, 1))])
 def test_what_was_before_the_record_may_ring_or_creep_through_all_of_it(plant, structure):
     # decay times of 2.1 s and 3.2 s, in a record of 12 s that starts in the middle of motion
-    fit = cr.fit_delay(cut_from_operation("prbs", plant, seed=2)).fit
+    fit = cr.fit_output_error(cut_from_operation("prbs", plant, seed=2)).fit
     assert fit.structure == structure
     assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std_given_structure / DT
     assert fit.std_given_structure / DT < 0.06
@@ -64,7 +64,7 @@ def test_an_output_that_does_not_follow_the_input_gets_no_answer():
     for seed in range(3):
         y = np.random.default_rng(seed).standard_normal(600)
         with pytest.raises(DataError, match="does not follow the input"):
-            cr.fit_delay(cr.Record(good.time, good.input, y))
+            cr.fit_output_error(cr.Record(good.time, good.input, y))
 
 
 def bound(plant, u, noise):
@@ -93,7 +93,7 @@ def test_all_samples_of_a_long_record_count(colour):
     clean = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     noise = 0.05 * float(np.std(clean))
     y = clean + lfilter([1.0], [1.0, -colour], noise * rng.standard_normal(u.size))
-    fit = cr.fit_delay(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
     # coloured noise leaves no more than white noise of its innovations would, filtered alike
     white = lfilter([1.0, -colour], [1.0], u)
     limit = bound(R1, white, noise)
@@ -111,7 +111,7 @@ def test_a_long_record_of_a_slow_plant_is_cut_and_says_so():
     u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 100), 60)
     y = cr.delayed_ss(slow, dead_time=DELAY * DT, dt=DT).simulate(u)
     y += 0.01 * np.random.default_rng(1).standard_normal(u.size)
-    fit = cr.fit_delay(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
     assert fit.time.size < 4000
     assert "cut" in [flag.code for flag in fit.flags]
 
@@ -123,7 +123,7 @@ def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample(see
     plant = cr.DelayedStateSpace(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT), 150)
     u = rng.choice([-1.0, 1.0], 1000)
     y = plant.simulate(u) + 0.05 * rng.standard_normal(1000)
-    fit = cr.fit_delay(cr.Record(DT * np.arange(1000), u, y)).fit
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(1000), u, y)).fit
     assert fit.structure == (1, 1)
     assert abs(fit.delay - 150) < 0.5
     assert fit.delay_interval[0] <= 150 <= fit.delay_interval[1]
@@ -142,11 +142,11 @@ def random_binary(poles, noise, disturbance=0.0, seed=0):
 
 @pytest.mark.parametrize("noise", [0.005, 0.03])
 def test_many_lags_are_no_dead_time_under_any_input(noise):
-    five = cr.fit_delay(random_binary([1, 1.5, 2, 3, 5], noise)).fit
+    five = cr.fit_output_error(random_binary([1, 1.5, 2, 3, 5], noise)).fit
     assert five.interval[0] <= 0.8 <= five.interval[1]
     # three poles with two zeros, the best of the smaller models, say 1.15 s
     assert abs(five.dead_time - 0.8) < 0.2
-    eight = cr.fit_delay(random_binary([3.0] * 8, noise)).fit
+    eight = cr.fit_output_error(random_binary([3.0] * 8, noise)).fit
     assert eight.interval[0] <= 0.8 <= eight.interval[1]
     assert abs(eight.dead_time - 0.8) < 0.05
     assert eight.order == 8
@@ -156,7 +156,7 @@ def test_many_lags_are_no_dead_time_under_any_input(noise):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_slow_disturbance_does_not_move_the_dead_time(seed):
     # a fifth of the response, over a period of 60 s: the fit was half a second late
-    fit = cr.fit_delay(random_binary([0.5, 1.25], 0.02, disturbance=0.2, seed=seed)).fit
+    fit = cr.fit_output_error(random_binary([0.5, 1.25], 0.02, disturbance=0.2, seed=seed)).fit
     assert fit.interval[0] <= 0.8 <= fit.interval[1]
     assert abs(fit.dead_time - 0.8) < 0.1
 
@@ -167,7 +167,7 @@ def test_an_input_that_rests_for_longer_than_is_fitted_is_fitted_where_it_moves(
     u = np.concatenate([np.zeros(rest), np.repeat(rng.choice([-1.0, 1.0], 250), 10)])
     y = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     y += 0.02 * np.ptp(y) * rng.standard_normal(y.size)
-    fit = cr.fit_delay(cr.Record(DT * np.arange(u.size), 4 + u, y), structures=[(1, 1)]).fit
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), 4 + u, y), structures=[(1, 1)]).fit
     assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std_given_structure / DT
     # what is shown lies where the input moves
     assert fit.time[-1] > DT * rest

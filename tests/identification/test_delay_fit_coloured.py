@@ -38,7 +38,7 @@ def errors(colour, noise, way, seeds=4):
     found = []
     for seed in range(seeds):
         data, delay = record(seed, colour, noise)
-        found.append(cr.fit_delay(data, noise=way).fit.delay - delay)
+        found.append(cr.fit_output_error(data, noise=way).fit.delay - delay)
     return np.sqrt(np.mean(np.square(found)))
 
 
@@ -53,17 +53,17 @@ def test_slow_noise_leaves_a_narrower_interval_that_holds():
     narrower = 0
     for seed in range(5):
         data, delay = record(seed, slow, 0.005)
-        fit = cr.fit_delay(data).fit
+        fit = cr.fit_output_error(data).fit
         low, high = fit.delay_interval
         assert low <= delay <= high
-        first, last = cr.fit_delay(data, noise="white").fit.delay_interval
+        first, last = cr.fit_output_error(data, noise="white").fit.delay_interval
         narrower += high - low < last - first
     assert narrower >= 4
 
 
 def test_white_noise_is_fitted_as_before_to_the_last_digit():
     data, _ = record(0, lambda rng: rng.standard_normal(N), 0.005)
-    found, plain = (cr.fit_delay(data, noise=way).fit for way in ("auto", "white"))
+    found, plain = (cr.fit_output_error(data, noise=way).fit for way in ("auto", "white"))
     assert found.dead_time == plain.dead_time
     assert found.interval == plain.interval
 
@@ -73,7 +73,7 @@ def test_colour_that_only_the_response_has_is_a_misfit():
     data, _ = record(2, lambda rng: rng.standard_normal(N), 0.005)
     after = np.arange(N) >= BEFORE
     bent = data.output + 0.02 * after * ringing(np.random.default_rng(5))
-    fit = cr.fit_delay(cr.Record(data.time, data.input, bent)).fit
+    fit = cr.fit_output_error(cr.Record(data.time, data.input, bent)).fit
     assert "generalised" not in fit.report()
 
 
@@ -84,7 +84,7 @@ def test_records_fitted_together_know_the_noise_of_their_mean():
     several = [
         cr.Record(k * rigs.TS, 1.0 * (k >= BEFORE), step + 0.005 * ringing(rng)) for _ in range(4)
     ]
-    fit = cr.fit_delay(several).fit
+    fit = cr.fit_output_error(several).fit
     assert "generalised" in fit.report()
     assert fit.delay == pytest.approx(36.4, abs=0.1)
     low, high = fit.delay_interval
@@ -108,7 +108,7 @@ def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
     y = np.where(k > 543, -np.expm1(-(k - 543) / 60), 0)
     for burst in rng.integers(0, 1390, 25):
         y[burst : burst + 6] += 0.05 * rng.standard_normal()
-    fit = cr.fit_delay(cr.Record(0.1 * k, 1.0 * (k >= 500), y)).fit
+    fit = cr.fit_output_error(cr.Record(0.1 * k, 1.0 * (k >= 500), y)).fit
     assert "generalised" not in fit.report()
     low, high = fit.delay_interval
     assert low <= 43 <= high

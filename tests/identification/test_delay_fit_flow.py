@@ -1,4 +1,4 @@
-"""fit_delay on simulated flows that disperse: inverse Gaussian residence times."""
+"""fit_output_error on simulated flows that disperse: inverse Gaussian residence times."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def codes(fit) -> set[str]:
     [(0.45, 0.001, 1.0), (0.7, 0.001, 0.5), (1.0, 0.001, 0.3), (1.0, 0.005, 1.0)],
 )
 def test_the_dead_time_before_a_flow_is_found(spread, noise, near):
-    fit = cr.fit_delay(flow_record(spread, noise)).fit
+    fit = cr.fit_output_error(flow_record(spread, noise)).fit
     low, high = fit.delay_interval
     # Lags alone put it 20 (narrow) to 6 samples late (wide), in intervals of 15 samples.
     assert abs(fit.delay - DELAY) < near
@@ -50,7 +50,7 @@ def test_the_dead_time_before_a_flow_is_found(spread, noise, near):
 
 
 def test_a_lag_behind_the_flow_is_not_taken_for_it():
-    fit = cr.fit_delay(flow_record(0.7, 0.001, lag=0.02)).fit
+    fit = cr.fit_output_error(flow_record(0.7, 0.001, lag=0.02)).fit
     low, high = fit.delay_interval
     assert abs(fit.delay - DELAY) < 2
     assert low <= DELAY <= high
@@ -58,7 +58,7 @@ def test_a_lag_behind_the_flow_is_not_taken_for_it():
 
 def test_the_model_follows_the_flow_down_to_noise():
     record = flow_record(0.7, 0.001)
-    model = cr.fit_delay(record)
+    model = cr.fit_output_error(record)
     assert model.fit.residual == pytest.approx(0.002, rel=0.05)
     left = model.fit.measured - model.fit.fitted
     # Five lags behind the dead time: what they miss is less than the noise of one sample.
@@ -70,7 +70,7 @@ def test_the_model_follows_the_flow_down_to_noise():
 
 
 def test_a_flow_as_narrow_as_sixteen_lags_is_covered_and_told():
-    fit = cr.fit_delay(flow_record(0.25, 0.001)).fit
+    fit = cr.fit_output_error(flow_record(0.25, 0.001)).fit
     low, high = fit.delay_interval
     # No five poles follow it: the model is that of lags, forty samples late.
     assert low <= DELAY <= high
@@ -80,5 +80,5 @@ def test_a_flow_as_narrow_as_sixteen_lags_is_covered_and_told():
 @pytest.mark.parametrize("plant", [rigs.R2, rigs.R3, rigs.R4])
 def test_lags_are_not_read_as_a_flow(plant):
     for seed in range(2):
-        fit = cr.fit_delay(rigs.step_record(plant, noise=0.005, seed=seed)).fit
+        fit = cr.fit_output_error(rigs.step_record(plant, noise=0.005, seed=seed)).fit
         assert "dispersed_flow" not in codes(fit)

@@ -25,7 +25,7 @@ def codes(fit):
 
 @pytest.fixture(scope="module")
 def sixteen():
-    return cr.fit_delay([record(seed) for seed in range(16)]).fit
+    return cr.fit_output_error([record(seed) for seed in range(16)]).fit
 
 
 def test_the_mean_of_sixteen_records_is_four_times_as_exact(sixteen):
@@ -50,7 +50,7 @@ def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
         for k in range(4)
         for a in (4, 8, 16)
     ]
-    fit = cr.fit_delay(records).fit
+    fit = cr.fit_output_error(records).fit
     assert "amplitude_trend" in codes(fit)
     assert fit.repeatability.trend / TS == pytest.approx(1 / 8, rel=0.3)
 
@@ -60,8 +60,8 @@ def test_a_trend_shows_in_few_records_too(count):
     heights = [16.0] * (count // 2) + [8.0] * (count - count // 2)
     alike = [record(k, delay=37, amplitude=a) for k, a in enumerate(heights)]
     apart = [record(k, delay=37 + 2 * (a == 8), amplitude=a) for k, a in enumerate(heights)]
-    assert "amplitude_trend" not in codes(cr.fit_delay(alike).fit)
-    assert "amplitude_trend" in codes(cr.fit_delay(apart).fit)
+    assert "amplitude_trend" not in codes(cr.fit_output_error(alike).fit)
+    assert "amplitude_trend" in codes(cr.fit_output_error(apart).fit)
 
 
 def moving(seed: int, *, drifts: bool) -> cr.Record:
@@ -78,7 +78,7 @@ def moving(seed: int, *, drifts: bool) -> cr.Record:
 
 @pytest.mark.parametrize("drifts", [True, False])
 def test_records_that_were_not_at_rest_are_fitted_together(drifts):
-    fit = cr.fit_delay([moving(seed, drifts=drifts) for seed in range(6)]).fit
+    fit = cr.fit_output_error([moving(seed, drifts=drifts) for seed in range(6)]).fit
     assert ("drift" if drifts else "not_at_rest") in codes(fit)
     assert "records_differ" not in codes(fit)
     assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
@@ -87,7 +87,7 @@ def test_records_that_were_not_at_rest_are_fitted_together(drifts):
 
 def test_a_record_that_came_twice_is_told():
     records = [record(k) for k in range(3)]
-    apart, twice = (cr.fit_delay([*records, more]).fit for more in (record(3), records[1]))
+    apart, twice = (cr.fit_output_error([*records, more]).fit for more in (record(3), records[1]))
     assert "same_records" not in codes(apart)
     (told,) = (str(flag) for flag in twice.flags if flag.code == "same_records")
     assert "1 of 4 records are others over again (the 4. is the 2.)" in told

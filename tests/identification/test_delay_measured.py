@@ -1,4 +1,4 @@
-"""fit_delay on plants that others have measured, with its defaults.
+"""fit_output_error on plants that others have measured, with its defaults.
 
 Bands: what the sources state or the first motion allows (README of the data). They are doubtful
 by a sample or two themselves.
@@ -37,7 +37,7 @@ def fitted(path):
     n = len(data)
     # The canal's stamps are rounded to 0.1 us; the mean step is the sample time.
     time = data[0, 0] + np.arange(n) * (data[-1, 0] - data[0, 0]) / (n - 1)
-    return cr.fit_delay(cr.Record(time, data[:, 1], data[:, 2])).fit
+    return cr.fit_output_error(cr.Record(time, data[:, 1], data[:, 2])).fit
 
 
 def band(name, dt):
@@ -102,7 +102,7 @@ def test_a_drift_before_the_step_does_not_make_an_integrator_of_a_lamp(shared_da
         path = shared_data / "heating_system" / f"edge{i}.csv"
         data = np.loadtxt(path, delimiter=",", skiprows=1)
         records.append(cr.Record(*data.T, name=path.stem))
-    fit = cr.fit_delay(records).fit
+    fit = cr.fit_output_error(records).fit
     flags = {flag.code for flag in fit.flags}
     assert "drift" in flags
     assert "integrating" not in flags

@@ -35,7 +35,7 @@ def codes(system):
 
 
 def test_errors_of_gain_and_total_delay_are_those_of_the_noise():
-    fits = [cr.fit_delay(step(120, seed=s), structures=[(1, 1)]).fit for s in range(40)]
+    fits = [cr.fit_output_error(step(120, seed=s), structures=[(1, 1)]).fit for s in range(40)]
     gains = np.array([fit.gain for fit in fits])
     # 40 values tell a standard deviation to 11 %
     claimed = np.mean([fit.gain_std_given_structure for fit in fits])

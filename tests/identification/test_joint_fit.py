@@ -79,7 +79,7 @@ def test_error_and_standard_error_are_those_of_the_bound(values):
             )
             for i, (kind, n, size, sigma) in enumerate(KINDS)
         ]
-        fit = cr.fit_delay([record for record, _ in made], structures=structures).fit
+        fit = cr.fit_output_error([record for record, _ in made], structures=structures).fit
         limits.append(bound([u for _, u in made], [sigma for *_, sigma in KINDS], values))
         errors.append(fit.delay - DELAY)
         claims.append(fit.std_given_structure / DT)
@@ -110,7 +110,9 @@ def test_steps_and_random_inputs_go_together():
     k = np.arange(400)
     u = np.where(k < 100, 0.0, 2.0)
     y = respond(u, values) + 0.02 * np.random.default_rng(5).standard_normal(400)
-    fit = cr.fit_delay([random, cr.Record(DT * k, u, y, name="step")], structures=[(1, 1)]).fit
+    fit = cr.fit_output_error(
+        [random, cr.Record(DT * k, u, y, name="step")], structures=[(1, 1)]
+    ).fit
     assert abs(fit.delay - DELAY) < 4 * fit.std_given_structure / DT
     assert fit.repeatability.p_value > 0.01
     assert fit.repeatability.amplitudes.tolist() == [2.0, 2.0]
@@ -120,6 +122,6 @@ def test_records_that_do_not_go_together_are_refused():
     one, _ = operation("prbs", 1, 300, (DELAY, 1.0, 2.0))
     slow = cr.Record(2 * one.time, one.input, one.output)
     with pytest.raises(DataError, match="one sample time"):
-        cr.fit_delay([one, slow])
+        cr.fit_output_error([one, slow])
     with pytest.raises(OptionError, match="takes one record"):
         cr.identify([one, one], method="scan")

@@ -31,7 +31,7 @@ def driven(seed, gain=1.0, lag=1.0, delay=0.5, noise=0.02):
 
 
 def codes(records):
-    return {flag.code for flag in cr.fit_delay(records, structures=[(1, 1)]).fit.flags}
+    return {flag.code for flag in cr.fit_output_error(records, structures=[(1, 1)]).fit.flags}
 
 
 def test_steps_of_different_gain_are_no_plant_without_objection():
@@ -82,7 +82,7 @@ def test_records_of_other_inputs_are_compared_too(name, value, code):
 
 
 def test_the_table_shows_every_record_beside_the_model():
-    fit = cr.fit_delay(
+    fit = cr.fit_output_error(
         [step(1.0, 0, lag=0.8), step(2.0, 1), step(4.0, 2, lag=1.3)], structures=[(1, 1)]
     ).fit
     table = fit.repeatability.table()
@@ -106,7 +106,7 @@ def test_the_gains_of_a_canal_differ_with_the_opening_of_its_gate(shared_data):
 
 def test_the_picture_of_a_fit_has_every_record_beside_the_model():
     records = [step(1.0, 0, 1.0), step(2.0, 1, 0.5), step(4.0, 2, 0.25)]
-    fit = cr.fit_delay(records, structures=[(1, 1)]).fit
+    fit = cr.fit_output_error(records, structures=[(1, 1)]).fit
     drawn = cr.plots.fit_plot(fit).figure.axes[0].get_lines()
     ends = [float(np.mean(line.get_ydata()[-50:])) for line in drawn]
     for gain in (1.0, 0.5, 0.25, fit.gain):

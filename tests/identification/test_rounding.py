@@ -46,7 +46,7 @@ def measured(folder, name):
 
 
 def answer(record):
-    fit = cr.fit_delay(record).fit
+    fit = cr.fit_output_error(record).fit
     shape = fit.order, fit.relative_degree, sorted(flag.code for flag in fit.flags)
     return shape, np.array([fit.dead_time, *fit.interval]) / fit.dt
 

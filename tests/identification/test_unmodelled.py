@@ -50,7 +50,7 @@ def rising(seconds, *, damping=None):
 
 
 def flags(record):
-    return {flag.code for flag in cr.fit_delay(record).fit.flags}
+    return {flag.code for flag in cr.fit_output_error(record).fit.flags}
 
 
 def test_a_lag_counts_as_settled_after_three_time_constants():
@@ -63,13 +63,15 @@ def test_a_pair_that_rings_on_for_many_periods_has_shown_its_gain():
 
 
 def test_a_total_delay_is_called_firm_where_it_is():
-    assert "firm" in cr.fit_delay(rising(2.2)).fit.report()
-    assert "firm" not in cr.fit_delay(rising(1.0)).fit.report().replace("neither is firm", "")
+    assert "firm" in cr.fit_output_error(rising(2.2)).fit.report()
+    assert "firm" not in cr.fit_output_error(rising(1.0)).fit.report().replace(
+        "neither is firm", ""
+    )
 
 
 def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
     case = sensors.analyser(np.random.default_rng([1, 7]))
-    fit = cr.fit_delay(case.records).fit
+    fit = cr.fit_output_error(case.records).fit
     low, high = fit.interval
     assert low <= fit.dead_time <= high
     assert low <= case.dead_time

@@ -15,7 +15,7 @@ from ctrl_realize.numerics.separable.structures import (
     Candidate,
     Scales,
     choose,
-    needless_charge,
+    needless_parameters,
     parameter_bounds,
     plausible,
     search,
@@ -45,7 +45,7 @@ def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
 
 
 def test_zeros_and_a_fourth_pole_must_be_worth_it():
-    assert [needless_charge(Structure(n, r)) for n, r in ((3, 3), (3, 1), (4, 4), (5, 4))] == [
+    assert [needless_parameters(Structure(n, r)) for n, r in ((3, 3), (3, 1), (4, 4), (5, 4))] == [
         0, 12, 4, 14,
     ]  # fmt: skip
     simple, zero, fourth = Structure(3, 3), Structure(3, 2), Structure(4, 4)

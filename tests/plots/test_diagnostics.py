@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 import ctrl_realize as cr
 from ctrl_realize import plots
 from ctrl_realize.errors import OptionError
-from ctrl_realize.identification.validation.delay_estimates_result import DelayView
+from ctrl_realize.identification.validation.delay_estimates_result import DelayEstimate
 
 PLANT = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
 
@@ -22,7 +22,7 @@ def record():
 
 
 def test_residual_plot_shows_data_model_and_correlations(record):
-    check = cr.check_residuals(PLANT, record)
+    check = cr.analyse_residuals(PLANT, record)
     drawn = check.plot()
     assert isinstance(drawn, ct.ControlPlot)
     measured, simulated = drawn.lines[0, 0]
@@ -37,10 +37,10 @@ def test_residual_plot_shows_data_model_and_correlations(record):
 @pytest.mark.parametrize("agree", [True, False])
 def test_delay_check_plot_has_a_bar_for_each_view(agree):
     views = (
-        DelayView("output error", "record", "dead time", 0.02, 0.01, 0.03),
-        DelayView("phase slope", "FRF", "upper bound", 0.05, 0.04, 0.06),
+        DelayEstimate("output error", "record", "dead time", 0.02, 0.01, 0.03),
+        DelayEstimate("phase slope", "FRF", "upper bound", 0.05, 0.04, 0.06),
     )
-    check = cr.DelayCheck(views, agree, (0.01, 0.03) if agree else None, (), 0.001)
+    check = cr.DelayComparison(views, agree, (0.01, 0.03) if agree else None, (), 0.001)
     drawn = check.plot()
     assert len(drawn.lines[0, 0]) == 2
     names = [label.get_text() for label in drawn.axes[0, 0].get_yticklabels()]

@@ -35,7 +35,7 @@ def scanned(record):
 
 @pytest.fixture(scope="module")
 def fitted(record):
-    return cr.fit_delay(record, structures=[(3, 3)])
+    return cr.fit_output_error(record, structures=[(3, 3)])
 
 
 @pytest.fixture(scope="module")
@@ -193,7 +193,7 @@ def test_records_of_any_input_are_drawn_one_after_the_other_and_steps_as_their_m
         moving.append(cr.Record(0.05 * np.arange(200), u, y))
     steps = [rigs.step_record(noise=0.01, seed=k, before=400, after=900) for k in range(2)]
     for records, label in ((moving, "measured"), (steps, "mean of 2 records")):
-        drawn = plots.fit_plot(cr.fit_delay(records, structures=[(1, 1)]))
+        drawn = plots.fit_plot(cr.fit_output_error(records, structures=[(1, 1)]))
         assert drawn.lines[0, 0][0].get_label() == label
 
 

@@ -67,7 +67,7 @@ def record(valve):
 
 @pytest.fixture(scope="module")
 def fitted(record):
-    return cr.fit_delay(record, structures=[(3, 3)])
+    return cr.fit_output_error(record, structures=[(3, 3)])
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_a_report_of_several_channels_draws_every_output(tmp_path):
     u, noise = np.random.default_rng(0).standard_normal((2, 2, 300))
     y = cr.DelayedStateSpace(core, (2, 5)).simulate(u) + 0.1 * noise
     record = cr.Record(0.1 * np.arange(300), u, y, output_labels=["level", "heat"])
-    system = cr.fit_channels(record, 2)
+    system = cr.fit_state_space(record, 2)
     path = report.write_identification(tmp_path / "r.html", system, record)
     text = path.read_text(encoding="utf-8")
     assert "The output level" in text
@@ -204,7 +204,7 @@ def test_a_report_that_fails_leaves_the_old_one(tmp_path, record, fitted, monkey
 def test_an_edge_among_many_is_not_shown_as_a_step(valve):
     rng = np.random.default_rng(2)
     switching = valve.record(4 + 8 * np.repeat(rng.integers(0, 2, 40), 90), rng=1, name="prbs")
-    system = cr.fit_delay(switching, structures=[(3, 3)])
+    system = cr.fit_output_error(switching, structures=[(3, 3)])
     assert np.isnan(system.fit.onset)
     names = [sketch.key for sketch in identification_sketches(system, switching)]
     assert names == ["fit", "record", "frf"]

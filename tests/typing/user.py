@@ -17,7 +17,7 @@ def model_of(path: Path) -> cr.DelayedStateSpace:
     scanned: cr.DelayedStateSpace = cr.estimate_delay(impulse, 3, max_delay=100)
     orders: cr.OrderScan = cr.scan_orders(impulse, range(1, 6), max_delay=100)
     realized = cr.realize(impulse, orders.order, delay=37, hankel="padded")
-    fitted = cr.fit_delay(record, structures=[(3, 3)], loss="least_squares")
+    fitted = cr.fit_output_error(record, structures=[(3, 3)], loss="least_squares")
     simple = cr.identify(record, method="scan", order=2)
     for system in (scanned, realized, fitted, simple):
         cr.save_model(path.with_suffix(".json"), system)

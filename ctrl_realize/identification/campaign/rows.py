@@ -21,7 +21,7 @@ from ...delayed import DelayedStateSpace
 from ...errors import CtrlRealizeError, DataError
 from ...results import Flag
 from ..identify import Method, identify
-from ..output_error.result import DelayFit
+from ..output_error.result import OutputErrorFit
 from ..realization.delay_scan_result import DelayScan
 from ..step.steps import detect_step
 from .packed_model import PackedModel
@@ -156,7 +156,7 @@ def identify_row(
             if not record.issiso:
                 raise DataError(
                     f"{record!r}: a campaign compares the delays of one input and one output; for "
-                    "several channels see fit_channels, which takes several records too"
+                    "several channels see fit_state_space, which takes several records too"
                 )
             row = replace(row, name=record.name or row.name, amplitude=_amplitude(record))
             key = fingerprint(record, method, options)
@@ -241,7 +241,7 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
     )
 
 
-def _scaled_misfit(fit: DelayFit | DelayScan, amplitude: float) -> float:
+def _scaled_misfit(fit: OutputErrorFit | DelayScan, amplitude: float) -> float:
     """Misfit for a unit step: a scan works on one, a fit on the raw record."""
     if isinstance(fit, DelayScan):
         return fit.misfit

@@ -38,7 +38,7 @@ def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice
     The regularized estimate is kept unless OKID is clearly better: its errors are known better.
     Where the first two thirds are too short for one of them, the other is taken.
     """
-    p = group[0].n_outputs
+    p = group[0].noutputs
     free = ("auto",) * p
     splits = [round((1 - HELD_BACK) * record.n_samples) for record in group]
     first = tuple(_until(record, split) for record, split in zip(group, splits, strict=True))

@@ -130,7 +130,7 @@ def impulse_from_io(
         raise OptionError(f"arx_order={arx_order!r} belongs to method='okid', not {method!r}")
     group = as_group(records)
     longest = max(record.n_samples for record in group)
-    most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].n_inputs), 2)
+    most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].ninputs), 2)
     if length is None:
         # A window that ends before the response begins would show nothing, and no tail either.
         count = min(max(SHORTEST, 2 * _latest_onset(group, most)), most)
@@ -187,7 +187,7 @@ def _estimate(
 ) -> PulseRegression:
     """Estimate by what was asked for, or by what was chosen."""
     method, kernel, arx_order = asked
-    kernels = (kernel,) * group[0].n_outputs
+    kernels = (kernel,) * group[0].noutputs
     if chosen is not None:
         method = chosen.method
         kernels = chosen.kernels if kernel == "auto" else kernels
@@ -228,9 +228,9 @@ def as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:
                 f"record {i} has the sample time {other.dt:g} s, the first one {first.dt:g} s; "
                 "resample one of them"
             )
-        if (other.n_inputs, other.n_outputs) != (first.n_inputs, first.n_outputs):
+        if (other.ninputs, other.noutputs) != (first.ninputs, first.noutputs):
             raise DataError(
-                f"record {i} has {other.n_inputs} inputs and {other.n_outputs} outputs, the "
-                f"first one {first.n_inputs} and {first.n_outputs}"
+                f"record {i} has {other.ninputs} inputs and {other.noutputs} outputs, the "
+                f"first one {first.ninputs} and {first.noutputs}"
             )
     return group

@@ -60,7 +60,7 @@ class PulseRegression:
 
 def without_prior(group: tuple[Record, ...], count: int, start: str) -> PulseRegression:
     """Estimate `count` free Markov parameters by least squares."""
-    m = group[0].n_inputs
+    m = group[0].ninputs
     equations = _fir_equations(group, count, start, m * count + 1)
     excited, wanted = excited_directions(equations.gram), m * count
     if excited < wanted:
@@ -90,7 +90,7 @@ def with_prior(
 
     `kernels` has one name for each output.
     """
-    m, p = group[0].n_inputs, group[0].n_outputs
+    m, p = group[0].ninputs, group[0].noutputs
     equations = _fir_equations(group, count, start, 2 * m + 8)
     excited, wanted = excited_directions(equations.gram), m * count
     if excited < min(wanted, 2 * m + 1):
@@ -133,7 +133,7 @@ def through_arx(
     group: tuple[Record, ...], count: int, start: str, arx_order: int | None
 ) -> PulseRegression:
     """Estimate a long ARX model and expand it to `count` Markov parameters (OKID)."""
-    m, p = group[0].n_inputs, group[0].n_outputs
+    m, p = group[0].ninputs, group[0].noutputs
     total = sum(record.n_samples for record in group)
     if arx_order is None:
         # At least five equations for each unknown, or BIC's asymptotics mean nothing.
@@ -196,7 +196,7 @@ def through_arx(
 
 
 def _okid_equations(group: tuple[Record, ...], order: int, start: str) -> NormalEquations:
-    m, p = group[0].n_inputs, group[0].n_outputs
+    m, p = group[0].ninputs, group[0].noutputs
     parts = []
     for record in group:
         u, y = _signals(record, order, start)

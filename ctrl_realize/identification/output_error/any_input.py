@@ -13,7 +13,7 @@ from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.output_error.input_fit import SampledFit, fit_sampled
-from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse
@@ -22,7 +22,7 @@ from .averaging import common_sample_time, compared, delay_outliers, widened
 from .flags import sampled_flags
 from .repeat_flags import repeat_flags
 from .repeatability import Repeatability
-from .result import DelayFit
+from .result import OutputErrorFit
 from .summary import summarise, with_repeats
 
 FOLLOWS = 36.0
@@ -35,7 +35,7 @@ _APART = 5.0  # standard deviations by which a record's gain may lie from the ot
 
 def fit_any_input(
     records: tuple[Record, ...], limit: float | None, settings: Mapping[str, Any]
-) -> tuple[DelayFit, OutputErrorFit]:
+) -> tuple[OutputErrorFit, OutputErrorEstimate]:
     """Fit one model to all records, each with its own level, drift and initial state.
 
     A record whose delay or gain lies apart from the others' is left out, as among step records,
@@ -121,12 +121,12 @@ def _gain_outliers(own: list[OwnResponse], used: tuple[int, ...]) -> tuple[int, 
 
 def _summary(
     found: SampledFit,
-    fit: OutputErrorFit,
+    fit: OutputErrorEstimate,
     records: tuple[Record, ...],
     used: tuple[int, ...],
     limit: float | None,
     flags: tuple[Flag, ...],
-) -> DelayFit:
+) -> OutputErrorFit:
     """Lay what was fitted out record after record, on one time axis."""
     data = found.data
     times: list[FloatArray] = []

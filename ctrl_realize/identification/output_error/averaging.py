@@ -11,7 +11,7 @@ from ..._wording import named
 from ...data import Record, StepResponse
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
-from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse, homogeneity, own_step_response
 from ..step.steps import unit_step
@@ -185,7 +185,9 @@ def compared(
     )
 
 
-def widened(fit: OutputErrorFit, repeats: Repeatability, used: tuple[int, ...]) -> OutputErrorFit:
+def widened(
+    fit: OutputErrorEstimate, repeats: Repeatability, used: tuple[int, ...]
+) -> OutputErrorEstimate:
     """Add the scatter of the mean where records differ by more than their noise."""
     if repeats.p_value >= 0.01:
         return fit

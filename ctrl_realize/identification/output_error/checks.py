@@ -19,7 +19,7 @@ from ...numerics.validation.innovations import feedback_chance, nonlinear_chance
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
 from ...numerics.validation.white_step import WhiteStep, white_step
 from ...results import Flag
-from .result import DelayFit
+from .result import OutputErrorFit
 
 RARE = 1e-4
 """Chance of an alarm by noise alone, of each test. Of 290 records without feedback (29 worlds of
@@ -43,7 +43,7 @@ _MOST_SAMPLES, _REGRESSED = 20_000, 4000
 _LEAST_PAST, _MOST_PAST = 30, 150
 
 
-def checked(fit: DelayFit, *, alone: bool = True) -> DelayFit:
+def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     """Add what the record says against the model, and widen the interval where it says more.
 
     By the time for which samples are held; and, where the residual is coloured, by what
@@ -51,14 +51,14 @@ def checked(fit: DelayFit, *, alone: bool = True) -> DelayFit:
 
     Parameters
     ----------
-    fit : DelayFit
+    fit : OutputErrorFit
         Of one record, or of several.
     alone : bool, optional
         The model is all that lies between input and output; there are no known dynamics besides.
 
     Returns
     -------
-    DelayFit
+    OutputErrorFit
         The same with further flags; `interval` may be wider.
     """
     codes = {flag.code for flag in fit.flags}
@@ -104,7 +104,7 @@ class Shown:
         return np.asarray(self.output - self.fitted)
 
 
-def _shown(fit: DelayFit) -> Shown:
+def _shown(fit: OutputErrorFit) -> Shown:
     record = fit.records[0]
     first = round((float(fit.time[0]) - float(record.time[0])) / fit.dt)
     count = min(fit.measured.size, _MOST_SAMPLES)
@@ -112,7 +112,7 @@ def _shown(fit: DelayFit) -> Shown:
     return Shown(fit.measured[:count], fit.fitted[:count], drive)
 
 
-def _white(fit: DelayFit, shown: Shown) -> WhiteStep | None:
+def _white(fit: OutputErrorFit, shown: Shown) -> WhiteStep | None:
     """One step of generalised least squares from a fit whose residual is coloured."""
     if not np.all(fit.poles) or not fit.gain:
         return None
@@ -124,7 +124,7 @@ def _white(fit: DelayFit, shown: Shown) -> WhiteStep | None:
     return step if step is None or abs(step.delay - fit.dead_time) <= reach else None
 
 
-def _white_flags(fit: DelayFit, step: WhiteStep) -> list[Flag]:
+def _white_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
     gains = abs(step.gain - fit.gain) + _TWO_SIDED * step.gain_error
     totals = abs(step.total - fit.total_delay) + _TWO_SIDED * step.total_error
     if gains <= _OFF * abs(fit.gain) and totals <= _OFF * abs(fit.total_delay):
@@ -274,7 +274,7 @@ def _limit_flags(output: FloatArray) -> list[Flag]:
     ]
 
 
-def _earlier_input(fit: DelayFit, codes: set[str]) -> list[Flag]:
+def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
     """Where a response begins with its step, tell whether an earlier move may be behind it."""
     before = float(fit.records[0].time[0])
     rest = _first_move(fit.records[0]) - before

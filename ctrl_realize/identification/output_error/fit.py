@@ -17,9 +17,9 @@ from ...delayed import DelayedStateSpace, delayed_ss
 from ...errors import DataError, NoStepError, OptionError, OrderError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, own_regressors, step_data
-from ...numerics.output_error.step_fit import fit_output_error
+from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.separable.varpro import KnownFactor, Structure
 from ..step.steps import found_step
 from .any_input import LEAST_MOVE, fit_any_input
@@ -28,7 +28,7 @@ from .checks import checked
 from .flags import fit_flags
 from .known import known_factor
 from .repeat_flags import repeat_flags, same_record_flags
-from .result import DelayFit
+from .result import OutputErrorFit
 from .summary import fitted_core, summarise, with_repeats
 
 Loss = Literal["huber", "least_squares"]
@@ -44,7 +44,7 @@ _DWELL = 3  # times the first motion: steps that follow faster hide each other's
 
 
 @single_threaded
-def fit_delay(
+def fit_output_error(
     records: Record | Sequence[Record],
     *,
     structures: Sequence[tuple[int, int]] | None = None,
@@ -86,7 +86,7 @@ def fit_delay(
     -------
     DelayedStateSpace
         Continuous model sampled exactly behind a hold, the fraction of a sample included; its
-        `.fit` is a `DelayFit`.
+        `.fit` is a `OutputErrorFit`.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def fit_delay(
     >>> u = np.where(t < 1.0, 0.0, 2.0)
     >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
     >>> rng = np.random.default_rng(1)
-    >>> sys = cr.fit_delay(cr.Record(t, u, y + 0.01 * rng.standard_normal(t.size)))
+    >>> sys = cr.fit_output_error(cr.Record(t, u, y + 0.01 * rng.standard_normal(t.size)))
     >>> sys.fit.structure, round(sys.fit.dead_time, 3), round(sys.fit.gain, 2)
     ((1, 1), 0.125, 3.0)
     """
@@ -174,19 +174,19 @@ class _Settings(TypedDict):
 
 def _fit_one(
     record: Record, limit: float | None, settings: _Settings
-) -> tuple[DelayFit, OutputErrorFit]:
+) -> tuple[OutputErrorFit, OutputErrorEstimate]:
     data = _step_data(record)
     if data is None:
         return fit_any_input((record,), limit, settings)
     latest = None if limit is None else limit * record.dt
-    fit = fit_output_error(data, latest=latest, **settings)
+    fit = fit_step_record(data, latest=latest, **settings)
     flags = fit_flags(data, fit, limit)
     return summarise(fit, data, record.time, (record,), flags), fit
 
 
 def _fit_mean(
     records: tuple[Record, ...], limit: float | None, settings: _Settings
-) -> tuple[DelayFit, OutputErrorFit]:
+) -> tuple[OutputErrorFit, OutputErrorEstimate]:
     steps = aligned_steps(records)
     latest = None if limit is None else limit * steps[0].dt
     skip: tuple[int, ...] = ()
@@ -195,7 +195,7 @@ def _fit_mean(
         data = step_data(mean.output, mean.input, mean.dt, [(mean.edge, 1)])
         if data.motion is None:
             raise DataError("the mean of the records does not leave its rest level by 5 sigma")
-        fit = fit_output_error(data, latest=latest, **settings)
+        fit = fit_step_record(data, latest=latest, **settings)
         own = own_regressors(data, fit.poles if fit.relaxing else None)
         repeats = repeatability(steps, mean, fit.fitted, fit.delay, own)
         apart = delay_outliers(repeats, mean.used)
@@ -212,7 +212,7 @@ def _fit_mean(
 def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
     several = as_records(records)
     for record in several:
-        check_complete(record, "fit_delay")
+        check_complete(record, "fit_output_error")
         if record.n_samples < FEWEST_SAMPLES:
             raise DataError(
                 f"{named('record', record.name)} has {record.n_samples} samples; a fit of delay, "
@@ -226,8 +226,8 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
             )
         if not record.issiso:
             raise DataError(
-                f"{named('record', record.name)} has {record.n_inputs} inputs and "
-                f"{record.n_outputs} outputs; choose one of each when it is made"
+                f"{named('record', record.name)} has {record.ninputs} inputs and "
+                f"{record.noutputs} outputs; choose one of each when it is made"
             )
     return several
 

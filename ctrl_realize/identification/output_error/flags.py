@@ -7,7 +7,7 @@ import numpy as np
 from ..._wording import in_time, interval_in_time, time_within
 from ...numerics.arrays import FloatArray
 from ...numerics.output_error.interval import flow_lead
-from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
@@ -19,7 +19,9 @@ _BEYOND = 20.0  # ranges: no overshoot goes as far
 _FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
 
 
-def fit_flags(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> tuple[Flag, ...]:
+def fit_flags(
+    data: StepData, fit: OutputErrorEstimate, max_delay: float | None
+) -> tuple[Flag, ...]:
     """List the flags of a fit of one (mean) step record."""
     length = (data.output.size - data.edge) * data.dt
     found = [
@@ -31,7 +33,7 @@ def fit_flags(data: StepData, fit: OutputErrorFit, max_delay: float | None) -> t
 
 
 def sampled_flags(
-    fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
+    fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
 ) -> tuple[Flag, ...]:
     """List the flags of a fit of a record whose input is no step."""
     found = model_flags(fit, dt, length, max_delay)
@@ -47,7 +49,7 @@ def sampled_flags(
 
 
 def model_flags(
-    fit: OutputErrorFit, dt: float, length: float, max_delay: float | None
+    fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
 ) -> list[Flag | None]:
     """List what the model itself shows."""
     extrapolated = slow_modes(fit, length), open_gain(fit)
@@ -67,7 +69,7 @@ def model_flags(
     ]
 
 
-def _apparent(fit: OutputErrorFit) -> Flag | None:
+def _apparent(fit: OutputErrorEstimate) -> Flag | None:
     """Say so where structures were asked for and another one rules them out."""
     if fit.better is None:
         return None
@@ -84,7 +86,7 @@ def _apparent(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _bound(dt: float, fit: OutputErrorFit, max_delay: float | None) -> Flag | None:
+def _bound(dt: float, fit: OutputErrorEstimate, max_delay: float | None) -> Flag | None:
     if max_delay is None or fit.latest < max_delay * dt * (1 - 1e-9):
         return None
     if fit.high < 0.98 * fit.latest:
@@ -95,7 +97,7 @@ def _bound(dt: float, fit: OutputErrorFit, max_delay: float | None) -> Flag | No
     )
 
 
-def _misfit(fit: OutputErrorFit) -> Flag | None:
+def _misfit(fit: OutputErrorEstimate) -> Flag | None:
     if fit.adequate:
         return None
     return Flag(
@@ -110,7 +112,7 @@ def _misfit(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _disagreement(dt: float, fit: OutputErrorFit, firm: str) -> Flag | None:
+def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None:
     if fit.views:
         width = fit.high - fit.low
         if width <= 0.3 * max(fit.delay, dt):
@@ -129,11 +131,11 @@ def _disagreement(dt: float, fit: OutputErrorFit, firm: str) -> Flag | None:
     )
 
 
-def _near(fit: OutputErrorFit, delay: float) -> bool:
+def _near(fit: OutputErrorEstimate, delay: float) -> bool:
     return abs(delay - fit.delay) <= 0.15 * fit.delay
 
 
-def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
+def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
     if fit.low > _SAMPLES_BESIDE_NOTHING * dt:
         return None
     return Flag(
@@ -141,7 +143,7 @@ def _nothing(dt: float, fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _many_lags(fit: OutputErrorFit, firm: str) -> Flag | None:
+def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
     if fit.like_flow and not fit.endless:
         return Flag(
             "many_lags",
@@ -157,7 +159,7 @@ def _many_lags(fit: OutputErrorFit, firm: str) -> Flag | None:
     )
 
 
-def _dispersed(fit: OutputErrorFit) -> Flag | None:
+def _dispersed(fit: OutputErrorEstimate) -> Flag | None:
     """Say so where a flow explains the response better than lags."""
     flow = min(fit.flows, key=lambda flow: flow.excess, default=None)
     if flow is None or (flow.excess >= 0 and not fit.follows_flow):
@@ -180,7 +182,7 @@ def _dispersed(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _open_start(fit: OutputErrorFit, firm: str) -> Flag | None:
+def _open_start(fit: OutputErrorEstimate, firm: str) -> Flag | None:
     if not fit.open_start:
         return None
     return Flag(
@@ -191,7 +193,7 @@ def _open_start(fit: OutputErrorFit, firm: str) -> Flag | None:
     )
 
 
-def _gain(fit: OutputErrorFit, length: float) -> Flag | None:
+def _gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
     """Say so where the record does not tell the sign of the gain."""
     low, high = fit.gain_ends
     if fit.static is None or not low <= 0 <= high:
@@ -210,13 +212,13 @@ def _gain(fit: OutputErrorFit, length: float) -> Flag | None:
     )
 
 
-def _only_total(fit: OutputErrorFit) -> str:
+def _only_total(fit: OutputErrorEstimate) -> str:
     """Say that the total delay is firm, where it is."""
     firm = fit.static is None or is_firm(fit.static.total, fit.total_ends)
     return "; only the total delay is firm" if firm else ""
 
 
-def _inverse(fit: OutputErrorFit) -> Flag | None:
+def _inverse(fit: OutputErrorEstimate) -> Flag | None:
     if fit.follows_flow:
         # Zeros on the right make the beginning late, as that of a flow is.
         return None
@@ -231,7 +233,7 @@ def _inverse(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _disturbances(data: StepData, fit: OutputErrorFit) -> list[Flag | None]:
+def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]:
     flags: list[Flag | None] = []
     if data.edge < 8:
         flags.append(

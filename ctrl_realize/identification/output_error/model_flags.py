@@ -6,7 +6,7 @@ import numpy as np
 
 from ..._wording import interval_in_time
 from ...numerics.arrays import ComplexArray, FloatArray
-from ...numerics.output_error.result import OutputErrorFit
+from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.separable.lag_chains import lag_sum
 from ...results import Flag
 
@@ -20,7 +20,7 @@ SETTLED = 3.0
 """Time constants after which a lag counts as settled: 95 % of its step response."""
 
 
-def slow_modes(fit: OutputErrorFit, length: float) -> Flag | None:
+def slow_modes(fit: OutputErrorEstimate, length: float) -> Flag | None:
     """Tell whether a record of `length` s ends before the slowest mode has died away."""
     slowest = float(np.abs(fit.poles).min()) * length
     if slowest < INTEGRATOR:
@@ -42,7 +42,7 @@ def slow_modes(fit: OutputErrorFit, length: float) -> Flag | None:
     )
 
 
-def open_gain(fit: OutputErrorFit) -> Flag | None:
+def open_gain(fit: OutputErrorEstimate) -> Flag | None:
     """Tell whether structures that are not ruled out differ in gain or total delay."""
     kept = [line for line in fit.structures if line.excess <= _AS_GOOD]
     gain, total = _gain_and_total(fit)
@@ -58,7 +58,7 @@ def open_gain(fit: OutputErrorFit) -> Flag | None:
     )
 
 
-def _gain_and_total(fit: OutputErrorFit) -> tuple[float, float]:
+def _gain_and_total(fit: OutputErrorEstimate) -> tuple[float, float]:
     own = float(np.real(fit.numerator[0] / np.prod(-fit.poles)))
     return own, fit.delay + lag_sum(fit.poles, fit.numerator)
 
@@ -78,7 +78,7 @@ def _not_died_away(poles: ComplexArray, seen: float) -> ComplexArray:
     return poles[slow & (np.abs(poles.imag) * seen < 2 * np.pi)]
 
 
-def cancelled_pair(fit: OutputErrorFit) -> Flag | None:
+def cancelled_pair(fit: OutputErrorEstimate) -> Flag | None:
     """Tell whether the model has a pair of poles that the input does not move."""
     zeros = np.roots(fit.numerator[::-1])
     for pole in fit.poles[fit.poles.imag > 0]:

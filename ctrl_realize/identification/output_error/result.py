@@ -57,7 +57,7 @@ class StructureRow:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DelayFit(Result):
+class OutputErrorFit(Result):
     """Dead time and model from an output-error fit of raw records.
 
     ``interval[0] <= dead_time <= interval[1]`` and
@@ -138,7 +138,7 @@ class DelayFit(Result):
     >>> u = np.where(t < 1.0, 0.0, 2.0)
     >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
     >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
-    >>> fit = cr.fit_delay(cr.Record(t, u, y + noise), structures=[(1, 1)]).fit
+    >>> fit = cr.fit_output_error(cr.Record(t, u, y + noise), structures=[(1, 1)]).fit
     >>> print(f"{fit.dead_time:.4f} s, within {fit.interval[0]:.4f} to {fit.interval[1]:.4f} s")
     0.1250 s, within 0.1245 to 0.1254 s
     """
@@ -206,7 +206,8 @@ class DelayFit(Result):
         low, high = self.interval
         level = "noise" if self.at_noise_level else f"{self.misfit:.2g} x noise"
         return (
-            f"<DelayFit {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, order {self.order}, "
+            f"<OutputErrorFit {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, "
+            f"order {self.order}, "
             f"relative degree {self.relative_degree}, residual {level}>"
         )
 

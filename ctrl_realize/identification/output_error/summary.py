@@ -10,29 +10,29 @@ import numpy as np
 from ..._wording import interval_in_time
 from ...data import Record
 from ...numerics.arrays import ComplexArray, FloatArray, locked
-from ...numerics.output_error.result import Better, OutputErrorFit
+from ...numerics.output_error.result import Better, OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR
 from ...results import Flag
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
-from .result import DelayFit, StructureRow
+from .result import OutputErrorFit, StructureRow
 
 
 def summarise(
-    fit: OutputErrorFit,
+    fit: OutputErrorEstimate,
     data: StepData,
     time: FloatArray,
     records: tuple[Record, ...],
     flags: tuple[Flag, ...],
-) -> DelayFit:
-    """Collect a `DelayFit`."""
+) -> OutputErrorFit:
+    """Collect a `OutputErrorFit`."""
     length = (data.output.size - data.edge) * data.dt
     poles = np.where(np.abs(fit.poles) < INTEGRATOR / length, 0.0, fit.poles)
     onset = data.motion.onset * data.dt if data.motion is not None else float("nan")
     zeros = np.roots(fit.numerator[::-1]).astype(np.complex128)
-    return DelayFit(
+    return OutputErrorFit(
         dead_time=fit.delay,
         std_given_structure=fit.std,
         interval=(fit.low, fit.high),
@@ -82,7 +82,7 @@ def _row_of(better: Better) -> StructureRow:
     return StructureRow(n, r, better.delay, better.total, -better.excess, ends)
 
 
-def with_repeats(result: DelayFit, repeats: Repeatability) -> DelayFit:
+def with_repeats(result: OutputErrorFit, repeats: Repeatability) -> OutputErrorFit:
     """Say how the records differ; the interval of the gain holds theirs where they do."""
     low, high = result.gain_interval
     kept = [name not in repeats.outlying for name in repeats.names]
@@ -92,7 +92,7 @@ def with_repeats(result: DelayFit, repeats: Repeatability) -> DelayFit:
     return replace(result, repeatability=repeats, gain_interval=(float(low), float(high)))
 
 
-def fitted_core(fit: OutputErrorFit, poles: ComplexArray) -> ct.StateSpace:
+def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
     """Companion form of b(s)/a(s), in a time unit that makes its entries comparable."""
     n = poles.size
     moving = np.abs(poles[poles != 0])
@@ -107,7 +107,7 @@ def fitted_core(fit: OutputErrorFit, poles: ComplexArray) -> ct.StateSpace:
     return ct.StateSpace(unit * matrix, unit * last, b[None], np.zeros((1, 1)))
 
 
-def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
+def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     s = fit.structure
     simple = " with up to three poles" if fit.views else ""
     kind = fit.chain or f"order {s.order}, relative degree {s.relative_degree}"
@@ -139,7 +139,7 @@ def _choices(fit: OutputErrorFit) -> tuple[str, ...]:
     return tuple(reasons)
 
 
-def _interval_of(fit: OutputErrorFit) -> str:
+def _interval_of(fit: OutputErrorEstimate) -> str:
     """Say what the interval is made of: structures of the table, and what reaches beyond them."""
     ends = [(line.low, line.high) for line in fit.structures if line.low == line.low]
     parts = [f"{len(ends)} structure(s)"] if ends else []

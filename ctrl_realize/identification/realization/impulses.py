@@ -77,7 +77,7 @@ def check_samples(
 
 def check_order(impulse: ImpulseResponse, order: int, samples: int, *, padded: bool) -> None:
     """Raise when the Hankel matrix is too small for the order."""
-    largest = hankel_size(samples, padded=padded) * min(impulse.n_inputs, impulse.n_outputs)
+    largest = hankel_size(samples, padded=padded) * min(impulse.ninputs, impulse.noutputs)
     if not 1 <= order <= largest:
         raise OrderError(
             f"order={order}, but a Hankel matrix of {samples} samples allows "
@@ -108,8 +108,8 @@ def settled_samples(impulse: ImpulseResponse, order: int, max_delay: int) -> int
         raise DataError(
             f"a scan of {max_delay + 1} delays over {fits} samples would take hours: the response "
             "is sampled far more finely than it moves; take every so many samples (of the record, "
-            "behind a low-pass), give max_delay= and samples=, or use fit_delay, which takes "
-            "samples together by itself"
+            "behind a low-pass), give max_delay= and samples=, or use fit_output_error, which "
+            "takes samples together by itself"
         )
     return min(fits, affordable, max(3 * settled, 256, 8 * order))
 

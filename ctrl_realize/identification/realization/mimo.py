@@ -29,7 +29,7 @@ ALIKE, EXACT = 1.5, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ChannelRealization(Result):
+class MimoRealization(Result):
     """How a model of several channels was put together.
 
     ``delays[i, j] == output_delays[i] + input_delays[j] + rest[i, j]``, where `rest` is inside
@@ -57,7 +57,7 @@ class ChannelRealization(Result):
     >>> import ctrl_realize as cr
     >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
     >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
-    >>> found = cr.realize_channels(np.array(late)[:, None, :], 1, dt=0.1).fit
+    >>> found = cr.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1).fit
     >>> found.structure, found.delays.ravel().tolist(), found.output_delays, found.input_delays
     ('common', [3, 7], (0, 4), (3,))
     """
@@ -89,10 +89,10 @@ class ChannelRealization(Result):
 
     def __repr__(self) -> str:
         p, m = self.delays.shape
-        return f"<ChannelRealization: {p} x {m}, {self.structure}, {self.states} states>"
+        return f"<MimoRealization: {p} x {m}, {self.structure}, {self.states} states>"
 
 
-def channel_delays(
+def delay_matrix(
     impulse: ImpulseResponse | ArrayLike, *, level: float = 0.1, dt: float | None = None
 ) -> IntArray:
     """Find the delay of every channel where its response sets in.
@@ -126,7 +126,7 @@ def channel_delays(
     >>> import ctrl_realize as cr
     >>> pulse = 0.8 ** np.arange(60)
     >>> late = [np.r_[np.zeros(d + 1), pulse][:60] for d in (3, 7)]
-    >>> cr.channel_delays(np.array(late)[:, None, :], dt=0.1)
+    >>> cr.delay_matrix(np.array(late)[:, None, :], dt=0.1)
     array([[3],
            [7]])
     """
@@ -149,7 +149,7 @@ def channel_delays(
 
 
 @single_threaded
-def realize_channels(
+def realize_mimo(
     impulse: ImpulseResponse | ArrayLike,
     order: int,
     *,
@@ -176,9 +176,9 @@ def realize_channels(
         States of each model that the core is made of, without delays; less where the data have a
         lower rank.
     delays : array_like of int, shape (p, m), optional
-        Delay of every channel, -1 where there is no response. Default: `channel_delays`.
+        Delay of every channel, -1 where there is no response. Default: `delay_matrix`.
     level : float, default 0.1
-        For `channel_delays`.
+        For `delay_matrix`.
     structure : {"auto", "common", "rows", "columns"}
         ``"common"`` keeps one A even where channels are left with delays inside; they then count
         in `order`.
@@ -190,7 +190,7 @@ def realize_channels(
     Returns
     -------
     DelayedStateSpace
-        With a delay for every input and output; its `fit` is a `ChannelRealization`.
+        With a delay for every input and output; its `fit` is a `MimoRealization`.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def realize_channels(
     ...     [[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1
     ... )
     >>> plant = cr.DelayedStateSpace(core, (2, 5), output_delay=(0, 9))
-    >>> sys = cr.realize_channels(plant.markov(200), 2, level=0, dt=0.1)
+    >>> sys = cr.realize_mimo(plant.markov(200), 2, level=0, dt=0.1)
     >>> sys.input_delays, sys.output_delays
     ((2, 5), (0, 9))
     >>> bool(np.allclose(sys.markov(200), plant.markov(200)))
@@ -221,7 +221,7 @@ def realize_channels(
     choice = one_of(structure, "structure", ("auto", "common", "rows", "columns"))
     one_of(hankel, "hankel", HANKEL)
     markov = channels(data)
-    found = channel_delays(data, level=level) if delays is None else given_delays(delays, markov)
+    found = delay_matrix(data, level=level) if delays is None else given_delays(delays, markov)
     known = found >= 0
     if not known.any():
         raise DataError("no channel has a response; is the input connected?")
@@ -247,7 +247,7 @@ def realize_channels(
     behind, before = (np.array(d, dtype=np.int64) for d in (pieces.outputs, pieces.inputs))
     return pieces.system(
         data.dt,
-        ChannelRealization(
+        MimoRealization(
             delays=_locked(found),
             rest=_locked(np.where(known, found - np.add.outer(behind, before), 0)),
             output_delays=pieces.outputs,

@@ -91,7 +91,7 @@ class Realization(Result):
         count = whole(count, "count", 1)
         padded = self.hankel == "padded"
         size = hankel_size(self.samples, padded=padded)
-        count = min(count, size * min(self.impulse.n_inputs, self.impulse.n_outputs))
+        count = min(count, size * min(self.impulse.ninputs, self.impulse.noutputs))
         if count <= self.singular_values.size:
             return self.singular_values[:count]
         markov = channels(self.impulse)

@@ -23,7 +23,7 @@ from ...numerics.state_space.sections import in_sections
 from ...results import Flag
 from ..impulse.from_io import Method, Start, as_group, impulse_from_io
 from ..long_records import lively_parts
-from ..realization.mimo import channel_delays, given_delays
+from ..realization.mimo import delay_matrix, given_delays
 from .result import fitted_system
 from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, experiments
 
@@ -45,7 +45,7 @@ STILL = 10
 
 
 @single_threaded
-def fit_channels(
+def fit_state_space(
     records: Record | Sequence[Record],
     order: int | Sequence[int] | None = None,
     *,
@@ -76,7 +76,7 @@ def fit_channels(
     -------
     DelayedStateSpace
         Stable, in balanced coordinates, with a delay for every input and output; its `fit` is a
-        `ChannelFit`.
+        `StateSpaceFit`.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def fit_channels(
 
     See Also
     --------
-    fit_delay : One input and output, with a delay between samples and its interval.
+    fit_output_error : One input and output, with a delay between samples and its interval.
     refine : The last step by itself, from any model.
 
     Notes
@@ -116,7 +116,7 @@ def fit_channels(
     >>> rng = np.random.default_rng(1)
     >>> u = rng.choice([-1.0, 1.0], (2, 600))
     >>> y = plant.simulate(u) + 0.1 * rng.standard_normal((2, 600))
-    >>> sys = cr.fit_channels(cr.Record(0.1 * np.arange(600), u, y))
+    >>> sys = cr.fit_state_space(cr.Record(0.1 * np.arange(600), u, y))
     >>> sys.fit.order, sys.fit.input_delays, sys.fit.output_delays
     (2, (2, 5), (0, 0))
     """
@@ -184,15 +184,15 @@ def _from_start(
         # What the prior has filled in only serves as a start.
         warnings.simplefilter("ignore", DataWarning)
         impulse = impulse_from_io(group, method=method, start=start)
-    markov = np.reshape(impulse.markov, (group[0].n_outputs, group[0].n_inputs, -1))
+    markov = np.reshape(impulse.markov, (group[0].noutputs, group[0].ninputs, -1))
     unseen = sum(flag.code == "no_response" for flag in impulse.flags)
-    if unseen == group[0].n_outputs:
+    if unseen == group[0].noutputs:
         raise DataError(
             "no output shows a response to the inputs above the noise; are the channels right?"
         )
     search = Search(group, markov, max(asked or ORDERS), enough)
     orders = search.orders(asked)
-    found = channel_delays(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
+    found = delay_matrix(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
     shares = _split(found)
     fits = search.by_order(orders, shares, direct=feedthrough is not False)
     best = min(fits, key=lambda c: c.bic)
@@ -257,14 +257,14 @@ def refine(
         Discrete, with the sample time of the records, from `realize` for example; poles outside
         the unit circle are drawn inside first.
     records : Record or sequence of Record
-        As for `fit_channels`.
+        As for `fit_state_space`.
     feedthrough : bool, optional
         Whether there is a direct term. Default: if `system` has one.
 
     Returns
     -------
     DelayedStateSpace
-        Its `fit` is a `ChannelFit`.
+        Its `fit` is a `StateSpaceFit`.
 
     Raises
     ------

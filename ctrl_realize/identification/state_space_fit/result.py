@@ -13,9 +13,9 @@ from ...delayed import DelayedStateSpace
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.state_space.balancing import balanced_truncation
 from ...results import Flag, Result
-from ..output_error.result import DelayFit
-from ..validation.residuals import check_residuals
-from ..validation.residuals_result import ResidualCheck
+from ..output_error.result import OutputErrorFit
+from ..validation.residuals import analyse_residuals
+from ..validation.residuals_result import ResidualAnalysis
 from .search import Candidate
 
 COLOURED, WANDERING = 0.5, 0.97
@@ -28,7 +28,7 @@ LAGS = 25
 
 
 @dataclass(frozen=True, eq=False)
-class ChannelFit(Result):
+class StateSpaceFit(Result):
     """How a model was fitted to records of one or several channels.
 
     Attributes
@@ -48,7 +48,7 @@ class ChannelFit(Result):
         Gauss-Newton steps of the last fit.
     fit_percent : ndarray, shape (p,)
         ``100 (1 - noise_std / std y)`` of every output, over all records.
-    checks : tuple of ResidualCheck
+    checks : tuple of ResidualAnalysis
         Of every record without gaps.
     dead_time : float, optional
         In s, of one input and output that `identify` has fitted; None otherwise.
@@ -57,7 +57,7 @@ class ChannelFit(Result):
         leave twice as much.
     total_delay : float, optional
         Delay at zero frequency in s.
-    lags : DelayFit, optional
+    lags : OutputErrorFit, optional
         The fit of lags behind a dead time, which left too much, and whose place this one takes.
     records : tuple of Record
         What was fitted.
@@ -75,9 +75,9 @@ class ChannelFit(Result):
     >>> plant = cr.delayed_ss(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
     >>> y = plant.simulate(u) + 0.05 * noise
-    >>> fit = cr.fit_channels(cr.Record(0.1 * np.arange(500), u, y), 1).fit
+    >>> fit = cr.fit_state_space(cr.Record(0.1 * np.arange(500), u, y), 1).fit
     >>> fit
-    <ChannelFit: order 1, fit 85.7 %>
+    <StateSpaceFit: order 1, fit 85.7 %>
     >>> fit.input_delays, fit.noise_std.round(2), fit.checks[0].independent
     ((5,), array([0.05]), True)
     """
@@ -90,14 +90,14 @@ class ChannelFit(Result):
     noise_std: FloatArray
     fit_percent: FloatArray
     steps: int
-    checks: tuple[ResidualCheck, ...]
+    checks: tuple[ResidualAnalysis, ...]
     records: tuple[Record, ...]
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
     dead_time: float | None = None
     interval: tuple[float, float] | None = None
     total_delay: float | None = None
-    lags: DelayFit | None = None
+    lags: OutputErrorFit | None = None
 
     @property
     def delay(self) -> int | None:
@@ -152,7 +152,7 @@ class ChannelFit(Result):
 
     def __repr__(self) -> str:
         fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
-        return f"<ChannelFit: order {self.order}, fit {fit} %>"
+        return f"<StateSpaceFit: order {self.order}, fit {fit} %>"
 
 
 def fitted_system(
@@ -169,7 +169,7 @@ def fitted_system(
     system = DelayedStateSpace(core, best.inputs, output_delay=best.outputs)
     complete = [r for r in group if not r.n_missing]
     checks = tuple(
-        check_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
+        analyse_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
     )
     seen = {flag.code: flag for check in checks for flag in check.flags}
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
@@ -179,13 +179,13 @@ def fitted_system(
         advice = "compare a lower order on other data"
         if slow and group[0].issiso:
             advice = (
-                "the slowest pole is slower than the record, as of an integrator: fit_delay (or "
-                "identify) fits those of one input and output"
+                "the slowest pole is slower than the record, as of an integrator: fit_output_error "
+                "(or identify) fits those of one input and output"
             )
         elif slow or neighbours > WANDERING:
             advice = (
                 "the output wanders like an integral: fit differences of input and output "
-                "(np.diff of both), each channel by fit_delay, or a frequency response "
+                "(np.diff of both), each channel by fit_output_error, or a frequency response "
                 "(spectral_frf, fit_frf)"
             )
         seen["coloured_residual"] = Flag(
@@ -194,7 +194,7 @@ def fitted_system(
             "drifts, or a plant that is not linear. BIC takes them for independent, so the order "
             f"may be too high, with slow poles that follow the drift; {advice}",
         )
-    fit = ChannelFit(
+    fit = StateSpaceFit(
         order=core.nstates,
         input_delays=best.inputs,
         output_delays=best.outputs,

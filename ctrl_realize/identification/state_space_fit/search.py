@@ -31,7 +31,7 @@ FARTHEST = 200
 """Moves of delays after which the search for them ends."""
 
 RULED_OUT = 10.0
-"""Excess of the criterion from which the data rule a delay out, as in `fit_delay`."""
+"""Excess of the criterion from which the data rule a delay out, as in `fit_output_error`."""
 FARTHEST_PLAUSIBLE = 12
 """Samples around a delay that are looked at."""
 

@@ -13,7 +13,7 @@ from ...results import Result
 
 
 @dataclass(frozen=True, eq=False)
-class TrackedDelay(Result):
+class TrackPoint(Result):
     """What the samples of the forgetting window say at one moment.
 
     ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
@@ -99,11 +99,11 @@ class TrackedDelay(Result):
 
     def __repr__(self) -> str:
         told = "" if self.tells else f", cannot tell: {self.reason}"
-        return f"<TrackedDelay {self.delay} {self.delay_interval} at {self.time:.6g} s{told}>"
+        return f"<TrackPoint {self.delay} {self.delay_interval} at {self.time:.6g} s{told}>"
 
 
 @dataclass(frozen=True, eq=False)
-class DelayTrack(Result):
+class TrackHistory(Result):
     """Course of a tracked delay: all arrays have one entry for each moment in `time`.
 
     Where ``tells`` is false, nothing is claimed; `low` and `high` then only show what is left
@@ -122,7 +122,7 @@ class DelayTrack(Result):
     tells : ndarray of bool, shape (K,)
         Whether the samples within the memory tell a delay.
     lost : ndarray of bool, shape (K,)
-        Where the residual was much louder than the model's, see `TrackedDelay`.
+        Where the residual was much louder than the model's, see `TrackPoint`.
     dt : float
         Sample time in s.
 
@@ -183,16 +183,16 @@ class DelayTrack(Result):
         ]
 
     def __repr__(self) -> str:
-        return f"<DelayTrack: {self.time.size} moments, told at {int(self.tells.sum())}>"
+        return f"<TrackHistory: {self.time.size} moments, told at {int(self.tells.sum())}>"
 
 
-def track_of(course: Sequence[TrackedDelay], dt: float) -> DelayTrack:
+def track_of(course: Sequence[TrackPoint], dt: float) -> TrackHistory:
     """Put single moments into the arrays of a track."""
 
     def along(values: Iterable[float]) -> FloatArray:
         return read_only(np.array(list(values)))
 
-    return DelayTrack(
+    return TrackHistory(
         time=along(moment.time for moment in course),
         dead_time=along(moment.dead_time for moment in course),
         low=along(moment.interval[0] for moment in course),

@@ -26,7 +26,7 @@ from ...numerics.state_space.pole_sensitivity import (
 )
 from .checks import check_candidates, check_memory, check_start, model_noise
 from .estimate import LinearisedBank, Solution, solve
-from .results import DelayTrack, TrackedDelay, track_of
+from .results import TrackHistory, TrackPoint, track_of
 
 MOMENTS = 50
 """Estimates made in one memory."""
@@ -102,7 +102,7 @@ class DelayTracker:
     more, and takes over. Until then the delay may be off by a tenth of the lag per tenth of a
     pole's speed, and beyond 30 % nothing is claimed. A delay outside the candidates, poles that
     have left at once and a drifting disturbance leave a residual much louder than the model's:
-    nothing is told then, and `TrackedDelay.lost` is true. `reset` starts anew from
+    nothing is told then, and `TrackPoint.lost` is true. `reset` starts anew from
     here. Probabilities of delays count exponential weights as whole samples, which is on the safe
     side, and a residual that is slower than white as fewer of them.
 
@@ -254,7 +254,7 @@ class DelayTracker:
             self._start = (core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]))
         self._begin(self._start, np.linalg.eigvals(self._start[0]).astype(np.complex128))
 
-    def estimate(self) -> TrackedDelay:
+    def estimate(self) -> TrackPoint:
         """Tell what the samples so far say; asking changes nothing."""
         return self._latest()[1]
 
@@ -273,7 +273,7 @@ class DelayTracker:
         )
 
     @single_threaded
-    def run(self, record: Record) -> DelayTrack:
+    def run(self, record: Record) -> TrackHistory:
         """Take in a whole record, and return the course of the estimate.
 
         Raises
@@ -288,7 +288,7 @@ class DelayTracker:
             raise DataError(
                 f"the record has the sample time {record.dt:g} s, the model {self.dt:g} s"
             )
-        course: list[TrackedDelay] = []
+        course: list[TrackPoint] = []
         for u, y in zip(record.input.ravel(), record.output.ravel(), strict=True):
             self.update(float(u), float(y))
             if self._count % self._stride == 0:
@@ -321,7 +321,7 @@ class DelayTracker:
             return None
         return solve(self._now, self._variance, self._residual.inflation)
 
-    def _latest(self) -> tuple[Solution | None, TrackedDelay]:
+    def _latest(self) -> tuple[Solution | None, TrackPoint]:
         """Return what holds now: what was kept, where no sample has come since."""
         if self._count % self._stride == 0:
             return self._solution, self._told
@@ -356,9 +356,9 @@ class DelayTracker:
         if wait is not None:
             self._next = replace(fresh, begin=self._count + wait + self._high + 1)
 
-    def _nothing_yet(self) -> TrackedDelay:
+    def _nothing_yet(self) -> TrackPoint:
         low = self._low
-        return TrackedDelay(
+        return TrackPoint(
             time=max(self._count - 1, 0) * self.dt,
             delay=low,
             dead_time=low * self.dt,
@@ -372,11 +372,11 @@ class DelayTracker:
             reason=f"only {self._count} samples yet" if self._count else "no samples yet",
         )
 
-    def _tell(self, found: Solution | None) -> TrackedDelay:
+    def _tell(self, found: Solution | None) -> TrackPoint:
         if found is None:
             return self._nothing_yet()
         loud, pending = self._too_loud(found), self._pending()
-        return TrackedDelay(
+        return TrackPoint(
             time=(self._count - 1) * self.dt,
             delay=found.delay,
             dead_time=found.place * self.dt,

@@ -18,7 +18,7 @@ from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.noise import correlation_time, kept_in_blocks
 from ...results import Flag, Result
-from ..output_error.fit import fit_delay
+from ..output_error.fit import fit_output_error
 
 Estimator: TypeAlias = Callable[[Any], DelayedStateSpace]
 
@@ -61,7 +61,7 @@ class Bootstrap(Result):
     >>> u = np.where(t < 0.5, 0.0, 2.0)
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
-    >>> again = cr.bootstrap(record, partial(cr.fit_delay, structures=[(1, 1)]), repeats=10)
+    >>> again = cr.bootstrap(record, partial(cr.fit_output_error, structures=[(1, 1)]), repeats=10)
     >>> print(f"{again.system.fit.dead_time:.4f} s, and {again.std:.4f} s of scatter")
     0.1250 s, and 0.0002 s of scatter
     """
@@ -155,7 +155,7 @@ class Bootstrap(Result):
 @single_threaded
 def bootstrap(
     records: Record | Sequence[Record],
-    estimator: Estimator = fit_delay,
+    estimator: Estimator = fit_output_error,
     *,
     repeats: int = 200,
     block: int | None = None,
@@ -172,7 +172,7 @@ def bootstrap(
     records : Record or sequence of Record
         What `estimator` is given.
     estimator : callable, optional
-        Any method that makes a `DelayedStateSpace` of them: `fit_delay`, or for example
+        Any method that makes a `DelayedStateSpace` of them: `fit_output_error`, or for example
         ``functools.partial(identify, method="scan")``.
     repeats : int, optional
         Number of draws.
@@ -211,7 +211,7 @@ def bootstrap(
     >>> u = np.where(t < 0.5, 0.0, 2.0)
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
-    >>> lag = partial(cr.fit_delay, structures=[(1, 1)])
+    >>> lag = partial(cr.fit_output_error, structures=[(1, 1)])
     >>> again = bootstrap(record, lag, repeats=10)
     >>> print(f"{again.interval[0]:.4f} to {again.interval[1]:.4f} s")
     0.1245 to 0.1253 s

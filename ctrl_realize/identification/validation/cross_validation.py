@@ -31,11 +31,11 @@ def cross_validate(
     Parameters
     ----------
     systems : dict of str to control.StateSpace, or control.StateSpace
-        Models by name, or one; any that `check_residuals` takes.
+        Models by name, or one; any that `analyse_residuals` takes.
     records : Record or sequence of Record
         Best those that no model has seen. Of the same name the second gets a number.
     start : {"estimate", "rest"}
-        As for `check_residuals`.
+        As for `analyse_residuals`.
 
     Returns
     -------

@@ -13,12 +13,12 @@ from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_ti
 from ...numerics.signals.onset import correlation_onset, phase_slope
 from ...results import Flag
 from ..impulse.from_io import impulse_from_io
-from ..output_error.fit import fit_delay
-from ..output_error.result import DelayFit
+from ..output_error.fit import fit_output_error
+from ..output_error.result import OutputErrorFit
 from ..realization.delay_scan import estimate_delay
 from ..step.impulse import impulse_from_step
 from ..step.steps import unit_step
-from .delay_estimates_result import DelayCheck, DelayView, common_dead_time
+from .delay_estimates_result import DelayComparison, DelayEstimate, common_dead_time
 
 TOP_BAND = 1 / 3
 """Part of the band, from its upper end, where the slope of the phase is taken."""
@@ -33,16 +33,16 @@ DOUBTFUL = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_lead
 
 
 @single_threaded
-def check_delay(
+def compare_delay_estimates(
     record: Record | None = None,
     *,
     frf: MeasuredFRF | None = None,
     max_delay: int | None = None,
     order: int | None = None,
-) -> DelayCheck:
+) -> DelayComparison:
     """Estimate a delay in every way that the data allow, and compare.
 
-    From a record: output-error fit (`fit_delay`), the paper's scan (`estimate_delay`, on the
+    From a record: output-error fit (`fit_output_error`), the paper's scan (`estimate_delay`, on the
     differentiated step or on `impulse_from_io`), first motion after a step, and the onset of
     the cross-correlation with a whitened input. From an FRF: fit with a free dead time
     (`fit_frf`) and slope of the phase at the top of the band.
@@ -61,7 +61,7 @@ def check_delay(
 
     Returns
     -------
-    DelayCheck
+    DelayComparison
 
     Raises
     ------
@@ -87,7 +87,7 @@ def check_delay(
     >>> rng = np.random.default_rng(0)
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 100), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(1500)
-    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(1500), u, y))
+    >>> check = cr.compare_delay_estimates(cr.Record(0.01 * np.arange(1500), u, y))
     >>> check.agree, [view.method for view in check.views]
     (True, ['output error', 'scan', 'cross-correlation'])
     """
@@ -97,7 +97,7 @@ def check_delay(
         whole(max_delay, "max_delay", 0)
     if order is not None:
         whole(order, "order", 1)
-    views: list[DelayView] = []
+    views: list[DelayEstimate] = []
     flags: list[Flag] = []
     if record is not None:
         _from_record(record, max_delay, order, views, flags)
@@ -106,7 +106,7 @@ def check_delay(
     if not views:
         raise DataError("no method found a delay: " + "; ".join(map(str, flags)))
     common, conflicts = common_dead_time(views)
-    return DelayCheck(
+    return DelayComparison(
         views=tuple(views),
         agree=common is not None,
         common=common,
@@ -120,25 +120,29 @@ def _from_record(
     record: Record,
     max_delay: int | None,
     order: int | None,
-    views: list[DelayView],
+    views: list[DelayEstimate],
     flags: list[Flag],
 ) -> None:
-    check_complete(record, "check_delay")
+    check_complete(record, "compare_delay_estimates")
     if not record.issiso:
         raise DataError(f"{record!r} has several channels; needed is one input and one output")
     dt = record.dt
     total, model_order, stepped = 0.1 * record.n_samples * dt, 2, False
     try:
-        fit: DelayFit = fit_delay(record).fit
+        fit: OutputErrorFit = fit_output_error(record).fit
     except CtrlRealizeError as problem:
         flags.append(Flag("no_output_error", f"output error: {problem}"))
     else:
-        views.append(DelayView("output error", "record", "dead time", fit.dead_time, *fit.interval))
+        views.append(
+            DelayEstimate("output error", "record", "dead time", fit.dead_time, *fit.interval)
+        )
         stepped = bool(np.isfinite(fit.onset))
         if stepped:
             # Walked back to the last sample at rest; the motion began within the sample before.
             first = max(fit.onset, 0.0)
-            views.append(DelayView("first motion", "record", "upper bound", first, 0.0, first + dt))
+            views.append(
+                DelayEstimate("first motion", "record", "upper bound", first, 0.0, first + dt)
+            )
         total, model_order = max(fit.total_delay, fit.dead_time), min(fit.order, 3)
     most = int(np.ceil(total / dt)) + 10 if max_delay is None else max_delay
     try:
@@ -149,7 +153,9 @@ def _from_record(
         _from_correlation(record, most, views, flags)
 
 
-def _from_correlation(record: Record, most: int, views: list[DelayView], flags: list[Flag]) -> None:
+def _from_correlation(
+    record: Record, most: int, views: list[DelayEstimate], flags: list[Flag]
+) -> None:
     lags = int(min(MOST_LAGS, max(most, 20), record.n_samples // 4))
     seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 1 - UNSEEN)
     if seen.onset < 0:
@@ -159,10 +165,10 @@ def _from_correlation(record: Record, most: int, views: list[DelayView], flags: 
         return
     # Behind a hold, what is seen at lag k for the first time came within the sample before.
     value = seen.onset * record.dt
-    views.append(DelayView("cross-correlation", "record", "upper bound", value, 0.0, value))
+    views.append(DelayEstimate("cross-correlation", "record", "upper bound", value, 0.0, value))
 
 
-def _scan(record: Record, stepped: bool, most: int, order: int, total: float) -> DelayView:
+def _scan(record: Record, stepped: bool, most: int, order: int, total: float) -> DelayEstimate:
     if stepped:
         impulse = impulse_from_step(unit_step(record))
     else:
@@ -171,7 +177,7 @@ def _scan(record: Record, stepped: bool, most: int, order: int, total: float) ->
         impulse = impulse_from_io(record, length)
     scan = estimate_delay(impulse, order, max_delay=min(most, impulse.n_samples // 2)).fit
     low, high = scan.delay_interval
-    return DelayView(
+    return DelayEstimate(
         "scan",
         "record",
         "dead time",
@@ -187,7 +193,7 @@ def _doubt(flags: tuple[Flag, ...]) -> str:
     return "; ".join(str(flag) for flag in flags if flag.code in DOUBTFUL)
 
 
-def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> None:
+def _from_frf(frf: MeasuredFRF, views: list[DelayEstimate], flags: list[Flag]) -> None:
     # Not at the top: most checks have no FRF, and its fit is a large part of the package.
     from ...frequency.fit_frf import fit_frf
 
@@ -198,7 +204,7 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> No
     else:
         low, high = fit.interval
         doubt = _doubt(fit.flags)
-        views.append(DelayView("FRF fit", "FRF", "dead time", fit.dead_time, low, high, doubt))
+        views.append(DelayEstimate("FRF fit", "FRF", "dead time", fit.dead_time, low, high, doubt))
     omega = 2 * np.pi * np.asarray(frf.frequency_hz)
     values = np.asarray(frf.complex, dtype=np.complex128).ravel()
     if omega.size < 4:
@@ -207,4 +213,4 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayView], flags: list[Flag]) -> No
     phase = unwrap_with_dead_time(omega, values, dead_time_from_phase(omega, values))
     slope, std = phase_slope(omega, phase, TOP_BAND)
     low, high = max(slope - 2 * std, 0.0), slope + 2 * std
-    views.append(DelayView("phase slope", "FRF", "upper bound", slope, low, high))
+    views.append(DelayEstimate("phase slope", "FRF", "upper bound", slope, low, high))

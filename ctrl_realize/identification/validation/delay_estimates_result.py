@@ -17,7 +17,7 @@ Kind = Literal["dead time", "upper bound"]
 
 
 @dataclass(frozen=True)
-class DelayView:
+class DelayEstimate:
     """One way to look at the delay, in s.
 
     ``low <= value <= high``. A view of kind ``"dead time"`` estimates the dead time itself; an
@@ -40,7 +40,7 @@ class DelayView:
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> view = cr.DelayView("fit", "sine sweep", "dead time", 0.0289, 0.0285, 0.0294)
+    >>> view = cr.DelayEstimate("fit", "sine sweep", "dead time", 0.0289, 0.0285, 0.0294)
     >>> view.low, view.value, view.high
     (0.0285, 0.0289, 0.0294)
     """
@@ -55,7 +55,7 @@ class DelayView:
 
 
 @dataclass(frozen=True, eq=False)
-class DelayCheck(Result):
+class DelayComparison(Result):
     """Delay from several methods side by side.
 
     `agree` is true when one dead time lies in the interval of every dead-time view that counts and
@@ -65,7 +65,7 @@ class DelayCheck(Result):
 
     Attributes
     ----------
-    views : tuple of DelayView
+    views : tuple of DelayEstimate
     agree : bool
     common : tuple of float or None
         In s.
@@ -87,12 +87,12 @@ class DelayCheck(Result):
     >>> rng = np.random.default_rng(0)
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    >>> check = cr.check_delay(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
+    >>> check = cr.compare_delay_estimates(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
     >>> print(f"{check.common[0]:.3f} to {check.common[1]:.3f} s, take that of the {check.rely_on}")
     0.113 to 0.126 s, take that of the output error
     """
 
-    views: tuple[DelayView, ...]
+    views: tuple[DelayEstimate, ...]
     agree: bool
     common: tuple[float, float] | None
     conflicts: tuple[tuple[str, str], ...]
@@ -133,7 +133,7 @@ class DelayCheck(Result):
         rows += [(f"{view.method} in doubt", view.doubt) for view in self.views if view.doubt]
         return rows
 
-    def _words(self, view: DelayView) -> str:
+    def _words(self, view: DelayEstimate) -> str:
         samples = "" if self.dt is None else f" = {view.value / self.dt:.4g} samples"
         kind = "" if view.kind == "dead time" else ", upper bound"
         doubt = "; in doubt" if view.doubt else ""
@@ -142,16 +142,16 @@ class DelayCheck(Result):
 
     def __repr__(self) -> str:
         verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"
-        return f"<DelayCheck: {len(self.views)} views that {verdict}>"
+        return f"<DelayComparison: {len(self.views)} views that {verdict}>"
 
 
-def counted(views: Sequence[DelayView]) -> list[DelayView]:
+def counted(views: Sequence[DelayEstimate]) -> list[DelayEstimate]:
     """Leave out the views in doubt."""
     return [view for view in views if not view.doubt]
 
 
 def common_dead_time(
-    views: Sequence[DelayView],
+    views: Sequence[DelayEstimate],
 ) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
     """Find the dead times that no view rules out, or the pairs that rule each other out."""
     views = counted(views)
@@ -167,6 +167,6 @@ def common_dead_time(
     return None, tuple((one.method, other.method) for one, other in pairs if _apart(one, other))
 
 
-def _apart(time: DelayView, other: DelayView) -> bool:
+def _apart(time: DelayEstimate, other: DelayEstimate) -> bool:
     """Whether a dead time and another view cannot both be right."""
     return time.low > other.high or (other.kind == "dead time" and other.low > time.high)

@@ -84,7 +84,7 @@ def predict(
     Parameters
     ----------
     system, record, start
-        As for `check_residuals`.
+        As for `analyse_residuals`.
     steps : int
         Samples ahead, at least 1.
 
@@ -95,7 +95,7 @@ def predict(
     Raises
     ------
     DataError, UnsuitableSystemError, OptionError
-        As for `check_residuals`; steps that are no whole number from 1 on.
+        As for `analyse_residuals`; steps that are no whole number from 1 on.
 
     Notes
     -----

@@ -16,21 +16,21 @@ from ...numerics.arrays import BoolArray, FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.correlation import correlation, cross_bound, fit_percent, whiteness
 from ...results import Flag
-from .residuals_result import ResidualCheck
+from .residuals_result import ResidualAnalysis
 
 EXACT = 1e-8
 """Residual, as a part of the range of the output, below which a model counts as exact."""
 
 
 @single_threaded
-def check_residuals(
+def analyse_residuals(
     system: ct.StateSpace,
     record: Record,
     *,
     lags: int = 25,
     confidence: float = 0.99,
     start: Start = "estimate",
-) -> ResidualCheck:
+) -> ResidualAnalysis:
     """Simulate a model with the input of a record and look at what is left.
 
     On another record than the model was made from, this is its cross-validation.
@@ -51,7 +51,7 @@ def check_residuals(
 
     Returns
     -------
-    ResidualCheck
+    ResidualAnalysis
 
     Raises
     ------
@@ -70,9 +70,9 @@ def check_residuals(
     >>> u = rng.standard_normal(2000)
     >>> y = 7 + plant.simulate(u) + 0.05 * rng.standard_normal(2000)
     >>> record = cr.Record(0.1 * np.arange(2000), u, y)
-    >>> cr.check_residuals(plant, record)
-    <ResidualCheck: fit 85.1 %, white True, independent True>
-    >>> cr.check_residuals(plant.replace(delay=4), record).independent
+    >>> cr.analyse_residuals(plant, record)
+    <ResidualAnalysis: fit 85.1 %, white True, independent True>
+    >>> cr.analyse_residuals(plant.replace(delay=4), record).independent
     False
     """
     count = whole(lags, "lags", 1)
@@ -96,7 +96,7 @@ def check_residuals(
     later, earlier = outside[:, :, count:].copy(), outside[:, :, : count + 1].copy()
     later[:, :, 0] &= direct
     earlier[:, :, -1] &= ~direct
-    return ResidualCheck(
+    return ResidualAnalysis(
         fit_percent=read_only(fit_percent(y, simulated)),
         simulated=read_only(simulated.reshape(record.output.shape)),
         residual=read_only(e.reshape(record.output.shape)),

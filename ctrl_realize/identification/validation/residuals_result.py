@@ -13,7 +13,7 @@ from ...results import Flag, Result
 
 
 @dataclass(frozen=True, eq=False)
-class ResidualCheck(Result):
+class ResidualAnalysis(Result):
     """Residual of a simulated model against a record.
 
     ``residual == record.output - simulated``. A model that has taken all from the input leaves a
@@ -52,7 +52,7 @@ class ResidualCheck(Result):
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
     >>> record = cr.Record(0.1 * np.arange(2000), u, plant.simulate(u) + 0.05 * noise)
     >>> for delay in (5, 4):
-    ...     check = cr.check_residuals(plant.replace(delay=delay), record)
+    ...     check = cr.analyse_residuals(plant.replace(delay=delay), record)
     ...     print(delay, check.fit_percent.round(1), "free of the input:", check.independent)
     5 [85.1] free of the input: True
     4 [35.] free of the input: False
@@ -93,4 +93,6 @@ class ResidualCheck(Result):
 
     def __repr__(self) -> str:
         fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
-        return f"<ResidualCheck: fit {fit} %, white {self.white}, independent {self.independent}>"
+        return (
+            f"<ResidualAnalysis: fit {fit} %, white {self.white}, independent {self.independent}>"
+        )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..separable.profile_ends import profile_limits
-from ..separable.structures import ALL_STRUCTURES, PLAUSIBLE, Candidate, needless_charge, search
+from ..separable.structures import ALL_STRUCTURES, PLAUSIBLE, Candidate, needless_parameters, search
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
 from .result import Better, profile_of
@@ -40,8 +40,8 @@ def better_structure(
         return None
     cost = _cost(free, given)
     own = free.criteria({given.structure: Candidate(given.structure, given.parameters, cost)})
-    excess = own[given.structure] + needless_charge(given.structure)
-    excess -= free.criterion[best.structure] + needless_charge(best.structure)
+    excess = own[given.structure] + needless_parameters(given.structure)
+    excess -= free.criterion[best.structure] + needless_parameters(best.structure)
     # Too many poles are no reason: they leave as little.
     if excess <= PLAUSIBLE or cost <= best.cost + PLAUSIBLE * free.variance:
         return None

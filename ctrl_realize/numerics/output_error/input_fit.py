@@ -26,7 +26,7 @@ from .better_structure import better_structure
 from .condensed import MOST_LAGS, Condensed, condensed
 from .input_data import SampledData, cut
 from .interval import likelihood_fit
-from .result import OutputErrorFit
+from .result import OutputErrorEstimate
 from .selection import chains_of
 
 WHITE = 3.0
@@ -61,7 +61,7 @@ class SampledFit:
     are longer than `data`, `condensed` is what was fitted of them.
     """
 
-    fit: OutputErrorFit
+    fit: OutputErrorEstimate
     data: SampledData
     fitted: tuple[FloatArray, ...]
     explained: float
@@ -94,7 +94,7 @@ def fit_sampled(
     dt : float
         Sample time in s.
     structures, latest, known, huber
-        See `fit_output_error`; orders up to 3 by default, `latest` a quarter of the longest
+        See `fit_step_record`; orders up to 3 by default, `latest` a quarter of the longest
         record.
 
     Notes
@@ -223,7 +223,7 @@ def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> W
     return replace(fit, criterion=fit.criteria(found))
 
 
-def _on_stretch(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> FloatArray:
+def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> FloatArray:
     """Model at the samples of the stretch, with its own level, drift and initial state."""
     problem = data.problem(known)
     parameters = np.concatenate([[fit.delay], parameters_from_poles(fit.poles)])
@@ -281,7 +281,7 @@ def _first_order(
     return settled(problem, replace(best, ends=None), scales[0])
 
 
-def _own_delay(data: SampledData, fit: OutputErrorFit, known: KnownFactor) -> OwnResponse:
+def _own_delay(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> OwnResponse:
     """Gauss-Newton steps for gain and delay, everything else of the model being common."""
     problem = data.problem(known)
     assert problem.stretches is not None

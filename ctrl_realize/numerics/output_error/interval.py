@@ -23,7 +23,7 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, plausible
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
-from .result import OutputErrorFit, Profile, assembled, profiles_of
+from .result import OutputErrorEstimate, Profile, assembled, profiles_of
 from .selection import Choice, choose_model
 
 _UNSEEN = 3.0
@@ -53,7 +53,7 @@ def likelihood_fit(
     chains: Sequence[LagChain] = (),
     flows: Sequence[DispersedFlow] = (),
     onset: float | None = None,
-) -> OutputErrorFit:
+) -> OutputErrorEstimate:
     """Take delay and interval from the likelihood.
 
     `onset` is the time of the first motion; without it the structures are believed.

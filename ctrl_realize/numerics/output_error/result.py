@@ -14,7 +14,7 @@ from ..separable.lag_chains import lag_sum
 from ..separable.profile import delay_profile
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import StaticGain, averaged_ends
-from ..separable.structures import Candidate, needless_charge
+from ..separable.structures import Candidate, needless_parameters
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
 
@@ -57,7 +57,7 @@ class Better:
 
 
 @dataclass(frozen=True, eq=False)
-class OutputErrorFit:
+class OutputErrorEstimate:
     """Delay and model of one record; see the rule in `output_error`.
 
     ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
@@ -173,7 +173,7 @@ def assembled(
     profiles: dict[Structure, Profile],
     interval: tuple[float, float, float],
     profile: Profile,
-) -> OutputErrorFit:
+) -> OutputErrorEstimate:
     """Put a result together; `interval` is its lower and upper end and the standard error, in s.
 
     `profiles` are those of the table of structures, `profile` that of the delay chosen.
@@ -182,14 +182,14 @@ def assembled(
     numerator = state.numerator[0]
     low, high, std = interval
     static = whole.static(chosen)
-    charged = {s: whole.criterion[s] + needless_charge(s) for s in profiles}
+    charged = {s: whole.criterion[s] + needless_parameters(s) for s in profiles}
     least = charged.get(chosen.structure, np.inf)
     alike = [
         (whole.static(whole.candidates[s]), float(np.exp(-max(value - least, 0.0) / 2)))
         for s, value in charged.items()
         if s != chosen.structure
     ]
-    return OutputErrorFit(
+    return OutputErrorEstimate(
         delay=chosen.delay,
         low=low,
         high=high,

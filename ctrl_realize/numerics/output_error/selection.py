@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from ..separable.dispersion import DispersedFlow, fit_flows
 from ..separable.lag_chains import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
-from ..separable.structures import PLAUSIBLE, Candidate, choose, needless_charge, search
+from ..separable.structures import PLAUSIBLE, Candidate, choose, needless_parameters, search
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
 
@@ -78,7 +78,7 @@ def choose_model(
 
 def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> Choice:
     best = whole.best
-    level = whole.criterion[best.structure] + needless_charge(best.structure)
+    level = whole.criterion[best.structure] + needless_parameters(best.structure)
     better = min(tanks, key=lambda chain: chain.criterion, default=None)
     if better is not None and better.criterion < level:
         return Choice(better.candidate, better.criterion, better)

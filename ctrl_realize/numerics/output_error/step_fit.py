@@ -30,13 +30,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..separable.compared_fits import at_delay
-from ..separable.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, needless_charge
+from ..separable.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, needless_parameters
 from ..separable.varpro import KnownFactor, Structure, evaluate
 from ..separable.window import WindowFit, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
 from .interval import likelihood_fit
-from .result import OutputErrorFit, assembled, profile_of
+from .result import OutputErrorEstimate, assembled, profile_of
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
 
@@ -51,7 +51,7 @@ a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less)."
 _FEWEST_LATE = 8  # bins in the later half of what comes when the response has settled
 
 
-def fit_output_error(
+def fit_step_record(
     data: StepData,
     *,
     structures: Sequence[Structure] | None = None,
@@ -59,7 +59,7 @@ def fit_output_error(
     known: KnownFactor | None = None,
     huber: bool = True,
     whiten: bool = True,
-) -> OutputErrorFit:
+) -> OutputErrorEstimate:
     """Estimate the dead time of a step record.
 
     Parameters
@@ -128,7 +128,7 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
         error = whole.window.output - whole.window.predict(whole.problem, whole.best)
         squares = float(np.sum(np.clip(error, -worst, worst) ** 2))
         terms = best.order + best.zeros + (best.order if data.relaxing else bool(data.drift))
-        return squares / closest.variance + closest.penalty * terms + needless_charge(best)
+        return squares / closest.variance + closest.penalty * terms + needless_parameters(best)
 
     return min(ways, key=criterion)[0]
 
@@ -154,7 +154,7 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
 
 def _robust_fit(
     whole: WindowFit, chosen: Candidate, views: tuple[tuple[str, float], ...]
-) -> OutputErrorFit:
+) -> OutputErrorEstimate:
     """Take delay and interval from the views (points 3 and 4 of the rule)."""
     delay = float(np.median([at for _, at in views[:-1]]))
     delays = np.sort([at for _, at in views])

@@ -171,7 +171,7 @@ def parameter_charge(samples: float) -> float:
 
 def choose(criterion: dict[Structure, float]) -> Structure:
     """Structure of the lowest criterion, where zeros and a fourth pole must be worth it."""
-    return min(criterion, key=lambda s: criterion[s] + needless_charge(s))
+    return min(criterion, key=lambda s: criterion[s] + needless_parameters(s))
 
 
 def plausible(
@@ -196,13 +196,13 @@ def plausible(
         s
         for s, value in criterion.items()
         if value <= limit
-        or value + needless_charge(s) <= weighed
+        or value + needless_parameters(s) <= weighed
         or candidates[s] is chosen
         or (s.zeros == 0 and s.order <= lags and candidates[s].cost <= fits)
     ]
 
 
-def needless_charge(structure: Structure) -> float:
+def needless_parameters(structure: Structure) -> float:
     """What zeros, and poles beyond the third, must be worth before a structure is chosen."""
     return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
 
