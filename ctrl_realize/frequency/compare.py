@@ -79,6 +79,13 @@ def compare_frf(
     The trusted band is the widest stretch (in octaves) in which the coherence, smoothed by a
     running median of five points, stays up.
 
+    The hold is the factor ``(1 - exp(-s dt)) / (s dt)`` of [1]_.
+
+    References
+    ----------
+    .. [1] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+       section 2.3.
+
     Examples
     --------
     >>> import control as ct

@@ -95,21 +95,27 @@ def fit_frf(
     are smoothed over nine neighbours (geometric mean) before they weight the points.
 
     Where the noise is not known, the deviations of the poles come from the residuals, each point
-    with its own (White 1980): a noisy part of the band makes uncertain what rests on it.
+    with its own [3]_: a noisy part of the band makes uncertain what rests on it.
 
     The flag ``"phase_leads"`` tells of an FRF whose time axis starts late.
 
     The interval is the profile likelihood's, widened for residuals larger than the noise or
     correlated along frequency, joined with that of the mixture of all structures, each with the
-    weight ``exp(-BIC / 2)``: the split of the phase between dead time and lags depends on the
+    weight ``exp(-BIC / 2)`` [4]_: the split of the phase between dead time and lags depends on the
     structure, which the data may not tell.
 
     References
     ----------
-    .. [1] R. Pintelon and L. Van Biesen, Identification of transfer functions with time delay
-       and its application to cable fault location, IEEE Trans. Instrum. Meas. 39 (1990).
+    .. [1] R. Pintelon and L. Van Biesen, Identification of transfer functions with time delay and
+       its application to cable fault location, IEEE Trans. Instrum. Meas. 39 (1990) 479-484.
     .. [2] B. Gustavsen and A. Semlyen, Rational approximation of frequency domain responses by
-       vector fitting, IEEE Trans. Power Delivery 14 (1999).
+       vector fitting, IEEE Trans. Power Delivery 14 (1999) 1052-1061, doi:10.1109/61.772353.
+    .. [3] H. White, A heteroskedasticity-consistent covariance matrix estimator and a direct test
+       for heteroskedasticity, Econometrica 48 (1980) 817-838, doi:10.2307/1912934.
+    .. [4] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed.,
+       Springer 2002, chapter 4, doi:10.1007/b97636.
+    .. [5] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd
+       ed., Wiley 2012, chapter 9, doi:10.1002/9781118287422.
 
     Examples
     --------

@@ -92,6 +92,17 @@ def impulse_from_frf(
     extrapolated). ``"cut_off"`` and ``"unexplained"`` tell that `length` is too short, the latter
     also that the data are noisy. `fit_frf` needs no such care where a model of low order will do.
 
+    Prior and tuning are those of [1]_, for data in the frequency domain as in [2]_.
+
+    References
+    ----------
+    .. [1] T. Chen, H. Ohlsson and L. Ljung, On the estimation of transfer functions,
+       regularizations and Gaussian processes - revisited, Automatica 48 (2012) 1525-1535,
+       doi:10.1016/j.automatica.2012.05.026.
+    .. [2] J. Lataire and T. Chen, Transfer function and transient estimation by Gaussian process
+       regression in the frequency domain, Automatica 72 (2016) 217-229,
+       doi:10.1016/j.automatica.2016.06.009.
+
     Examples
     --------
     >>> import numpy as np

@@ -79,10 +79,11 @@ def spectral_frf(
 
     Notes
     -----
-    The coherence is :math:`\gamma^2 = |S_{yu}|^2 / (S_{uu} S_{yy})`. The variance of the complex
-    response is :math:`|H|^2 (1 - \gamma^2) / (\gamma^2 (K - 1))` with K independent segments: the
-    number of segments, reduced for what overlapping ones share (Welch 1967). For periods it
-    comes from their scatter [1]_.
+    H1, H2 and Hv are compared in [4]_. The coherence is
+    :math:`\gamma^2 = |S_{yu}|^2 / (S_{uu} S_{yy})`. The variance of the complex response is
+    :math:`|H|^2 (1 - \gamma^2) / (\gamma^2 (K - 1))` with K independent segments [3]_: the number
+    of segments, reduced for what overlapping ones share [2]_. For periods it comes from their
+    scatter [1]_.
 
     That scatter is of what differs from period to period. What comes again in each of them it
     does not tell: what a plant that is not linear adds to a multisine, and the rounding of a
@@ -103,8 +104,14 @@ def spectral_frf(
 
     References
     ----------
-    .. [1] R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*,
-       2nd ed., section 2.5.
+    .. [1] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd
+       ed., Wiley 2012, chapter 2, doi:10.1002/9781118287422.
+    .. [2] P. D. Welch, The use of fast Fourier transform for the estimation of power spectra, IEEE
+       Trans. Audio Electroacoust. 15 (1967) 70-73, doi:10.1109/TAU.1967.1161901.
+    .. [3] J. S. Bendat and A. G. Piersol, Random Data, 4th ed., Wiley 2010, chapter 9,
+       doi:10.1002/9781118032428.
+    .. [4] G. T. Rocklin, J. Crowley and H. Vold, A comparison of H1, H2, and Hv frequency response
+       functions, Proc. 3rd Int. Modal Analysis Conf. (1985) 272-278.
 
     Examples
     --------

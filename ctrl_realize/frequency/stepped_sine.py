@@ -84,6 +84,15 @@ def stepped_sine_frf(
     It is the part of the output's power that is a sine and repeats: 1 for
     a perfect linear plant, and ``1 / (1 + noise power / sine power)`` with noise on the output.
 
+    The sine with a free frequency is the four-parameter fit of [1]_; averaging over repeats as in
+    [2]_.
+
+    References
+    ----------
+    .. [1] IEEE Std 1057, IEEE Standard for Digitizing Waveform Recorders.
+    .. [2] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd
+       ed., Wiley 2012, chapter 2, doi:10.1002/9781118287422.
+
     Examples
     --------
     >>> import numpy as np

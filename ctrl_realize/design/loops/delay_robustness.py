@@ -162,6 +162,16 @@ def delay_robustness(
     OptionError
         No interval given and none known, or one that is none.
 
+    Notes
+    -----
+    A loop that predicts may be stable at the nominal dead time and at neither side of it [1]_; so
+    the whole interval is looked at, and not its ends alone.
+
+    References
+    ----------
+    .. [1] Z. J. Palmor, Stability properties of Smith dead-time compensator controllers, Int. J.
+       Control 32 (1980) 937-949.
+
     Examples
     --------
     >>> import control as ct

@@ -78,6 +78,17 @@ def margins(
     python-control's ``stability_margins`` forms the polynomial of the augmented matrix first
     and is silently wrong from d of about 37 on.
 
+    Gain and phase margin and the modulus margin 1/Ms (the *stability margin* of [1]_) are read off
+    the loop's crossovers; the delay margin is the least of phase margin over crossover frequency
+    [2]_. The count of encirclements is the generalized Nyquist criterion [1]_.
+
+    References
+    ----------
+    .. [1] K. J. Astrom and R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press
+       2021, sections 10.2 and 10.3.
+    .. [2] S. Skogestad and I. Postlethwaite, Multivariable Feedback Control, 2nd ed., Wiley 2005,
+       section 2.4.
+
     Examples
     --------
     >>> import control as ct

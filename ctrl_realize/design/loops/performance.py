@@ -132,6 +132,15 @@ def performance(
     ModelWarning
         A loop that goes on for more than 260 000 samples; the numbers are those up to there.
 
+    Notes
+    -----
+    The integrated error of a load step is ``ti / kp`` for an ideal PI or PID controller [1]_.
+
+    References
+    ----------
+    .. [1] K. J. Astrom and T. Hagglund, Advanced PID Control, ISA 2006, chapter 4 (Controller
+       design).
+
     Examples
     --------
     >>> import ctrl_realize as cr

@@ -181,6 +181,17 @@ def uncertainty_bound(
     DataError
         Frequencies that do not rise, systems of another sample time.
 
+    Notes
+    -----
+    The bound is on the multiplicative (relative) uncertainty of [1]_: plants ``G (1 + Delta)`` with
+    ``|Delta(j w)|`` at most the bound. A dead time that is off by x alone gives ``|exp(-j w x) -
+    1|``.
+
+    References
+    ----------
+    .. [1] S. Skogestad and I. Postlethwaite, Multivariable Feedback Control, 2nd ed., Wiley 2005,
+       section 7.4 (Representing uncertainty in the frequency domain).
+
     Examples
     --------
     >>> import control as ct
@@ -246,6 +257,14 @@ def robust_stability(uncertainty: UncertaintyBound, controller: Any) -> Robustne
     -----
     Sufficient, and for a bound on the size of Delta alone also necessary; a wrong dead time is
     only one of the errors that such a bound admits, so `delay_robustness` may be kinder.
+
+    The condition is ``|T(j w)| |Delta(j w)| < 1`` at all frequencies, T the complementary
+    sensitivity [1]_.
+
+    References
+    ----------
+    .. [1] S. Skogestad and I. Postlethwaite, Multivariable Feedback Control, 2nd ed., Wiley 2005,
+       section 7.5 (SISO robust stability).
 
     Examples
     --------

@@ -38,6 +38,18 @@ def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.
     control.StateSpace
         Continuous.
 
+    Notes
+    -----
+    The approximant is the diagonal one of [1]_. Like the realization of [2]_ the ladder is
+    balanced: all Hankel singular values of an all-pass are 1.
+
+    References
+    ----------
+    .. [1] G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., Johns Hopkins 2013, section
+       9.3.1.
+    .. [2] J. Lam, Balanced realization of Pade approximants of exp(-sT), IEEE Trans. Automat.
+       Control 36 (1991) 1096-1100.
+
     Examples
     --------
     >>> import numpy as np
@@ -75,6 +87,17 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     ------
     DelayRangeError
         Less than half a sample, but not nothing: no causal all-pass has that delay.
+
+    Notes
+    -----
+    The coefficients are Thiran's [1]_, read as an all-pass [2]_.
+
+    References
+    ----------
+    .. [1] J.-P. Thiran, Recursive digital filters with maximally flat group delay, IEEE Trans.
+       Circuit Theory 18 (1971) 659-664, doi:10.1109/TCT.1971.1083363.
+    .. [2] T. I. Laakso, V. Valimaki, M. Karjalainen and U. K. Laine, Splitting the unit delay, IEEE
+       Signal Process. Mag. 13 (1996) 30-60, the section on all-pass filters, doi:10.1109/79.482137.
 
     Examples
     --------

@@ -86,6 +86,18 @@ def hankel_singular_values(system: Any) -> FloatArray:
     -------
     ndarray, shape (k,)
 
+    Notes
+    -----
+    Square roots of the eigenvalues of the product of both Gramians [1]_, [2]_.
+
+    References
+    ----------
+    .. [1] B. C. Moore, Principal component analysis in linear systems: controllability,
+       observability, and model reduction, IEEE Trans. Automat. Control 26 (1981) 17-32,
+       doi:10.1109/TAC.1981.1102568.
+    .. [2] L. Pernebo and L. M. Silverman, Model reduction via balanced state space representations,
+       IEEE Trans. Automat. Control 27 (1982) 382-387, doi:10.1109/TAC.1982.1102945.
+
     Examples
     --------
     >>> import control as ct
@@ -129,6 +141,26 @@ def reduce(
         An order larger than the core's, or smaller than its unstable part.
     OptionError
         Not exactly one of `order` and `tolerance`.
+
+    Notes
+    -----
+    Balanced truncation [1]_, [2]_, by the square-root method [3]_. The error is bounded by twice
+    the sum of the Hankel singular values left out [4]_, in discrete time as well [5]_.
+
+    References
+    ----------
+    .. [1] B. C. Moore, Principal component analysis in linear systems: controllability,
+       observability, and model reduction, IEEE Trans. Automat. Control 26 (1981) 17-32,
+       doi:10.1109/TAC.1981.1102568.
+    .. [2] L. Pernebo and L. M. Silverman, Model reduction via balanced state space representations,
+       IEEE Trans. Automat. Control 27 (1982) 382-387, doi:10.1109/TAC.1982.1102945.
+    .. [3] M. S. Tombs and I. Postlethwaite, Truncated balanced realization of a stable non-minimal
+       state-space system, Int. J. Control 46 (1987) 1319-1330, doi:10.1080/00207178708933971.
+    .. [4] K. Glover, All optimal Hankel-norm approximations of linear multivariable systems and
+       their L-infinity error bounds, Int. J. Control 39 (1984) 1115-1193,
+       doi:10.1080/00207178408933239.
+    .. [5] U. M. Al-Saggaf and G. F. Franklin, An error bound for a discrete reduced order model of
+       a linear multivariable system, IEEE Trans. Automat. Control 32 (1987) 815-819.
 
     Examples
     --------

@@ -180,6 +180,18 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
         A pole at z = 0 or on the negative real axis: no continuous system of the same order has
         these samples. Channels with different delays. A system that is continuous already.
 
+    Notes
+    -----
+    The matrix ``[[A, B], [0, I]]`` of the samples is the exponential of that of the continuous
+    model; its principal logarithm is taken [1]_, [2]_.
+
+    References
+    ----------
+    .. [1] N. J. Higham, Functions of Matrices, SIAM 2008, chapter 11 (Matrix logarithm),
+       doi:10.1137/1.9780898717778.
+    .. [2] A. H. Al-Mohy and N. J. Higham, Improved inverse scaling and squaring algorithms for the
+       matrix logarithm, SIAM J. Sci. Comput. 34 (2012) C153-C169, doi:10.1137/110852553.
+
     Examples
     --------
     >>> import control as ct
@@ -251,6 +263,15 @@ def to_discrete(
     Returns
     -------
     DelayedStateSpace
+
+    Notes
+    -----
+    Sampling behind a hold, with a dead time of any length, as in [1]_.
+
+    References
+    ----------
+    .. [1] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+       section 2.3.
 
     Examples
     --------

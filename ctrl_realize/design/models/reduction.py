@@ -58,6 +58,16 @@ def reduce_fopdt(
         An unstable system, several channels, no static gain; for the half rule also a core that
         has no continuous counterpart.
 
+    Notes
+    -----
+    The half rule is that of [1]_: half of the largest lag that is left out goes to the dead time
+    and half to the lag that stays.
+
+    References
+    ----------
+    .. [1] S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, J.
+       Process Control 13 (2003) 291-309, section 2, doi:10.1016/S0959-1524(02)00062-8.
+
     Examples
     --------
     Half of the lag of 0.2 s goes to each side, and that of 0.04 s to the dead time:
@@ -89,6 +99,12 @@ def reduce_sopdt(
     Returns
     -------
     ProcessModel
+
+    References
+    ----------
+    .. [1] S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, J.
+       Process Control 13 (2003) 291-309, section 2 (the half rule),
+       doi:10.1016/S0959-1524(02)00062-8.
 
     Examples
     --------

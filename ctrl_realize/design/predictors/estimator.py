@@ -104,6 +104,16 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     DataError, OptionError
         Covariances of the wrong shape, or not symmetric.
 
+    Notes
+    -----
+    The steady filter of the core [1]_; predicting its state over the delay of the outputs is
+    optimal, since no measurement tells of the samples in between.
+
+    References
+    ----------
+    .. [1] B. D. O. Anderson and J. B. Moore, Optimal Filtering, Prentice Hall 1979, chapter 4
+       (Time-invariant filters).
+
     Examples
     --------
     >>> import control as ct

@@ -70,6 +70,18 @@ def lqg(
     ModelWarning
         The loop is unstable for some dead time within the interval that the system carries.
 
+    Notes
+    -----
+    Separation of estimator and regulator [1]_; the regulator acts on the state predicted over the
+    dead time of the inputs, as in the reduction of [2]_.
+
+    References
+    ----------
+    .. [1] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+       chapter 11 (Optimal design methods).
+    .. [2] Z. Artstein, Linear systems with delayed controls: a reduction, IEEE Trans. Automat.
+       Control 27 (1982) 869-879, doi:10.1109/TAC.1982.1103023.
+
     Examples
     --------
     >>> import control as ct

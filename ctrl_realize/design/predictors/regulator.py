@@ -153,8 +153,11 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
 
     References
     ----------
-    .. [1] H. Zhang, L. Xie and D. Wang, "Linear quadratic regulation for discrete-time systems
-       with multiple input delays", Proc. American Control Conference, 2006.
+    .. [1] H. Zhang, G. Duan and L. Xie, Linear quadratic regulation for linear time-varying systems
+       with multiple input delays, Automatica 42 (2006) 1465-1476,
+       doi:10.1016/j.automatica.2006.04.007.
+    .. [2] Z. Artstein, Linear systems with delayed controls: a reduction, IEEE Trans. Automat.
+       Control 27 (1982) 869-879, doi:10.1109/TAC.1982.1103023.
 
     Examples
     --------

@@ -78,9 +78,22 @@ def smith_predictor(
 
     Notes
     -----
-    Smith (1957); filter after Normey-Rico and Camacho, *Control of Dead-time Processes* (2007),
-    chapter 7. The prediction is computed as ``y0[k] = sum_i g_i u[k-i] + C A^d x[k-d]``, with the
+    The structure is Smith's [1]_; the filter on the prediction error, and the slow poles that it
+    takes out of the predictor, are those of the filtered Smith predictor [2]_, [3]_, [4]_. The
+    prediction is computed as ``y0[k] = sum_i g_i u[k-i] + C A^d x[k-d]``, with the
     line of past inputs and the state of the model behind its dead time.
+
+    References
+    ----------
+    .. [1] O. J. M. Smith, Closer control of loops with dead time, Chem. Eng. Progress 53 (1957)
+       217-219.
+    .. [2] J. E. Normey-Rico, C. Bordons and E. F. Camacho, Improving the robustness of dead-time
+       compensating PI controllers, Control Eng. Practice 5 (1997) 801-810,
+       doi:10.1016/S0967-0661(97)00064-6.
+    .. [3] J. E. Normey-Rico and E. F. Camacho, Unified approach for robust dead-time compensator
+       design, J. Process Control 19 (2009) 38-47, doi:10.1016/j.jprocont.2008.02.003.
+    .. [4] J. E. Normey-Rico and E. F. Camacho, Control of Dead-time Processes, Springer 2007,
+       doi:10.1007/978-1-84628-829-6.
 
     Examples
     --------

@@ -98,6 +98,34 @@ def pid(
         An unstable plant, several channels, an integrating plant for a rule that has no answer;
         a rule whose controller makes the loop unstable on `system` itself.
 
+    Notes
+    -----
+    The rules are those of [1]_ (simc, sections 3 and 4), [2]_ and [3]_ (lambda, stable and
+    integrating), [4]_ (imc, table II), [5]_ (amigo), [6]_ (both rules of Ziegler and Nichols) and
+    [7]_. The optimal rule solves the problem of [8]_ and [9]_, least absolute load error under a
+    limit on the sensitivity, on the exact frequency response.
+
+    References
+    ----------
+    .. [1] S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, J.
+       Process Control 13 (2003) 291-309, doi:10.1016/S0959-1524(02)00062-8.
+    .. [2] E. B. Dahlin, Designing and tuning digital controllers, Instrum. Control Syst. 41 (1968)
+       77-83.
+    .. [3] I.-L. Chien and P. S. Fruehauf, Consider IMC tuning to improve controller performance,
+       Chem. Eng. Progress 86 (1990) 33-41.
+    .. [4] D. E. Rivera, M. Morari and S. Skogestad, Internal model control: PID controller design,
+       Ind. Eng. Chem. Process Des. Dev. 25 (1986) 252-265, doi:10.1021/i200032a041.
+    .. [5] K. J. Astrom and T. Hagglund, Advanced PID Control, ISA 2006, chapter 7 (A
+       Ziegler-Nichols replacement).
+    .. [6] J. G. Ziegler and N. B. Nichols, Optimum settings for automatic controllers, Trans. ASME
+       64 (1942) 759-768, doi:10.1115/1.4019264.
+    .. [7] G. H. Cohen and G. A. Coon, Theoretical consideration of retarded control, Trans. ASME 75
+       (1953) 827-834.
+    .. [8] K. J. Astrom, H. Panagopoulos and T. Hagglund, Design of PI controllers based on
+       non-convex optimization, Automatica 34 (1998) 585-601, doi:10.1016/S0005-1098(98)00011-9.
+    .. [9] O. Garpinger, T. Hagglund and K. J. Astrom, Performance and robustness trade-offs in PID
+       control, J. Process Control 24 (2014) 568-577, doi:10.1016/j.jprocont.2014.02.020.
+
     Examples
     --------
     >>> import control as ct

@@ -99,6 +99,8 @@ def impulse_from_io(
 
     Notes
     -----
+    The regularized method is that of [1]_ (kernel SS: [2]_), ``"okid"`` that of [3]_.
+
     The normal equations are summed by FFT, so 1e5 samples and 1000 lags take seconds. Noise is
     taken as white: coloured noise leaves the estimate unbiased, but makes `std` too small at the
     frequencies where it is strong. The response is step-invariant: right for a plant behind a
@@ -106,8 +108,14 @@ def impulse_from_io(
 
     References
     ----------
-    T. Chen, H. Ohlsson, L. Ljung, Automatica 48 (2012), 1525-1535; J.-N. Juang et al., J. Guidance
-    16 (1993), 320-329.
+    .. [1] T. Chen, H. Ohlsson and L. Ljung, On the estimation of transfer functions,
+       regularizations and Gaussian processes - revisited, Automatica 48 (2012) 1525-1535,
+       doi:10.1016/j.automatica.2012.05.026.
+    .. [2] G. Pillonetto and G. De Nicolao, A new kernel-based approach for linear system
+       identification, Automatica 46 (2010) 81-93, doi:10.1016/j.automatica.2009.10.031.
+    .. [3] J.-N. Juang, M. Phan, L. G. Horta and R. W. Longman, Identification of observer/Kalman
+       filter Markov parameters: theory and experiments, J. Guidance 16 (1993) 320-329,
+       doi:10.2514/3.21006.
 
     Examples
     --------

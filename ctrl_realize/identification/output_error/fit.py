@@ -77,7 +77,7 @@ def fit_output_error(
     noise : {"auto", "white"}, optional
         Of step records. ``"auto"``: noise that is coloured while the output rests is made white
         first, by its autoregression, where the model leaves no more than that noise (generalised
-        least squares: Aitken 1935). ``"white"``: all samples weigh alike, and colour only widens
+        least squares). ``"white"``: all samples weigh alike, and colour only widens
         the interval.
     include_known : bool, optional
         Put the known dynamics into the model that is returned.
@@ -118,6 +118,27 @@ def fit_output_error(
 
     A dead time has no Fisher information in a model with more zeros than the plant: a superfluous
     zero imitates it. That is why the relative degree is chosen, not left free.
+
+    The model is an output-error model [1]_ in continuous time; gain, level and drift, in which it
+    is linear, are eliminated by variable projection [2]_. Huber's loss is that of [3]_; noise of
+    known colour is made white as in [4]_; intervals are profile likelihoods [5]_; dispersion is
+    that of [6]_.
+
+    References
+    ----------
+    .. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999,
+       section 4.2.
+    .. [2] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection
+       method and its applications, Inverse Problems 19 (2003) R1-R26,
+       doi:10.1088/0266-5611/19/2/201.
+    .. [3] P. J. Huber and E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, chapter 7
+       (Regression), doi:10.1002/9780470434697.
+    .. [4] A. C. Aitken, On least squares and linear combination of observations, Proc. Roy. Soc.
+       Edinburgh 55 (1935) 42-48.
+    .. [5] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based
+       confidence intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+    .. [6] O. Levenspiel, Chemical Reaction Engineering, 3rd ed., Wiley 1999, chapter 13 (The
+       dispersion model).
 
     Examples
     --------

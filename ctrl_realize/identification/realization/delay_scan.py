@@ -90,8 +90,12 @@ def estimate_delay(
 
     References
     ----------
-    .. [1] van Helvoirt et al., Approximate realization of valve dynamics with
-       time delay, IFAC 2005, section 2.1.
+    .. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of
+       valve dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 2.1.
+    .. [2] S. Y. Kung, A new identification and model reduction algorithm via singular value
+       decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
+    .. [3] S. Bjorklund and L. Ljung, A review of time-delay estimation techniques, Proc. 42nd IEEE
+       Conf. Decision and Control (2003) 2502-2507, doi:10.1109/CDC.2003.1272997.
 
     Examples
     --------

@@ -201,6 +201,18 @@ def realize_mimo(
     OrderError, OptionError
         As for `realize`.
 
+    Notes
+    -----
+    Aligned responses are realized by Kung's algorithm [1]_ on the block Hankel matrix [2]_; how the
+    delays are split and the structures compared is our own.
+
+    References
+    ----------
+    .. [1] S. Y. Kung, A new identification and model reduction algorithm via singular value
+       decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
+    .. [2] B. De Schutter, Minimal state-space realization in linear system theory: an overview, J.
+       Comput. Appl. Math. 121 (2000) 331-354, section 4, doi:10.1016/S0377-0427(00)00341-1.
+
     Examples
     --------
     >>> import control as ct

@@ -214,6 +214,16 @@ def scan_orders(
     OrderError, DelayRangeError, OptionError, DataError
         As for `estimate_delay`.
 
+    Notes
+    -----
+    Kung's models of lower order are leading parts of those of higher order [1]_: the singular
+    vectors are the same, and there are fewer of them.
+
+    References
+    ----------
+    .. [1] S. Y. Kung, A new identification and model reduction algorithm via singular value
+       decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
+
     Examples
     --------
     >>> import numpy as np

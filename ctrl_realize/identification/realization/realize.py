@@ -93,8 +93,12 @@ def realize(
 
     References
     ----------
-    .. [1] van Helvoirt et al., Approximate realization of valve dynamics with
-       time delay, IFAC 2005, section 2.1.
+    .. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of
+       valve dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 2.1.
+    .. [2] S. Y. Kung, A new identification and model reduction algorithm via singular value
+       decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
+    .. [3] B. L. Ho and R. E. Kalman, Effective construction of linear state-variable models from
+       input/output functions, Regelungstechnik 14 (1966) 545-548, doi:10.1524/auto.1966.14.112.545.
 
     Examples
     --------

@@ -95,8 +95,8 @@ class DelayTracker:
 
     Notes
     -----
-    Multiple-model estimation of a delay on line after Tuch, Feuer and Palmor (1994) and
-    Orlov et al. (2002). The regressors are simulated, not measured, outputs, so noise does not
+    Multiple-model estimation of a delay on line after [1]_ and [2]_, with a bank of
+    candidates as in [3]_. The regressors are simulated, not measured, outputs, so noise does not
     bias the dynamics. Pole moves enter to first order about a model that is renewed when a pole
     has moved by 4 % or more: a second bank then runs beside the first for two memories and
     more, and takes over. Until then the delay may be off by a tenth of the lag per tenth of a
@@ -105,6 +105,18 @@ class DelayTracker:
     nothing is told then, and `TrackPoint.lost` is true. `reset` starts anew from
     here. Probabilities of delays count exponential weights as whole samples, which is on the safe
     side, and a residual that is slower than white as fewer of them.
+
+    References
+    ----------
+    .. [1] J. Tuch, A. Feuer and Z. J. Palmor, Time delay estimation in continuous linear
+       time-invariant systems, IEEE Trans. Automat. Control 39 (1994) 823-827.
+    .. [2] Y. Orlov, L. Belkoura, J. P. Richard and M. Dambrine, On identifiability of linear
+       time-delay systems, IEEE Trans. Automat. Control 47 (2002) 1319-1324,
+       doi:10.1109/TAC.2002.801202.
+    .. [3] D. T. Magill, Optimal adaptive estimation of sampled stochastic processes, IEEE Trans.
+       Automat. Control 10 (1965) 434-439, doi:10.1109/TAC.1965.1098191.
+    .. [4] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999,
+       section 11.2 (recursive least squares).
 
     Examples
     --------

@@ -202,6 +202,15 @@ def bootstrap(
     ``(n - p) / n`` of the variance, and of the autocorrelation at lag k blocks of L samples keep
     ``1 - k / L``.
 
+    Blocks of the residual as in [1]_, whole records as in [2]_.
+
+    References
+    ----------
+    .. [1] H. R. Kunsch, The jackknife and the bootstrap for general stationary observations, Ann.
+       Statist. 17 (1989) 1217-1241, doi:10.1214/aos/1176347265.
+    .. [2] B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap, Chapman and Hall 1993,
+       chapters 6 and 8, doi:10.1201/9780429246593.
+
     Examples
     --------
     >>> import numpy as np

@@ -47,6 +47,15 @@ def cross_validate(
     DataError
         No records or models, or something else among them.
 
+    Notes
+    -----
+    Fit in percent is ``100 (1 - |y - ys| / |y - mean y|)`` of the simulated output ys [1]_.
+
+    References
+    ----------
+    .. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999,
+       section 16.5 (Model validation).
+
     Examples
     --------
     >>> import control as ct

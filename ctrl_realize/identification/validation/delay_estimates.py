@@ -78,6 +78,14 @@ def compare_delay_estimates(
     the correlation and slope of the phase cannot be before the dead time ends (but for noise),
     and lie after it by part of the lags: they bound it from above.
 
+    The ways belong to the classes of [1]_: explicit parameter, approximation (onset and
+    correlation) and phase.
+
+    References
+    ----------
+    .. [1] S. Bjorklund and L. Ljung, A review of time-delay estimation techniques, Proc. 42nd IEEE
+       Conf. Decision and Control (2003) 2502-2507, doi:10.1109/CDC.2003.1272997.
+
     Examples
     --------
     >>> import control as ct

@@ -103,6 +103,13 @@ def predict(
     `fit_percent` says how well this record is described, not how well the next one would be
     predicted. Compare models at the same `steps`.
 
+    The predictor is that of [1]_ for the model ``y = G u + v``, v the autoregression.
+
+    References
+    ----------
+    .. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999,
+       section 3.2 (Prediction).
+
     Examples
     --------
     >>> import control as ct

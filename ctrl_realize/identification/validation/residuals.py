@@ -60,6 +60,17 @@ def analyse_residuals(
     UnsuitableSystemError
         A system that is continuous or unstable.
 
+    Notes
+    -----
+    Tests of whiteness and of independence from the input as in [1]_, with the statistic of [2]_.
+
+    References
+    ----------
+    .. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999,
+       section 16.6 (Residual analysis).
+    .. [2] G. M. Ljung and G. E. P. Box, On a measure of lack of fit in time series models,
+       Biometrika 65 (1978) 297-303, doi:10.1093/biomet/65.2.297.
+
     Examples
     --------
     >>> import control as ct

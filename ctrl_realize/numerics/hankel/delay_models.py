@@ -2,6 +2,13 @@
 
 Glue between the Hankel matrix of shifted Markov parameters, the solver that
 fits its size, and the state-space formulas.
+
+References
+----------
+.. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of valve
+   dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 2.1.
+.. [2] S. Y. Kung, A new identification and model reduction algorithm via singular value
+   decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
 """
 
 from __future__ import annotations

@@ -4,6 +4,12 @@ Model responses come from block powers: ``C A^(i + L j) B`` is the product of
 ``[C; C A; ...; C A^(L-1)]`` and ``[B, A^L B, ...]``, both built by doubling.
 No eigenvectors are needed, so defective and unstable models are fine, and no
 transfer function, whose coefficients lose all digits at order 10.
+
+References
+----------
+.. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of valve
+   dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 2.1, the delay of least
+   integrated absolute error.
 """
 
 from __future__ import annotations

@@ -1,14 +1,27 @@
 """Kung's algorithm: state-space matrices from the Hankel matrix's leading pairs.
 
-The steps of the paper (section 2.1, step 5) with its misprints corrected
-read ``A = S^-1/2 U^T H_a V S^-1/2``, ``B = S^-1/2 U^T H_b``,
-``C = H_c V S^-1/2`` with ``H_a = T(2:r+1, 1:r)``, ``H_b = T(1:r, 1)``,
-``H_c = T(1, 1:r)``: the block size is r where ``rho`` is printed, and the
-transposes on ``V_rho`` do not belong there. No product with a Hankel matrix
-is needed: its leading rows and columns are ``U S`` and ``V S``.
+The steps of the paper [1]_ (section 2.1, step 5; Kung's algorithm [2]_, after that of Ho and
+Kalman [3]_) with its misprints corrected read ``A = S^-1/2 U^T H_a V S^-1/2``,
+``B = S^-1/2 U^T H_b``, ``C = H_c V S^-1/2`` with ``H_a = T(2:r+1, 1:r)``, ``H_b = T(1:r, 1)``,
+``H_c = T(1, 1:r)``: the block size is r where ``rho`` is printed, and the transposes on ``V_rho``
+do not belong there. No product with a Hankel matrix is needed: its leading rows and columns are
+``U S`` and ``V S``.
 
 The model of order j is the leading j x j part of the model of any higher
 order, so one decomposition serves all orders.
+
+References
+----------
+.. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of valve
+   dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 2.1.
+.. [2] S. Y. Kung, A new identification and model reduction algorithm via singular value
+   decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
+.. [3] B. L. Ho and R. E. Kalman, Effective construction of linear state-variable models from
+   input/output functions, Regelungstechnik 14 (1966) 545-548, doi:10.1524/auto.1966.14.112.545.
+.. [4] K. Glover, All optimal Hankel-norm approximations of linear multivariable systems and their
+   L-infinity error bounds, Int. J. Control 39 (1984) 1115-1193, doi:10.1080/00207178408933239.
+.. [5] U. M. Al-Saggaf and G. F. Franklin, An error bound for a discrete reduced order model of a
+   linear multivariable system, IEEE Trans. Automat. Control 32 (1987) 815-819.
 """
 
 from __future__ import annotations
@@ -61,6 +74,7 @@ def realize_symmetric(
     if last_row is not None:
         along = np.matmul(vectors, last_row[:, :, np.newaxis])[:, :, 0]
         shifted += vectors[:, :, -1, np.newaxis] * along[:, np.newaxis, :]
+    # A = S^-1/2 U^T H_a V S^-1/2: H_a V is V S one row up, and the last row is its own.
     left = sign * turn * inverse
     A = left[:, :, np.newaxis] * shifted * (turn * inverse)[:, np.newaxis, :]
     B = root * np.abs(vectors[:, :, 0])
@@ -99,6 +113,7 @@ def realize_block(
     shifted = (U[:-p].T @ U[p:]) * singular_values
     if last_rows is not None:
         shifted += U[-p:].T @ (last_rows @ V)
+    # Step 5: A = S^-1/2 U^T H_a V S^-1/2, B = S^-1/2 U^T H_b = S^1/2 V_1^T, C = U_1 S^1/2.
     A = (turn * inverse)[:, np.newaxis] * shifted * (turn * inverse)
     B = (turn * root)[:, np.newaxis] * V[:m].T
     C = U[:p] * (turn * root)
@@ -117,7 +132,8 @@ def tail_bound(norm_squared: float, leading: FloatArray, size: int) -> float:
     """Bound twice the sum of the singular values that were not computed.
 
     For the zero-padded Hankel matrix, twice the tail bounds the largest gain
-    of the error over all frequencies. The tail has ``size - k`` values
+    of the error over all frequencies ([4]_, in discrete time [5]_; the padded matrix holds all
+    of a finite response, whose balanced truncation this is). The tail has ``size - k`` values
     whose squares add up to what the leading ones leave of the squared
     Frobenius norm; equal values make the largest sum.
 

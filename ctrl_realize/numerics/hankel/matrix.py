@@ -5,6 +5,13 @@ with ``h[k] = G[k + 1]`` this is the matrix of Kung's algorithm. Parameters of
 shape ``(p, m, N)`` give a block Hankel matrix with ``p x m`` blocks.
 Sequences that are shorter than a matrix needs are continued by zeros, which
 is Kung's zero-padded version.
+
+References
+----------
+.. [1] G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., Johns Hopkins 2013, section 4.8
+   (circulant matrices and the fast Fourier transform).
+.. [2] S. Y. Kung, A new identification and model reduction algorithm via singular value
+   decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
 """
 
 from __future__ import annotations

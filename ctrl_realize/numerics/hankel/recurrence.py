@@ -1,4 +1,14 @@
-"""Lanczos recurrence for many symmetric Hankel matrices in step."""
+"""Lanczos recurrence for many symmetric Hankel matrices in step.
+
+The recurrence is [2]_; its loss of orthogonality is bounded as in [1]_.
+
+References
+----------
+.. [1] H. D. Simon, The Lanczos algorithm with partial reorthogonalization, Math. Comp. 42 (1984)
+   115-142, doi:10.1090/S0025-5718-1984-0725988-X.
+.. [2] B. N. Parlett, The Symmetric Eigenvalue Problem, SIAM 1998, chapter 13,
+   doi:10.1137/1.9781611971163.
+"""
 
 from __future__ import annotations
 
@@ -91,6 +101,8 @@ class LanczosRecurrence:
 
     def _loses_orthogonality(self, norm: FloatArray) -> bool:
         """Bound the loss of the vector to come; tell whether to orthogonalise it against all."""
+        # The recurrence of Simon for the inner products, in absolute values, with one bound for
+        # all earlier vectors in the place of each product.
         j = self.steps
         before, last = self._overlap
         into = self.scale + np.abs(self.alpha[:, j])
@@ -123,6 +135,7 @@ class LanczosRecurrence:
             self.alpha[i, :steps], self.beta[i, : steps - 1], count + 1
         )
         following = float(abs(values[count])) if values.size > count else 0.0
+        # |H v - theta v| = beta_j |last entry of the eigenvector of T|: Parlett, chapter 13.
         residuals = self.beta[i, steps - 1] * np.abs(coordinates[-1, :count])
         return values[:count], residuals, coordinates[:, :count], following
 

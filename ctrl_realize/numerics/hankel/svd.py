@@ -4,6 +4,16 @@ Large matrices go through Golub-Kahan bidiagonalisation with FFT products
 and full reorthogonalisation. It works on H itself, not on ``H^T H``, so small
 singular values keep their digits. It stops by the residual of every wanted
 triplet.
+
+Bidiagonalisation as in [1]_ (its upper form), with the reorthogonalisation and the residual of
+[2]_.
+
+References
+----------
+.. [1] G. Golub and W. Kahan, Calculating the singular values and pseudo-inverse of a matrix, SIAM
+   J. Numer. Anal. B 2 (1965) 205-224, doi:10.1137/0702016.
+.. [2] R. M. Larsen, Lanczos bidiagonalization with partial reorthogonalization, DAIMI PB-537,
+   Aarhus University 1998.
 """
 
 from __future__ import annotations

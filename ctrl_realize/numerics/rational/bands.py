@@ -1,4 +1,8 @@
-"""Stretches of a frequency grid in which something holds."""
+"""Stretches of a frequency grid in which something holds.
+
+The band of good coherence is our own rule: the widest run in octaves, so that neither the many
+points of a high octave nor one bad point decides.
+"""
 
 from __future__ import annotations
 

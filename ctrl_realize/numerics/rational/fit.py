@@ -1,4 +1,20 @@
-"""Search and refinement for transfer functions with dead time; see `rational`."""
+"""Search and refinement for transfer functions with dead time; see `rational`.
+
+Damped Gauss-Newton steps on the variable projection functional [1]_ with the Jacobian of [2]_; the
+damping is scaled by the diagonal of the normal matrix as in [3]_.
+
+References
+----------
+.. [1] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
+   squares problems whose variables separate, SIAM J. Numer. Anal. 10 (1973) 413-432,
+   doi:10.1137/0710036.
+.. [2] L. Kaufman, A variable projection method for solving separable nonlinear least squares
+   problems, BIT 15 (1975) 49-57, doi:10.1007/BF01932995.
+.. [3] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, J. SIAM
+   11 (1963) 431-441, doi:10.1137/0111030.
+.. [4] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer 2006, section 10.3
+   (Levenberg-Marquardt), doi:10.1007/978-0-387-40065-5.
+"""
 
 from __future__ import annotations
 
@@ -102,6 +118,7 @@ def refine(
         improved = False
         for _ in range(8):
             damped = gram.copy()
+            # (J'J + damping diag(J'J)) step = -J'r: Marquardt (1963).
             damped.flat[:: order + 2] += damping * size
             step = np.linalg.solve(damped, -slope)
             # A factor of e in one step is as far as the linear picture goes.

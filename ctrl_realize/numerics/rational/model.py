@@ -3,11 +3,23 @@ r"""Transfer functions with dead time, fitted to frequency responses.
 The model is :math:`G(s) = e^{-s\tau}\, b(s) / a(s)`. The denominator is a product of factors of
 first and second order with positive coefficients, kept as logarithms, so that every model is
 stable and real and conjugate poles go into each other without a seam. The numerator enters
-linearly and is eliminated (variable projection).
+linearly and is eliminated (variable projection [2]_, [3]_). The likelihood is that of [1]_, [4]_.
 
 Numerators are written in the basis of partial products of the factors, slow ones first, which
 stays well conditioned over many decades, where powers of s do not. The basis functions are at
 the same time the states of a chain of the sections, so a state-space model needs no conversion.
+
+References
+----------
+.. [1] R. Pintelon and L. Van Biesen, Identification of transfer functions with time delay and its
+   application to cable fault location, IEEE Trans. Instrum. Meas. 39 (1990) 479-484.
+.. [2] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
+   squares problems whose variables separate, SIAM J. Numer. Anal. 10 (1973) 413-432,
+   doi:10.1137/0710036.
+.. [3] L. Kaufman, A variable projection method for solving separable nonlinear least squares
+   problems, BIT 15 (1975) 49-57, doi:10.1007/BF01932995.
+.. [4] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed.,
+   Wiley 2012, chapter 9, doi:10.1002/9781118287422.
 """
 
 from __future__ import annotations
@@ -195,6 +207,7 @@ def project(
     moved = turn[None, :] * (derivatives @ numerator)
     moved = np.vstack([moved, (-s * (design @ numerator))[None]])
     slopes = -stacked_parts(moved.T)
+    # Kaufman (1975): only the part P D of the Jacobian, with P = I - Q Q' and D = -d(basis) b.
     slopes -= Q @ (Q.T @ slopes)
     return Projection(numerator=numerator, residual=residual, jacobian=slopes)
 

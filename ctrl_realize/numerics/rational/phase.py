@@ -1,4 +1,8 @@
-"""Phase of responses with a dead time, on grids too coarse to unwrap."""
+"""Phase of responses with a dead time, on grids too coarse to unwrap.
+
+Our own: a dead time turns the phase by ``-omega tau``, so that of all dead times the true one
+leaves the least to unwrap.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,16 @@
-"""All structures of a transfer function with dead time on one frequency response."""
+"""All structures of a transfer function with dead time on one frequency response.
+
+Structures are compared by BIC [1]_, [2]_. Where residuals are correlated along frequency the number
+of points is divided by ``(1 + r) / (1 - r)``, the variance factor of the mean of a first-order
+autoregression with correlation r between neighbours.
+
+References
+----------
+.. [1] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
+.. [2] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   16.4 (Model structure selection).
+"""
 
 from __future__ import annotations
 
@@ -98,6 +110,7 @@ def information_criteria(
     """
     best = min(fits.values(), key=lambda fit: fit.cost)
     count = 2 * data.s.size / correlation_cost(data, best)
+    # Schwarz (1978), noise variance eliminated: N log(cost) + parameters log N.
     return {
         (n, r): float(count * np.log(smallest_cost(data, fit)) + (2 * n + 2 - r) * np.log(count))
         for (n, r), fit in fits.items()

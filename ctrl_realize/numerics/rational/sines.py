@@ -3,7 +3,15 @@
 Several channels of one record share one frequency. The frequency enters nonlinearly, the
 rest linearly, so it is eliminated by variable projection: Gauss-Newton on the frequency
 alone, the linear part solved exactly in every step (Kaufman's simplification of the Jacobian).
-This is the four-parameter sine fit of IEEE Std 1057, for many records in one call.
+This is the four-parameter sine fit of IEEE Std 1057 [1]_, [2]_, [3]_, for many records in one call.
+
+References
+----------
+.. [1] IEEE Std 1057, IEEE Standard for Digitizing Waveform Recorders.
+.. [2] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+.. [3] L. Kaufman, A variable projection method for solving separable nonlinear least squares
+   problems, BIT 15 (1975) 49-57, doi:10.1007/BF01932995.
 """
 
 from __future__ import annotations

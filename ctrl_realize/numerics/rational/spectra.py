@@ -1,4 +1,18 @@
-"""Spectra, averaged over segments or periods, and what belongs to a frequency response."""
+"""Spectra, averaged over segments or periods, and what belongs to a frequency response.
+
+Segments are averaged as in [1]_, [2]_, periods as in [3]_; the hold is that of [4]_.
+
+References
+----------
+.. [1] P. D. Welch, The use of fast Fourier transform for the estimation of power spectra, IEEE
+   Trans. Audio Electroacoust. 15 (1967) 70-73, doi:10.1109/TAU.1967.1161901.
+.. [2] J. S. Bendat and A. G. Piersol, Random Data, 4th ed., Wiley 2010, chapters 9 and 11,
+   doi:10.1002/9781118032428.
+.. [3] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed.,
+   Wiley 2012, chapter 2, doi:10.1002/9781118287422.
+.. [4] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+   section 2.3.
+"""
 
 from __future__ import annotations
 
@@ -126,6 +140,7 @@ def independent_segments(window: FloatArray, hop: int, count: int) -> float:
     excess = 0.0
     for lag in range(1, min(count, -(-length // hop))):
         shift = lag * hop
+        # Welch (1967): the correlation of two periodograms is (sum w[n] w[n + shift] / sum w^2)^2.
         shared = float(window[: length - shift] @ window[shift:]) / energy
         excess += 2 * (1 - lag / count) * shared**2
     return count / (1 + excess)

@@ -4,6 +4,16 @@ Low orders come from a grid of dead times, at each of which the poles are found 
 problem. Higher orders grow out of the lower ones by a pole or a resonance at a time, put where
 it explains most of what was left: over decades of frequency and many resonances the linear
 problem alone ends in poor local minima, above all in noise.
+
+The linear problem is one step of vector fitting [1]_, which writes that of [2]_ in partial
+fractions. Where the search for a dead time begins and how many starts are kept is our own rule.
+
+References
+----------
+.. [1] B. Gustavsen and A. Semlyen, Rational approximation of frequency domain responses by vector
+   fitting, IEEE Trans. Power Delivery 14 (1999) 1052-1061, doi:10.1109/61.772353.
+.. [2] C. K. Sanathanan and J. Koerner, Transfer function synthesis as a ratio of two complex
+   polynomials, IEEE Trans. Automat. Control 8 (1963) 56-58, doi:10.1109/TAC.1963.1105517.
 """
 
 from __future__ import annotations
@@ -75,6 +85,7 @@ def relocate_poles(
         stacked / scale, stacked_parts((weight * response)[:, None])[:, 0], rcond=1e-12
     )[0]
     sigma = (solution / scale)[n:]
+    # New poles: eigenvalues of A - b c' (Gustavsen and Semlyen, appendix on zeros of sigma).
     moved = np.linalg.eigvals(A - np.outer(b, sigma)).astype(np.complex128)
     # Keep away from the axis: a pole on it would make the next problem singular.
     floor = 1e-4 * np.abs(moved) + 1e-12 * np.abs(s).max()

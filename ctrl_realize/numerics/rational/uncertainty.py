@@ -1,4 +1,17 @@
-"""Uncertainty of fitted transfer functions: covariance, poles, and the dead time's profile."""
+"""Uncertainty of fitted transfer functions: covariance, poles, and the dead time's profile.
+
+The covariance is the inverse Fisher information [1]_, or the sandwich of [2]_; the interval of the
+dead time is the profile likelihood's [3]_.
+
+References
+----------
+.. [1] S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall
+   1993, chapters 3 and 7.
+.. [2] H. White, A heteroskedasticity-consistent covariance matrix estimator and a direct test for
+   heteroskedasticity, Econometrica 48 (1980) 817-838, doi:10.2307/1912934.
+.. [3] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +22,7 @@ from .fit import FRFData, RationalFit, refine
 from .model import full_jacobian, project
 
 _LEAST_INFORMATION = 1e-10
+# 95 % point of chi-square with one degree of freedom.
 _CHI2_95 = 3.841458820694124
 
 

@@ -2,12 +2,14 @@
 
 ``A(q) y = B(q) u + e`` with ``A = I + A_1 q^-1 + ...`` is linear in its coefficients. Its pulse
 response is ``A^-1 B``: with many lags this is the observer/Kalman filter identification (OKID)
-of Juang, whose observer turns a plant that rings for long into a short regression.
+of Juang [1]_, whose observer turns a plant that rings for long into a short regression.
 
 References
 ----------
-J.-N. Juang, M. Phan, L. G. Horta, R. W. Longman, Identification of observer/Kalman filter Markov
-parameters, J. Guidance 16 (1993), 320-329.
+.. [1] J.-N. Juang, M. Phan, L. G. Horta and R. W. Longman, Identification of observer/Kalman filter
+   Markov parameters: theory and experiments, J. Guidance 16 (1993) 320-329, doi:10.2514/3.21006.
+.. [2] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, sections
+   4.2 (ARX models) and 10.1 (least squares).
 """
 
 from __future__ import annotations

@@ -1,12 +1,14 @@
 """Regularised impulse responses: Gaussian priors tuned by their marginal likelihood.
 
 The priors are those of `kernel_priors`; how fast the response decays and how large it is
-`kernel_search` finds from the data.
+`kernel_search` finds from the data [1]_. `cautious_std` is our own: a posterior deviation is
+right only where the prior is.
 
 References
 ----------
-T. Chen, H. Ohlsson, L. Ljung, On the estimation of transfer functions, regularizations and
-Gaussian processes - revisited, Automatica 48 (2012), 1525-1535.
+.. [1] T. Chen, H. Ohlsson and L. Ljung, On the estimation of transfer functions, regularizations
+   and Gaussian processes - revisited, Automatica 48 (2012) 1525-1535,
+   doi:10.1016/j.automatica.2012.05.026.
 """
 
 from __future__ import annotations

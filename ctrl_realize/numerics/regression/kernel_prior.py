@@ -3,19 +3,21 @@ r"""Gaussian priors of pulse responses that decay: the kernels TC, DC and SS.
 The covariance is c D K D, where D = diag(lambda^(w i)) is the decay and K a stationary correlation
 of neighbours:
 
-- TC ("tuned/correlated"): lambda^max(i, j), so w = 1/2 and K = lambda^(\|i-j\|/2);
-- DC ("diagonal/correlated"): w = 1/2 and K = rho^\|i-j\| with rho free;
-- SS ("stable spline"): w = 3/2 and K = (3 lambda^(\|i-j\|/2) - lambda^(3\|i-j\|/2)) / 2, smoother.
+- TC ("tuned/correlated" [1]_): lambda^max(i, j), so w = 1/2 and K = lambda^(\|i-j\|/2);
+- DC ("diagonal/correlated" [1]_): w = 1/2 and K = rho^\|i-j\| with rho free;
+- SS ("stable spline" [2]_): w = 3/2 and
+  K = (3 lambda^(\|i-j\|/2) - lambda^(3\|i-j\|/2)) / 2, smoother.
 
 Hyper-parameters are the rows (log rate, [log rate of neighbours,] log c / sigma^2), one for each
 input, where lambda = exp(-rate).
 
 References
 ----------
-T. Chen, H. Ohlsson, L. Ljung, On the estimation of transfer functions, regularizations and
-Gaussian processes - revisited, Automatica 48 (2012), 1525-1535;
-G. Pillonetto, G. De Nicolao, A new kernel-based approach for linear system identification,
-Automatica 46 (2010), 81-93.
+.. [1] T. Chen, H. Ohlsson and L. Ljung, On the estimation of transfer functions, regularizations
+   and Gaussian processes - revisited, Automatica 48 (2012) 1525-1535,
+   doi:10.1016/j.automatica.2012.05.026.
+.. [2] G. Pillonetto and G. De Nicolao, A new kernel-based approach for linear system
+   identification, Automatica 46 (2010) 81-93, doi:10.1016/j.automatica.2009.10.031.
 """
 
 from __future__ import annotations

@@ -4,6 +4,17 @@ With the prior's factor F, F F^T its covariance in units of the noise, estimate,
 likelihood need one Cholesky factorization of ``M = I + F^T R F``, R the Gram matrix of the lagged
 input; the noise variance is eliminated in closed form. The inverse of a kernel, whose entries
 reach lambda^-n, is never formed.
+
+The marginal likelihood is that of [1]_; that no inverse of a kernel is formed is the point of [2]_.
+
+References
+----------
+.. [1] T. Chen, H. Ohlsson and L. Ljung, On the estimation of transfer functions, regularizations
+   and Gaussian processes - revisited, Automatica 48 (2012) 1525-1535,
+   doi:10.1016/j.automatica.2012.05.026.
+.. [2] T. Chen and L. Ljung, Implementation of algorithms for tuning parameters in regularized least
+   squares problems in system identification, Automatica 49 (2013) 2213-2220,
+   doi:10.1016/j.automatica.2013.03.030.
 """
 
 from __future__ import annotations
@@ -111,6 +122,7 @@ class KernelProblem:
         C = cholesky(M)
         half = dtrtrs(C, right, lower=1)[0]
         least = max(self.power - float(half @ half), FLOOR * self.power)
+        # -2 log p(y) with the noise variance at its best: N log(least) + log det M.
         value = self.freedom * np.log(least) + 2.0 * float(np.log(np.diag(C)).sum())
         return Likelihood(value, C, half, least)
 

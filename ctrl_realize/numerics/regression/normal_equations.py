@@ -5,8 +5,13 @@ two rows of its Gram matrix differs from the one a diagonal step before by the s
 and enter at the ends, so one correlation by FFT and n row operations make the whole matrix; the
 tall regression matrix, 800 MB for 1e5 samples and 1000 lags, is never formed.
 
-Only rows with a complete past count (the "covariance" way): what the plant did before the record
-started does not enter.
+Only rows with a complete past count (the covariance method [1]_): what the plant did before the
+record started does not enter.
+
+References
+----------
+.. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   10.1 (the covariance method).
 """
 
 from __future__ import annotations

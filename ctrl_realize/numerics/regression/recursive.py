@@ -4,6 +4,11 @@ The regressors phi[k] come from the input alone, so those of delay d are the sam
 later: ``R_d[k] = sum lambda^(k-i) phi[i-d] phi[i-d]^T = R_0[k-d]``. One Gram matrix and its past
 serve all candidates, and a candidate costs one scaled vector sum a sample. Nothing is solved
 until somebody asks.
+
+References
+----------
+.. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   11.2 (recursive least squares, forgetting factor).
 """
 
 from __future__ import annotations
