@@ -1,4 +1,16 @@
-"""The Cramer-Rao bound of a dead time in a step experiment."""
+"""The Cramer-Rao bound of a dead time in a step experiment.
+
+The bound is the inverse Fisher information [1]_ of delay, poles and linear parameters, of which the
+linear ones are projected out [2]_: what is left of the derivative by the delay is the Schur
+complement.
+
+References
+----------
+.. [1] S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall
+   1993, section 3.7 (Extension to a vector parameter).
+.. [2] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+"""
 
 from __future__ import annotations
 

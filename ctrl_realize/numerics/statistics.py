@@ -1,4 +1,17 @@
-"""Robust summaries of repeated estimates."""
+"""Robust summaries of repeated estimates.
+
+Trimmed means after [1]_; the ratio of a complex normal error to a deviation from repeats has the
+distribution that [2]_ gives for spectra; mixtures as in [3]_.
+
+References
+----------
+.. [1] K. K. Yuen, The two-sample trimmed t for unequal population variances, Biometrika 61 (1974)
+   165-170, doi:10.1093/biomet/61.1.165.
+.. [2] N. R. Goodman, Statistical analysis based on a certain multivariate complex Gaussian
+   distribution, Ann. Math. Statist. 34 (1963) 152-177, doi:10.1214/aoms/1177704250.
+.. [3] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
+   2002, section 4.3, doi:10.1007/b97636.
+"""
 
 from __future__ import annotations
 

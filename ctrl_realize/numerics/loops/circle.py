@@ -1,4 +1,16 @@
-"""Closed-loop time responses from frequency responses, whatever the delay."""
+"""Closed-loop time responses from frequency responses, whatever the delay.
+
+Inversion of a z-transform by a fast Fourier transform on a circle, whose radius sets the error of
+aliasing [1]_. The largest gain outside a circle around -1 is that of [2]_, here at any controller
+times.
+
+References
+----------
+.. [1] J. Abate and W. Whitt, Numerical inversion of probability generating functions, Oper. Res.
+   Lett. 12 (1992) 245-251, doi:10.1016/0167-6377(92)90050-D.
+.. [2] K. J. Astrom, H. Panagopoulos and T. Hagglund, Design of PI controllers based on non-convex
+   optimization, Automatica 34 (1998) 585-601, doi:10.1016/S0005-1098(98)00011-9.
+"""
 
 from __future__ import annotations
 

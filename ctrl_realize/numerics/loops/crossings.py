@@ -2,6 +2,13 @@
 
 Everything works on a function of frequency, not on a polynomial: each crossing is bracketed on a
 grid that follows the curve, then found by root finding on the curve itself.
+
+Encirclements as in [1]_.
+
+References
+----------
+.. [1] K. J. Astrom and R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press 2021,
+   section 10.2 (the Nyquist criterion).
 """
 
 from __future__ import annotations

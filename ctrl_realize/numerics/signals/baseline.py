@@ -1,4 +1,14 @@
-"""Level and slope before a step: constant, drifting, or still settling from an earlier move."""
+"""Level and slope before a step: constant, drifting, or still settling from an earlier move.
+
+A slope counts as real by our own rule: where it is `SIGNIFICANT` standard errors, the error being
+that of a straight line with as many independent samples as the correlation leaves; where the sum of
+the autocorrelation ends elsewhere is Geyer's rule [1]_.
+
+References
+----------
+.. [1] C. J. Geyer, Practical Markov chain Monte Carlo, Statist. Sci. 7 (1992) 473-483,
+   doi:10.1214/ss/1177011137.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,10 @@
 
 A record of thousands of samples says little more about a smooth response than some two hundred
 averages, if they are single samples where the onset may be.
+
+Our own rule: a bin is as wide as 4 % of its distance from the onset. Lags faster than that distance
+have died away there, slower ones are nearly straight over the bin, and the model is averaged over
+the same bins: nothing is approximated, and little information lost.
 """
 
 from __future__ import annotations

@@ -1,4 +1,21 @@
-"""Correlations of residuals, their bounds, and predictions of a residual from its own past."""
+"""Correlations of residuals, their bounds, and predictions of a residual from its own past.
+
+Whiteness after [1]_, independence of the input after [2]_, autoregression by the recursion of Burg
+[3]_ with the order of [5]_, predictions as in [4]_.
+
+References
+----------
+.. [1] G. M. Ljung and G. E. P. Box, On a measure of lack of fit in time series models, Biometrika
+   65 (1978) 297-303, doi:10.1093/biomet/65.2.297.
+.. [2] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   16.6 (Residual analysis).
+.. [3] P. Stoica and R. Moses, Spectral Analysis of Signals, Prentice Hall 2005, section 3.9.3 (the
+   Burg method).
+.. [4] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   3.2 (Prediction).
+.. [5] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
+"""
 
 from __future__ import annotations
 
@@ -42,6 +59,7 @@ def whiteness(rho: FloatArray, samples: int) -> float:
     samples : int
     """
     L = rho.size
+    # Ljung and Box (1978): Q = n (n + 2) sum r_k^2 / (n - k), chi-square of L degrees of freedom.
     Q = samples * (samples + 2) * float(np.sum(rho**2 / (samples - np.arange(1, L + 1))))
     return float(gammaincc(L / 2, Q / 2))
 
@@ -50,7 +68,7 @@ def cross_bound(residual: FloatArray, drive: FloatArray, lags: int, confidence: 
     """Bound the correlation of a residual with an input that it does not contain.
 
     Both may be coloured: the variance is ``sum rho_e rho_u / N`` (Ljung, System Identification,
-    2nd ed., eq. 16.63 and after), summed over `lags` lags to both sides.
+    2nd ed., section 16.6), summed over `lags` lags to both sides.
     """
     own = correlation(residual, residual, lags)
     other = correlation(drive, drive, lags)
@@ -81,6 +99,7 @@ def autoregression(signal: FloatArray, most: int) -> FloatArray:
         energy = float(ahead @ ahead + behind @ behind)
         if energy <= 1e-28 * power:
             break
+        # Burg: the reflection coefficient of least forward and backward prediction errors.
         reflection = -2.0 * float(ahead @ behind) / energy
         forward, backward = ahead + reflection * behind, behind + reflection * ahead
         longer = np.append(filter_, 0.0)

@@ -1,4 +1,14 @@
-"""Find the edges of a measured input signal."""
+"""Find the edges of a measured input signal.
+
+Levels are medians and noise a median absolute deviation [1]_, neither of which a minority of
+samples moves. Where an edge begins and ends is our own rule: within `REST_TOLERANCE` of its height
+from the levels beside it.
+
+References
+----------
+.. [1] F. R. Hampel, The influence curve and its role in robust estimation, J. Amer. Statist. Assoc.
+   69 (1974) 383-393, doi:10.1080/01621459.1974.10482962.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Where in a long record its inputs move."""
+"""Where in a long record its inputs move.
+
+Our own rule, to spend a limited number of samples where the input has most of its variance.
+"""
 
 from __future__ import annotations
 

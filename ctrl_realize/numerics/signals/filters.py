@@ -1,4 +1,17 @@
-"""Differences, low-pass filters and moving means."""
+"""Differences, low-pass filters and moving means.
+
+Difference and filter are those of [1]_; the five-point stencil is in [2]_, Butterworth filters by
+the bilinear transformation in [3]_.
+
+References
+----------
+.. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of valve
+   dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 3.2.
+.. [2] M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, Dover 1965, section 25.3
+   (numerical differentiation).
+.. [3] A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, 3rd ed., Pearson 2010,
+   chapter 7 (Filter design techniques).
+"""
 
 from __future__ import annotations
 

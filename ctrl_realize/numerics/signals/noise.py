@@ -1,4 +1,19 @@
-"""How large the noise of a measured signal is, how coarse, how coloured, and whether it hums."""
+"""How large the noise of a measured signal is, how coarse, how coloured, and whether it hums.
+
+Noise levels are median absolute deviations [1]_ or winsorised ones [3]_, never below ``q /
+sqrt(12)`` of a quantiser [4]_. The correlation time ends its sum as in [2]_, section 3.3.
+
+References
+----------
+.. [1] F. R. Hampel, The influence curve and its role in robust estimation, J. Amer. Statist. Assoc.
+   69 (1974) 383-393, doi:10.1080/01621459.1974.10482962.
+.. [2] C. J. Geyer, Practical Markov chain Monte Carlo, Statist. Sci. 7 (1992) 473-483,
+   doi:10.1214/ss/1177011137.
+.. [3] P. J. Huber and E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, chapter 5 (Scale
+   estimates), doi:10.1002/9780470434697.
+.. [4] B. Widrow and I. Kollar, Quantization Noise, Cambridge University Press 2008,
+   doi:10.1017/CBO9780511754661.
+"""
 
 from __future__ import annotations
 
@@ -50,6 +65,7 @@ def mad_sigma(values: FloatArray) -> float:
     """Standard deviation of Gaussian noise from the median absolute deviation."""
     away = values - np.median(values)
     np.abs(away, out=away)
+    # 1 / Phi^-1(3/4): that of a Gaussian over its median absolute deviation.
     return 1.4826 * float(np.median(away, overwrite_input=True))
 
 
@@ -87,6 +103,7 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     """
     floor = quantum / np.sqrt(12)
     if before.size < _FEW:
+        # 1, -3, 3, -1: white noise has 20 times its variance in these differences.
         third = np.diff(record, 3) / np.sqrt(20)
         return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0
     slope, left = _robust_line(before, quantum)
@@ -118,6 +135,7 @@ def correlation_time(residual: FloatArray) -> float:
     The sum ends where a pair of neighbouring terms turns negative (Geyer's initial positive
     sequence); what white noise scatters to, 1.5, counts as 1.
     """
+    # Geyer (1992), section 3.3: -1 + 2 sum of rho_2m + rho_2m+1 while these pairs are positive.
     time = 2 * float(_correlation(residual).sum(axis=1).sum()) - 1.0
     return time if time > 1.5 else 1.0
 

@@ -2,8 +2,17 @@
 
 Least squares weigh all errors alike. Noise that is slow, or that rings as the ripple of a motor
 does, is much weaker where a delay shows, in fast motions, than a count of independent samples
-makes of it: means over bins are decorrelated first (Aitken), by the autoregression that the
+makes of it: means over bins are decorrelated first [1]_, by the autoregression that the
 output follows where the plant stands still.
+
+References
+----------
+.. [1] A. C. Aitken, On least squares and linear combination of observations, Proc. Roy. Soc.
+   Edinburgh 55 (1935) 42-48.
+.. [2] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
+.. [3] P. Stoica and R. Moses, Spectral Analysis of Signals, Prentice Hall 2005, section 3.9.3 (the
+   Burg method).
 """
 
 from __future__ import annotations

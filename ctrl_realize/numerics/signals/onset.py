@@ -1,4 +1,18 @@
-"""Where a response first leaves the noise: thresholds on records and on impulse responses."""
+"""Where a response first leaves the noise: thresholds on records and on impulse responses.
+
+Whitened correlation as in [1]_ and [2]_, slope of the phase as in [3]_. The first lasting motion is
+our own rule: a threshold in standard deviations, and the line through two thresholds back to rest.
+
+References
+----------
+.. [1] G. E. P. Box and G. M. Jenkins, Time Series Analysis: Forecasting and Control, Holden-Day
+   1970, chapter 11.
+.. [2] C. H. Knapp and G. C. Carter, The generalized correlation method for estimation of time
+   delay, IEEE Trans. Acoust. Speech Signal Process. 24 (1976) 320-327,
+   doi:10.1109/TASSP.1976.1162830.
+.. [3] S. Bjorklund and L. Ljung, A review of time-delay estimation techniques, Proc. 42nd IEEE
+   Conf. Decision and Control (2003) 2502-2507, doi:10.1109/CDC.2003.1272997.
+"""
 
 from __future__ import annotations
 

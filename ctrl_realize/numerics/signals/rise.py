@@ -1,4 +1,7 @@
-"""How fast a step response rises, in the presence of noise."""
+"""How fast a step response rises, in the presence of noise.
+
+Rise time in its usual sense, 10 % to 90 %; the averaging is our own.
+"""
 
 from __future__ import annotations
 

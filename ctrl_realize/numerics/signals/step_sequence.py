@@ -1,4 +1,7 @@
-"""Write a measured input as a short list of moves."""
+"""Write a measured input as a short list of moves.
+
+Our own rule: what does not differ by more than its noise is one level.
+"""
 
 from __future__ import annotations
 

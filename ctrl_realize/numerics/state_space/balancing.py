@@ -1,4 +1,19 @@
-"""Gramians, balanced coordinates and modal blocks."""
+"""Gramians, balanced coordinates and modal blocks.
+
+Modes are split as in [1]_, Gramians summed by the squared iteration of [2]_, models truncated by
+the square-root method of [3]_; in discrete time balanced parts of a stable model are stable [4]_.
+
+References
+----------
+.. [1] G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., Johns Hopkins 2013, section
+   7.6.3 (block diagonalization).
+.. [2] R. A. Smith, Matrix equation XA + BX = C, SIAM J. Appl. Math. 16 (1968) 198-201,
+   doi:10.1137/0116017.
+.. [3] M. S. Tombs and I. Postlethwaite, Truncated balanced realization of a stable non-minimal
+   state-space system, Int. J. Control 46 (1987) 1319-1330, doi:10.1080/00207178708933971.
+.. [4] L. Pernebo and L. M. Silverman, Model reduction via balanced state space representations,
+   IEEE Trans. Automat. Control 27 (1982) 382-387, doi:10.1109/TAC.1982.1102945.
+"""
 
 from __future__ import annotations
 

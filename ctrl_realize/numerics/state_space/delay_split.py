@@ -2,6 +2,11 @@
 
 A line is a chain of delays with taps: one line per input serves all outputs, one per output all
 inputs.
+
+References
+----------
+.. [1] A. Schrijver, Theory of Linear and Integer Programming, Wiley 1986, chapter 19 (Totally
+   unimodular matrices).
 """
 
 from __future__ import annotations
@@ -34,7 +39,7 @@ def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntAr
     Notes
     -----
     The least rest is a linear program whose constraints are the edges of a bipartite graph:
-    totally unimodular, so that its corners are whole numbers.
+    totally unimodular, so that its corners are whole numbers (see the module).
     """
     p, m = delays.shape
     rows, columns = np.nonzero(known)

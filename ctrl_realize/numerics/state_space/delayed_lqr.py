@@ -1,4 +1,15 @@
-"""Optimal state feedback of a core whose inputs act after different delays."""
+"""Optimal state feedback of a core whose inputs act after different delays.
+
+Known as the regulator for multiple input delays [1]_; with one delay it is the stationary gain on
+the predicted state [2]_.
+
+References
+----------
+.. [1] H. Zhang, G. Duan and L. Xie, Linear quadratic regulation for linear time-varying systems
+   with multiple input delays, Automatica 42 (2006) 1465-1476, doi:10.1016/j.automatica.2006.04.007.
+.. [2] Z. Artstein, Linear systems with delayed controls: a reduction, IEEE Trans. Automat. Control
+   27 (1982) 869-879, doi:10.1109/TAC.1982.1103023.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,18 @@
-"""Rational approximations of a dead time: Pade (continuous) and Thiran (discrete)."""
+"""Rational approximations of a dead time: Pade (continuous) and Thiran (discrete).
+
+The approximant of [1]_ in balanced coordinates, as in [2]_; the all-pass of [3]_ and [4]_.
+
+References
+----------
+.. [1] G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., Johns Hopkins 2013, section
+   9.3.1 (Pade approximation of the exponential).
+.. [2] J. Lam, Balanced realization of Pade approximants of exp(-sT), IEEE Trans. Automat. Control
+   36 (1991) 1096-1100.
+.. [3] J.-P. Thiran, Recursive digital filters with maximally flat group delay, IEEE Trans. Circuit
+   Theory 18 (1971) 659-664, doi:10.1109/TCT.1971.1083363.
+.. [4] T. I. Laakso, V. Valimaki, M. Karjalainen and U. K. Laine, Splitting the unit delay, IEEE
+   Signal Process. Mag. 13 (1996) 30-60, doi:10.1109/79.482137.
+"""
 
 from __future__ import annotations
 
@@ -31,6 +45,7 @@ def pade_ladder(dead_time: float, order: int) -> Ladder:
     A, B, C, D : ndarray, shapes (n, n), (n, 1), (1, n), (1, 1)
     """
     n = order
+    # Denominator of the diagonal approximant (Golub and Van Loan, section 9.3.1):
     # Q(s) = sum (2n-k)! / (k! (n-k)!) s^k for tau = 1, highest power first.
     falling = [
         Fraction(factorial(2 * n - k), factorial(k) * factorial(n - k)) for k in range(n, -1, -1)

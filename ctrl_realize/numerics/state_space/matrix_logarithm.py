@@ -1,4 +1,13 @@
-"""Principal logarithm of a matrix, the same at every call."""
+"""Principal logarithm of a matrix, the same at every call.
+
+References
+----------
+.. [1] A. H. Al-Mohy and N. J. Higham, Improved inverse scaling and squaring algorithms for the
+   matrix logarithm, SIAM J. Sci. Comput. 34 (2012) C153-C169, sections 2 and 5,
+   doi:10.1137/110852553.
+.. [2] N. J. Higham, Functions of Matrices, SIAM 2008, chapter 11 (Matrix logarithm),
+   doi:10.1137/1.9780898717778.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,11 @@
-"""Step responses of process models, and Skogestad's half rule."""
+"""Step responses of process models, and Skogestad's half rule.
+
+References
+----------
+.. [1] S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, J. Process
+   Control 13 (2003) 291-309, sections 2 (half rule) and 5 (rules T1 to T3),
+   doi:10.1016/S0959-1524(02)00062-8.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,16 @@ The transfer-function polynomial is never formed: with poles that crowd at z = 1
 oversampled records do, its coefficients lose all digits from order 10 on. Frequency responses
 go through the complex Schur form, time responses through block powers; both need no
 eigenvectors, so defective and unstable A are fine.
+
+One decomposition for all frequencies as in [1]_, there with the Hessenberg form; balancing is that
+of [2]_.
+
+References
+----------
+.. [1] A. J. Laub, Efficient multivariable frequency response computations, IEEE Trans. Automat.
+   Control 26 (1981) 407-408.
+.. [2] B. N. Parlett and C. Reinsch, Balancing a matrix for calculation of eigenvalues and
+   eigenvectors, Numer. Math. 13 (1969) 293-304, doi:10.1007/BF02165404.
 """
 
 from __future__ import annotations

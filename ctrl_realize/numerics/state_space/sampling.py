@@ -1,4 +1,17 @@
-"""Sampling of continuous systems under a zero-order hold, and its inverse."""
+"""Sampling of continuous systems under a zero-order hold, and its inverse.
+
+Sampling with and without dead time as in [1]_, both integrals from one exponential [2]_; the
+inverse is the principal logarithm [3]_.
+
+References
+----------
+.. [1] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+   section 2.3.
+.. [2] C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Trans. Automat.
+   Control 23 (1978) 395-404, doi:10.1109/TAC.1978.1101743.
+.. [3] N. J. Higham, Functions of Matrices, SIAM 2008, chapter 11 (Matrix logarithm),
+   doi:10.1137/1.9780898717778.
+"""
 
 from __future__ import annotations
 
@@ -32,6 +45,7 @@ def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray
     block = np.zeros((n + m, n + m))
     block[:n, :n] = A
     block[:n, n:] = B
+    # exp([[A, B], [0, 0]] dt) = [[Phi, Gamma], [0, I]] (Van Loan 1978).
     grown = expm(block * dt)
     return grown[:n, :n], grown[:n, n:]
 
@@ -88,6 +102,8 @@ def sample_with_dead_time(
         return Phi, Gamma, C, D, whole
     if np.any(D):
         raise AssertionError("a fractional delay of a direct term is no state-space model")
+    # x[k+1] = Phi x[k] + Gamma1 u[k-d-1] + Gamma0 u[k-d] (Astrom and Wittenmark, section 2.3),
+    # then x[k] - Gamma0 u[k-d-1] as the state.
     early, Gamma0 = zero_order_hold(A, B, (1 - rest) * dt)
     late, partial = zero_order_hold(A, B, rest * dt)
     Phi = late @ early

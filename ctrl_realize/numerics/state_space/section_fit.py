@@ -5,6 +5,18 @@ The misfit is the likelihood of white noise of an unknown size in every output,
 record enter linearly and are eliminated (variable projection); the rest moves by damped
 Gauss-Newton steps. The sections leave two directions each in which B and C cancel: the damping
 keeps still there.
+
+Prediction errors with one unknown variance for each output [1]_; elimination as in [2]_, steps as
+in [3]_.
+
+References
+----------
+.. [1] T. Soderstrom and P. Stoica, System Identification, Prentice Hall 1989, chapter 7 (Prediction
+   error methods).
+.. [2] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+.. [3] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   10.2 (Numerical solution by iterative search methods).
 """
 
 from __future__ import annotations

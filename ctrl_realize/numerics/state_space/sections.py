@@ -9,6 +9,13 @@ which holds two real poles as well as a complex pair, and lets one become the ot
 derivative of the output is a signal behind ``1 / (z^2 + a1 z + a2)``: a few filters of second
 order, where derivatives in all entries of A would take n^2 simulations. Of an odd order the last
 section has one state: its a2, the first row of its B and the first column of its C are zero.
+
+Derivatives by filters as in [1]_.
+
+References
+----------
+.. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   10.3 (Computing gradients).
 """
 
 from __future__ import annotations

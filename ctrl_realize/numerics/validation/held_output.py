@@ -1,4 +1,13 @@
-"""Outputs that stand still where a plant does not: held between samples, or at their limit."""
+"""Outputs that stand still where a plant does not: held between samples, or at their limit.
+
+Our own rule: noise of one quantisation step [1]_ repeats a value seldom, a held output most of the
+time.
+
+References
+----------
+.. [1] B. Widrow and I. Kollar, Quantization Noise, Cambridge University Press 2008,
+   doi:10.1017/CBO9780511754661.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,18 @@
 The output is predicted from its own past and that of the input by one long regression, with no
 model of the plant in between. So the tests stay right where the model that was fitted is wrong:
 closed-loop records are often fitted by the controller turned round, which leaves no residual.
+
+References
+----------
+.. [1] C. A. Sims, Money, income, and causality, Amer. Econ. Rev. 62 (1972) 540-552.
+.. [2] L. D. Haugh, Checking the independence of two covariance-stationary time series, J. Amer.
+   Statist. Assoc. 71 (1976) 378-385, doi:10.1080/01621459.1976.10480353.
+.. [3] C. W. J. Granger, Investigating causal relations by econometric models and cross-spectral
+   methods, Econometrica 37 (1969) 424-438, doi:10.2307/1912791.
+.. [4] R. S. Tsay, Nonlinearity tests for time series, Biometrika 73 (1986) 461-466,
+   doi:10.1093/biomet/73.2.461.
+.. [5] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   16.6 (Residual analysis).
 """
 
 from __future__ import annotations

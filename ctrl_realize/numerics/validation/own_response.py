@@ -1,4 +1,15 @@
-"""One record against the response of a model that is common to several."""
+"""One record against the response of a model that is common to several.
+
+The test of homogeneity is that of [1]_; shift, gain and stretch come from the linear model [2]_
+about the common response.
+
+References
+----------
+.. [1] W. G. Cochran, The combination of estimates from different experiments, Biometrics 10 (1954)
+   101-129, doi:10.2307/3001666.
+.. [2] S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall
+   1993, chapter 4 (Linear models).
+"""
 
 from __future__ import annotations
 

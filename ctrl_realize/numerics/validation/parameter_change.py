@@ -5,6 +5,13 @@ groups of samples: of one time, one level, one direction. Where one model holds 
 the groups do not differ but by noise. (Lagrange multiplier test against parameters that change:
 Godfrey, Misspecification Tests in Econometrics, Cambridge 1988, chapter 4; with a transition
 variable: Terasvirta, J. Am. Stat. Ass. 89 (1994) 208-218.)
+
+References
+----------
+.. [1] L. G. Godfrey, Misspecification Tests in Econometrics, Cambridge University Press 1988,
+   chapter 4.
+.. [2] T. Terasvirta, Specification, estimation, and evaluation of smooth transition autoregressive
+   models, J. Amer. Statist. Assoc. 89 (1994) 208-218, doi:10.1080/01621459.1994.10476462.
 """
 
 from __future__ import annotations

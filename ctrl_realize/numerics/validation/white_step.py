@@ -6,6 +6,15 @@ data that the residual's own autoregression has made white is as good as the max
 likelihood (one-step estimator: Lehmann and Casella, Theory of Point Estimation, 2nd ed., section
 6.4); where it differs from least squares by more than noise, one of them is wrong (Hausman,
 Econometrica 46 (1978) 1251-1271).
+
+References
+----------
+.. [1] E. L. Lehmann and G. Casella, Theory of Point Estimation, 2nd ed., Springer 1998, section
+   6.4, doi:10.1007/b98854.
+.. [2] J. A. Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251-1271,
+   doi:10.2307/1913827.
+.. [3] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+   section 2.3.
 """
 
 from __future__ import annotations
