@@ -40,8 +40,8 @@ CASES = {
     "a gain without states": lambda: STATIC,
     "a continuous gain": lambda: cr.design.to_continuous(STATIC),
     "an integrating process": lambda: cr.design.reduce_fopdt(INTEGRATING),
-    "an output that rests": lambda: cr.analyse_residuals(PLANT, constant()),
-    "a prediction of it": lambda: cr.predict(PLANT, constant(), 3),
+    "an output that rests": lambda: cr.validation.analyse_residuals(PLANT, constant()),
+    "a prediction of it": lambda: cr.validation.predict(PLANT, constant(), 3),
     "a tracker without news": untold,
     "a bound that is too large": lambda: cr.design.uncertainty_bound(
         [1.1 * PLANT], PLANT, dead_time_interval=(0.0, 0.5)
@@ -78,9 +78,9 @@ RESULTS = {
     "a fit of it": lambda: cr.fit_frf(FRF, order=1).fit,
     "a comparison": lambda: cr.compare_frf(PLANT, FRF),
     "margins": lambda: cr.design.margins(PLANT, cr.design.pid(PLANT)),
-    "a check of residuals": lambda: cr.analyse_residuals(PLANT, driven()),
-    "a check of the delay": lambda: cr.compare_delay_estimates(frf=FRF),
-    "a bootstrap": lambda: cr.bootstrap(STEP, one_lag, repeats=3),
+    "a check of residuals": lambda: cr.validation.analyse_residuals(PLANT, driven()),
+    "a check of the delay": lambda: cr.validation.compare_delay_estimates(frf=FRF),
+    "a bootstrap": lambda: cr.validation.bootstrap(STEP, one_lag, repeats=3),
     "a record": lambda: STEP,
     "a step response": lambda: cr.unit_step(STEP),
     "a system": lambda: PLANT,

@@ -77,11 +77,11 @@ def test_a_record_whose_process_is_killed_is_a_row_with_the_reason_and_all_other
 
 
 def test_a_record_over_which_the_process_died_twice_is_not_tried_for_ever(tmp_path):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     dying = (
         "import os, signal, sys\n"
         "import ctrl_realize as cr\n"
-        "with cr.CampaignStore(sys.argv[1]).attempt(sys.argv[2]):\n"
+        "with cr.io.CampaignStore(sys.argv[1]).attempt(sys.argv[2]):\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     for _ in range(2):

@@ -93,7 +93,7 @@ def test_a_disk_that_is_full_while_rows_are_kept_loses_no_result(files, tmp_path
 
     monkeypatch.setattr("ctrl_realize.io.store.write_text", full)
     records = [cr.read_record(file) for file in files]
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     kept = cr.identify_campaign(records, method="scan", order=3, max_delay=80, store=store)
     assert len(kept.good) == COUNT
     assert all("No space left" in row.warnings[-1] for row in kept.rows)

@@ -20,7 +20,7 @@ FLOORS = [
     {"delayed"},
     {"frequency", "bench"},
     {"identification"},
-    {"design"},
+    {"design", "validation"},
     {"io"},
     {"plots"},
     {"report"},

@@ -159,7 +159,7 @@ def test_unusable_impulse_responses_are_refused(markov, dt, error, match):
 
 
 def test_paper_filter_delays_by_13_samples_and_lags_48_degrees_at_13_hz():
-    spec = cr.FilterSpec(5, 50.0, False, 7.8125e-4)
+    spec = cr.data.FilterSpec(5, 50.0, False, 7.8125e-4)
     # paper.md E11 and section 0.3: 13.1 samples, 10.25 ms, 48.4 degrees
     assert_allclose(spec.group_delay, 13.12, atol=0.01)
     assert_allclose(spec.group_delay * spec.dt, 10.25e-3, atol=0.01e-3)
@@ -168,7 +168,7 @@ def test_paper_filter_delays_by_13_samples_and_lags_48_degrees_at_13_hz():
 
 
 def test_zero_phase_filter_has_no_phase_and_half_gain_at_cutoff():
-    spec = cr.FilterSpec(5, 50.0, True, 1e-3)
+    spec = cr.data.FilterSpec(5, 50.0, True, 1e-3)
     response = spec.response(2 * np.pi * np.array([1.0, 50.0]))
     assert_allclose(response.imag, 0, atol=0)
     assert_allclose(response[1].real, 0.5, atol=1e-9)  # -3 dB twice

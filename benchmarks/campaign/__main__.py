@@ -71,7 +71,7 @@ def peaks() -> tuple[float, float]:
 
 def measure(records: int, jobs: int, method: str, folder: Path, store_folder: Path) -> Measured:
     """Run a tenth, then all, then all again from the store."""
-    store = cr.CampaignStore(store_folder)
+    store = cr.io.CampaignStore(store_folder)
     found = len(store)
     sources = [functools.partial(make, seed, str(folder)) for seed in range(records)]
 

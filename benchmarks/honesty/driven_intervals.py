@@ -43,7 +43,7 @@ def any_input(kind: str, plant: str, noise: float, seed: int) -> Seen:
         model = cr.fit_output_error(case.record)
         # The check would fit the same record once more.
         with patch.object(delay_estimates, "fit_output_error", lambda record: model):
-            check = cr.compare_delay_estimates(case.record)
+            check = cr.validation.compare_delay_estimates(case.record)
     fit = model.fit
     reach = 1.96 * fit.std_given_structure
     near = (fit.dead_time - reach, fit.dead_time + reach)

@@ -158,7 +158,7 @@ def residuals(seed: int, *, shift: int = 0, kind: str = "white") -> Codes:
     """Check the plant itself, its delay off by `shift` samples, on a record of its own."""
     case = driven(seed, kind)
     model = case.plant.replace(delay=case.plant.delay + shift)
-    return codes(cr.analyse_residuals(model, case.record))
+    return codes(cr.validation.analyse_residuals(model, case.record))
 
 
 def closed_loop(seed: int, *, integral: float) -> Codes:
@@ -175,11 +175,11 @@ def closed_loop(seed: int, *, integral: float) -> Codes:
         u[k] = gain * (target[k] - y[k]) + total
     record = cr.Record(DRIVEN_DT * np.arange(n), u, y)
     core = ct.ss([[pole]], [[1 - pole]], [[pole]], [[1 - pole]], DRIVEN_DT)
-    return codes(cr.analyse_residuals(cr.DelayedStateSpace(core, 3), record))
+    return codes(cr.validation.analyse_residuals(cr.DelayedStateSpace(core, 3), record))
 
 
 def check(seed: int, **options: object) -> Codes:
-    return codes(cr.compare_delay_estimates(driven(seed).record, **options))
+    return codes(cr.validation.compare_delay_estimates(driven(seed).record, **options))
 
 
 def unrelated(seed: int) -> Codes:
@@ -187,24 +187,28 @@ def unrelated(seed: int) -> Codes:
     case = driven(seed)
     rng = np.random.default_rng([seed, 36])
     noise = noise_of("white", case.record.n_samples, rng)
-    return codes(cr.compare_delay_estimates(cr.Record(case.record.time, case.record.input, noise)))
+    return codes(
+        cr.validation.compare_delay_estimates(cr.Record(case.record.time, case.record.input, noise))
+    )
 
 
 def hardly_moving(seed: int) -> Codes:
     """A step at the end of which the output has just begun to move."""
     made = rigs.step_record(rigs.R3, noise=0.01, seed=seed, before=20, after=30, delay=40)
     frf = frf_of(rigs.R2, seed, _noise(seed))
-    return codes(cr.compare_delay_estimates(made, frf=frf))
+    return codes(cr.validation.compare_delay_estimates(made, frf=frf))
 
 
 def few_lines(seed: int) -> Codes:
     frf = frf_of(rigs.R1, seed, _noise(seed), points=3)
-    return codes(cr.compare_delay_estimates(driven(seed).record, frf=frf))
+    return codes(cr.validation.compare_delay_estimates(driven(seed).record, frf=frf))
 
 
 def many_lines(seed: int) -> Codes:
     return codes(
-        cr.compare_delay_estimates(driven(seed).record, frf=frf_of(rigs.R2, seed, _noise(seed)))
+        cr.validation.compare_delay_estimates(
+            driven(seed).record, frf=frf_of(rigs.R2, seed, _noise(seed))
+        )
     )
 
 

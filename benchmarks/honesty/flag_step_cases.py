@@ -292,7 +292,7 @@ def bootstrap(seed: int, *, fails: bool = False, steps: float = 0.0) -> Codes:
             raise cr.errors.DataError("made to fail")
         return cr.fit_output_error(drawn, structures=[(1, 1)])
 
-    return codes(cr.bootstrap(record, estimator, repeats=8))
+    return codes(cr.validation.bootstrap(record, estimator, repeats=8))
 
 
 _FIT = FlagCase("fit_output_error", "", "", ordinary, "R1 to R4, white noise 0.1 to 2 %", ordinary)

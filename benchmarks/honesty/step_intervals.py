@@ -53,7 +53,7 @@ def views(kind: str, plant: str, noise: float, seed: int) -> Seen:
     """Views of compare_delay_estimates on a step."""
     case = step_case(kind, plant, noise, seed)
     with quietly():
-        check = cr.compare_delay_estimates(case.record)
+        check = cr.validation.compare_delay_estimates(case.record)
     return Seen(
         "views",
         kind,
@@ -65,7 +65,7 @@ def views(kind: str, plant: str, noise: float, seed: int) -> Seen:
     )
 
 
-def view_coverage(check: cr.DelayComparison, truth: float) -> dict[str, float]:
+def view_coverage(check: cr.validation.DelayComparison, truth: float) -> dict[str, float]:
     """Whether each view, and what they have in common, holds the truth."""
     covered = {
         f"compare_delay_estimates: {view.method}": float(
@@ -126,7 +126,7 @@ def redrawn(kind: str, plant: str, noise: float, seed: int) -> Seen:
     estimator = partial(cr.fit_output_error, structures=[structure])
     with quietly():
         # The fewest draws whose outermost hold one more with 95 %.
-        drawn = cr.bootstrap(case.record, estimator, repeats=39, seed=seed)
+        drawn = cr.validation.bootstrap(case.record, estimator, repeats=39, seed=seed)
     truth = case.delay * DT
     middle = float(np.median(drawn.dead_times))
     covered = {
@@ -141,7 +141,7 @@ def redrawn(kind: str, plant: str, noise: float, seed: int) -> Seen:
     return Seen("redrawn", kind, plant, noise, seed, covered)
 
 
-def _bands(drawn: cr.Bootstrap, exact: cr.DelayedStateSpace) -> dict[str, float]:
+def _bands(drawn: cr.validation.Bootstrap, exact: cr.DelayedStateSpace) -> dict[str, float]:
     """Part of the step, gain and phase bands that holds the plant."""
     low, high = drawn.step_band(600)
     step = np.cumsum(np.ravel(exact.markov(600)))[50:]

@@ -27,7 +27,7 @@ def answer(record: cr.Record) -> Answer:
     except cr.errors.CtrlRealizeError as error:
         return {"structure": type(error).__name__, "flags": [], "times": []}
     fit = system.fit
-    kind = "lags" if isinstance(fit, cr.OutputErrorFit) else "modes"
+    kind = "lags" if isinstance(fit, cr.identification.OutputErrorFit) else "modes"
     shape = [fit.order, fit.relative_degree] if kind == "lags" else [fit.order, bool(fit.direct)]
     return {
         "structure": " ".join(map(str, [kind, *shape])),

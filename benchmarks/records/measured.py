@@ -102,7 +102,7 @@ def predicted(way: Model, order: int, first: cr.Record, second: cr.Record) -> fl
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             model = way(first, order)
-            return float(cr.analyse_residuals(model, second).fit_percent.mean())
+            return float(cr.validation.analyse_residuals(model, second).fit_percent.mean())
     except ImportError:
         return "not installed"
     except UnfitRecordError:

@@ -39,12 +39,12 @@ def baseline_seconds(markov: np.ndarray, order: int) -> tuple[float, np.ndarray]
     return min(times) * DELAYS, np.array(misfits)
 
 
-def ours(impulse: cr.ImpulseResponse, order: int) -> cr.DelayScan:
+def ours(impulse: cr.ImpulseResponse, order: int) -> cr.identification.DelayScan:
     """The scan with its model, its flags and all."""
     return cr.estimate_delay(impulse, order, max_delay=MAX_DELAY, samples=SAMPLES).fit
 
 
-def surface(impulse: cr.ImpulseResponse) -> cr.OrderScan:
+def surface(impulse: cr.ImpulseResponse) -> cr.identification.OrderScan:
     """Orders 1...8."""
     return cr.scan_orders(impulse, 8, max_delay=MAX_DELAY, samples=SAMPLES)
 

@@ -13,7 +13,7 @@ from ..errors import CtrlRealizeError, DataError, OptionError
 from ..frequency import compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
-from ..identification.identify import identify as identify_record
+from ..identification.methods import identify as identify_record
 from ..io import read_frf
 from .inputs import Reading, calls_again, check_files, reading, typed_call, words_again
 from .manifest import Run, refuse_other_results

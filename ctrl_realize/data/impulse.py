@@ -37,7 +37,7 @@ class FilterSpec:
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> low_pass = cr.FilterSpec(order=5, cutoff_hz=20.0, zero_phase=False, dt=0.001)
+    >>> low_pass = cr.data.FilterSpec(order=5, cutoff_hz=20.0, zero_phase=False, dt=0.001)
     >>> gain = abs(low_pass.response(np.array([2 * np.pi * 20.0])))
     >>> print(gain.round(3), f"{low_pass.group_delay:.1f} samples")
     [0.707] 25.7 samples

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .._wording import in_time
 from ..numerics.arrays import FloatArray, read_only
 from ..results import Flag, Result
-from . import ImpulseResponse
+from .impulse import ImpulseResponse
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

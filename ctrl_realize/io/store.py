@@ -54,7 +54,7 @@ class CampaignStore:
     >>> import ctrl_realize as cr
     >>> records = [cr.bench.valve().step_record(16.0, seed) for seed in range(2)]
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     store = cr.CampaignStore(folder)
+    ...     store = cr.io.CampaignStore(folder)
     ...     first = cr.identify_campaign(records, method="paper", store=store)
     ...     again = cr.identify_campaign(records, method="paper", store=store)
     ...     print(len(store), bool((first.delays == again.delays).all()))

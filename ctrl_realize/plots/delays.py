@@ -79,7 +79,8 @@ def delay_check_plot(
     >>> rng = np.random.default_rng(0)
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    >>> check = cr.compare_delay_estimates(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
+    >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
+    >>> check = cr.validation.compare_delay_estimates(record, order=1)
     >>> cplt = plots.delay_check_plot(check)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time, or bound ◂ [ms]'
@@ -144,7 +145,8 @@ def bootstrap_plot(
     >>> u = np.where(t < 0.5, 0.0, 2.0)
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
-    >>> again = cr.bootstrap(record, partial(cr.fit_output_error, structures=[(1, 1)]), repeats=30)
+    >>> one_lag = partial(cr.fit_output_error, structures=[(1, 1)])
+    >>> again = cr.validation.bootstrap(record, one_lag, repeats=30)
     >>> cplt = plots.bootstrap_plot(again)
     >>> [axes.get_xlabel() for axes in cplt.figure.axes]
     ['time [s]', 'dead time [ms]']

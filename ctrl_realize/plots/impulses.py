@@ -121,7 +121,8 @@ def channels_plot(
     >>> from ctrl_realize import plots
     >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
     >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
-    >>> cplt = plots.channels_plot(cr.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1).fit)
+    >>> system = cr.identification.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1)
+    >>> cplt = plots.channels_plot(system.fit)
     >>> [axes.get_title(loc="right") for axes in cplt.figure.axes]
     ['input 0 to output 0', 'input 0 to output 1']
     """

@@ -55,7 +55,7 @@ def residual_plot(
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
     >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.residual_plot(cr.analyse_residuals(plant, record))
+    >>> cplt = plots.residual_plot(cr.validation.analyse_residuals(plant, record))
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
@@ -142,7 +142,7 @@ def prediction_plot(
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 300))
     >>> record = cr.Record(0.1 * np.arange(300), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.prediction_plot(cr.predict(plant, record, 10))
+    >>> cplt = plots.prediction_plot(cr.validation.predict(plant, record, 10))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['measured', '10 ahead, fit 86.6 %']
     """

@@ -6,34 +6,27 @@ import ast
 from pathlib import Path
 
 RAISED_BY = {
-    "any_input_fit": "fit_output_error",
-    "bootstrap": "bootstrap",
-    "campaign_flags": "identify_campaign",
-    "channel_fit": "fit_state_space",
-    "channel_fit_result": "fit_state_space",
-    "compare": "compare_frf",
-    "cross_check": "compare_delay_estimates",
-    "data_loops": "design.margins",
-    "disagreement": "compare_frf",
-    "fit_flags": "fit_output_error",
-    "from_frf": "impulse_from_frf",
-    "from_io": "impulse_from_io",
-    "frf_selection": "fit_frf",
-    "identify": "identify",
-    "impulses": "realize",
-    "loop_check": "design.pid",
-    "margins": "design.margins",
-    "long_records": "fit_state_space",
-    "mode_choice": "identify",
-    "model_checks": "fit_output_error",
-    "model_flags": "fit_output_error",
-    "pulse_regression": "impulse_from_io",
-    "realization": "realize",
-    "repeat_flags": "fit_output_error",
-    "residuals": "analyse_residuals",
-    "scan_curve": "estimate_delay",
+    "design/loops/data_loops": "design.margins",
+    "design/loops/loop_check": "design.pid",
+    "design/loops/margins": "design.margins",
+    "frequency/compare": "compare_frf",
+    "frequency/disagreement": "compare_frf",
+    "frequency/from_frf": "impulse_from_frf",
+    "frequency/frf_selection": "fit_frf",
+    "identification/campaign": "identify_campaign",
+    "identification/impulse": "impulse_from_io",
+    "identification/long_records": "fit_state_space",
+    "identification/methods": "identify",
+    "identification/model_class": "identify",
+    "identification/output_error": "fit_output_error",
+    "identification/realization": "realize",
+    "identification/realization/scan_curve": "estimate_delay",
+    "identification/state_space_fit": "fit_state_space",
+    "identification/validation/bootstrap": "validation.bootstrap",
+    "identification/validation/delay_estimates": "validation.compare_delay_estimates",
+    "identification/validation/residuals": "validation.analyse_residuals",
 }
-"""File of the source -> public function whose results carry the flag."""
+"""File or folder of the source -> public function whose results carry the flag."""
 
 COMPOSED = {
     "outliers": "… sample(s), the first at index …, are …, far beyond the others: if that stands "
@@ -64,7 +57,8 @@ def flags(package: Path) -> list[tuple[str, str, str]]:
                 continue
             if len(node.args) > 1 and isinstance(node.args[0], ast.Constant):
                 code = str(node.args[0].value)
-                by = RAISED_BY.get(path.stem, path.stem)
+                place = path.relative_to(package).with_suffix("").as_posix()
+                by = RAISED_BY.get(place) or RAISED_BY[place.rpartition("/")[0]]
                 found.add((code, by, _message(node.args[1], code)))
     return sorted(found)
 

@@ -30,6 +30,11 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "Functions return the model itself; how it was found is in its `.fit`.",
         ("ctrl_realize.identification", "ctrl_realize.numerics"),
     ),
+    "validation": (
+        "Validation",
+        "How far a model is to be trusted.",
+        ("ctrl_realize.identification.validation",),
+    ),
     "systems": (
         "Systems with dead time",
         "A `control.StateSpace` that keeps its dead time beside the core; saving and loading.",
@@ -47,6 +52,12 @@ GROUPS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
 }
 """Page -> title, one line, and the modules whose names it lists (longest prefix wins)."""
+
+PLACES = ("data", "identification", "validation", "frequency", "io", "errors", "results")
+"""Public modules whose names are sorted into the pages above."""
+
+DEFINING = ("errors", "results")
+"""Those that offer what they define, and no more."""
 
 SUBMODULES = {
     "design": "Controllers for plants with dead time.",
@@ -100,15 +111,13 @@ def pages() -> dict[str, str]:
     sorted_names: dict[str, list[str]] = {page: [] for page in GROUPS}
     for name, value in public(package).items():
         sorted_names[group_of(value)].append(f"ctrl_realize.{name}")
-    # Errors and result mixins are caught by name; they need not be at the top level.
-    for module_name in ("ctrl_realize.errors", "ctrl_realize.results"):
+    # What is not at the top level stands under the module that offers it.
+    for place in PLACES:
+        module_name = f"ctrl_realize.{place}"
         for name, value in public(import_module(module_name)).items():
-            full = f"{module_name}.{name}"
-            if getattr(value, "__module__", "") == module_name and not hasattr(package, name):
-                sorted_names["errors"].append(full)
-    for name, value in public(import_module("ctrl_realize.io")).items():
-        if not hasattr(package, name):
-            sorted_names[group_of(value)].append(f"ctrl_realize.io.{name}")
+            at_home = place not in DEFINING or getattr(value, "__module__", "") == module_name
+            if at_home and not hasattr(package, name):
+                sorted_names[group_of(value)].append(f"{module_name}.{name}")
     texts = {
         page: _page(title, line, sorted_names[page]) for page, (title, line, _) in GROUPS.items()
     }

@@ -59,7 +59,7 @@ def test_noise_of_the_response_is_no_disagreement():
 
 def test_a_contradiction_is_the_first_line_of_the_verdict():
     comparison = cr.compare_frf(MODEL, measured(exact(1.5)))
-    more = [cr.Flag("delay_at_bound", "try a larger one"), *comparison.flags]
+    more = [cr.results.Flag("delay_at_bound", "try a larger one"), *comparison.flags]
     verdict = report.verdict_of(MODEL, more)
     assert verdict.level == "poor"
     assert "contradicts" in verdict.judgement

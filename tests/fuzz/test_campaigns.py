@@ -135,7 +135,7 @@ class StopsAt:
         return self.source if isinstance(self.source, cr.Record) else self.source()
 
 
-class CutStore(cr.CampaignStore):
+class CutStore(cr.io.CampaignStore):
     """A store whose process ends before, or just after, a row is written."""
 
     def __init__(self, folder, rng):
@@ -238,11 +238,15 @@ def stopped_campaign(rng, tmp_path_factory):
         if rng.randrange(2):
             spoil(rng, folder)
     with good_end() as campaigns:
-        campaigns.append(cr.identify_campaign(sources, store=cr.CampaignStore(folder), **settings))
+        campaigns.append(
+            cr.identify_campaign(sources, store=cr.io.CampaignStore(folder), **settings)
+        )
     same(campaigns[0], whole)
     with good_end() as campaigns:
         # all from the store now
-        campaigns.append(cr.identify_campaign(sources, store=cr.CampaignStore(folder), **settings))
+        campaigns.append(
+            cr.identify_campaign(sources, store=cr.io.CampaignStore(folder), **settings)
+        )
     same(campaigns[0], whole)
     for path in folder.iterdir():
         path.unlink()

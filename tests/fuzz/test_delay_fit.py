@@ -20,7 +20,7 @@ def check_fit(model: cr.DelayedStateSpace) -> None:
     assert low <= model.fit.dead_time <= high
     assert low >= 0
     # where the residual follows the input, a model in sections is what identify gives
-    if isinstance(model.fit, cr.OutputErrorFit):
+    if isinstance(model.fit, cr.identification.OutputErrorFit):
         assert model.fit.noise >= 0
         assert np.isfinite(model.fit.residual)
 

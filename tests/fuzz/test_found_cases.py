@@ -173,7 +173,7 @@ def test_a_file_name_that_is_no_utf8_does_not_lose_a_campaign(tmp_path):
     except OSError:
         pytest.skip("this file system takes no such names")
     sources = [functools.partial(cr.read_record, path) for path in paths]
-    store = cr.CampaignStore(tmp_path / "rows")
+    store = cr.io.CampaignStore(tmp_path / "rows")
     campaign = cr.identify_campaign(sources, method="scan", order=1, max_delay=9, store=store)
     assert (len(campaign.good), len(store)) == (1, 1)
     assert "udcff" in campaign.table().index[0]
@@ -201,7 +201,7 @@ def test_whatever_a_reading_function_raises_is_a_row(fault):
 def test_an_edited_number_in_a_store_is_not_believed(tmp_path):
     # the model was signed, the numbers beside it were not
     record = cr.bench.valve().step_record(16.0, 0)
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     first = cr.identify_campaign([record], method="paper", store=store)
     (path,) = tmp_path.glob("row-*.json")
     path.write_text(path.read_text().replace('"delay": "', '"delay": "9'))

@@ -54,13 +54,13 @@ def test_realization_predicts_as_well_as_a_subspace_method(
     first, second = halves(shared_data, plant)
     hankel = "square" if plant == "robot_arm" else "padded"
     ours = cr.realize(cr.impulse_from_io(first, length, **options), order, hankel=hankel)
-    fit = cr.analyse_residuals(ours, second).fit_percent.mean()
+    fit = cr.validation.analyse_residuals(ours, second).fit_percent.mean()
     theirs = []
     for block_rows in (10, 20):
         model = by_n4sid(first, order, block_rows)
         # It does not promise a stable model, and an unstable one simulates nothing.
         if np.abs(model.poles()).max() < 1:
-            theirs.append(cr.analyse_residuals(model, second).fit_percent.mean())
+            theirs.append(cr.validation.analyse_residuals(model, second).fit_percent.mean())
     # One percent: halves of a record differ by more.
     assert fit > max(theirs, default=0.0) - 1.0
 
@@ -71,7 +71,7 @@ def test_the_robot_arm_needs_no_choice_of_method_or_length(shared_data):
     first, second = halves(shared_data, "robot_arm")
     impulse = cr.impulse_from_io(first)
     assert impulse.method.startswith("OKID")
-    assert cr.analyse_residuals(cr.realize(impulse, 6), second).fit_percent[0] > 95
+    assert cr.validation.analyse_residuals(cr.realize(impulse, 6), second).fit_percent[0] > 95
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(
     shared_data, plant, orders, gain
 ):
     first, second = halves(shared_data, plant)
-    fit = cr.analyse_residuals(cr.fit_state_space(first), second).fit_percent.mean()
+    fit = cr.validation.analyse_residuals(cr.fit_state_space(first), second).fit_percent.mean()
     theirs = []
     for order in orders:
         for block_rows in (10, 20):
@@ -97,6 +97,6 @@ def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(
                 continue
             model = by_n4sid(first, order, block_rows)
             if np.abs(model.poles()).max() < 1:
-                theirs.append(cr.analyse_residuals(model, second).fit_percent.mean())
+                theirs.append(cr.validation.analyse_residuals(model, second).fit_percent.mean())
     # One percent: halves of a record differ by more, and theirs are the best in hindsight.
     assert fit > max(theirs, default=0.0) + gain - 1.0

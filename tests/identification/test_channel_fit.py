@@ -155,7 +155,7 @@ def test_arguments_that_make_no_sense_are_refused():
 def test_refining_brings_a_rough_model_to_the_fit(model):
     core = ct.ss(CORE.A * 0.9, 0.5 * CORE.B, CORE.C, CORE.D, DT)
     rough = cr.DelayedStateSpace(core, (2, 5), output_delay=(0, 7))
-    found = cr.refine(rough, record())
+    found = cr.identification.refine_state_space(rough, record())
     assert found.fit.order == 3
     expected = model.markov(60)
     assert_allclose(found.markov(60), expected, rtol=0, atol=2e-3 * np.abs(expected).max())

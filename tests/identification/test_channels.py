@@ -30,7 +30,7 @@ delays_of = st.integers(0, 12)
 def test_delays_of_inputs_and_outputs_come_back_with_one_core(inputs, outputs):
     plant = cr.DelayedStateSpace(CORE, inputs, output_delay=outputs)
     data = plant.markov(200)
-    sys = cr.realize_mimo(data, 3, level=0.0, dt=DT)
+    sys = cr.identification.realize_mimo(data, 3, level=0.0, dt=DT)
     assert sys.fit.structure == "common"
     assert np.array_equal(np.broadcast_to(sys.delay, (3, 2)), np.add.outer(outputs, inputs))
     assert sys.delay_free.nstates == 3
@@ -58,25 +58,25 @@ def separate(delays):
 )
 def test_delays_that_no_split_explains_take_the_fewest_states(delays, structure):
     data = separate(np.array(delays))
-    sys = cr.realize_mimo(data, 2, dt=DT)
+    sys = cr.identification.realize_mimo(data, 2, dt=DT)
     fit = sys.fit
     assert fit.structure == structure
     assert_allclose(sys.markov(200), data, rtol=0, atol=1e-9)
     assert sys.nstates == fit.states == 4 + 25
     for other in ("rows", "columns"):
-        assert cr.realize_mimo(data, 2, dt=DT, structure=other).nstates >= fit.states
+        assert cr.identification.realize_mimo(data, 2, dt=DT, structure=other).nstates >= fit.states
     # with one core and that many states the data are explained as well
-    core = cr.realize_mimo(data, 12, dt=DT, structure="common")
+    core = cr.identification.realize_mimo(data, 12, dt=DT, structure="common")
     assert core.nstates >= fit.states - 1
 
 
 def test_other_units_change_no_delay_and_no_pole():
     data = separate(np.array([[3, 4], [9, 10]]))
     units = np.array([1e3, 1e-2])[:, None, None] * np.array([5.0, 0.1])[:, None]
-    plain, other = (cr.realize_mimo(d, 3, dt=DT) for d in (data, units * data))
+    plain, other = (cr.identification.realize_mimo(d, 3, dt=DT) for d in (data, units * data))
     assert np.array_equal(plain.delay, other.delay)
     for unit in (1e-9, 1e9):
-        assert np.array_equal(cr.delay_matrix(unit * data, dt=DT), [[3, 4], [9, 10]])
+        assert np.array_equal(cr.identification.delay_matrix(unit * data, dt=DT), [[3, 4], [9, 10]])
 
 
 @pytest.mark.parametrize("structure", ["rows", "columns"])
@@ -87,7 +87,7 @@ def test_lines_with_a_pure_gain_and_without_response_have_no_tap_too_many(struct
     data[2, 1] = 0.0
     if structure == "columns":
         delays, data = delays.T, np.swapaxes(data, 0, 1)
-    sys = cr.realize_mimo(data, 2, delays=delays, structure=structure, dt=DT)
+    sys = cr.identification.realize_mimo(data, 2, delays=delays, structure=structure, dt=DT)
     assert_allclose(sys.markov(200), data, rtol=0, atol=1e-9)
     fit = sys.fit
     assert fit.orders == (2, 2, 0)
@@ -102,12 +102,14 @@ def test_noise_is_not_taken_for_a_response():
     u = rng.standard_normal((2, 3000))
     y = plant.simulate(u) + 0.05 * rng.standard_normal((3, 3000))
     estimate = cr.impulse_from_io(cr.Record(DT * np.arange(3000), u, y), 60)
-    assert np.array_equal(cr.delay_matrix(estimate), plant.delay)
-    sys = cr.realize_mimo(estimate, 3)
+    assert np.array_equal(cr.identification.delay_matrix(estimate), plant.delay)
+    sys = cr.identification.realize_mimo(estimate, 3)
     assert np.array_equal(sys.delay, plant.delay)
     assert np.abs(sys.markov(60) - plant.markov(60)).max() < 0.03
     fresh = rng.standard_normal((2, 1000))
-    check = cr.analyse_residuals(sys, cr.Record(DT * np.arange(1000), fresh, plant.simulate(fresh)))
+    check = cr.validation.analyse_residuals(
+        sys, cr.Record(DT * np.arange(1000), fresh, plant.simulate(fresh))
+    )
     assert np.all(check.fit_percent > 97)
 
 
@@ -125,7 +127,7 @@ def test_noise_is_not_taken_for_a_response():
 )
 def test_unusable_choices_are_refused(options, error, match):
     with pytest.raises(error, match=match):
-        cr.realize_mimo(separate(np.array([[3, 4], [9, 10]])), 2, dt=DT, **options)
+        cr.identification.realize_mimo(separate(np.array([[3, 4], [9, 10]])), 2, dt=DT, **options)
 
 
 class _Plain:
@@ -159,7 +161,7 @@ def test_delays_between_two_ears_are_those_of_a_sphere():
     sphere = 0.0875 / 343 * (lateral + np.sin(lateral)) * rate
     found = []
     for ears in responses:
-        sys = cr.realize_mimo(ears[:, None, :], 12, samples=160, dt=1 / rate)
+        sys = cr.identification.realize_mimo(ears[:, None, :], 12, samples=160, dt=1 / rate)
         assert sys.fit.structure == "common"
         left, right = sys.output_delays
         found.append(right - left)

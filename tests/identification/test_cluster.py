@@ -40,7 +40,7 @@ def client():
 
 def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(client, tmp_path):
     sources = [functools.partial(record, seed, 0.2) for seed in range(16)]
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     pids = list(client.run(os.getpid).values())
 
     def kill_one() -> None:

@@ -38,7 +38,7 @@ def view(method, low, high, kind="dead time"):
 
 @pytest.fixture(scope="module")
 def both():
-    return cr.compare_delay_estimates(operating_record(), frf=frequency_response())
+    return cr.validation.compare_delay_estimates(operating_record(), frf=frequency_response())
 
 
 def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(both):
@@ -57,7 +57,7 @@ def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(bo
 
 
 def test_a_step_is_seen_in_three_ways():
-    check = cr.compare_delay_estimates(step_record(R1, noise=0.002))
+    check = cr.validation.compare_delay_estimates(step_record(R1, noise=0.002))
     assert [v.method for v in check.views] == ["output error", "first motion", "scan"]
     fit, onset, scan = check.views
     assert "not how far off" in scan.doubt  # its set holds the truth in 4 of 10 records
@@ -68,7 +68,7 @@ def test_a_step_is_seen_in_three_ways():
 
 
 def test_frequency_response_of_another_plant_does_not_agree(both):
-    other = cr.compare_delay_estimates(frf=frequency_response(dead_time=0.4))
+    other = cr.validation.compare_delay_estimates(frf=frequency_response(dead_time=0.4))
     views = (*both.views[:3], *other.views)
     common, conflicts = common_dead_time(list(views))
     assert common is None
@@ -79,7 +79,7 @@ def test_frequency_response_of_another_plant_does_not_agree(both):
 
 
 def test_a_frequency_response_alone_is_enough():
-    check = cr.compare_delay_estimates(frf=frequency_response())
+    check = cr.validation.compare_delay_estimates(frf=frequency_response())
     assert [v.method for v in check.views] == ["FRF fit", "phase slope"]
     fit, slope = check.views
     assert fit.low <= 0.124 <= fit.high
@@ -110,7 +110,7 @@ def test_a_view_in_doubt_is_shown_and_does_not_count():
 def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
     rng = np.random.default_rng(0)
     u, y = rng.standard_normal((2, 1500))
-    check = cr.compare_delay_estimates(cr.Record(0.01 * np.arange(1500), u, y))
+    check = cr.validation.compare_delay_estimates(cr.Record(0.01 * np.arange(1500), u, y))
     assert not check.agree
     assert check.common is None
     assert check.rely_on is None
@@ -122,7 +122,7 @@ def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
 def test_measured_plants_under_random_input_are_agreed_on(shared_data, plant, low, high):
     table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
     record = cr.Record(*table.T)
-    check = cr.compare_delay_estimates(record)
+    check = cr.validation.compare_delay_estimates(record)
     assert check.agree
     assert low * record.dt <= check.common[1] * (1 + 1e-9)
     assert check.common[0] <= high * record.dt
@@ -131,7 +131,7 @@ def test_measured_plants_under_random_input_are_agreed_on(shared_data, plant, lo
 def test_the_motor_has_its_step_and_its_frequency_response_in_one_table(shared_data):
     folder = shared_data / "dc_motor_tacho"
     record = cr.Record(*np.loadtxt(folder / "up.csv", delimiter=",", skiprows=1).T)
-    check = cr.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
+    check = cr.validation.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
     table = check.table()
     # 2.5 ms from the step and 2.9 ms from the FRF, by the look of the data's keepers
     assert 1.8e-3 < table.loc["output error", "value"] < 3.2e-3
@@ -147,7 +147,7 @@ def test_the_motor_has_its_step_and_its_frequency_response_in_one_table(shared_d
 def test_the_circuit_without_delay_is_not_given_one_by_a_scan_that_doubts_itself(shared_data):
     folder = shared_data / "rlc_zero_delay"
     record = cr.Record(*np.loadtxt(folder / "up.csv", delimiter=",", skiprows=1).T)
-    check = cr.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
+    check = cr.validation.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
     table = check.table()
     # The scan sees eight samples, and says that it cannot tell them from none.
     assert table.loc["scan", "samples"] > 4

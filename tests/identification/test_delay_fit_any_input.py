@@ -46,7 +46,7 @@ def test_an_input_that_never_holds_is_no_step(shared_data):
     model = cr.fit_output_error(first)
     assert np.isnan(model.fit.onset)
     assert model.fit.dead_time <= 1.0  # s, one sample: the delay is 0
-    assert cr.analyse_residuals(model, second).fit_percent[0] > 35
+    assert cr.validation.analyse_residuals(model, second).fit_percent[0] > 35
 
 
 @pytest.mark.parametrize(("plant", "structure"), [(pair(1.5, 0.05), (2, 2)), (lag(0.05), (1, 1))])

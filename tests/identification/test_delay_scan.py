@@ -175,7 +175,7 @@ def test_padded_candidates_are_the_padded_realizations():
 
 
 def test_a_causal_filter_is_named_with_its_delay():
-    causal = cr.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
+    causal = cr.data.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
     fit = cr.estimate_delay(
         cr.ImpulseResponse(valve_pulse("causal"), TS, filter=causal), 3, max_delay=100
     ).fit

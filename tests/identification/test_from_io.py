@@ -99,9 +99,9 @@ def test_missing_samples_take_out_the_equations_that_they_touch():
         cr.fit_output_error,
         cr.spectral_frf,
         lambda holes: cr.stepped_sine_frf([holes]),
-        cr.compare_delay_estimates,
-        lambda holes: cr.analyse_residuals(TWO_STATES, holes),
-        lambda holes: cr.predict(TWO_STATES, holes, 1),
+        cr.validation.compare_delay_estimates,
+        lambda holes: cr.validation.analyse_residuals(TWO_STATES, holes),
+        lambda holes: cr.validation.predict(TWO_STATES, holes, 1),
         lambda holes: cr.DelayTracker(TWO_STATES, max_delay=20, memory=10.0).run(holes),
     ],
 )

@@ -34,7 +34,7 @@ def test_the_papers_method_is_the_paper_step_by_step():
     at_once = cr.identify(record, method="paper")
     assert at_once.delay == by_hand.delay
     assert_allclose(at_once.markov(1101), by_hand.markov(1101), rtol=0, atol=0)
-    assert isinstance(at_once.fit, cr.DelayScan)
+    assert isinstance(at_once.fit, cr.identification.DelayScan)
 
 
 def test_the_paper_is_13_samples_late_and_says_so():

@@ -51,7 +51,7 @@ def test_unpacking_gives_the_model_bit_by_bit(system):
 def kept(tmp_path_factory):
     made = step_record(noise=1e-3, before=400, after=1300)
     record = cr.Record(made.time, made.input, made.output, name="r")
-    store = cr.CampaignStore(tmp_path_factory.mktemp("store"))
+    store = cr.io.CampaignStore(tmp_path_factory.mktemp("store"))
     return cr.identify_campaign([record], method="paper", store=store)
 
 

@@ -91,7 +91,7 @@ def test_flags_tell_what_to_distrust():
     assert codes(cr.realize(0.99 ** np.arange(201), 1, dt=1.0)) == set()
     assert codes(cr.realize(0.992 ** np.arange(201), 1, dt=1.0)) == {"not_died_away"}
     assert "no_gap" in codes(cr.realize(np.random.default_rng(0).standard_normal(300), 3, dt=1.0))
-    causal = cr.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
+    causal = cr.data.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
     lagging = cr.realize(cr.ImpulseResponse(valve_pulse("clean"), TS, filter=causal), 3, delay=37)
     assert codes(lagging) == {"filter_delay"}
     assert "13.1 samples" in str(lagging.fit.flags[0])

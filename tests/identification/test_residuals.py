@@ -28,7 +28,7 @@ def record(
 def test_the_true_model_leaves_noise_and_raises_no_alarm(drive, colour):
     alarms = []
     for seed in range(25):
-        check = cr.analyse_residuals(
+        check = cr.validation.analyse_residuals(
             TWO_STATES, record(seed=seed, colour=colour, drive=drive, skip=50), confidence=0.999
         )
         alarms.append(not check.independent or bool(check.flags))
@@ -39,18 +39,18 @@ def test_the_true_model_leaves_noise_and_raises_no_alarm(drive, colour):
 @pytest.mark.parametrize("plant", [TWO_STATES, MIMO], ids=["siso", "mimo"])
 def test_a_record_cut_out_of_the_middle_of_an_experiment_is_explained_from_its_start(plant):
     one = record(plant, noise=0.0, skip=137, n=400)
-    check = cr.analyse_residuals(plant, one)
+    check = cr.validation.analyse_residuals(plant, one)
     # state, offset and what was inside the dead times are found from exact data
     assert_allclose(check.residual, 0, atol=1e-9)
     assert np.all(check.fit_percent > 100 - 1e-7)
-    rest = cr.analyse_residuals(plant, one, start="rest")
+    rest = cr.validation.analyse_residuals(plant, one, start="rest")
     assert np.all(rest.fit_percent < 99.9)
     assert np.abs(rest.residual).max() > 0.05
 
 
 @pytest.mark.parametrize("delay", [4, 6])
 def test_a_delay_that_is_off_by_one_shows_in_the_cross_correlation(delay):
-    check = cr.analyse_residuals(TWO_STATES.replace(delay=delay), record())
+    check = cr.validation.analyse_residuals(TWO_STATES.replace(delay=delay), record())
     assert not check.independent
     assert [flag.code for flag in check.flags] == ["input_in_residual"]
     # the model's first response is missing, or comes too soon: G_1 = 0.1 at the sample after
@@ -67,7 +67,7 @@ def test_feedback_is_told_from_a_wrong_model():
         y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1] + (e[k] - 0.8 * e[k - 1])
         u[k] = r[k] - 1.5 * y[k]
     plant = ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], DT)
-    check = cr.analyse_residuals(plant, cr.Record(DT * np.arange(n), u, y))
+    check = cr.validation.analyse_residuals(plant, cr.Record(DT * np.arange(n), u, y))
     assert "feedback" in [flag.code for flag in check.flags]
 
 
@@ -84,12 +84,14 @@ def test_a_controller_of_the_same_sample_is_feedback_and_no_wrong_delay(integral
         total += integral * (target[k] - y[k])
         u[k] = target[k] - y[k] + total
     core = ct.ss([[0.8]], [[1.0]], [[0.2 * 0.8]], [[0.2]], DT)
-    check = cr.analyse_residuals(cr.DelayedStateSpace(core, 4), cr.Record(DT * np.arange(n), u, y))
+    check = cr.validation.analyse_residuals(
+        cr.DelayedStateSpace(core, 4), cr.Record(DT * np.arange(n), u, y)
+    )
     assert [flag.code for flag in check.flags] == ["feedback"]
     assert check.independent
     # a model that answers at once may be wrong at lag 0 itself
     direct = ct.ss([[0.8]], [[1.0]], [[0.16]], [[0.2]], DT)
-    at_once = cr.analyse_residuals(direct, cr.Record(DT * np.arange(n), u, y))
+    at_once = cr.validation.analyse_residuals(direct, cr.Record(DT * np.arange(n), u, y))
     assert not at_once.independent
 
 
@@ -112,7 +114,7 @@ def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
     # what is left follows the input of `shift` samples before: 0.1 of it, sigma is 0.03
     y = (y + 0.03 * np.roll(u, shift))[1:-1]
     for system in (plant, cr.DelayedStateSpace(plant)):
-        check = cr.analyse_residuals(system, cr.Record(DT * np.arange(1000), u[1:-1], y))
+        check = cr.validation.analyse_residuals(system, cr.Record(DT * np.arange(1000), u[1:-1], y))
         assert [flag.code for flag in check.flags] == [told]
         assert check.independent == (told == "feedback")
         assert np.abs(check.cross[0, 0]).argmax() == 25 + shift
@@ -122,18 +124,18 @@ def test_what_rounding_leaves_says_nothing_about_the_model():
     one = record(noise=0.0)
     for size, whether in ((1e-9, True), (1e-7, False)):
         y = one.output + size * np.ptp(one.output) * np.sin(np.arange(1000))
-        check = cr.analyse_residuals(TWO_STATES, cr.Record(one.time, one.input, y))
+        check = cr.validation.analyse_residuals(TWO_STATES, cr.Record(one.time, one.input, y))
         assert check.white == whether
         assert np.all(check.residual == 0) == whether
 
 
 def test_predictions_fall_from_the_noise_model_to_the_simulation():
     one = record(noise=0.1, colour=0.95, n=2000)
-    simulated = cr.analyse_residuals(TWO_STATES, one).fit_percent[0]
-    fits = [cr.predict(TWO_STATES, one, k).fit_percent[0] for k in (1, 5, 20, 200)]
+    simulated = cr.validation.analyse_residuals(TWO_STATES, one).fit_percent[0]
+    fits = [cr.validation.predict(TWO_STATES, one, k).fit_percent[0] for k in (1, 5, 20, 200)]
     assert fits[0] > fits[1] > fits[2]
     assert abs(fits[-1] - simulated) < 2.0
-    prediction = cr.predict(TWO_STATES, one, 1)
+    prediction = cr.validation.predict(TWO_STATES, one, 1)
     # what is left one step ahead is the innovation, of 0.1
     assert_allclose(np.std(one.output - prediction.output), 0.1, rtol=0.06)
     assert prediction.noise_order == (1,)
@@ -152,5 +154,5 @@ def test_measured_plants_are_predicted_on_the_half_that_was_not_used(
     middle = whole.time[whole.n_samples // 2]
     first, second = whole.between(0, middle), whole.between(middle, np.inf)
     model = cr.estimate_delay(cr.impulse_from_io(first, length), order, max_delay=10)
-    assert cr.analyse_residuals(model, second).fit_percent[0] > least
-    assert cr.predict(model, second, 1).fit_percent[0] > least + 3
+    assert cr.validation.analyse_residuals(model, second).fit_percent[0] > least
+    assert cr.validation.predict(model, second, 1).fit_percent[0] > least + 3

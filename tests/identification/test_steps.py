@@ -180,4 +180,4 @@ def test_a_record_that_starts_at_its_step_is_filtered_as_if_it_had_rested(zero_p
 def test_the_filter_that_is_left_is_recorded():
     step = cr.unit_step(step_record())
     g = cr.impulse_from_step(step, cutoff_hz=50.0, zero_phase=False)
-    assert g.filter == cr.FilterSpec(5, 50.0, False, TS)
+    assert g.filter == cr.data.FilterSpec(5, 50.0, False, TS)

@@ -42,14 +42,14 @@ def assert_same_results(one: cr.Campaign, other: cr.Campaign) -> None:
 
 def test_a_store_changes_no_number(records, tmp_path):
     plain = cr.identify_campaign(records, method="paper")
-    kept = cr.identify_campaign(records, method="paper", store=cr.CampaignStore(tmp_path))
+    kept = cr.identify_campaign(records, method="paper", store=cr.io.CampaignStore(tmp_path))
     assert_same_results(plain, kept)
     assert kept.system.delay == plain.system.delay
     assert_array_equal(kept.system.A, plain.system.A)
 
 
 def test_a_second_run_reads_what_the_first_has_done(records, tmp_path, monkeypatch):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     first = cr.identify_campaign(records[:2], method="paper", store=store)
     assert len(store) == 2
     stamps = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
@@ -60,7 +60,7 @@ def test_a_second_run_reads_what_the_first_has_done(records, tmp_path, monkeypat
 
 
 def test_other_settings_are_other_rows(records, tmp_path):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     cr.identify_campaign(records[:1], method="paper", store=store)
     cr.identify_campaign(records[:1], method="paper", order=2, store=store)
     cr.identify_campaign(records[:1], method="scan", order=2, store=store)
@@ -68,7 +68,7 @@ def test_other_settings_are_other_rows(records, tmp_path):
 
 
 def test_failures_are_not_kept(records, tmp_path):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     missing = functools.partial(cr.read_record, tmp_path / "later.csv")
     broken = cr.identify_campaign([missing, records[0]], method="paper", store=store)
     assert (len(broken.failed), len(store)) == (1, 1)
@@ -81,7 +81,7 @@ def test_failures_are_not_kept(records, tmp_path):
 
 @pytest.mark.parametrize("damage", ["truncated", "edited", "empty", "binary", "renamed"])
 def test_a_damaged_row_is_made_anew(records, tmp_path, damage):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     first = cr.identify_campaign(records[:1], method="paper", store=store)
     (path,) = tmp_path.glob("row-*.json")
     text = path.read_text()
@@ -105,14 +105,14 @@ def test_a_damaged_row_is_made_anew(records, tmp_path, damage):
 
 
 def test_workers_write_to_one_store(records, tmp_path):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     parallel = cr.identify_campaign(records, method="paper", store=store, n_jobs=2)
     assert len(store) == 4
     assert_same_results(parallel, cr.identify_campaign(records, method="paper"))
 
 
 def test_rows_of_a_store_hold_no_data(records, tmp_path):
-    kept = cr.identify_campaign(records[:1], method="paper", store=cr.CampaignStore(tmp_path))
+    kept = cr.identify_campaign(records[:1], method="paper", store=cr.io.CampaignStore(tmp_path))
     assert not hasattr(kept.rows[0].system.fit, "impulse")
     assert "misfit" in kept.rows[0].system.fit.report()
 
@@ -131,7 +131,7 @@ def test_systems_that_look_alike_are_other_rows(records, monkeypatch):
 
 @pytest.mark.parametrize("package", ["ctrl-realize", "numpy", "scipy"])
 def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     first = cr.identify_campaign(records[:1], method="paper", store=store)
     (path,) = tmp_path.glob("row-*.json")
     content = json.loads(path.read_text())
@@ -150,7 +150,7 @@ def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are those of POSIX")
 def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records, tmp_path):
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     first = cr.identify_campaign(records[:1], method="paper", store=store)
     (path,) = tmp_path.glob("row-*.json")
     path.unlink()
@@ -164,7 +164,7 @@ def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records
 def test_a_file_is_no_store(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OptionError, match="needs a folder"):
-        cr.CampaignStore(tmp_path / "file")
+        cr.io.CampaignStore(tmp_path / "file")
 
 
 SCRIPT = """
@@ -177,7 +177,7 @@ def slowly(seed):
     time.sleep(0.3 if seed else 0.0)
     return record(seed)
 
-store = cr.CampaignStore(sys.argv[1])
+store = cr.io.CampaignStore(sys.argv[1])
 sources = [functools.partial(slowly, seed) for seed in range(40)]
 cr.identify_campaign(sources, method="paper", store=store)
 """
@@ -191,7 +191,7 @@ def test_a_stopped_run_goes_on_with_the_same_results(tmp_path, blow):
         stderr=subprocess.DEVNULL,
         cwd=os.fspath(pytest.importorskip("tests").__path__[0] + "/.."),
     )
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     for _ in range(6000):  # five minutes: a busy machine takes one to import
         if len(store) >= 2:
             break

@@ -76,7 +76,7 @@ def test_model_file_and_table_give_every_printable_character_back(tmp_path):
 
 def test_a_store_gives_a_name_of_every_printable_character_back(tmp_path):
     record = cr.Record(*step_samples(), name=r"a\1 {b} $c$", input_labels=["FIC101.OP"])
-    store = cr.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path)
     campaign = cr.identify_campaign([record], store=store, method="scan", order=1, max_delay=40)
     (row,) = campaign.rows
     assert (row.name, row.error, row.warnings) == (r"a\1 {b} $c$", None, ())

@@ -22,7 +22,7 @@ def record():
 
 
 def test_residual_plot_shows_data_model_and_correlations(record):
-    check = cr.analyse_residuals(PLANT, record)
+    check = cr.validation.analyse_residuals(PLANT, record)
     drawn = check.plot()
     assert isinstance(drawn, ct.ControlPlot)
     measured, simulated = drawn.lines[0, 0]
@@ -40,7 +40,7 @@ def test_delay_check_plot_has_a_bar_for_each_view(agree):
         DelayEstimate("output error", "record", "dead time", 0.02, 0.01, 0.03),
         DelayEstimate("phase slope", "FRF", "upper bound", 0.05, 0.04, 0.06),
     )
-    check = cr.DelayComparison(views, agree, (0.01, 0.03) if agree else None, (), 0.001)
+    check = cr.validation.DelayComparison(views, agree, (0.01, 0.03) if agree else None, (), 0.001)
     drawn = check.plot()
     assert len(drawn.lines[0, 0]) == 2
     names = [label.get_text() for label in drawn.axes[0, 0].get_yticklabels()]

@@ -20,7 +20,7 @@ from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ...results import Flag, Result
-from ..identify import Method, fit_records, identify
+from ..methods import Method, fit_records, identify
 from ..realization.realize import realize
 from .flags import campaign_flags
 from .rows import CampaignRow, RecordSource, read_source

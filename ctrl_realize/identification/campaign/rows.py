@@ -20,7 +20,7 @@ from ...data import Record
 from ...delayed import DelayedStateSpace
 from ...errors import CtrlRealizeError, DataError
 from ...results import Flag
-from ..identify import Method, identify
+from ..methods import Method, identify
 from ..output_error.result import OutputErrorFit
 from ..realization.delay_scan_result import DelayScan
 from ..step.steps import detect_step

@@ -10,7 +10,7 @@ from typing import Any
 from ..._checks import one_of
 from ...data import Record
 from ...errors import DataError, OptionError
-from ..identify import METHODS, Method, identify
+from ..methods import METHODS, Method, identify
 from .campaign import Campaign
 from .rows import CampaignRow, RecordSource, RowStore
 from .workers import identified

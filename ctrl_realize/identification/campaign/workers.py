@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..identify import Method
+from ..methods import Method
 from .rows import CampaignRow, RecordSource, RowStore, identify_row, source_name
 
 

@@ -57,7 +57,7 @@ class MimoRealization(Result):
     >>> import ctrl_realize as cr
     >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
     >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
-    >>> found = cr.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1).fit
+    >>> found = cr.identification.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1).fit
     >>> found.structure, found.delays.ravel().tolist(), found.output_delays, found.input_delays
     ('common', [3, 7], (0, 4), (3,))
     """
@@ -126,7 +126,7 @@ def delay_matrix(
     >>> import ctrl_realize as cr
     >>> pulse = 0.8 ** np.arange(60)
     >>> late = [np.r_[np.zeros(d + 1), pulse][:60] for d in (3, 7)]
-    >>> cr.delay_matrix(np.array(late)[:, None, :], dt=0.1)
+    >>> cr.identification.delay_matrix(np.array(late)[:, None, :], dt=0.1)
     array([[3],
            [7]])
     """
@@ -222,7 +222,7 @@ def realize_mimo(
     ...     [[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1
     ... )
     >>> plant = cr.DelayedStateSpace(core, (2, 5), output_delay=(0, 9))
-    >>> sys = cr.realize_mimo(plant.markov(200), 2, level=0, dt=0.1)
+    >>> sys = cr.identification.realize_mimo(plant.markov(200), 2, level=0, dt=0.1)
     >>> sys.input_delays, sys.output_delays
     ((2, 5), (0, 9))
     >>> bool(np.allclose(sys.markov(200), plant.markov(200)))

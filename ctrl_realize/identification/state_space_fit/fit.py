@@ -88,7 +88,7 @@ def fit_state_space(
     See Also
     --------
     fit_output_error : One input and output, with a delay between samples and its interval.
-    refine : The last step by itself, from any model.
+    refine_state_space : The last step by itself, from any model.
 
     Notes
     -----
@@ -243,7 +243,7 @@ def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str
 
 
 @single_threaded
-def refine(
+def refine_state_space(
     system: ct.StateSpace,
     records: Record | Sequence[Record],
     *,
@@ -279,7 +279,8 @@ def refine(
     >>> fast, slow = (ct.ss([[a]], [[1.0]], [[1.0]], [[0.0]], 1.0) for a in (0.5, 0.8))
     >>> u = np.random.default_rng(0).choice([-1.0, 1.0], 400)
     >>> record = cr.Record(np.arange(400.0), u, cr.delayed_ss(slow, 3).simulate(u))
-    >>> print(cr.refine(cr.delayed_ss(fast, 3), record).poles().real.max().round(6))
+    >>> refined = cr.identification.refine_state_space(cr.delayed_ss(fast, 3), record)
+    >>> print(refined.poles().real.max().round(6))
     0.8
     """
     whole = as_group(records)

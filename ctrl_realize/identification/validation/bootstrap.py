@@ -61,7 +61,8 @@ class Bootstrap(Result):
     >>> u = np.where(t < 0.5, 0.0, 2.0)
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
-    >>> again = cr.bootstrap(record, partial(cr.fit_output_error, structures=[(1, 1)]), repeats=10)
+    >>> one_lag = partial(cr.fit_output_error, structures=[(1, 1)])
+    >>> again = cr.validation.bootstrap(record, one_lag, repeats=10)
     >>> print(f"{again.system.fit.dead_time:.4f} s, and {again.std:.4f} s of scatter")
     0.1250 s, and 0.0002 s of scatter
     """

@@ -64,7 +64,7 @@ def cross_validate(
     >>> fast, slow = (ct.ss([[a]], [[1 - a]], [[1.0]], [[0.0]], 1.0) for a in (0.5, 0.8))
     >>> u = np.random.default_rng(0).standard_normal(200)
     >>> y = cr.DelayedStateSpace(slow).simulate(u)
-    >>> table = cr.cross_validate(
+    >>> table = cr.validation.cross_validate(
     ...     {"fast": fast, "slow": slow}, [cr.Record(np.arange(200.0), u, y, name="day 2")]
     ... )
     >>> print(table["day 2"].round(1).to_dict())

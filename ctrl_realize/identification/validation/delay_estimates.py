@@ -95,7 +95,7 @@ def compare_delay_estimates(
     >>> rng = np.random.default_rng(0)
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 100), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(1500)
-    >>> check = cr.compare_delay_estimates(cr.Record(0.01 * np.arange(1500), u, y))
+    >>> check = cr.validation.compare_delay_estimates(cr.Record(0.01 * np.arange(1500), u, y))
     >>> check.agree, [view.method for view in check.views]
     (True, ['output error', 'scan', 'cross-correlation'])
     """

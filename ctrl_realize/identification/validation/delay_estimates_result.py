@@ -40,7 +40,7 @@ class DelayEstimate:
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> view = cr.DelayEstimate("fit", "sine sweep", "dead time", 0.0289, 0.0285, 0.0294)
+    >>> view = cr.validation.DelayEstimate("fit", "sine sweep", "dead time", 0.0289, 0.0285, 0.0294)
     >>> view.low, view.value, view.high
     (0.0285, 0.0289, 0.0294)
     """
@@ -87,7 +87,8 @@ class DelayComparison(Result):
     >>> rng = np.random.default_rng(0)
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    >>> check = cr.compare_delay_estimates(cr.Record(0.01 * np.arange(u.size), u, y), order=1)
+    >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
+    >>> check = cr.validation.compare_delay_estimates(record, order=1)
     >>> print(f"{check.common[0]:.3f} to {check.common[1]:.3f} s, take that of the {check.rely_on}")
     0.113 to 0.126 s, take that of the output error
     """

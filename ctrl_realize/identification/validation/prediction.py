@@ -50,7 +50,7 @@ class Prediction(Result):
     >>> y = plant.simulate(u) + slow.simulate(0.05 * e)
     >>> record = cr.Record(0.1 * np.arange(500), u, y)
     >>> for steps in (1, 10):
-    ...     print(steps, cr.predict(plant, record, steps).fit_percent.round(0))
+    ...     print(steps, cr.validation.predict(plant, record, steps).fit_percent.round(0))
     1 [87.]
     10 [65.]
     """
@@ -122,7 +122,7 @@ def predict(
     >>> noise = cr.DelayedStateSpace(slow, 0).simulate(0.05 * e)
     >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + noise)
     >>> for ahead in (1, 10):
-    ...     print(ahead, cr.predict(plant, record, ahead).fit_percent.round(0))
+    ...     print(ahead, cr.validation.predict(plant, record, ahead).fit_percent.round(0))
     1 [87.]
     10 [65.]
     """

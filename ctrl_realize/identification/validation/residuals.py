@@ -81,9 +81,9 @@ def analyse_residuals(
     >>> u = rng.standard_normal(2000)
     >>> y = 7 + plant.simulate(u) + 0.05 * rng.standard_normal(2000)
     >>> record = cr.Record(0.1 * np.arange(2000), u, y)
-    >>> cr.analyse_residuals(plant, record)
+    >>> cr.validation.analyse_residuals(plant, record)
     <ResidualAnalysis: fit 85.1 %, white True, independent True>
-    >>> cr.analyse_residuals(plant.replace(delay=4), record).independent
+    >>> cr.validation.analyse_residuals(plant.replace(delay=4), record).independent
     False
     """
     count = whole(lags, "lags", 1)

@@ -52,7 +52,7 @@ class ResidualAnalysis(Result):
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
     >>> record = cr.Record(0.1 * np.arange(2000), u, plant.simulate(u) + 0.05 * noise)
     >>> for delay in (5, 4):
-    ...     check = cr.analyse_residuals(plant.replace(delay=delay), record)
+    ...     check = cr.validation.analyse_residuals(plant.replace(delay=delay), record)
     ...     print(delay, check.fit_percent.round(1), "free of the input:", check.independent)
     5 [85.1] free of the input: True
     4 [35.] free of the input: False

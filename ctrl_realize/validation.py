@@ -1,0 +1,31 @@
+"""How far an identified model is to be trusted: residuals, prediction, new records, bootstrap."""
+
+from .identification.validation.bootstrap import Bootstrap as Bootstrap
+from .identification.validation.bootstrap import bootstrap as bootstrap
+from .identification.validation.cross_validation import cross_validate as cross_validate
+from .identification.validation.delay_estimates import (
+    compare_delay_estimates as compare_delay_estimates,
+)
+from .identification.validation.delay_estimates_result import DelayComparison as DelayComparison
+from .identification.validation.delay_estimates_result import DelayEstimate as DelayEstimate
+from .identification.validation.prediction import Prediction as Prediction
+from .identification.validation.prediction import predict as predict
+from .identification.validation.residuals import analyse_residuals as analyse_residuals
+from .identification.validation.residuals_result import ResidualAnalysis as ResidualAnalysis
+
+__all__ = [
+    "Bootstrap",
+    "DelayComparison",
+    "DelayEstimate",
+    "Prediction",
+    "ResidualAnalysis",
+    "analyse_residuals",
+    "bootstrap",
+    "compare_delay_estimates",
+    "cross_validate",
+    "predict",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
