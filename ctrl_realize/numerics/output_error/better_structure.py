@@ -1,4 +1,12 @@
-"""Look beyond the structures that were asked for: would another one explain the record better?"""
+"""Look beyond the structures that were asked for: would another one explain the record better?
+
+A structure is ruled out by the difference of criteria that [1]_ calls very strong.
+
+References
+----------
+.. [1] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
+   doi:10.1080/01621459.1995.10476572.
+"""
 
 from __future__ import annotations
 

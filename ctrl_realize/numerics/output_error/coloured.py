@@ -1,4 +1,15 @@
-"""Fit structures again where the noise of a step record is coloured, and known from its rest."""
+"""Fit structures again where the noise of a step record is coloured, and known from its rest.
+
+Generalised least squares [1]_; noise at rest counts as coloured by its correlation time [2]_. The
+thresholds are our own.
+
+References
+----------
+.. [1] A. C. Aitken, On least squares and linear combination of observations, Proc. Roy. Soc.
+   Edinburgh 55 (1935) 42-48.
+.. [2] C. J. Geyer, Practical Markov chain Monte Carlo, Statist. Sci. 7 (1992) 473-483,
+   doi:10.1214/ss/1177011137.
+"""
 
 from __future__ import annotations
 

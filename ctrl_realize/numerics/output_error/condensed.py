@@ -9,6 +9,20 @@ So a model of any structure is fitted to L rows or fewer instead of to millions,
 lost. What makes the noise white, an autoregression, is applied to input and output alike, which
 leaves g as it is. What came before a record matters to its first L samples alone: they are left
 out. A level of its own for every 2^17 samples takes slow drifts along.
+
+The sums are a sufficient statistic [1]_, their factor the triangle of a QR factorisation [2]_.
+Outliers are pulled in as in [3]_ with the constant of [4]_.
+
+References
+----------
+.. [1] S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall
+   1993, chapter 5 (sufficient statistics).
+.. [2] G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., Johns Hopkins 2013, section 5.3
+   (The full-rank least squares problem).
+.. [3] P. J. Huber and E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, section 7.8,
+   doi:10.1002/9780470434697.
+.. [4] P. W. Holland and R. E. Welsch, Robust regression using iteratively reweighted least-squares,
+   Comm. Statist. A 6 (1977) 813-827, doi:10.1080/03610927708827533.
 """
 
 from __future__ import annotations
@@ -35,6 +49,7 @@ PER_LAG = 20
 _PIECE = 2**17
 _MOST_NOISE_LAGS = 25
 _EXCITED = 1e-10  # of the strongest direction of the input; rounding is 1e-15 of it
+# Standard deviations: 95 % efficiency in Gaussian noise (Holland and Welsch 1977).
 _HUBER = 1.345
 _RIDGE = 1e-8
 _TURNS = 5
@@ -110,7 +125,7 @@ def condensed(
         Samples within which the response ends.
     huber : bool
         Pull outliers of the residual of the free pulse response in: one Newton step of Huber's
-        loss from there (Huber and Ronchetti, Robust Statistics, 2nd ed., section 6.7).
+        loss from there (Huber and Ronchetti, Robust Statistics, 2nd ed., section 7.8).
     """
     if not 1 < lags <= MOST_LAGS or sum(y.size for y in outputs) < PER_LAG * lags:
         return None

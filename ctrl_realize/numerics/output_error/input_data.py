@@ -1,4 +1,7 @@
-"""Records of any input as one problem: where each begins to count, and what it has for itself."""
+"""Records of any input as one problem: where each begins to count, and what it has for itself.
+
+Our own rule, for time: how many samples are fitted grows with what they cost, not with the record.
+"""
 
 from __future__ import annotations
 

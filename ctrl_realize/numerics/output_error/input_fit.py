@@ -2,6 +2,18 @@
 
 One record or several of one plant: poles, numerator and delay are common, level, drift and initial
 state are each record's own (see `own_terms`).
+
+Output error [1]_ with linear terms eliminated [2]_. Which samples count and when slow cosines are
+fitted along are our own rules.
+
+References
+----------
+.. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   4.2 (output-error models) and 10.2 (iterative search).
+.. [2] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+.. [3] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
+   doi:10.1080/01621459.1995.10476572.
 """
 
 from __future__ import annotations

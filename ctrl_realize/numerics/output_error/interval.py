@@ -1,6 +1,20 @@
 """Delay and interval where the residual is noise: of all explanations that are not ruled out.
 
 Point 2 of the rule in `output_error`.
+
+Profile likelihoods [1]_ of all structures within a difference of criteria [2]_; joining them,
+instead of trusting the best one, is the advice of [3]_. `_UNSEEN` and `_LIKE_A_FLOW` are our own,
+and so is the width that a zero opens: a zero imitates the beginning of a response, so that the
+first motion is all that is known of it.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+.. [2] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
+   doi:10.1080/01621459.1995.10476572.
+.. [3] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
+   2002, chapter 4 (Multimodel inference), doi:10.1007/b97636.
 """
 
 from __future__ import annotations

@@ -1,4 +1,12 @@
-"""What an output-error fit has found: delay, interval, model, and the table of structures."""
+"""What an output-error fit has found: delay, interval, model, and the table of structures.
+
+Intervals of structures are profile likelihoods [1]_.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,19 @@
 
 Beside the free structures stand chains of lags and flows that disperse, of few parameters each
 (point 1 of the rule in `output_error`).
+
+Compared by BIC [1]_, [2]_: lags, chains of lags [3]_ and flows that disperse [4]_.
+
+References
+----------
+.. [1] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
+.. [2] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
+   doi:10.1080/01621459.1995.10476572.
+.. [3] V. Strejc, Naherungsverfahren fur aperiodische Ubergangscharakteristiken, Regelungstechnik 7
+   (1959) 124-128.
+.. [4] O. Levenspiel, Chemical Reaction Engineering, 3rd ed., Wiley 1999, chapter 13 (The dispersion
+   model).
 """
 
 from __future__ import annotations

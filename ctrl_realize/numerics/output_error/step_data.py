@@ -1,4 +1,12 @@
-"""Turn the record of a step experiment into separable least-squares problems."""
+"""Turn the record of a step experiment into separable least-squares problems.
+
+Means over bins weigh with the inverse of their variance [1]_.
+
+References
+----------
+.. [1] A. C. Aitken, On least squares and linear combination of observations, Proc. Roy. Soc.
+   Edinburgh 55 (1935) 42-48.
+"""
 
 from __future__ import annotations
 

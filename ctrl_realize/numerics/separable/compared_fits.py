@@ -1,4 +1,13 @@
-"""Bring all structures that a comparison may choose, or not rule out, to their minima."""
+"""Bring all structures that a comparison may choose, or not rule out, to their minima.
+
+Criteria are compared at minima, for that is what they are defined for [1]_; how far a search is
+followed (`REACH`) was measured.
+
+References
+----------
+.. [1] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
+   2002, doi:10.1007/b97636.
+"""
 
 from __future__ import annotations
 

@@ -1,14 +1,21 @@
 """The axial-dispersion model (inverse-Gaussian residence time): its modes and its fit.
 
 Residence times in a pipe or a packed bed have an inverse Gaussian distribution where the flow
-carries its load along and spreads it by diffusion (Levenspiel, Chemical Reaction Engineering,
-chapter 13): with a mean m and a standard deviation c m its transfer function is
+carries its load along and spreads it by diffusion [1]_, [2]_: with a mean m and a standard
+deviation c m its transfer function is
 
     exp((1 - sqrt(1 + 2 c^2 m s)) / c^2),
 
 and 2/c^2 is the Peclet number. Three or four lags and a longer dead time imitate it down to the
 noise, so that no residual shows it; fitted to the same record it needs two parameters where they
 need four, and wins. Behind it there may be one lag, as of a sensor.
+
+References
+----------
+.. [1] O. Levenspiel, Chemical Reaction Engineering, 3rd ed., Wiley 1999, chapter 13 (The dispersion
+   model).
+.. [2] J. L. Folks and R. S. Chhikara, The inverse Gaussian distribution and its statistical
+   application - a review, J. Roy. Statist. Soc. B 40 (1978) 263-289.
 """
 
 from __future__ import annotations

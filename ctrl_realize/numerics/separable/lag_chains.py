@@ -6,6 +6,18 @@ they are nearly equal, as in Strejc's evaluation of step responses: here, spread
 rate. Where heat or matter diffuses they grow as (k - c)^2, c between 0 and 1/2 by the boundaries.
 That real lags do not keep to such a law is in the error of the delay: without it, its interval
 would be narrower than anything that is known.
+
+Tanks after [1]_, diffusion after [2]_ (eigenvalues of a slab), steps after [3]_; the spread of the
+rates and the charge of a kind of chain are our own.
+
+References
+----------
+.. [1] V. Strejc, Naherungsverfahren fur aperiodische Ubergangscharakteristiken, Regelungstechnik 7
+   (1959) 124-128.
+.. [2] H. S. Carslaw and J. C. Jaeger, Conduction of Heat in Solids, 2nd ed., Oxford University
+   Press 1959, chapter 3 (Linear flow of heat in the solid bounded by two parallel planes).
+.. [3] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, J. SIAM
+   11 (1963) 431-441, doi:10.1137/0111030.
 """
 
 from __future__ import annotations

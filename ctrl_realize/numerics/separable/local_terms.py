@@ -10,6 +10,17 @@ poles of a pair may be real, complex, or almost equal, its columns are
     (exp(p t) + exp(q t)) / 2    and    (exp(p t) - exp(q t)) / (p - q),
 
 which are real and independent in every case.
+
+Linear terms are projected out as in [1]_, [2]_; that a term of one stretch needs that stretch alone
+is what makes the projection block diagonal.
+
+References
+----------
+.. [1] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
+   squares problems whose variables separate, SIAM J. Numer. Anal. 10 (1973) 413-432,
+   doi:10.1137/0710036.
+.. [2] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
 """
 
 from __future__ import annotations

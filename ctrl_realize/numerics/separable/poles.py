@@ -5,6 +5,9 @@ An order-n denominator is written with ``n // 2`` quadratic factors
 The parameters are ``log(lambda)`` (odd n, first), then ``log(omega), log(zeta)`` of
 every pair. A damping above 1 stands for two real poles, so that nothing has to be
 decided in advance about which poles are complex.
+
+Our own parametrisation of stable polynomials: all real numbers give a stable one, and relative
+changes of a time constant are alike for slow and fast poles.
 """
 
 from __future__ import annotations

@@ -10,8 +10,14 @@ The sum of squares has a kink in the delay at every sample, where the response b
 Between two samples it is smooth: a step ends at the next sample and begins anew on its other side,
 and a minimum in a kink is where both sides lead back.
 
-.. [1] Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed.,
-   DTU 2004, section 3.2.
+References
+----------
+.. [1] K. Madsen, H. B. Nielsen and O. Tingleff, Methods for Non-Linear Least Squares Problems, 2nd
+   ed., Technical University of Denmark 2004, section 3.2 (The Levenberg-Marquardt method).
+.. [2] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer 2006, chapter 10
+   (Least-squares problems), doi:10.1007/978-0-387-40065-5.
+.. [3] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
 """
 
 from __future__ import annotations

@@ -1,4 +1,16 @@
-"""Profile-likelihood interval of the delay of one structure."""
+"""Profile-likelihood interval of the delay of one structure.
+
+Interval of the profile likelihood as in [1]_, ends by the method of [2]_ (Illinois). A kink of the
+misfit at a sample, where the delay passes it, is why points are laid inside the sample of the
+optimum.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+.. [2] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
+   equation, BIT 11 (1971) 168-174, doi:10.1007/BF01934364.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,12 @@
-"""Ends of a profile-likelihood interval: where the excess of the misfit crosses a threshold."""
+"""Ends of a profile-likelihood interval: where the excess of the misfit crosses a threshold.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+.. [2] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
+   equation, BIT 11 (1971) 168-174, doi:10.1007/BF01934364.
+"""
 
 from __future__ import annotations
 

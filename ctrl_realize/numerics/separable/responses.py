@@ -12,6 +12,14 @@ over the moves that have arrived, t > t_l + tau. Derivatives need dE_j/dp_j in a
 
 `MoveTrain` evaluates their means over bins of samples for a few moves (steps, ramps), many delays
 and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
+
+Exact for a held input, as sampling is in [1]_; a delay of a fraction of a sample needs nothing of
+its own, since moves have times and not sample numbers.
+
+References
+----------
+.. [1] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+   section 2.3.
 """
 
 from __future__ import annotations

@@ -1,4 +1,14 @@
-"""How well a record tells the gain and the total delay of a model that was fitted to it."""
+"""How well a record tells the gain and the total delay of a model that was fitted to it.
+
+Errors by the delta method [1]_, mixtures of structures as in [2]_.
+
+References
+----------
+.. [1] E. L. Lehmann and G. Casella, Theory of Point Estimation, 2nd ed., Springer 1998, section 1.8
+   (the delta method), doi:10.1007/b98854.
+.. [2] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
+   2002, section 4.3, doi:10.1007/b97636.
+"""
 
 from __future__ import annotations
 

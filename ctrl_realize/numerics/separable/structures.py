@@ -1,4 +1,18 @@
-"""Fit many structures to one record: where to start each, what to keep, how to compare."""
+"""Fit many structures to one record: where to start each, what to keep, how to compare.
+
+The criterion is BIC [1]_, [3]_. A difference of 10 (`PLAUSIBLE`) is where [2]_ speaks of very
+strong evidence. What zeros and poles beyond the third must be worth, and the patterns of poles that
+a search begins from, are our own rules; docs/ablation_table.md is for what they buy.
+
+References
+----------
+.. [1] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
+.. [2] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
+   doi:10.1080/01621459.1995.10476572.
+.. [3] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   16.4 (Model structure selection).
+"""
 
 from __future__ import annotations
 

@@ -6,10 +6,21 @@ The model of one record is
 
 with a monic `a` of order n (see `pole_factors`), `b` of degree n - r (r: relative degree) and
 known dynamics K in cascade. Numerator and regressors enter linearly and are eliminated; delay
-and poles are found by Levenberg-Marquardt steps on what is left, with Kaufman's Jacobian [1]_,
+and poles are found by Levenberg-Marquardt steps on what is left, with Kaufman's Jacobian [1]_
+(variable projection [2]_, [3]_; damping [4]_),
 for a whole batch of starts in the same array operations.
 
-.. [1] Golub and Pereyra, Separable nonlinear least squares, Inverse Problems 19 (2003) R1-R26.
+References
+----------
+.. [1] L. Kaufman, A variable projection method for solving separable nonlinear least squares
+   problems, BIT 15 (1975) 49-57, doi:10.1007/BF01932995.
+.. [2] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
+   squares problems whose variables separate, SIAM J. Numer. Anal. 10 (1973) 413-432,
+   doi:10.1137/0710036.
+.. [3] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+.. [4] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, J. SIAM
+   11 (1963) 431-441, doi:10.1137/0111030.
 """
 
 from __future__ import annotations

@@ -1,4 +1,19 @@
-"""Fit all structures to one stretch of a record, and see what noise the best of them leaves."""
+"""Fit all structures to one stretch of a record, and see what noise the best of them leaves.
+
+Huber's loss by modified residuals [1]_ with the constant of [2]_ (95 % efficiency in Gaussian
+noise); the number of independent samples is that of [3]_, the criterion [4]_.
+
+References
+----------
+.. [1] P. J. Huber and E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, section 7.8
+   (computation of regression estimates by modified residuals), doi:10.1002/9780470434697.
+.. [2] P. W. Holland and R. E. Welsch, Robust regression using iteratively reweighted least-squares,
+   Comm. Statist. A 6 (1977) 813-827, doi:10.1080/03610927708827533.
+.. [3] C. J. Geyer, Practical Markov chain Monte Carlo, Statist. Sci. 7 (1992) 473-483,
+   doi:10.1214/ss/1177011137.
+.. [4] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +33,7 @@ from .static_gain import StaticGain, static_gain
 from .structures import PLAUSIBLE, Candidate, Scales, choose, criteria, parameter_charge, search
 from .varpro import Problem, Structure, evaluate, respond
 
+# Standard deviations: 95 % efficiency in Gaussian noise (Holland and Welsch 1977).
 _HUBER = 1.345
 _PASSES = 2
 _LONG = 2**18
