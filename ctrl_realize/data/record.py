@@ -13,7 +13,7 @@ from .._checks import numbers, one_of, spelled_out
 from ..errors import DataError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.signals.time_axis import axis_fault, sample_time
-from .record_checks import check_finite, check_shape, check_size, labelled
+from .record_checks import axis_words, check_finite, check_shape, check_size, labelled
 from .resampling import MIN_SAMPLES, resampled
 
 MISSING = ("refuse", "keep")
@@ -107,8 +107,8 @@ class Record:
         fault = axis_fault(stamps)
         if fault is not None:
             raise TimeAxisError(
-                f"{fault}; Record.resampled(...) or read_record(..., resample=True) interpolates "
-                "small jitter, Record needs a uniform axis"
+                f"{axis_words(fault)}; Record.resampled(...) or read_record(..., resample=True) "
+                "interpolates small jitter, Record needs a uniform axis"
             )
         fix = object.__setattr__
         fix(self, "time", read_only(stamps))

@@ -9,7 +9,7 @@ import numpy as np
 from .._checks import spelled_out
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
-from ..numerics.signals.time_axis import EXTREME
+from ..numerics.signals.time_axis import EXTREME, UNIFORM_WITHIN, AxisFault
 
 
 def check_shape(values: FloatArray, what: str, samples: int) -> None:
@@ -58,3 +58,19 @@ def labelled(
     if len(labels) != count or len(set(labels)) != count:
         raise OptionError(f"{argument}={labels!r}; needed are {count} different names")
     return labels
+
+
+def axis_words(fault: AxisFault) -> str:
+    """Say what is wrong with a time axis, and where."""
+    kind, row, value, usual, worst = fault
+    return {
+        "extreme": f"time is {value:g} s at row {row}",
+        "tiny_steps": f"time runs in steps of {value:g} s",
+        "backwards": f"time runs backwards: row 1 is at {value:g} s, row 0 at {usual:g} s",
+        "repeated": f"time repeats at row {row}: {value:.9g} s after {usual:.9g} s",
+        "jumps_back": f"time jumps back at row {row}: {value:.9g} s after {usual:.9g} s",
+        "gap": f"time has a gap at row {row}: {value:.6g} s where {usual:.6g} s is usual "
+        f"(about {value / usual - 1 if usual else 0:.0f} sample(s) missing)",
+        "not_uniform": f"time is not uniform: row {row} is {value:.2g} samples off the uniform "
+        f"grid of {usual:.6g} s (worst: {worst:.2f}; allowed: {UNIFORM_WITHIN})",
+    }[kind]

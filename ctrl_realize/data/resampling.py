@@ -9,7 +9,7 @@ from .._checks import numbers, positive, real
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.time_axis import axis_fault, sample_time
-from .record_checks import check_finite, check_shape, check_size
+from .record_checks import axis_words, check_finite, check_shape, check_size
 
 MIN_SAMPLES = 3
 MAX_DENSER = 100
@@ -29,7 +29,7 @@ def resampled(
     steps = np.diff(stamps)
     fault = axis_fault(stamps) if np.any(steps <= 0) else None
     if fault is not None:
-        raise TimeAxisError(f"{fault}; resampling needs time that rises")
+        raise TimeAxisError(f"{axis_words(fault)}; resampling needs time that rises")
     usual = float(np.median(steps))
     worst = int(np.argmax(steps))
     if steps[worst] > (1 + max_jitter) * usual:

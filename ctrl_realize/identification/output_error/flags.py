@@ -13,6 +13,7 @@ from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
 from .model_flags import cancelled_pair, open_gain, slow_modes
 from .result import is_firm
+from .words import ESTIMATE_WORDS, model_words
 
 _SAMPLES_BESIDE_NOTHING = 0.5
 _BEYOND = 20.0  # ranges: no overshoot goes as far
@@ -117,7 +118,11 @@ def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None
         width = fit.high - fit.low
         if width <= 0.3 * max(fit.delay, dt):
             return None
-        apart = [f"{name} {in_time(delay)}" for name, delay in fit.views if not _near(fit, delay)]
+        apart = [
+            f"{ESTIMATE_WORDS[key]} {in_time(delay)}"
+            for key, delay in fit.views
+            if not _near(fit, delay)
+        ]
         return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
     low, high = profile_limits(*fit.profile)
     wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
@@ -144,11 +149,11 @@ def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
 
 
 def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
-    if fit.like_flow and not fit.endless:
+    if fit.chain and fit.like_flow and not fit.endless:
         return Flag(
             "many_lags",
-            f"the model is a {fit.chain}: a flow that disperses looks the same and begins "
-            f"{in_time(flow_lead(fit.poles))} earlier{firm}",
+            f"the model is a {model_words(fit.chain)}: a flow that disperses looks the same and "
+            f"begins {in_time(flow_lead(fit.poles))} earlier{firm}",
         )
     if not fit.endless:
         return None

@@ -18,6 +18,7 @@ from ...results import Flag
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
 from .result import OutputErrorFit, StructureRow
+from .words import ESTIMATE_WORDS, model_words
 
 
 def summarise(
@@ -48,7 +49,7 @@ def summarise(
         noise=data.sigma,
         residual=fit.residual,
         correlation=fit.correlation,
-        views=dict(fit.views),
+        views={ESTIMATE_WORDS[key]: delay for key, delay in fit.views},
         structures=tuple(
             StructureRow(
                 line.structure.order,
@@ -110,7 +111,11 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
 def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     s = fit.structure
     simple = " with up to three poles" if fit.views else ""
-    kind = fit.chain or f"order {s.order}, relative degree {s.relative_degree}"
+    kind = (
+        model_words(fit.chain)
+        if fit.chain
+        else f"order {s.order}, relative degree {s.relative_degree}"
+    )
     if fit.follows_flow:
         reasons = [
             f"dead time: that of a flow that disperses, which fits clearly better than all "
@@ -146,8 +151,8 @@ def _interval_of(fit: OutputErrorEstimate) -> str:
     low = min((end[0] for end in ends), default=np.inf)
     high = max((end[1] for end in ends), default=-np.inf)
     parts += [
-        f"{name} ({interval_in_time(first, last)})"
-        for name, first, last in fit.beside
+        f"{model_words(model)} ({interval_in_time(first, last)})"
+        for model, first, last in fit.other_models
         if first < low or last > high
     ]
     return f"interval: profile likelihood of {', '.join(parts)} that the data cannot rule out"

@@ -37,7 +37,7 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, plausible
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
-from .result import OutputErrorEstimate, Profile, assembled, profiles_of
+from .result import OtherModel, OutputErrorEstimate, Profile, assembled, profiles_of
 from .selection import Choice, choose_model
 
 _UNSEEN = 3.0
@@ -80,9 +80,9 @@ def likelihood_fit(
     if choice.chain is not None:
         whole = _with_chain(whole, choice.chain)
         kept.profiles[chosen.structure] = own
-    beside = kept.beside(scales)
+    others = kept.other_models(scales)
     limits = [profile_limits(*profile) for profile in kept.profiles.values()]
-    limits += [(first, last) for _, first, last in beside]
+    limits += [(other.low, other.high) for other in others]
     low = min(chosen.delay, *(first for first, _ in limits))
     high = max(chosen.delay, *(last for _, last in limits))
     if endless := still_improving(tanks):
@@ -97,8 +97,8 @@ def likelihood_fit(
     found = assembled(whole, chosen, adequate, (), kept.profiles, interval, own)
     return replace(
         found,
-        chain=choice.chain.name if choice.chain else "",
-        beside=tuple(beside),
+        chain=choice.chain,
+        other_models=tuple(others),
         endless=endless,
         like_flow=like_flow,
         open_start=open_start,
@@ -124,10 +124,10 @@ class _Kept:
                 return profile
         return self.profiles[choice.model.structure]
 
-    def beside(self, scales: Scales) -> list[tuple[str, float, float]]:
-        """What is not among the structures: its name, and its interval."""
-        flows = (("a flow that disperses", *profile_limits(*profile)) for _, profile in self.flows)
-        chains = ((chain.name, *chain_limits(chain, scales)) for chain in self.chains)
+    def other_models(self, scales: Scales) -> list[OtherModel]:
+        """What is not among the structures, with its interval."""
+        flows = (OtherModel(flow, *profile_limits(*profile)) for flow, profile in self.flows)
+        chains = (OtherModel(chain, *chain_limits(chain, scales)) for chain in self.chains)
         return [*flows, *chains]
 
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..separable.dispersion import DispersedFlow
-from ..separable.lag_chains import lag_sum
+from ..separable.lag_chains import LagChain, lag_sum
 from ..separable.profile import delay_profile
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import StaticGain, averaged_ends
@@ -30,6 +30,24 @@ _ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile
 
 Profile: TypeAlias = tuple[FloatArray, FloatArray]
 """Delays, and the misfit at each; see `delay_profile`."""
+
+RobustKey: TypeAlias = Literal[
+    "onset",
+    "one_lag_early",
+    "two_lags_early",
+    "three_lags_early",
+    "model_of_rise",
+    "model_of_record",
+]
+"""Delay estimates where no model is adequate: "early" is 15 % of the excursion, "rise" 63 %."""
+
+
+class OtherModel(NamedTuple):
+    """Interval of the delay in s under a model that is not in the table of structures."""
+
+    model: LagChain | DispersedFlow
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,16 +86,16 @@ class Better:
 class OutputErrorEstimate:
     """Delay and model of one record; see the rule in `output_error`.
 
-    ``low <= delay <= high``. `views` are (name, delay) pairs, empty where the model is adequate.
+    ``low <= delay <= high``. `views` are (key, delay) pairs, empty where the model is adequate.
     The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
     are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
-    which chain of lags the model is, if it is one; `endless`: chains of lags fit the better the
+    the chain of lags that the model is, if it is one; `endless`: chains of lags fit the better the
     longer they are, so that all of the delay may be lags; `like_flow`: no step tells the chain from
     a flow that disperses; `open_start`: how smoothly the response begins is open; `relaxing`: the
     plant was moving before the step, and its free response was fitted along. `flows` that disperse
     are not ruled out; with `follows_flow` the delay is that of the best of them, and the lags
-    behind it follow it. `beside` names what is not in the table of structures and not ruled out,
-    with its interval. `std` is that of the chosen structure. `whitened`: coloured noise was made
+    behind it follow it. `other_models` are those that are not in the table of structures and not
+    ruled out. `std` is that of the chosen structure. `whitened`: coloured noise was made
     white, by what it is at rest. `static` is the gain of the model,
     `alike` those of the other structures that are not ruled out and resolve one, each with its
     evidence over the model's. `better` is a structure that rules out those that were asked for.
@@ -95,17 +113,17 @@ class OutputErrorEstimate:
     residual: float
     correlation: float
     structures: tuple[StructureFit, ...]
-    views: tuple[tuple[str, float], ...]
+    views: tuple[tuple[RobustKey, float], ...]
     fitted: FloatArray
     profile: tuple[FloatArray, FloatArray]
     latest: float
-    chain: str = ""
+    chain: LagChain | None = None
     endless: bool = False
     like_flow: bool = False
     open_start: bool = False
     relaxing: bool = False
     flows: tuple[DispersedFlow, ...] = ()
-    beside: tuple[tuple[str, float, float], ...] = ()
+    other_models: tuple[OtherModel, ...] = ()
     follows_flow: bool = False
     whitened: bool = False
     static: StaticGain | None = None
@@ -149,8 +167,9 @@ def profiles_of(
     """
     found = {s: profile_of(whole, whole.candidates[s], solved=False) for s in structures}
     limits = {s: profile_limits(*profile) for s, profile in found.items()}
-    low = min(first for first, _ in limits.values())
-    high = max(last for _, last in limits.values())
+    # None are left where a dispersed flow rules out every structure.
+    low = min((first for first, _ in limits.values()), default=np.inf)
+    high = max((last for _, last in limits.values()), default=-np.inf)
     for s, (first, last) in limits.items():
         margin = _ROUGHLY * (last - first)
         if s == chosen or first - margin <= low or last + margin >= high:
@@ -177,7 +196,7 @@ def assembled(
     whole: WindowFit,
     chosen: Candidate,
     adequate: bool,
-    views: tuple[tuple[str, float], ...],
+    views: tuple[tuple[RobustKey, float], ...],
     profiles: dict[Structure, Profile],
     interval: tuple[float, float, float],
     profile: Profile,

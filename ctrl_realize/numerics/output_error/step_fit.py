@@ -53,7 +53,7 @@ from ..separable.window import WindowFit, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
 from .interval import likelihood_fit
-from .result import OutputErrorEstimate, assembled, profile_of
+from .result import OutputErrorEstimate, RobustKey, assembled, profile_of
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
 
@@ -170,7 +170,7 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
 
 
 def _robust_fit(
-    whole: WindowFit, chosen: Candidate, views: tuple[tuple[str, float], ...]
+    whole: WindowFit, chosen: Candidate, views: tuple[tuple[RobustKey, float], ...]
 ) -> OutputErrorEstimate:
     """Take delay and interval from the views (points 3 and 4 of the rule)."""
     delay = float(np.median([at for _, at in views[:-1]]))
@@ -201,18 +201,18 @@ def _fit_until(
 
 def _views(
     data: StepData, whole: Candidate, latest: float | None, known: KnownFactor, huber: bool
-) -> tuple[tuple[str, float], ...]:
-    """Looks at the delay that err in different ways, in s; the last serves the interval only."""
+) -> tuple[tuple[RobustKey, float], ...]:
+    """Six delay estimates in s whose errors are independent; the sixth only widens the interval."""
     assert data.motion is not None
     lags = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
     early = _fit_until(data, stop_at(data, 0.15), lags, latest, known, huber)
     rise = _fit_until(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, known, huber)
     onset = data.motion.onset * data.dt
     return (
-        ("first motion", onset if latest is None else min(onset, latest)),
-        ("first-order lag, first 15 %", early.candidates[lags[0]].delay),
-        ("second-order lag, first 15 %", early.candidates[lags[1]].delay),
-        ("best model of the first 63 %", rise.best.delay),
-        ("best model of the whole record", whole.delay),
-        ("third-order lag, first 15 %", early.candidates[lags[2]].delay),
+        ("onset", onset if latest is None else min(onset, latest)),
+        ("one_lag_early", early.candidates[lags[0]].delay),
+        ("two_lags_early", early.candidates[lags[1]].delay),
+        ("model_of_rise", rise.best.delay),
+        ("model_of_record", whole.delay),
+        ("three_lags_early", early.candidates[lags[2]].delay),
     )

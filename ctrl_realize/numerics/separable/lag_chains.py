@@ -61,13 +61,6 @@ class LagChain:
     error: float
     hidden: float = 0.0
 
-    @property
-    def name(self) -> str:
-        """What it is, in words."""
-        if self.hidden:
-            return "modes of diffusion"
-        return f"chain of {self.candidate.structure.order} nearly equal lags"
-
 
 @dataclass(frozen=True)
 class _Law:

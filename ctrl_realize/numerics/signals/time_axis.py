@@ -6,6 +6,8 @@ written; a missed sample is twenty times as far off.
 
 from __future__ import annotations
 
+from typing import Literal, NamedTuple, TypeAlias
+
 import numpy as np
 
 from ..arrays import FloatArray
@@ -39,8 +41,38 @@ def sample_time(time: FloatArray) -> float:
     return short if abs(short - mean) <= 1e-13 * mean else mean
 
 
-def axis_fault(time: FloatArray) -> str | None:
-    """Say what is wrong with a time axis, with the first bad row; None when it is uniform.
+AxisFaultKind: TypeAlias = Literal[
+    "extreme", "tiny_steps", "backwards", "repeated", "jumps_back", "gap", "not_uniform"
+]
+
+
+class AxisFault(NamedTuple):
+    """First fault of a time axis.
+
+    Attributes
+    ----------
+    kind : str
+        Key of the fault.
+    row : int
+        Where it is.
+    value : float
+        Time stamp of that row in s; for "tiny_steps" and "gap" the step in s, for "not_uniform"
+        the distance from the uniform grid in samples.
+    usual : float
+        What it is compared with, in s: the stamp before, or the usual step.
+    worst : float
+        Largest distance from the uniform grid, in samples.
+    """
+
+    kind: AxisFaultKind
+    row: int
+    value: float
+    usual: float = 0.0
+    worst: float = 0.0
+
+
+def axis_fault(time: FloatArray) -> AxisFault | None:
+    """Find the first fault of a time axis; None when it is uniform.
 
     Parameters
     ----------
@@ -49,33 +81,26 @@ def axis_fault(time: FloatArray) -> str | None:
     """
     far = int(np.argmax(np.abs(time)))
     if abs(time[far]) > EXTREME:
-        return f"time is {time[far]:g} s at row {far}"
+        return AxisFault("extreme", far, time[far])
     steps = np.diff(time)
     typical = float(np.median(steps))
     if 0 < typical < 1 / EXTREME:
-        return f"time runs in steps of {typical:g} s"
+        return AxisFault("tiny_steps", 0, typical)
     if typical < 0 and np.all(steps < 0):
-        return f"time runs backwards: row 1 is at {time[1]:g} s, row 0 at {time[0]:g} s"
+        return AxisFault("backwards", 1, time[1], time[0])
     back = np.flatnonzero(steps <= 0)
     if back.size:
         row = int(back[0]) + 1
-        kind = "repeats" if time[row] == time[row - 1] else "jumps back"
-        return f"time {kind} at row {row}: {time[row]:.9g} s after {time[row - 1]:.9g} s"
+        kind: AxisFaultKind = "repeated" if time[row] == time[row - 1] else "jumps_back"
+        return AxisFault(kind, row, time[row], time[row - 1])
     gaps = np.flatnonzero(steps > 1.5 * typical)
     if gaps.size:
         row = int(gaps[0]) + 1
-        missing = steps[row - 1] / typical - 1
-        return (
-            f"time has a gap at row {row}: {steps[row - 1]:.6g} s where {typical:.6g} s is usual "
-            f"(about {missing:.0f} sample(s) missing)"
-        )
+        return AxisFault("gap", row, steps[row - 1], typical)
     dt = sample_time(time)
     drift = np.abs(time - (time[0] + dt * np.arange(time.size))) / dt
     bad = np.flatnonzero(drift > UNIFORM_WITHIN)
     if bad.size:
         row = int(bad[0])
-        return (
-            f"time is not uniform: row {row} is {drift[row]:.2g} samples off the uniform grid "
-            f"of {dt:.6g} s (worst: {drift.max():.2f}; allowed: {UNIFORM_WITHIN})"
-        )
+        return AxisFault("not_uniform", row, drift[row], dt, drift.max())
     return None
