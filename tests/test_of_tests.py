@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
+import sys
 from pathlib import Path
+
+import ctrl_realize as cr
 
 TESTS = Path(__file__).parent
 FAULTS = {
@@ -22,6 +26,8 @@ def trees():
 
 
 def private(name):
+    """A part of it begins with an underscore, but for words that stand in every report."""
+    name = name.removeprefix("ctrl_realize._wording")
     return any(part.startswith("_") and not part.startswith("__") for part in name.split("."))
 
 
@@ -70,3 +76,14 @@ def test_no_test_replaces_a_part_of_the_package():
             elif {name.id for name in ast.walk(first) if isinstance(name, ast.Name)} & ours:
                 found.append((path, ast.unparse(node)))
     assert found == []
+
+
+def test_every_deliberate_defect_has_its_place_and_tests_that_concern_it():
+    path = TESTS.parent / "tools" / "defects.py"
+    spec = importlib.util.spec_from_file_location("defects", path)
+    sys.modules[spec.name] = tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    package = "\n".join(each.read_text("utf-8") for each in Path(cr.__file__).parent.rglob("*.py"))
+    names = " ".join(path.name for path, _ in trees())
+    assert [d.name for d in tool.DEFECTS if package.count(d.old) != 1] == []
+    assert [d.name for d in tool.DEFECTS if not any(w in names for w in d.where[0].split())] == []

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.design import performance
+from ctrl_realize.design.tuning.table import UNSTABLE
+from ctrl_realize.errors import DataError, ModelWarning, OptionError, UnsuitableSystemError
+from ctrl_realize.numerics.rational.phase import dead_time_from_phase
 
 DT = 7.8125e-4
 
@@ -116,3 +120,154 @@ def test_an_interval_is_around_the_dead_time_and_not_around_the_delay_that_holds
     checked = cr.design.delay_robustness(plant, cr.design.PIDController(0.5, 0.2, dt=DT))
     np.testing.assert_allclose(checked.dead_times / DT, np.arange(34.25, 38.5), rtol=1e-9)
     np.testing.assert_allclose(checked.table()["dead_time"], checked.dead_times)
+
+
+TS = 0.01
+
+
+def plant(lag=0.8, dead_time=0.3):
+    return cr.delayed_ss(ct.tf([2.0], [lag, 1]), dead_time=dead_time, dt=TS)
+
+
+def pi(gain, integral_time):
+    return ct.ss(ct.tf([gain * (1 + TS / integral_time), -gain], [1, -1], TS))
+
+
+@pytest.mark.parametrize("controller", [pi(0.4, 0.8), pi(0.02, 0.8), pi(0.7, 0.6)])
+def test_the_numbers_are_those_of_a_simulated_loop_without_a_guess(controller):
+    found = performance(plant(), controller)
+    time = TS * np.arange(20_000)
+    loop = ct.feedback(ct.ss(plant()) * controller, 1)
+    output = ct.step_response(loop, time).outputs
+    # the transform leaves 1e-6 of the height at every sample
+    assert found.setpoint_error == pytest.approx(np.abs(1 - output).sum() * TS, rel=2e-3)
+    assert found.overshoot == pytest.approx(max(output.max() - 1, 0), abs=1e-4)
+    outside = np.flatnonzero(np.abs(output - 1) > 0.02)
+    assert found.settling_time == pytest.approx((outside[-1] + 1) * TS, abs=2 * TS)
+
+
+@pytest.mark.parametrize("controller", [pi(0.4, 0.8), 0.5])
+def test_a_guess_changes_nothing(controller):
+    free = performance(plant(), controller)
+    for guess in (0.1, 30.0):
+        told = performance(plant(), controller, guess)
+        # a response counts as settled where its last part moves by 1e-4
+        assert told.settling_time == pytest.approx(free.settling_time, abs=2 * TS)
+        assert told.overshoot == pytest.approx(free.overshoot, abs=1e-3)
+        assert told.setpoint_error == pytest.approx(free.setpoint_error, rel=2e-3)
+
+
+def test_a_loop_that_is_not_stable_is_refused():
+    with pytest.raises(UnsuitableSystemError, match=r"the loop is not stable.*margins"):
+        performance(plant(), 40.0)
+    with pytest.raises(UnsuitableSystemError, match="the loop with 'mad' is not stable"):
+        cr.plots.closed_loop_plot(plant(), {"good": pi(0.4, 0.8), "mad": 40.0})
+    with pytest.raises(OptionError, match="total_time"):
+        performance(plant(), 0.1, -1.0)
+
+
+def test_a_loop_that_outlasts_what_is_computed_says_so():
+    with pytest.warns(ModelWarning, match="not settled after 262144 samples"):
+        performance(plant(), pi(1e-6, 0.8))
+
+
+@pytest.mark.parametrize("scale", [1.0, 100.0])
+def test_a_plot_ends_when_the_slowest_of_its_loops_has_settled(scale):
+    system = cr.delayed_ss(ct.tf([2.0], [0.8 * scale, 1]), dead_time=0.3 * scale, dt=TS * scale)
+    loops = {
+        name: ct.ss(ct.tf([gain * (1 + TS / 0.8), -gain], [1, -1], TS * scale))
+        for name, gain in (("quick", 0.4), ("slow", 0.1))
+    }
+    drawn = cr.plots.closed_loop_plot(system, loops)
+    last = [np.max(line.get_xdata()) for line in np.ravel(drawn.lines)[0]]
+    slowest = max(performance(system, each).settling_time for each in loops.values())
+    assert slowest <= min(last)
+    assert max(last) <= 2 * slowest
+    response = np.ravel(drawn.lines)[0][1].get_ydata()
+    assert abs(response[-1] - 1) < 0.02
+    plt.close(drawn.figure)
+
+
+def test_performance_is_told_in_words():
+    assert repr(performance(plant(), pi(0.4, 0.8))) == (
+        "<Performance: set-point error 1 s, load error 2 s, overshoot 0 %, settled after 2.81 s>"
+    )
+    assert "set-point error stays" in repr(performance(plant(), 0.5))
+    assert repr(UNSTABLE) == (
+        "<Performance: set-point error stays, load error stays, overshoot unknown, never settled>"
+    )
+
+
+@pytest.mark.parametrize("delay", [0, 37, 100, 300, 1000])
+def test_phase_is_that_of_a_fine_grid_on_any_grid(valve, delay):
+    plant = valve(delay)
+    fine = np.linspace(0.001, 0.99 * np.pi / DT, 400_000)
+    expected = np.unwrap(np.angle(plant(np.exp(1j * fine * DT))))
+    some = np.array([17, 40_000, 200_000, 399_999])
+    found = cr.design.unwrapped_phase(plant, fine[some])
+    np.testing.assert_allclose(found, expected[some], rtol=1e-9, atol=1e-9)
+
+
+def test_order_of_frequencies_and_unit_do_not_matter(valve):
+    omega = np.array([300.0, 1.0, 20.0])
+    found = cr.design.unwrapped_phase(valve(300), omega)
+    np.testing.assert_array_equal(cr.design.unwrapped_phase(valve(300), omega[::-1]), found[::-1])
+    np.testing.assert_allclose(
+        cr.design.unwrapped_phase(valve(300), omega, deg=True), np.degrees(found)
+    )
+
+
+@pytest.mark.parametrize("integrators", [0, 1, 2, 3])
+def test_integrators_start_at_minus_90_degrees_each(integrators):
+    loop = ct.tf([1.0], [1.0, *[0.0] * integrators])
+    found = cr.design.unwrapped_phase(loop, [0.1, 10.0], dead_time=2.0, deg=True)
+    expected = -90 * integrators - np.degrees(2.0 * np.array([0.1, 10.0]))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_a_negative_gain_starts_half_a_turn_lower(valve):
+    omega = np.array([1.0, 50.0])
+    found = cr.design.unwrapped_phase(-valve(37), omega) - cr.design.unwrapped_phase(
+        valve(37), omega
+    )
+    np.testing.assert_allclose(found, -np.pi, rtol=1e-12)
+
+
+@pytest.mark.parametrize("delay", [37, 300])
+def test_sixty_measured_points_are_unwrapped_without_being_told_the_delay(valve, delay):
+    omega = 2 * np.pi * np.geomspace(0.1, 50, 60)
+    response = valve(delay)(np.exp(1j * omega * DT))
+    noise = np.random.default_rng(1).standard_normal((2, 60)) * 0.02 * np.abs(response)
+    data = cr.MeasuredFRF(response + noise[0] + 1j * noise[1], omega / (2 * np.pi))
+    exact = cr.design.unwrapped_phase(valve(delay), omega)
+    found = cr.design.unwrapped_phase(data)
+    np.testing.assert_allclose(found, exact, atol=0.1)  # 2 % noise, five sigma
+    told = cr.design.unwrapped_phase(data, dead_time=delay * DT)
+    np.testing.assert_allclose(told, exact, atol=0.1)
+    # What plain unwrapping makes of it: whole turns are missing.
+    assert np.abs(np.unwrap(np.angle(response)) - exact).max() > 6 or delay == 37
+
+
+def test_wrong_uses_are_refused(valve):
+    data = cr.MeasuredFRF([1.0, 0.5, 0.2], [1, 2, 3])
+    with pytest.raises(OptionError, match="omega is missing"):
+        cr.design.unwrapped_phase(valve(3))
+    with pytest.raises(OptionError, match="leave it out"):
+        cr.design.unwrapped_phase(data, [1.0])
+    with pytest.raises(DataError, match="frequencies >= 0"):
+        cr.design.unwrapped_phase(valve(3), [-1.0])
+    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
+        cr.design.unwrapped_phase(cr.MeasuredFRF(np.ones((1, 2, 3)), [1, 2, 3]))
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_how_long_a_dead_time_can_be_told_depends_on_the_spacing_and_not_its_unit(unit):
+    # 4.5 rad from point to point at least: beyond half a turn, within one
+    uneven = np.cumsum([1.0, 1.0, 1.3, 1.1, 1.5, 1.2, 1.0, 1.4, 1.7, 1.3])
+    found = dead_time_from_phase(uneven / unit, np.exp(-4.5j * uneven))
+    assert found == pytest.approx(4.5 * unit, rel=1e-6)
+    # evenly spaced, 4.5 rad is 1.8 rad the other way round, which no delay is
+    even = np.arange(1.0, 11.0)
+    assert dead_time_from_phase(even / unit, np.exp(-2.5j * even)) == pytest.approx(2.5 * unit)
+    # the last delay tried is half a turn, or a sixty-fourth more
+    assert dead_time_from_phase(even / unit, np.exp(-4.5j * even)) < 1.05 * np.pi * unit

@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
-from ctrl_realize.identification.campaign.campaign import rows
+from ctrl_realize.identification.campaign import rows
 from tests.fuzz.draws import any_bytes, any_text, sometimes
 from tests.fuzz.lane import fuzz, good_end
 from tests.fuzz.test_binary_files import damaged

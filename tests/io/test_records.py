@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 import errno
+import io
 import math
 import os
 import re
 import warnings
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -23,7 +26,9 @@ from ctrl_realize.errors import (
     OptionError,
     TimeAxisError,
 )
-from ctrl_realize.io import read_record
+from ctrl_realize.io import read_frf, read_record
+from ctrl_realize.io.text.csv_files import as_text, write_csv
+from ctrl_realize.io.units import is_units_line, split_unit, to_seconds
 
 U = np.array([0.0, 0.0, 1.5, 1.5, -1.5])
 Y = np.array([10.25, 10.0, 9.75, 12.5, 12.0])
@@ -459,3 +464,262 @@ def test_a_separator_of_thousands_is_told(tmp_path):
     file.write_text("Zeit;u;y\n" + "".join(f"{k},0;0,5;1.12{k},5\n" for k in range(5)))
     with pytest.raises(DataError, match="without a separator of thousands"):
         read_record(file)
+
+
+N = 12
+ENDS = ["\n", "\r\n", "\r", "\r\r\n"]
+
+
+def rows(count=N):
+    return [[f"{0.1 * k:.1f}", f"{k % 2}", f"{k + 0.25:.2f}"] for k in range(count)]
+
+
+def is_whole(record):
+    assert record.n_samples == N
+    np.testing.assert_array_equal(record.output, np.arange(N) + 0.25)
+
+
+@given(
+    st.lists(st.sampled_from(["", "[°C]", "\n[°C]", "\r\n", " \n\n of ", '""', ", ;"]), max_size=3),
+    st.sampled_from(ENDS),
+    st.sampled_from([0, 1, 2]),
+    st.sampled_from([0, 1, 3]),
+    st.sampled_from([",", ";", "\t"]),
+)
+def test_no_sample_is_lost_whatever_the_line_ends_and_the_header(
+    tmp_path_factory, parts, end, titles, blank, delimiter
+):
+    header = ["time_s", "u", "y" + "".join(parts) + "."]
+    buffer = io.StringIO()
+    csv.writer(buffer, csv.unix_dialect, delimiter=delimiter, lineterminator=end).writerow(header)
+    body = end.join([delimiter.join(row) for row in rows()] + [""])
+    text = f"A title{end}" * titles + end * blank + buffer.getvalue() + end * blank + body
+    path = tmp_path_factory.mktemp("text") / "a.csv"
+    path.write_bytes((text + end * blank).encode())
+    record = read_record(path, input=1, output=2)
+    is_whole(record)
+    assert "".join(record.output_labels[0].split()) == "".join(header[2].split())
+
+
+def test_a_header_with_line_breaks_is_one_name(tmp_path):
+    path = tmp_path / "a.csv"
+    text = '"Time\n[s]","Valve\nposition\n[%]","Temp\r\n[°C]"\n'
+    path.write_text(text + "\n".join(",".join(row) for row in rows()), encoding="utf-8", newline="")
+    record = read_record(path, input="Valve position", output=2)
+    is_whole(record)
+    assert record.input_labels == ("Valve position [%]",)
+    assert record.output_labels == ("Temp [°C]",)
+
+
+def test_a_stray_quote_that_swallows_lines_is_told(tmp_path):
+    lines = [",".join([*row, "note"]) for row in rows()]
+    lines[4] = lines[4].replace("note", '"note')
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,u,y,remark\n" + "\n".join(lines) + "\n")
+    with pytest.raises(FileFormatError, match=r"are its quotes|is not a table"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("cell", ["00:05", "12:34.5"])
+def test_a_clock_of_two_numbers_is_asked_about(tmp_path, cell):
+    path = tmp_path / "a.csv"
+    path.write_text("time,u,y\n" + "".join(f"{cell},{k},{k}\n" for k in range(5)))
+    with pytest.raises(OptionError, match=r"line 2.*time_unit='h' or time_unit='min'"):
+        read_record(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "cells", "dt"),
+    [
+        ("time", "min", ["59:58", "59:59", "00:00"], 1.0),
+        ("time", "h", ["23:58", "23:59", "00:00"], 60.0),
+        ("time [mm:ss]", "auto", ["00:59.5", "01:00.0", "01:00.5"], 0.5),
+        ("time [hh:mm]", "auto", ["99:58", "99:59", "100:00"], 60.0),
+        ("time", "min", ["119:59", "120:00", "120:01"], 1.0),
+        ("time", "auto", ["23:59:59.9", "00:00:00.0", "00:00:00.1"], 0.1),
+    ],
+)
+def test_a_clock_runs_in_the_unit_that_was_said(tmp_path, header, unit, cells, dt):
+    path = tmp_path / "a.csv"
+    path.write_text(f"{header},u,y\n" + "".join(f"{cell},{k},1\n" for k, cell in enumerate(cells)))
+    record = read_record(path, time_unit=unit)
+    assert record.dt == pytest.approx(dt, rel=1e-12)
+
+
+def test_a_clock_of_two_numbers_and_of_three_is_refused(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,u,y\n59:58,0,1\n59:59,0,1\n1:00:00,0,1\n1:00:01,0,1\n")
+    with pytest.raises(DataError, match="of two numbers and of three"):
+        read_record(path, time_unit="min")
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "cells"),
+    [
+        (",", ["1,234", "2,345", "3,456"]),
+        (",", ["999", "1,001", "1,003"]),
+        (";", ["998", "999", "1,000"]),
+        ("\t", ["998", "999", "1,000"]),
+    ],
+)
+def test_commas_that_may_divide_thousands_are_asked_about(tmp_path, delimiter, cells):
+    path = tmp_path / "a.csv"
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, delimiter=delimiter)
+        writer.writerows([["time_s", "u", "y"], *([k, k, c] for k, c in enumerate(cells))])
+    with pytest.raises(FileFormatError, match=r"may be \d\.\d{3} or \d{4}; say decimal"):
+        read_record(path)
+    assert read_record(path, decimal=",").output[2] == float(cells[2].replace(",", "."))
+
+
+@pytest.mark.parametrize("cells", [["1,234", "2,345", "0,456"], ["1,25", "2,345", "3,4"]])
+def test_commas_that_can_only_mark_decimals_do(tmp_path, cells):
+    path = tmp_path / "a.csv"
+    for delimiter in (";", ","):
+        with path.open("w", newline="") as file:
+            writer = csv.writer(file, delimiter=delimiter)
+            writer.writerows([["time_s", "u", "y"], *([k, k, c] for k, c in enumerate(cells))])
+        read = read_record(path).output
+        np.testing.assert_array_equal(read, [float(c.replace(",", ".")) for c in cells])
+
+
+def test_decimals_of_a_fixed_number_are_decimals(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s;u;y\n" + "".join(f"{k};{k};{k + 1},125\n" for k in range(N)))
+    np.testing.assert_array_equal(read_record(path).output, np.arange(N) + 1.125)
+
+
+FORMULA_SIGNS = "=+-@\t\r\n\uff1d\uff0b\uff0d\uff20"
+NAMES = [
+    "=cmd|'/c calc'!A1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "\uff1d1", "valve;=1+1",
+    "valve\n=1", "'=1", "'", "", "NaN", "1e5", 'say "=1"', "a,b", "a\rb", "a\r\nb", "valve 16 mA",
+]  # fmt: skip
+
+
+def plain(text: str) -> str:
+    """The name that a cell stands for: as the documentation says, without one apostrophe."""
+    return re.sub(rf"(^|[;\t\r\n])'(?='*[{re.escape(FORMULA_SIGNS)}])", r"\1", text)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_cell_of_a_spreadsheet_begins_as_a_formula(name):
+    # also where the semicolon ends a cell, and where line ends are not in quotes
+    for cell in re.split("[;\t\r\n]", as_text(name)):
+        assert cell[:1] not in tuple(FORMULA_SIGNS)
+
+
+@given(st.text(st.sampled_from([*FORMULA_SIGNS, "'", ";", '"', ",", "a", " "]), max_size=8))
+def test_a_name_is_got_back_by_leaving_out_one_apostrophe(name):
+    assert plain(as_text(name)) == name
+
+
+def test_names_and_numbers_are_read_as_they_were_written(tmp_path):
+    values = np.resize([0.1, 1 / 3, -5e-324, 1e300, np.inf, np.nan], len(NAMES))
+    table = pd.DataFrame({"delay": values}, index=pd.Index(NAMES, name="record"))
+    write_csv(tmp_path / "a.csv", table, index=True)
+    again = pd.read_csv(tmp_path / "a.csv", keep_default_na=False, na_values={"delay": [""]})
+    assert [plain(name) for name in again["record"]] == NAMES
+    np.testing.assert_array_equal(again["delay"], values)
+
+
+def test_ordinary_tables_are_those_of_pandas(tmp_path):
+    table = pd.DataFrame(
+        {"gain": [1.5, -2.0, np.nan], "trusted": [True, False, True], "error": ["", "a, b", "c"]}
+    )
+    write_csv(tmp_path / "a.csv", table, index=False)
+    assert (tmp_path / "a.csv").read_bytes() == table.to_csv(index=False).encode()
+
+
+def test_names_of_columns_are_no_formulas_either(tmp_path):
+    write_csv(tmp_path / "a.csv", pd.DataFrame({"=1+1": [1]}), index=False)
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == "'=1+1\n1\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("time", ("time", "")),
+        ("time_ms", ("time", "ms")),
+        ("t [µs]", ("t", "us")),
+        ("Zeit/ms", ("Zeit", "ms")),
+        ("Time (Seconds)", ("Time", "s")),
+        ("frequency_hz", ("frequency", "hz")),
+        ("omega [rad/s]", ("omega", "rad/s")),
+        ("w_rad_s", ("w", "rad/s")),
+        ("phase deg", ("phase", "deg")),
+        ("|G| [dB]", ("|G|", "db")),
+        ("output_1", ("output_1", "")),
+        ("u[0]", ("u", "0")),
+        ("position (V)", ("position", "v")),
+        ("[s]", ("[s]", "s")),
+        ("", ("", "")),
+    ],
+)
+def test_a_name_splits_into_what_and_unit(name, parts):
+    assert split_unit(name) == parts
+
+
+@pytest.mark.parametrize(
+    ("cells", "answer"),
+    [
+        (["s", "mA", "V"], True),
+        (["[s]", "[bar]", ""], True),
+        (["(sec)", "(1)", "(mm)"], True),
+        (["time", "u", "y"], False),
+        (["", "", ""], False),
+    ],
+)
+def test_a_line_of_units_is_known_by_a_unit_or_by_brackets(cells, answer):
+    assert is_units_line(cells) is answer
+
+
+@pytest.mark.parametrize(
+    ("unit", "seconds"),
+    [("s", 7.0), ("ms", 7e-3), ("µs", 7e-6), ("ns", 7e-9), ("min", 420.0), ("Hours", 25200.0)],
+)
+def test_scaled_time_is_the_double_nearest_to_the_decimal_number(unit, seconds):
+    assert to_seconds(np.array([7.0]), unit)[0] == seconds
+
+
+def test_an_unknown_unit_of_time_is_named_with_those_that_are_known():
+    with pytest.raises(OptionError, match=r"'ticks'.*ms.*min"):
+        to_seconds(np.arange(3.0), "ticks")
+
+
+def test_every_measured_record_in_text_is_read_to_the_last_bit(shared_data):
+    files = [f for f in shared_data.rglob("*.csv") if "frf" not in f.name]
+    assert len(files) >= 25
+    for file in files:
+        record = read_record(file)
+        names = file.read_text().partition("\n")[0].split(",")
+        # NumPy's own reader is the second opinion
+        table = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
+        assert_array_equal(record.time, table[0])
+        inputs = [k for k, name in enumerate(names) if name.startswith("input")]
+        outputs = [k for k, name in enumerate(names) if name.startswith("output")]
+        assert_array_equal(np.atleast_2d(record.input), table[inputs])
+        assert_array_equal(np.atleast_2d(record.output), table[outputs])
+
+
+def test_every_measured_frequency_response_is_read(shared_data):
+    files = list(shared_data.rglob("*frf*.csv"))
+    assert len(files) >= 5
+    for file in files:
+        frf = read_frf(file)
+        frequency, magnitude, phase = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
+        assert_array_equal(frf.frequency_hz, frequency)
+        np.testing.assert_allclose(np.abs(frf.frdata[0, 0]), magnitude, rtol=1e-15)
+        turns = (np.angle(frf.frdata[0, 0], deg=True) - phase) / 360
+        # angle() and exp() round, and 2160 degrees cost three digits
+        np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("name", "dt", "samples"),
+    [("motor_bench_multisine.npz", 0.0004, 50_000), ("tue_load_500k.npz", 0.00025, 500_000)],
+)
+def test_long_records_in_npz_are_read(shared_data, name, dt, samples):
+    record = read_record(shared_data / name)
+    assert (record.dt, record.n_samples) == (dt, samples)
+    with np.load(shared_data / name) as arrays:
+        assert_array_equal(record.output, arrays["y"])

@@ -1,4 +1,4 @@
-"""Plots: what is drawn, where, with which units, and what they leave untouched."""
+"""Plots show what results hold, to scale and with units."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import ctrl_realize as cr
 from ctrl_realize import plots
 from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.identification.validation.delay_estimates_result import DelayEstimate
 from ctrl_realize.plots import style
 from tests import rigs
 
@@ -213,3 +214,112 @@ def test_what_a_plot_is_not_made_for_is_told_with_what_it_needs(record, scanned)
         plots.impulse_plot(scanned)
     with pytest.raises(DataError, match=r"such as design\.margins\(plant, controller\)"):
         plots.margins_plot(scanned)
+
+
+@pytest.fixture(autouse=True)
+def settings_of_the_session():
+    with mpl.rc_context():
+        yield
+    plt.close("all")
+
+
+@pytest.fixture
+def comparison():
+    plant = cr.delayed_ss(cr.bench.valve().truth.core, 37, dt=7.8125e-4)
+    return cr.design.compare_pid(plant, ["simc"])
+
+
+def test_the_style_holds_inside_and_the_users_settings_are_back_behind():
+    mine = {"font.size": 7.5, "lines.linewidth": 0.3, "axes.grid": False, "text.color": "#123456"}
+    mpl.rcParams.update(mine)
+    before = dict(mpl.rcParams)
+    with style.context():
+        assert mpl.rcParams["font.size"] == 12
+        assert mpl.rcParams["axes.grid"]
+    assert {key: mpl.rcParams[key] for key in mine} == mine
+    assert dict(mpl.rcParams) == before
+
+
+def test_the_users_settings_are_back_after_an_error():
+    before = dict(mpl.rcParams)
+    with pytest.raises(ZeroDivisionError), style.canvas(None, title="never"):
+        raise ZeroDivisionError
+    assert dict(mpl.rcParams) == before
+
+
+def test_a_figure_of_the_user_after_a_plot_looks_as_before_it(comparison):
+    mpl.rcParams.update({"lines.linewidth": 0.7, "axes.labelsize": 5.0})
+    comparison.plot()
+    axes = plt.figure().subplots()
+    (line,) = axes.plot([0, 1])
+    axes.set_xlabel("mine")
+    assert line.get_linewidth() == 0.7
+    assert axes.xaxis.label.get_size() == 5.0
+    assert axes.spines["top"].get_visible()
+
+
+def test_a_title_is_put_on_new_figures_only():
+    # The title of a figure that the user made is the user's.
+    for ax, title, shown in (
+        (None, None, "usual"),
+        (None, "mine", "mine"),
+        (None, "", ""),
+        (Figure(), "mine", ""),
+        (Figure().subplots(), "mine", ""),
+    ):
+        with style.canvas(ax, title=title, default_title="usual") as (axes,):
+            pass
+        assert axes.get_title(loc="left") == shown
+
+
+def test_any_plot_can_be_drawn_without_its_title(comparison):
+    assert comparison.plot().axes[0, 0].get_title(loc="left") == "Tuning rules on this plant"
+    assert comparison.plot(title="").axes[0, 0].get_title(loc="left") == ""
+
+
+PLANT = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
+
+
+@pytest.fixture
+def random_record():
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal(300)
+    y = PLANT.simulate(u) + 0.05 * rng.standard_normal(300)
+    return cr.Record(0.1 * np.arange(300), u, y, output_labels=["level"])
+
+
+def test_residual_plot_shows_data_model_and_correlations(random_record):
+    check = cr.validation.analyse_residuals(PLANT, random_record)
+    drawn = check.plot()
+    assert isinstance(drawn, ct.ControlPlot)
+    measured, simulated = drawn.lines[0, 0]
+    assert_allclose(measured.get_ydata(), random_record.output)
+    assert_allclose(simulated.get_ydata(), check.simulated)
+    assert_allclose(drawn.lines[2, 0][0].get_ydata(), check.cross[0, 0])
+    assert drawn.axes[0, 0].get_ylabel() == "level"
+    with pytest.raises(OptionError, match="output"):
+        plots.residual_plot(check, output=1)
+
+
+@pytest.mark.parametrize("agree", [True, False])
+def test_delay_check_plot_has_a_bar_for_each_view(agree):
+    views = (
+        DelayEstimate("output error", "record", "dead time", 0.02, 0.01, 0.03),
+        DelayEstimate("phase slope", "FRF", "upper bound", 0.05, 0.04, 0.06),
+    )
+    check = cr.validation.DelayComparison(views, agree, (0.01, 0.03) if agree else None, (), 0.001)
+    drawn = check.plot()
+    assert len(drawn.lines[0, 0]) == 2
+    names = [label.get_text() for label in drawn.axes[0, 0].get_yticklabels()]
+    assert names == ["phase slope\n(FRF)", "output error\n(record)"]
+    assert (drawn.axes[0, 0].get_legend() is not None) == agree
+
+
+def test_an_estimate_is_drawn_in_its_band(random_record):
+    estimate = cr.impulse_from_io(random_record, 40)
+    drawn = estimate.plot()
+    assert isinstance(drawn, ct.ControlPlot)
+    (band,) = drawn.axes[0, 0].collections
+    vertices = band.get_paths()[0].vertices
+    top = (estimate.density + 2 * estimate.std / estimate.dt).max()
+    assert_allclose(vertices[:, 1].max(), top)

@@ -1,0 +1,286 @@
+"""Many records: table, statistics, final model, and one bad record among them."""
+
+from __future__ import annotations
+
+import functools
+import gc
+import os
+import pickle
+import signal
+import threading
+import time
+
+import control as ct
+import joblib
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.identification.campaign.packed_model import PackedModel
+from ctrl_realize.identification.campaign.rows import fingerprint
+from tests.rigs import TS, step_record
+
+
+def named(record: cr.Record, name: str) -> cr.Record:
+    return cr.Record(record.time, record.input, record.output, name=name)
+
+
+@pytest.fixture(scope="module")
+def records() -> list[cr.Record]:
+    return [
+        named(step_record(noise=1e-3, seed=s, amplitude=a), f"{a:g}mA_{s}")
+        for a in (4.0, 16.0)
+        for s in range(4)
+    ]
+
+
+@pytest.fixture(scope="module")
+def campaign(records) -> cr.Campaign:
+    return cr.identify_campaign(records, method="paper")
+
+
+def test_every_record_is_a_row_in_order(campaign, records):
+    table = campaign.table()
+    assert list(table.index) == [record.name for record in records]
+    assert_allclose(table["amplitude"], [4.0] * 4 + [16.0] * 4, rtol=0.01)
+    assert_array_equal(table["delay"], campaign.delays)
+    assert_allclose(table["dead_time"], campaign.delays * TS)
+
+
+def test_serial_and_parallel_give_the_same_bits(campaign, records):
+    parallel = cr.identify_campaign(records, method="paper", n_jobs=2)
+    for one, other in zip(campaign.rows, parallel.rows, strict=True):
+        assert_array_equal(one.system.A, other.system.A)
+        assert_array_equal(one.system.C, other.system.C)
+
+
+def test_statistics_are_those_of_the_trimmed_delays(campaign):
+    summary = campaign.statistics(trim=2)
+    kept = np.sort(campaign.delays)[2:-2]
+    assert_allclose([summary.mean, summary.variance], [kept.mean(), kept.var(ddof=1)])
+    assert campaign.statistics().dropped == 4  # a quarter of eight at each end
+
+
+def test_a_bad_record_is_a_row_with_its_error(records):
+    t = TS * np.arange(2000)
+    flat = cr.Record(t, np.ones(2000), t, name="flat")
+    mixed = cr.identify_campaign([records[0], flat, records[1]], method="paper")
+    assert [row.system is None for row in mixed.rows] == [False, True, False]
+    assert mixed.rows[1].error.startswith("NoStepError: no step in the input of record 'flat'")
+    assert mixed.table().loc["flat", "error"] == mixed.rows[1].error
+    assert mixed.flags[0].code == "failed_records"
+    assert "flat" in mixed.report()
+
+
+def test_a_file_that_cannot_be_read_is_a_row_with_its_name(records, tmp_path):
+    missing = functools.partial(cr.read_record, tmp_path / "gone.csv")
+    mixed = cr.identify_campaign([records[0], missing], method="paper", n_jobs=2)
+    assert "gone.csv" in mixed.rows[1].name
+    assert "MissingFileError" in mixed.rows[1].error
+
+
+def test_records_of_different_sample_times_have_no_common_delay(records):
+    slow = cr.Record(records[0].time * 2, records[0].input, records[0].output, name="slow")
+    mixed = cr.identify_campaign([records[0], slow], method="paper")
+    with pytest.raises(DataError, match="sample times from"):
+        mixed.statistics()
+    assert mixed.table()["dead_time"].notna().all()
+
+
+def test_a_delay_that_grows_with_the_step_raises_the_alarm():
+    slow = [
+        named(step_record(noise=1e-3, seed=s, amplitude=a, delay=37 + 2 * a), f"{a:g}_{s}")
+        for a in (4.0, 16.0)
+        for s in range(4)
+    ]
+    flags = cr.identify_campaign(slow, method="scan", order=3, max_delay=120).flags
+    assert [flag.code for flag in flags] == ["amplitude_trend"]
+    assert "longer for larger steps" in str(flags[0])
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "match"),
+    [
+        (lambda: cr.identify_campaign([]), DataError, "no records"),
+        (lambda: cr.identify_campaign(["a.csv"]), DataError, "records.0. is a str"),
+        (lambda: cr.identify_campaign([step_record()], ordr=3), OptionError, "ordr"),
+        (lambda: cr.identify_campaign([step_record()], n_jobs=0), OptionError, "n_jobs=0"),
+        (lambda: cr.identify_campaign([step_record()], method="x"), OptionError, "choose one of"),
+    ],
+)
+def test_unusable_arguments_are_refused(make, error, match):
+    with pytest.raises(error, match=match):
+        make()
+
+
+def test_table_1_gives_the_papers_37_and_2():
+    # Through the statistics that a campaign uses: 36.676 and 2.042 / 2.104.
+    from ctrl_realize import paper
+    from ctrl_realize.numerics.statistics import trimmed_statistics
+
+    table = np.asarray(paper.TABLE_1, dtype=float)
+    summary = trimmed_statistics(table, 3)
+    assert_allclose(summary.mean, 36.676, atol=5e-4)
+    assert_allclose(summary.variance, 2.104, atol=5e-4)
+    assert_allclose(trimmed_statistics(table, 3, ddof=0).variance, 2.042, atol=5e-4)
+    assert (round(summary.mean), round(summary.variance)) == (paper.DELAY, 2)
+
+
+def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
+    system = campaign.system
+    assert isinstance(system, ct.StateSpace)
+    assert system.delay == round(campaign.statistics().mean)
+    scan = campaign.best.system.fit
+    again = cr.realize(scan.impulse, 3, delay=system.delay, samples=1000, feedthrough=True)
+    assert_array_equal(system.A, again.A)
+
+
+DT = 0.1
+TIME = DT * np.arange(200)
+
+
+def record(name="", step=-4.0, offset=0.0, **labels):
+    moved = step * (np.arange(200) >= 60)
+    return cr.Record(TIME, moved, offset + 2 * moved, name=name, **labels)
+
+
+def test_the_key_of_a_row_depends_on_samples_labels_method_and_options_alone():
+    one = record("a", offset=0.5)
+    assert fingerprint(record("b", offset=0.5), "scan", {}) == fingerprint(one, "scan", {})
+    later = cr.Record(TIME + 1, one.input, one.output)
+    other = cr.Record(TIME, one.input, one.output, output_labels=["level"])
+    keys = [
+        fingerprint(one, "scan", {}),
+        fingerprint(one, "paper", {}),
+        fingerprint(one, "scan", {"order": 2}),
+        fingerprint(one, "scan", {"order": 3}),
+        fingerprint(record(), "scan", {}),
+        fingerprint(record(step=-4 - 1e-15, offset=0.5), "scan", {}),
+        fingerprint(later, "scan", {}),
+        fingerprint(other, "scan", {}),
+        fingerprint(record(offset=0.5, input_labels=["valve"]), "scan", {}),
+    ]
+    assert len(set(keys)) == len(keys)
+    ways = [{"order": 2, "samples": 9}, {"samples": 9, "order": 2}]
+    assert len({fingerprint(one, "scan", way) for way in ways}) == 1
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        lambda pole=2.0, gain=1.0, dt=0: ct.tf([gain], [1.0, pole], dt),
+        lambda pole=2.0, gain=1.0, dt=0: ct.ss([[-pole]], [[1.0]], [[gain]], [[0.0]], dt),
+        lambda pole=2.0, gain=1.0, dt=0: ct.ss([[-2.0]], [[pole]], [[1.0]], [[gain]], dt),
+    ],
+)
+def test_the_key_knows_a_system_by_all_its_digits(known):
+    one = record()
+
+    def key(system):
+        return fingerprint(one, "output_error", {"known": system})
+
+    same = known()
+    same.name = "sensor"
+    assert key(same) == key(known())
+    # python-control prints eight digits
+    others = [known(pole=2 + 1e-12), known(gain=1 + 1e-12), known(dt=DT)]
+    assert len({key(system) for system in [same, *others]}) == 4
+
+
+RNG = np.random.default_rng(1)
+SISO = ct.ss([[0.9, 0.1], [0, 0.5]], [[0], [1]], [[1, 1 / 3]], 0.1, 7e-4)
+MIMO = ct.ss(*(RNG.standard_normal(shape) for shape in ((3, 3), (3, 2), (2, 3), (2, 2))), 0.1)
+STATIC = ct.ss([], [], [], [[2.0]], 1.0)
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        cr.DelayedStateSpace(SISO, 37, name="valve", inputs="i", outputs="x", fit="how"),
+        cr.DelayedStateSpace(SISO, 0),
+        cr.DelayedStateSpace(MIMO, (2, 5), output_delay=(0, 3), name="plant"),
+        cr.DelayedStateSpace(STATIC, 4),
+    ],
+    ids=["siso", "no delay", "mimo", "static"],
+)
+def test_unpacking_gives_the_model_bit_by_bit(system):
+    packed = pickle.loads(pickle.dumps(PackedModel.of(system)))
+    for twin in (PackedModel.of(system).unpack(), packed.unpack()):
+        for letter in "ABCD":
+            assert_array_equal(getattr(twin, letter), getattr(system, letter))
+            assert_array_equal(getattr(twin.delay_free, letter), getattr(system.delay_free, letter))
+        assert_array_equal(twin.delay, system.delay)
+        assert (twin.input_delays, twin.output_delays) == (
+            system.input_delays,
+            system.output_delays,
+        )
+        assert (twin.name, twin.dt, twin.fit) == (system.name, system.dt, system.fit)
+        assert twin.input_labels == system.input_labels
+        assert twin.output_labels == system.output_labels
+        assert twin.state_labels == system.state_labels
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    made = step_record(noise=1e-3, before=400, after=1300)
+    record = cr.Record(made.time, made.input, made.output, name="r")
+    store = cr.io.CampaignStore(tmp_path_factory.mktemp("store"))
+    return cr.identify_campaign([record], method="paper", store=store)
+
+
+def test_a_campaign_with_a_store_holds_no_augmented_matrix(kept):
+    gc.collect()
+    before = sum(type(thing) is cr.DelayedStateSpace for thing in gc.get_objects())
+    twin = pickle.loads(pickle.dumps(kept.rows))
+    after = sum(type(thing) is cr.DelayedStateSpace for thing in gc.get_objects())
+    assert after == before
+    assert twin[0].system.nstates > 30
+
+
+distributed = pytest.importorskip("distributed", reason="dask[distributed] is not installed")
+
+# What a cluster says while it starts, stops and loses workers is not ours.
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
+
+
+def quick(seed: int, wait: float = 0.0) -> cr.Record:
+    time.sleep(wait)
+    made = step_record(noise=1e-3, seed=seed, before=400, after=1300)
+    return cr.Record(made.time, made.input, made.output, name=f"r{seed}")
+
+
+@pytest.fixture
+def client():
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as connected,
+    ):
+        yield connected
+
+
+def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(client, tmp_path):
+    sources = [functools.partial(quick, seed, 0.2) for seed in range(16)]
+    store = cr.io.CampaignStore(tmp_path)
+    pids = list(client.run(os.getpid).values())
+
+    def kill_one() -> None:
+        while len(store) < 3:
+            time.sleep(0.05)
+        os.kill(pids[0], signal.SIGKILL)
+
+    killer = threading.Thread(target=kill_one)
+    killer.start()
+    with joblib.parallel_config(backend="dask"):
+        spread = cr.identify_campaign(sources, method="paper", n_jobs=-1, store=store)
+    killer.join()
+    serial = cr.identify_campaign([functools.partial(quick, s) for s in range(16)], method="paper")
+    assert spread.failed == ()
+    assert spread.table().equals(serial.table())
+    for a, b in zip(spread.good, serial.good, strict=True):
+        assert_array_equal(a.system.A, b.system.A)
+    # The killed worker is gone; the cluster's nanny starts another in its place.
+    assert pids[0] not in client.run(os.getpid).values()

@@ -1,0 +1,289 @@
+"""Output-error fits of records whose input is no step, one or several."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError
+from tests.rigs import R1, R3, lag, pair
+
+DT = 0.01
+DELAY = 12.4
+
+
+def cut_from_operation(kind, plant, seed, n=1200, skip=300):
+    """A record that starts while the plant is moving; 5 % noise."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(n + skip)
+    if kind == "prbs":
+        u = np.repeat(rng.choice([-1.0, 1.0], k.size // 10 + 1), 10)[: k.size]
+    else:
+        u = np.sin(2 * np.pi * np.cumsum(np.geomspace(0.1, 8, k.size)) * DT)
+    y = cr.delayed_ss(plant, dead_time=DELAY * DT, dt=DT).simulate(u)
+    y = y + 0.05 * y.std() * rng.standard_normal(k.size)
+    return cr.Record(k[skip:] * DT, 4 + u[skip:], 3 + y[skip:], name=kind)
+
+
+@pytest.mark.parametrize(("kind", "plant"), [("prbs", R1), ("prbs", R3), ("chirp", R3)])
+def test_the_dead_time_is_found_from_operation_with_unknown_start(kind, plant):
+    fit = cr.fit_output_error(cut_from_operation(kind, plant, seed=1)).fit
+    error = fit.dead_time / DT - DELAY
+    assert abs(error) < 4 * fit.std_given_structure / DT
+    assert fit.std_given_structure / DT < 0.2
+    assert fit.interval[0] <= DELAY * DT <= fit.interval[1]
+    assert fit.structure == ((1, 1) if plant is R1 else (3, 3))
+
+
+def test_an_input_that_never_holds_is_no_step(shared_data):
+    # the first half of this record has moves that pass for one edge
+    table = np.loadtxt(shared_data / "exchanger" / "record.csv", delimiter=",", skiprows=1)
+    whole = cr.Record(*table.T)
+    first, second = whole.between(0, 2000), whole.between(2001, 4000)
+    model = cr.fit_output_error(first)
+    assert np.isnan(model.fit.onset)
+    assert model.fit.dead_time <= 1.0  # s, one sample: the delay is 0
+    assert cr.validation.analyse_residuals(model, second).fit_percent[0] > 35
+
+
+@pytest.mark.parametrize(("plant", "structure"), [(pair(1.5, 0.05), (2, 2)), (lag(0.05), (1, 1))])
+def test_what_was_before_the_record_may_ring_or_creep_through_all_of_it(plant, structure):
+    # decay times of 2.1 s and 3.2 s, in a record of 12 s that starts in the middle of motion
+    fit = cr.fit_output_error(cut_from_operation("prbs", plant, seed=2)).fit
+    assert fit.structure == structure
+    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std_given_structure / DT
+    assert fit.std_given_structure / DT < 0.06
+    assert fit.measured.shape == fit.fitted.shape == fit.time.shape
+
+
+def test_an_output_that_does_not_follow_the_input_gets_no_answer():
+    good = cut_from_operation("prbs", R1, seed=0, n=600)
+    for seed in range(3):
+        y = np.random.default_rng(seed).standard_normal(600)
+        with pytest.raises(DataError, match="does not follow the input"):
+            cr.fit_output_error(cr.Record(good.time, good.input, y))
+
+
+def bound(plant, u, noise):
+    """Cramer-Rao bound of the dead time, in s, with gain, poles and level unknown."""
+
+    def response(delay, scale):
+        slower = ct.ss(plant)
+        slower = ct.ss(slower.A / scale, slower.B / scale, slower.C, slower.D)
+        return cr.delayed_ss(slower, dead_time=delay, dt=DT).simulate(u)
+
+    h, tau = 1e-3, DELAY * DT
+    columns = [
+        (response(tau + h * DT, 1.0) - response(tau - h * DT, 1.0)) / (2 * h * DT),
+        (response(tau, 1 + h) - response(tau, 1 - h)) / (2 * h),
+        response(tau, 1.0),
+        np.ones(u.size),
+    ]
+    J = np.stack(columns, axis=1)[300:]
+    return noise * float(np.sqrt(np.linalg.inv(J.T @ J)[0, 0]))
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_all_samples_of_a_long_record_count(colour):
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.choice([-1.0, 1.0], 3000), 10)
+    clean = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
+    noise = 0.05 * float(np.std(clean))
+    y = clean + lfilter([1.0], [1.0, -colour], noise * rng.standard_normal(u.size))
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
+    # coloured noise leaves no more than white noise of its innovations would, filtered alike
+    white = lfilter([1.0, -colour], [1.0], u)
+    limit = bound(R1, white, noise)
+    assert fit.std_given_structure == pytest.approx(limit, rel=0.1)
+    assert abs(fit.dead_time - DELAY * DT) < 3.5 * limit
+    assert "cut" not in [flag.code for flag in fit.flags]
+    assert any("condensed" in choice for choice in fit.choices)
+    # what is shown is a stretch
+    assert fit.time.size < 4000
+    assert np.std(fit.measured - fit.fitted) < 1.1 * noise / np.sqrt(1 - colour**2)
+
+
+def test_a_long_record_of_a_slow_plant_is_cut_and_says_so():
+    slow = lag(0.02)  # responses of 5000 samples
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 100), 60)
+    y = cr.delayed_ss(slow, dead_time=DELAY * DT, dt=DT).simulate(u)
+    y += 0.01 * np.random.default_rng(1).standard_normal(u.size)
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
+    assert fit.time.size < 4000
+    assert "cut" in [flag.code for flag in fit.flags]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample(seed):
+    # A lag of ten samples behind 150: the valley is as narrow as the lag.
+    rng = np.random.default_rng(seed)
+    plant = cr.DelayedStateSpace(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT), 150)
+    u = rng.choice([-1.0, 1.0], 1000)
+    y = plant.simulate(u) + 0.05 * rng.standard_normal(1000)
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(1000), u, y)).fit
+    assert fit.structure == (1, 1)
+    assert abs(fit.delay - 150) < 0.5
+    assert fit.delay_interval[0] <= 150 <= fit.delay_interval[1]
+
+
+def random_binary(poles, noise, disturbance=0.0, seed=0):
+    """Lags behind 0.8 s under a random binary input; per cent of noise, and a slow sine."""
+    rng = np.random.default_rng(seed)
+    t = 0.05 * np.arange(2000)
+    u = np.repeat(rng.choice([-1.0, 1.0], 100), 20)
+    plant = ct.tf([float(np.prod(poles))], np.poly(-np.asarray(poles)))
+    y = cr.delayed_ss(plant, dead_time=0.8, dt=0.05).simulate(u)
+    y = y + noise * rng.standard_normal(t.size) + disturbance * np.sin(2 * np.pi * t / 60)
+    return cr.Record(t, u, y)
+
+
+@pytest.mark.parametrize("noise", [0.005, 0.03])
+def test_many_lags_are_no_dead_time_under_any_input(noise):
+    five = cr.fit_output_error(random_binary([1, 1.5, 2, 3, 5], noise)).fit
+    assert five.interval[0] <= 0.8 <= five.interval[1]
+    # three poles with two zeros, the best of the smaller models, say 1.15 s
+    assert abs(five.dead_time - 0.8) < 0.2
+    eight = cr.fit_output_error(random_binary([3.0] * 8, noise)).fit
+    assert eight.interval[0] <= 0.8 <= eight.interval[1]
+    assert abs(eight.dead_time - 0.8) < 0.05
+    assert eight.order == 8
+    assert eight.at_noise_level
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_slow_disturbance_does_not_move_the_dead_time(seed):
+    # a fifth of the response, over a period of 60 s: the fit was half a second late
+    fit = cr.fit_output_error(random_binary([0.5, 1.25], 0.02, disturbance=0.2, seed=seed)).fit
+    assert fit.interval[0] <= 0.8 <= fit.interval[1]
+    assert abs(fit.dead_time - 0.8) < 0.1
+
+
+@pytest.mark.parametrize("rest", [4500, 20000])
+def test_an_input_that_rests_for_longer_than_is_fitted_is_fitted_where_it_moves(rest):
+    rng = np.random.default_rng(0)
+    u = np.concatenate([np.zeros(rest), np.repeat(rng.choice([-1.0, 1.0], 250), 10)])
+    y = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
+    y += 0.02 * np.ptp(y) * rng.standard_normal(y.size)
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), 4 + u, y), structures=[(1, 1)]).fit
+    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std_given_structure / DT
+    # what is shown lies where the input moves
+    assert fit.time[-1] > DT * rest
+
+
+SKIP = 100  # samples of operation before a record begins
+START = 20  # samples of a record that the bound does not count: about those that a fit leaves out
+
+
+def signal(kind, seed, n):
+    rng = np.random.default_rng(seed)
+    if kind == "prbs":
+        return np.repeat(rng.choice([-1.0, 1.0], n // 10 + 1), 10)[:n]
+    if kind == "noise":
+        return rng.standard_normal(n)
+    return np.sin(2 * np.pi * np.cumsum(np.geomspace(0.2, 8, n)) * DT)
+
+
+def respond(u, values):
+    """Plant of delay [samples], gain, pole [Hz], and a pair [Hz, damping] if there is one."""
+    delay, gain, hz, *more = values
+    plant = gain * lag(hz) * (pair(*more) if more else 1)
+    return cr.delayed_ss(plant, dead_time=delay * DT, dt=DT).simulate(u)
+
+
+def operation(kind, seed, n, values, *, sigma=0.02, size=1.0, level=0.0, drift=0.0, name=""):
+    """A piece cut out of operation, noise `sigma`; returns the record and the whole input."""
+    u = size * signal(kind, seed, n + SKIP)
+    y = respond(u, values) + sigma * np.random.default_rng(seed + 999).standard_normal(n + SKIP)
+    time = DT * np.arange(n)
+    y = level + drift * time + y[SKIP:]
+    return cr.Record(time, 4 + u[SKIP:], y, name=name or f"{kind} {seed}"), u
+
+
+def joint_bound(inputs, sigmas, values):
+    """Cramer-Rao bound of the delay in samples; level, drift and state of each record are free."""
+    information = np.zeros((len(values), len(values)))
+    for u, sigma in zip(inputs, sigmas, strict=True):
+        slopes = []
+        for i, value in enumerate(values):
+            step = 1e-4 * value
+            ends = [respond(u, [*values[:i], value + h, *values[i + 1 :]]) for h in (step, -step)]
+            slopes.append((ends[0] - ends[1])[SKIP + START :] / (2 * step))
+        slopes = np.array(slopes).T
+        k = np.arange(len(slopes))
+        plant = lag(values[2]) * (pair(*values[3:]) if values[3:] else 1)
+        poles = plant.poles()[plant.poles().imag >= 0]
+        free = np.exp(np.outer(k * DT, poles))
+        own = np.column_stack([np.ones(k.size), k / k.size, free.real, free.imag])
+        own = np.linalg.svd(own, full_matrices=False)
+        base = own.U[:, own.S / own.S[0] > 1e-9]
+        left = slopes - base @ (base.T @ slopes)
+        information += left.T @ left / sigma**2
+    return np.sqrt(np.linalg.inv(information)[0, 0])
+
+
+KINDS = [("prbs", 300, 1.0, 0.02), ("chirp", 400, 0.5, 0.02), ("noise", 250, 2.0, 0.1)]
+
+
+@pytest.mark.parametrize(
+    "values", [(DELAY, 1.0, 2.0), (DELAY, 2.5, 2.0, 5.0, 0.5)], ids=["R1", "R3"]
+)
+def test_error_and_standard_error_are_those_of_the_bound(values):
+    structures = [(1, 1)] if len(values) == 3 else [(3, 3)]
+    errors, claims, limits = [], [], []
+    for seed in range(4):
+        made = [
+            operation(
+                kind, 10 * seed + i, n, values, sigma=sigma, size=size, level=i, drift=-0.3 * i
+            )
+            for i, (kind, n, size, sigma) in enumerate(KINDS)
+        ]
+        fit = cr.fit_output_error([record for record, _ in made], structures=structures).fit
+        limits.append(joint_bound([u for _, u in made], [sigma for *_, sigma in KINDS], values))
+        errors.append(fit.delay - DELAY)
+        claims.append(fit.std_given_structure / DT)
+        assert fit.at_noise_level
+        assert fit.repeatability.p_value > 1e-3
+    # noise levels are known from 250 samples each, and Huber's loss costs 2 %
+    assert_allclose(np.array(claims) / limits, 1.0, rtol=0, atol=0.25)
+    assert_allclose(np.mean(np.array(claims) / limits), 1.0, rtol=0, atol=0.12)
+    # chi-square of four: 18.5 is exceeded once in 1000
+    assert np.sum((np.array(errors) / limits) ** 2) < 18.5
+
+
+def test_several_records_find_the_structure_that_made_them():
+    values = (DELAY, 2.5, 2.0, 5.0, 0.5)
+    records = [operation("prbs", seed, 400, values)[0] for seed in range(3)]
+    sys = cr.identify(records)
+    assert sys.fit.structure == (3, 3)
+    assert sys.fit.interval[0] <= DELAY * DT <= sys.fit.interval[1]
+    assert sys.fit.gain == pytest.approx(2.5, abs=0.02)
+    assert sys.fit.fitted.size == sys.fit.measured.size < 1200
+    assert np.all(np.diff(sys.fit.time) > 0)
+    assert "records" in sys.fit.report()
+
+
+def test_steps_and_random_inputs_go_together():
+    values = (DELAY, 1.0, 2.0)
+    random, _ = operation("prbs", 1, 400, values)
+    k = np.arange(400)
+    u = np.where(k < 100, 0.0, 2.0)
+    y = respond(u, values) + 0.02 * np.random.default_rng(5).standard_normal(400)
+    fit = cr.fit_output_error(
+        [random, cr.Record(DT * k, u, y, name="step")], structures=[(1, 1)]
+    ).fit
+    assert abs(fit.delay - DELAY) < 4 * fit.std_given_structure / DT
+    assert fit.repeatability.p_value > 0.01
+    assert fit.repeatability.amplitudes.tolist() == [2.0, 2.0]
+
+
+def test_records_that_do_not_go_together_are_refused():
+    one, _ = operation("prbs", 1, 300, (DELAY, 1.0, 2.0))
+    slow = cr.Record(2 * one.time, one.input, one.output)
+    with pytest.raises(DataError, match="one sample time"):
+        cr.fit_output_error([one, slow])
+    with pytest.raises(OptionError, match="takes one record"):
+        cr.identify([one, one], method="scan")

@@ -1,0 +1,327 @@
+"""Output-error fits of many lags, dispersing flows and coloured noise. Simulated."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+from scipy.special import gammainc, log_ndtr, ndtr
+from scipy.stats import invgauss
+
+import ctrl_realize as cr
+from tests import rigs
+
+TS = rigs.TS
+
+
+def chain_record(lags: int, hz: float, noise: float, *, delay: float = 37.0, seed: int = 0):
+    """Step record of equal lags in a row: the incomplete gamma function."""
+    k = np.arange(-2000, 2600)
+    after = np.clip((k - delay) * TS, 0, None)
+    y = 16 * gammainc(lags, 2 * np.pi * hz * after)
+    y += noise * 16 * np.random.default_rng(seed).standard_normal(k.size)
+    return cr.Record(k * TS, 16.0 * (k >= 0), y)
+
+
+@pytest.mark.parametrize(("lags", "hz"), [(5, 8.0), (6, 10.0), (8, 12.0)])
+def test_the_delay_before_many_equal_lags_is_found_and_covered(lags, hz):
+    fit = cr.fit_output_error(chain_record(lags, hz, 0.005)).fit
+    low, high = fit.delay_interval
+    assert fit.structure == (lags, lags)
+    # Free structures of up to five poles are 6, 12 and 13 samples late here.
+    assert abs(fit.delay - 37) < 1.5
+    assert low <= 37 <= high
+
+
+def test_lags_that_are_not_spread_evenly_are_covered():
+    plant = rigs.lag(3) * rigs.lag(4) * rigs.lag(5) * rigs.lag(7) * rigs.lag(9)
+    for noise in (0.001, 0.005):
+        fit = cr.fit_output_error(rigs.step_record(plant, noise=noise)).fit
+        low, high = fit.delay_interval
+        assert fit.structure == (5, 5)
+        assert low <= 37 <= high
+        assert high - low < 20  # without chains: 32 and 45 samples
+
+
+def diffusion_record(noise: float, *, delay: float = 37.0, seed: int = 0):
+    """Step record of 1 / cosh(sqrt(s T)), its slowest mode at 2.2 Hz: a wall that is heated."""
+    k = np.arange(-2000, 2600)
+    after = np.clip((k - delay) * TS, 0, None)
+    m = np.arange(300)[:, None]
+    modes = (
+        4 / np.pi * (-1.0) ** m / (2 * m + 1) * np.exp(-2 * np.pi * 2.2 * (2 * m + 1) ** 2 * after)
+    )
+    y = np.where(after > 0, 16 * (1 - modes.sum(axis=0)), 0.0)
+    y += noise * 16 * np.random.default_rng(seed).standard_normal(k.size)
+    return cr.Record(k * TS, 16.0 * (k >= 0), y)
+
+
+@pytest.mark.parametrize(("noise", "width"), [(0.001, 15), (0.005, 30)])
+def test_the_dead_time_before_diffusion_is_covered(noise, width):
+    for seed in range(3):
+        low, high = cr.fit_output_error(diffusion_record(noise, seed=seed)).fit.delay_interval
+        # Free structures alone put it in 40 ... 49 samples.
+        assert low <= 37 <= high
+        assert high - low < width  # half as much again as is seen
+
+
+def test_more_lags_than_were_tried_are_flagged_and_no_delay_is_promised():
+    fit = cr.fit_output_error(chain_record(12, 20.0, 0.005)).fit
+    assert "many_lags" in {flag.code for flag in fit.flags}
+    assert fit.interval[0] == 0.0
+    # 37 samples and twelve lags of 10.2, less the half sample of the hold.
+    assert fit.total_delay / TS == pytest.approx(37 + 12 / (2 * np.pi * 20 * TS) - 0.5, abs=1.0)
+
+
+def test_three_lags_need_no_chain():
+    fit = cr.fit_output_error(rigs.step_record(noise=0.005)).fit
+    assert fit.structure == (3, 3)
+    assert "many_lags" not in {flag.code for flag in fit.flags}
+
+
+def dispersion_record(
+    noise: float, *, mean: float, narrow: float = 1.0, delay: float = 37.0, seed: int = 0
+):
+    """Step record of a flow that disperses: inverse Gaussian residence times, in s.
+
+    Their shape is `narrow` times their mean.
+    """
+    k = np.arange(-2000, 2600)
+    time = np.maximum((k - delay) * TS, 1e-6)
+    root = np.sqrt(narrow * mean / time)
+    y = ndtr(root * (time / mean - 1))
+    y += np.exp(2 * narrow + log_ndtr(-root * (time / mean + 1)))
+    y = np.where(k > delay, y, 0.0) + noise * np.random.default_rng(seed).standard_normal(k.size)
+    return cr.Record(k * TS, (k >= 0).astype(float), y)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_beginning_that_a_zero_imitates_is_left_open(seed):
+    # Three tenths go ahead, the rest comes twenty samples later.
+    k = np.arange(-1000, 1600)
+    ahead, behind = (rigs.exact_step(rigs.R2, (k - late) * TS) for late in (37, 57))
+    y = 0.3 * ahead + 0.7 * behind + 0.001 * np.random.default_rng(seed).standard_normal(k.size)
+    fit = cr.fit_output_error(cr.Record(k * TS, (k >= 0).astype(float), y)).fit
+    low, high = fit.delay_interval
+    assert fit.order > fit.relative_degree
+    assert "onset_open" in {flag.code for flag in fit.flags}
+    assert fit.delay > 39
+    assert low <= 37 <= high
+    # three times as far before the delay as the first motion is behind it, and a sample after that
+    assert fit.delay - low == pytest.approx(3 * (fit.onset / TS - fit.delay))
+    assert high >= fit.onset / TS + 1 - 1e-9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_flow_that_disperses_little_looks_like_a_chain_of_lags_and_is_covered(seed):
+    fit = cr.fit_output_error(dispersion_record(0.005, mean=0.2, narrow=15.0, seed=seed)).fit
+    low, high = fit.delay_interval
+    assert fit.order >= 6
+    assert fit.delay > 60
+    assert low <= 37 <= high
+
+
+def test_a_plant_with_a_zero_is_covered_and_one_without_is_not_called_open():
+    w = 2 * np.pi * 4.0
+    zero = cr.fit_output_error(rigs.step_record(rigs.R3 * ct.tf([1 / w, 1], [1]), noise=0.001)).fit
+    assert zero.structure == (3, 2)
+    assert "onset_open" in {flag.code for flag in zero.flags}
+    assert zero.delay_interval[0] <= 37 <= zero.delay_interval[1]
+    assert zero.delay_interval[1] - zero.delay_interval[0] < 25  # onset: five samples after it
+    plain = cr.fit_output_error(rigs.step_record(noise=0.001)).fit
+    assert "onset_open" not in {flag.code for flag in plain.flags}
+
+
+def test_structures_that_are_given_are_believed():
+    fit = cr.fit_output_error(dispersion_record(0.005, mean=0.08), structures=[(3, 2)]).fit
+    assert "onset_open" not in {flag.code for flag in fit.flags}
+    assert fit.interval[1] - fit.interval[0] < 5 * TS
+
+
+def test_a_chain_of_seven_lags_in_noise_may_be_a_flow_that_begins_half_of_its_lags_earlier():
+    noisy, quiet = (
+        cr.fit_output_error(chain_record(7, 20.0, noise)).fit for noise in (0.01, 0.002)
+    )
+    for fit, told in ((noisy, True), (quiet, False)):
+        lead = 0.5 * np.sum(1 / np.abs(fit.poles)) / fit.dt
+        assert ("many_lags" in {flag.code for flag in fit.flags}) == told
+        assert (fit.interval[0] / fit.dt <= fit.delay - lead + 1e-6) == told
+
+
+DELAY = 37.0
+
+
+def flow_record(spread: float, noise: float, *, lag: float = 0.0, seed: int = 1) -> cr.Record:
+    """Step through a flow of 80 ms and a lag in s, with a noise in parts of the step.
+
+    `spread` is the standard deviation of the residence times over their mean.
+    """
+    k = np.arange(-1000, 1600)
+    fine = np.arange(0, 1600, 0.05)
+    step = invgauss(mu=spread**2, scale=0.08 / spread**2).cdf((fine - DELAY) * TS)
+    if lag:
+        decay = np.exp(-0.05 * TS / lag)
+        step = ct.forced_response(ct.tf([1 - decay, 0], [1, -decay], True), None, step).outputs
+    y = np.interp(k, fine, step, left=0.0)
+    y += noise * np.random.default_rng(seed).standard_normal(k.size)
+    return cr.Record(k * TS, (k >= 0).astype(float), 3 + 2 * y)
+
+
+def codes(fit) -> set[str]:
+    return {flag.code for flag in fit.flags}
+
+
+@pytest.mark.parametrize(
+    ("spread", "noise", "near"),
+    [(0.45, 0.001, 1.0), (0.7, 0.001, 0.5), (1.0, 0.001, 0.3), (1.0, 0.005, 1.0)],
+)
+def test_the_dead_time_before_a_flow_is_found(spread, noise, near):
+    fit = cr.fit_output_error(flow_record(spread, noise)).fit
+    low, high = fit.delay_interval
+    # Lags alone put it 20 (narrow) to 6 samples late (wide), in intervals of 15 samples.
+    assert abs(fit.delay - DELAY) < near
+    assert low <= DELAY <= high
+    assert "dispersed_flow" in codes(fit)
+    assert "inverse_response" not in codes(fit)
+
+
+def test_a_lag_behind_the_flow_is_not_taken_for_it():
+    fit = cr.fit_output_error(flow_record(0.7, 0.001, lag=0.02)).fit
+    low, high = fit.delay_interval
+    assert abs(fit.delay - DELAY) < 2
+    assert low <= DELAY <= high
+
+
+def test_the_model_follows_the_flow_down_to_noise():
+    record = flow_record(0.7, 0.001)
+    model = cr.fit_output_error(record)
+    assert model.fit.residual == pytest.approx(0.002, rel=0.05)
+    left = model.fit.measured - model.fit.fitted
+    # Five lags behind the dead time: what they miss is less than the noise of one sample.
+    smooth = np.convolve(left, np.ones(25) / 25, "valid")
+    assert np.abs(smooth).max() < 0.002
+    response = model.simulate(record.input) + model.fit.fitted[0]
+    assert_allclose(response, model.fit.fitted, rtol=0, atol=1e-6)
+    assert model.fit.total_delay == pytest.approx(DELAY * TS + 0.08 - TS / 2, abs=TS)
+
+
+def test_a_flow_as_narrow_as_sixteen_lags_is_covered_and_told():
+    fit = cr.fit_output_error(flow_record(0.25, 0.001)).fit
+    low, high = fit.delay_interval
+    # No five poles follow it: the model is that of lags, forty samples late.
+    assert low <= DELAY <= high
+    assert "dispersed_flow" in codes(fit)
+
+
+@pytest.mark.parametrize("plant", [rigs.R2, rigs.R3, rigs.R4])
+def test_lags_are_not_read_as_a_flow(plant):
+    for seed in range(2):
+        fit = cr.fit_output_error(rigs.step_record(plant, noise=0.005, seed=seed)).fit
+        assert "dispersed_flow" not in codes(fit)
+
+
+BEFORE, N = 600, 1600
+
+
+def ringing(rng):
+    """Noise like the ripple of a motor: period of 70 samples, unit variance."""
+    radius, angle = 0.97, 2 * np.pi / 70
+    noise = lfilter(
+        [1.0], [1, -2 * radius * np.cos(angle), radius**2], rng.standard_normal(N + 3000)
+    )
+    return noise[3000:] / noise.std()
+
+
+def slow(rng):
+    """AR(1) noise with a pole at 0.9, unit variance."""
+    return lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal(N + 200))[200:]
+
+
+def record(seed, colour, noise, plant=rigs.R1):
+    rng = np.random.default_rng([seed, 7])
+    delay = float(rng.uniform(30, 45))
+    k = np.arange(N)
+    y = rigs.exact_step(plant, (k - BEFORE - delay) * rigs.TS) + noise * colour(rng)
+    return cr.Record(k * rigs.TS, 1.0 * (k >= BEFORE), y), delay
+
+
+def errors(colour, noise, way, seeds=4):
+    found = []
+    for seed in range(seeds):
+        data, delay = record(seed, colour, noise)
+        found.append(cr.fit_output_error(data, noise=way).fit.delay - delay)
+    return np.sqrt(np.mean(np.square(found)))
+
+
+def test_ripple_hardly_touches_the_delay():
+    weighed = errors(ringing, 0.005, "auto")
+    # The bound of generalised least squares is 0.012 samples.
+    assert weighed < 0.06
+    assert errors(ringing, 0.005, "white") > 5 * weighed
+
+
+def test_slow_noise_leaves_a_narrower_interval_that_holds():
+    narrower = 0
+    for seed in range(5):
+        data, delay = record(seed, slow, 0.005)
+        fit = cr.fit_output_error(data).fit
+        low, high = fit.delay_interval
+        assert low <= delay <= high
+        first, last = cr.fit_output_error(data, noise="white").fit.delay_interval
+        narrower += high - low < last - first
+    assert narrower >= 4
+
+
+def test_white_noise_is_fitted_as_before_to_the_last_digit():
+    data, _ = record(0, lambda rng: rng.standard_normal(N), 0.005)
+    found, plain = (cr.fit_output_error(data, noise=way).fit for way in ("auto", "white"))
+    assert found.dead_time == plain.dead_time
+    assert found.interval == plain.interval
+
+
+def test_colour_that_only_the_response_has_is_a_misfit():
+    # White at rest; a ringing that no model of the toolbox has is left in the response.
+    data, _ = record(2, lambda rng: rng.standard_normal(N), 0.005)
+    after = np.arange(N) >= BEFORE
+    bent = data.output + 0.02 * after * ringing(np.random.default_rng(5))
+    fit = cr.fit_output_error(cr.Record(data.time, data.input, bent)).fit
+    assert "generalised" not in fit.report()
+
+
+def test_records_fitted_together_know_the_noise_of_their_mean():
+    rng = np.random.default_rng(11)
+    k = np.arange(N)
+    step = rigs.exact_step(rigs.R1, (k - BEFORE - 36.4) * rigs.TS)
+    several = [
+        cr.Record(k * rigs.TS, 1.0 * (k >= BEFORE), step + 0.005 * ringing(rng)) for _ in range(4)
+    ]
+    fit = cr.fit_output_error(several).fit
+    assert "generalised" in fit.report()
+    assert fit.delay == pytest.approx(36.4, abs=0.1)
+    low, high = fit.delay_interval
+    assert low <= 36.4 <= high
+
+
+def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow(shared_data):
+    data = cr.read_record(shared_data / "dc_motor_tacho" / "up.csv")
+    fit = cr.identify(data).fit
+    low, high = fit.interval
+    assert fit.at_noise_level
+    assert 31 <= fit.delay <= 42
+    assert high - low <= 0.3 * fit.onset
+    first, last = cr.identify(data, noise="white").fit.interval
+    assert last - first > 2 * (high - low)
+
+
+def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
+    rng = np.random.default_rng(1)
+    k = np.arange(1400)
+    y = np.where(k > 543, -np.expm1(-(k - 543) / 60), 0)
+    for burst in rng.integers(0, 1390, 25):
+        y[burst : burst + 6] += 0.05 * rng.standard_normal()
+    fit = cr.fit_output_error(cr.Record(0.1 * k, 1.0 * (k >= 500), y)).fit
+    assert "generalised" not in fit.report()
+    low, high = fit.delay_interval
+    assert low <= 43 <= high

@@ -1,0 +1,345 @@
+"""Several step records of one plant: mean, scatter, trend, outliers, differences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.special import chdtrc
+
+import ctrl_realize as cr
+from ctrl_realize import report
+from ctrl_realize.identification.output_error.averaging import (
+    MeanStep,
+    aligned_steps,
+    mean_step,
+    repeatability,
+    widened,
+)
+from ctrl_realize.identification.output_error.repeatability import Repeatability
+from ctrl_realize.report.verdict import campaign_verdict
+from tests import rigs
+
+TS = rigs.TS
+
+
+def record(seed, *, delay=37.0, amplitude=16.0, name="", plant=rigs.R3):
+    made = rigs.step_record(
+        plant, delay=delay, noise=0.005, seed=seed, amplitude=amplitude, before=400, after=1300
+    )
+    return cr.Record(made.time, made.input, made.output, name=name or f"no. {seed}")
+
+
+def codes(fit):
+    return {flag.code for flag in fit.flags}
+
+
+@pytest.fixture(scope="module")
+def sixteen():
+    return cr.fit_output_error([record(seed) for seed in range(16)]).fit
+
+
+def test_the_mean_of_sixteen_records_is_four_times_as_exact(sixteen):
+    assert sixteen.std_given_structure / TS == pytest.approx(0.46 / 4, rel=0.25)
+    assert abs(sixteen.delay - 37) < 4 * 0.46 / 4
+    assert sixteen.at_noise_level
+    assert sixteen.gain == pytest.approx(1.0, abs=0.002)
+
+
+def test_records_that_differ_by_noise_alone_are_not_called_different(sixteen):
+    repeats = sixteen.repeatability
+    assert repeats.p_value > 0.01
+    assert not repeats.outlying
+    # standard error of a shift with known shape: 0.15 samples per 1 % noise
+    assert np.median(repeats.errors) / TS == pytest.approx(0.15 * 0.5, rel=0.3)
+    assert not codes(sixteen) & {"records_differ", "amplitude_trend", "outlying_records"}
+
+
+def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
+    records = [
+        record(10 * k + a, delay=36 + a / 8, amplitude=float(a))
+        for k in range(4)
+        for a in (4, 8, 16)
+    ]
+    fit = cr.fit_output_error(records).fit
+    assert "amplitude_trend" in codes(fit)
+    assert fit.repeatability.trend / TS == pytest.approx(1 / 8, rel=0.3)
+
+
+@pytest.mark.parametrize("count", [4, 6])
+def test_a_trend_shows_in_few_records_too(count):
+    heights = [16.0] * (count // 2) + [8.0] * (count - count // 2)
+    alike = [record(k, delay=37, amplitude=a) for k, a in enumerate(heights)]
+    apart = [record(k, delay=37 + 2 * (a == 8), amplitude=a) for k, a in enumerate(heights)]
+    assert "amplitude_trend" not in codes(cr.fit_output_error(alike).fit)
+    assert "amplitude_trend" in codes(cr.fit_output_error(apart).fit)
+
+
+def moving(seed: int, *, drifts: bool) -> cr.Record:
+    """Two lags behind 0.6 s: a drift of its own, or an earlier step 5 to 9 s before."""
+    rng = np.random.default_rng(seed)
+    t = 0.05 * np.arange(-400, 1000)
+    before = 0.0 if drifts else rng.uniform(-1, 1)
+    u = np.select([t < -rng.uniform(5, 9), t < 0], [0.0, before], 2.0 + before)
+    plant = cr.delayed_ss(ct.tf([1.5], [5, 6, 1]), dead_time=0.6, dt=0.05)
+    y = plant.simulate(u) + 0.01 * rng.standard_normal(t.size)
+    drift = rng.uniform(-0.03, 0.03) * t if drifts else 0.0
+    return cr.Record(t, u, y + drift, name=f"no. {seed}").between(-4, 50)
+
+
+@pytest.mark.parametrize("drifts", [True, False])
+def test_records_that_were_not_at_rest_are_fitted_together(drifts):
+    fit = cr.fit_output_error([moving(seed, drifts=drifts) for seed in range(6)]).fit
+    assert ("drift" if drifts else "not_at_rest") in codes(fit)
+    assert "records_differ" not in codes(fit)
+    assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
+    assert fit.total_delay == pytest.approx(6.6, rel=0.01)
+
+
+def test_a_record_that_came_twice_is_told():
+    records = [record(k) for k in range(3)]
+    apart, twice = (cr.fit_output_error([*records, more]).fit for more in (record(3), records[1]))
+    assert "same_records" not in codes(apart)
+    (told,) = (str(flag) for flag in twice.flags if flag.code == "same_records")
+    assert "1 of 4 records are others over again (the 4. is the 2.)" in told
+
+
+LEVEL = np.ones((1600, 1))
+
+
+def simulated(delays, amplitudes, *, noise=0.0, gains=None, names=None):
+    gains = gains or [1.0] * len(delays)
+    made = []
+    for i, (delay, height, gain) in enumerate(zip(delays, amplitudes, gains, strict=True)):
+        record = rigs.step_record(
+            rigs.R3, delay=delay, amplitude=height, noise=noise, seed=i, before=300, after=1300
+        )
+        name = names[i] if names else ""
+        made.append(cr.Record(record.time, record.input, gain * record.output, name=name))
+    return aligned_steps(tuple(made))
+
+
+def model_of(mean: MeanStep, delay: float):
+    time = TS * (np.arange(mean.output.size) - mean.edge)
+    return rigs.exact_step(rigs.R3, time - delay * TS)
+
+
+def test_shifts_gains_and_names_of_exact_records_are_found():
+    delays, gains = [36.0, 37.0, 38.5], [0.9, 1.0, 1.3]
+    made = simulated(delays, [16.0, 8.0, -4.0], gains=gains, names=["a", "", "c"])
+    mean = mean_step(made)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
+    # linear interpolation of the model: (w Ts)^2 / 8 of the curvature, w = 50 rad/s
+    assert_allclose(found.delays / TS, delays, atol=0.01)
+    assert_allclose(found.gains, gains, rtol=1e-3)
+    assert found.names == ("a", "record 1", "c")
+    assert_allclose(found.amplitudes, [16, 8, -4])
+    assert found.outlying == ()
+
+
+def test_errors_and_chi_square_are_those_of_the_noise():
+    noise, count = 0.01, 30
+    made = simulated([37.0] * count, [16.0] * count, noise=noise)
+    mean = mean_step(made)
+    found = repeatability(made, mean, model_of(mean, 37.0), 37 * TS, LEVEL)
+    # the scatter of 30 tells sigma to 13 %
+    assert np.std(found.delays, ddof=1) == pytest.approx(np.mean(found.errors), rel=0.4)
+    slope = np.gradient(model_of(mean, 37.0)) / TS
+    line = np.linspace(0, 1, slope.size)
+    columns = np.stack([-slope, model_of(mean, 37.0), np.ones(slope.size), line], axis=1)
+    expected = noise * np.sqrt(np.linalg.inv(columns.T @ columns)[0, 0])
+    assert_allclose(found.errors, expected, rtol=0.1)
+    assert abs(found.delays.mean() / TS - 37) < 4 * expected / TS / np.sqrt(count)
+    kept = np.array(mean.used)
+    weight = found.errors[kept] ** -2
+    centre = np.sum(weight * found.delays[kept]) / weight.sum()
+    statistic = np.sum(weight * (found.delays[kept] - centre) ** 2)
+    assert found.chi_square == pytest.approx(statistic, rel=1e-6)
+    assert found.p_value == pytest.approx(chdtrc(kept.size - 1, statistic), rel=1e-6)
+    assert found.p_value > 0.001
+
+
+def test_what_a_record_has_for_itself_moves_its_delay_no_more_than_noise_does():
+    made = simulated([37.0] * 3, [16.0] * 3, noise=1e-3)
+    mean = mean_step(made)
+    model = model_of(mean, 37.0)
+    own = np.column_stack([LEVEL, np.exp(-np.arange(1600) / 200)])
+    plain = repeatability(made, mean, model, 37 * TS, own)
+    moved = []
+    for i, step in enumerate(made):
+        record = step.record
+        extra = (i - 1) * (0.5 * np.exp(-np.arange(1600) / 200) + 2.0 * record.time)
+        moved.append(cr.Record(record.time, record.input, record.output + extra))
+    found = repeatability(aligned_steps(tuple(moved)), mean, model, 37 * TS, own)
+    assert_allclose(found.delays, plain.delays, atol=1e-3 * TS)
+    assert_allclose(found.errors, plain.errors, rtol=1e-3)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What is widened of a fit."""
+
+    low: float
+    high: float
+    std: float
+
+
+def repeats_of(delays, p_value):
+    n = len(delays)
+    return Repeatability(
+        names=("",) * n, amplitudes=np.ones(n), delays=np.array(delays), errors=np.ones(n),
+        gains=np.ones(n), chi_square=0.0, p_value=p_value, trend=0.0, trend_error=0.0, outlying=(),
+    )  # fmt: skip
+
+
+def test_an_interval_takes_up_the_scatter_of_records_that_differ():
+    fit = Fit(low=9.0, high=11.0, std=0.5)
+    delays = [10.0, 12.0, 8.0, 50.0]
+    between = np.std(delays[:3], ddof=1) / np.sqrt(3)
+    wide = widened(fit, repeats_of(delays, 1e-6), (0, 1, 2))
+    assert_allclose(
+        [wide.low, wide.high, wide.std],
+        [9 - 1.96 * between, 11 + 1.96 * between, np.sqrt(0.25 + between**2)],
+    )
+    # a delay is not negative
+    assert widened(Fit(0.1, 11.0, 0.5), repeats_of(delays, 1e-6), (0, 1, 2)).low == 0
+    # records that differ by noise alone leave it as it is
+    assert widened(fit, repeats_of(delays, 0.01), (0, 1, 2)) is fit
+    assert widened(fit, repeats_of(delays, 0.0099), (0, 1, 2)) is not fit
+
+
+T = 0.05 * np.arange(400)
+
+
+def step(height, seed, gain=1.0, lag=1.0, delay=0.5, noise=0.01):
+    u = np.where(T < 4, 0.0, height)
+    y = gain * height * -np.expm1(-np.maximum(T - 4 - delay, 0) / lag)
+    rng = np.random.default_rng(seed)
+    return cr.Record(T, u, y + noise * rng.standard_normal(T.size), name=f"step_{height:g}")
+
+
+def driven(seed, gain=1.0, lag=1.0, delay=0.5, noise=0.02):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)
+    plant = cr.delayed_ss(
+        cr.design.ProcessModel(gain=gain, lag=lag, dead_time=delay).system(0.05).delay_free,
+        round(delay / 0.05),
+    )
+    y = plant.simulate(u) + noise * rng.standard_normal(u.size)
+    return cr.Record(T, u, y, name=f"driven_{seed}")
+
+
+def told(records):
+    return {flag.code for flag in cr.fit_output_error(records, structures=[(1, 1)]).fit.flags}
+
+
+def test_steps_of_different_gain_are_no_plant_without_objection():
+    records = [step(1.0, 0, 1.0), step(2.0, 1, 0.5), step(4.0, 2, 0.25)]
+    system = cr.identify(records)
+    found = {flag.code: str(flag) for flag in system.fit.flags}
+    assert {"gains_differ", "no_common_gain"} <= set(found)
+    verdict = report.verdict_of(system)
+    assert verdict.level == "poor"
+    assert verdict.reasons[0].startswith("The gain of the model is that of no record")
+    # their gains over each other, whatever the common one is
+    gains = system.fit.repeatability.gains * system.fit.gain
+    np.testing.assert_allclose(gains, [1.0, 0.5, 0.25], rtol=0.02)
+    assert (system.fit.repeatability.fit_percent < 90).all()
+
+
+def test_records_of_one_plant_are_not_told_apart():
+    alarms = [told([step(h, 100 * seed + h) for h in (1, 2, 4)]) for seed in range(8)]
+    assert not set().union(*alarms) & {"gains_differ", "lags_differ", "records_differ"}
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "code"),
+    [
+        ("gain", (1.0, 1.05, 1.1), "gains_differ"),
+        ("lag", (1.0, 1.2, 1.4), "lags_differ"),
+        ("delay", (0.5, 0.55, 0.6), "records_differ"),
+    ],
+)
+def test_what_differs_is_named(name, values, code):
+    records = [step(1.0 + i, i, **{name: value}) for i, value in enumerate(values)]
+    assert code in told(records)
+
+
+def test_a_dead_time_that_differs_is_not_taken_for_lags_or_gains():
+    records = [step(1.0 + i, i, delay=0.5 + 0.05 * i) for i in range(3)]
+    assert not told(records) & {"gains_differ", "lags_differ"}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "code"),
+    [("gain", 2.0, "no_common_gain"), ("lag", 1.5, "lags_differ")],
+)
+def test_records_of_other_inputs_are_compared_too(name, value, code):
+    same = [driven(seed) for seed in (1, 2)]
+    assert not told(same) & {"gains_differ", "lags_differ", "no_common_gain"}
+    assert code in told([*same[:1], driven(2, **{name: value})])
+
+
+def test_the_table_shows_every_record_beside_the_model():
+    fit = cr.fit_output_error(
+        [step(1.0, 0, lag=0.8), step(2.0, 1), step(4.0, 2, lag=1.3)], structures=[(1, 1)]
+    ).fit
+    table = fit.repeatability.table()
+    assert list(table.index) == ["step_1", "step_2", "step_4"]
+    # over each other: 0.8 to 1 to 1.3; the common model fits the mean
+    ratio = (table["lags"] / table["lags"]["step_2"]).to_numpy()
+    np.testing.assert_allclose(ratio, [0.8, 1.0, 1.3], rtol=0.03)
+    assert (table["fit_percent"] < 100).all()
+
+
+def test_the_gains_of_a_canal_differ_with_the_opening_of_its_gate(shared_data):
+    folder = shared_data / "wis_canal"
+    records = [
+        cr.read_record(folder / f"20210202_step_gate1_2_s{opening}.csv")
+        for opening in (25, 100, 255)
+    ]
+    system = cr.identify(records)
+    assert "gains_differ" in {flag.code for flag in system.fit.flags}
+    assert report.verdict_of(system).level == "poor"
+
+
+def test_the_picture_of_a_fit_has_every_record_beside_the_model():
+    records = [step(1.0, 0, 1.0), step(2.0, 1, 0.5), step(4.0, 2, 0.25)]
+    fit = cr.fit_output_error(records, structures=[(1, 1)]).fit
+    drawn = cr.plots.fit_plot(fit).figure.axes[0].get_lines()
+    ends = [float(np.mean(line.get_ydata()[-50:])) for line in drawn]
+    for gain in (1.0, 0.5, 0.25, fit.gain):
+        assert min(abs(end - gain) for end in ends) < 0.02
+
+
+@pytest.mark.parametrize("method", ["output_error", "scan"])
+def test_a_campaign_of_different_gains_is_flagged(method):
+    records = [step(1.0, 0, 1.0), step(2.0, 1, 0.5), step(4.0, 2, 0.25)]
+    options = {"structures": [(1, 1)]} if method == "output_error" else {}
+    campaign = cr.identify_campaign(records, method=method, **options)
+    found = {flag.code for flag in campaign.flags}
+    assert {"gains_differ", "no_common_gain"} <= found
+    assert campaign_verdict(campaign).level == "poor"
+    np.testing.assert_allclose(campaign.table()["gain"], [1.0, 0.5, 0.25], rtol=0.05)
+
+
+def test_a_campaign_of_one_plant_is_not_flagged():
+    campaign = cr.identify_campaign([step(h, 50 + h) for h in (1, 2, 4)], structures=[(1, 1)])
+    assert campaign.flags == ()
+
+
+def test_a_campaign_tells_dead_times_that_differ():
+    records = [step(2.0, i, delay=0.5 + 0.1 * i) for i in range(3)]
+    found = {flag.code for flag in cr.identify_campaign(records, structures=[(1, 1)]).flags}
+    assert "records_differ" in found
+    assert "gains_differ" not in found
+
+
+def test_a_campaign_tells_lags_that_differ():
+    records = [step(2.0, i, lag=1.0 + 0.3 * i) for i in range(3)]
+    assert "lags_differ" in {
+        flag.code for flag in cr.identify_campaign(records, structures=[(1, 1)]).flags
+    }

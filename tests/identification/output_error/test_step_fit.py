@@ -1,0 +1,436 @@
+"""fit_output_error: right on simulated plants, honest where the model is wrong."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize import report
+from ctrl_realize.errors import UnsuitableSystemError
+from ctrl_realize.identification.output_error.known import known_factor
+from tests import rigs
+from tests.rigs import lag, pair
+
+TS = rigs.TS
+
+
+def codes(fit) -> set[str]:
+    return {flag.code for flag in fit.flags}
+
+
+def covers(fit, delay: float) -> bool:
+    low, high = fit.delay_interval
+    return low <= delay <= high
+
+
+def changed(record: cr.Record, output) -> cr.Record:
+    return cr.Record(record.time, record.input, output)
+
+
+@pytest.fixture(scope="module")
+def valve() -> cr.DelayedStateSpace:
+    return cr.fit_output_error(rigs.step_record(noise=0.001, delay=36.4))
+
+
+def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(valve):
+    fit = valve.fit
+    assert fit.structure == (3, 3)
+    assert abs(fit.delay - 36.4) < 4 * 0.092  # four times the Cramer-Rao bound at 0.1 %
+    assert fit.std_given_structure / TS == pytest.approx(0.092, rel=0.15)
+    assert covers(fit, 36.4)
+    assert fit.at_noise_level
+    assert not fit.views
+    # Delay and lags together: 165.2 samples for 37, less 0.6; known to 0.02.
+    assert abs(fit.total_delay / TS - 164.6) < 0.1
+    assert fit.onset > fit.dead_time
+
+
+def test_the_table_lists_all_structures_best_first(valve):
+    rows = valve.fit.structures
+    assert {(row.order, row.relative_degree) for row in rows} == {
+        (n, r) for n in range(1, 6) for r in range(1, n + 1)
+    }
+    assert [row.excess for row in rows] == sorted(row.excess for row in rows)
+    assert all(row.interval for row in rows if row.excess <= 10)
+    low = min(row.interval[0] for row in rows if row.interval)
+    high = max(row.interval[1] for row in rows if row.interval)
+    assert valve.fit.interval == (low, high)
+
+
+def test_gain_offset_and_time_unit_do_not_matter():
+    record = rigs.step_record(noise=0.002, seed=3, before=400, after=1200)
+    fit = cr.fit_output_error(record).fit
+    other = cr.Record(1000 * record.time, record.input, 7.0 - 300 * record.output)
+    same = cr.fit_output_error(other).fit
+    # Thresholds of the iterations are relative; what is left is rounding in the start values.
+    assert same.delay == pytest.approx(fit.delay, abs=2e-3)
+    assert same.dead_time == pytest.approx(1000 * fit.dead_time, abs=2e-3 * 1000 * TS)
+    assert_allclose(same.delay_interval, fit.delay_interval, atol=0.2)
+    assert same.gain == pytest.approx(-300 * fit.gain, rel=1e-4)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e6])
+def test_any_unit_of_time_gives_the_same_answer_in_samples(unit):
+    record = rigs.step_record(noise=0.002, seed=3, before=300, after=900)
+    fit = cr.fit_output_error(record, structures=[(3, 3)]).fit
+    scaled = cr.Record(unit * record.time, record.input, record.output)
+    same = cr.fit_output_error(scaled, structures=[(3, 3)]).fit
+    # nothing but rounding: all thresholds are relative
+    assert same.delay == pytest.approx(fit.delay, rel=1e-6)
+    assert_allclose(same.delay_interval, fit.delay_interval, rtol=1e-4)
+    assert same.std_given_structure / same.dt == pytest.approx(
+        fit.std_given_structure / fit.dt, rel=1e-4
+    )
+
+
+def test_an_unknown_sensor_widens_the_interval_and_a_known_one_narrows_it():
+    sensor = rigs.lag(30.0)
+    for seed in range(2):
+        record = rigs.step_record(rigs.R4, noise=0.005, seed=seed, before=600, after=1500)
+        blind = cr.fit_output_error(record).fit
+        assert covers(blind, 37)  # the order chosen is 3, which alone would be off by 5.4
+        told = cr.fit_output_error(record, known=sensor, structures=[(3, 3)]).fit
+        assert abs(told.delay - 37) < 3 * told.std_given_structure / TS
+        assert told.std_given_structure < 1.2 * 0.48 * TS  # the Cramer-Rao bound is 0.48 samples
+        assert_allclose(np.sort(told.poles.real), np.sort(rigs.R3.poles().real), rtol=0.1)
+
+
+def test_known_dynamics_stay_out_of_the_model_unless_asked_for():
+    sensor = rigs.lag(30.0)
+    record = rigs.step_record(rigs.R4, noise=0.001, before=400, after=1200)
+    without = cr.fit_output_error(record, known=sensor, structures=[(3, 3)])
+    within = cr.fit_output_error(record, known=sensor, structures=[(3, 3)], include_known=True)
+    assert (without.delay_free.nstates, within.delay_free.nstates) == (3, 4)
+    s = 2j * np.pi * 5.0
+    ratio = within(np.exp(s * TS)) / without(np.exp(s * TS))
+    assert_allclose(ratio, sensor(s), atol=2e-3)  # the hold acts once, not twice: (5/1280)^2
+
+
+def test_hum_and_drift_before_the_step_are_fitted_along():
+    record = rigs.step_record(noise=0.001)
+    hum = 0.005 * 16 * np.sin(2 * np.pi * 50 * record.time + 1)
+    fit = cr.fit_output_error(changed(record, record.output + hum)).fit
+    assert abs(fit.delay - 37) < 0.5
+    assert "hum" in codes(fit)
+    drifting = cr.fit_output_error(changed(record, record.output + 0.02 * 16 * record.time)).fit
+    assert abs(drifting.delay - 37) < 0.5
+    assert "drift" in codes(drifting)
+
+
+def after_an_earlier_step(rest: float, before: float) -> cr.Record:
+    """Two lags of 5 and 1 s behind 0.6 s, cut `rest` s before a step, `before` s after another."""
+    plant = cr.delayed_ss(ct.tf([1.5], [5, 6, 1]), dead_time=0.6, dt=0.05)
+    t = 0.05 * np.arange(-200, 1200)
+    u = np.select([t < -before, t < 0], [0.0, 1.0], 3.0)
+    y = plant.simulate(u - u[0]) + 0.01 * np.random.default_rng(0).standard_normal(t.size)
+    return cr.Record(t, u, y).between(-rest, 60)
+
+
+@pytest.mark.parametrize("rest", [1.5, 3.0, 4.0])
+def test_a_plant_still_moving_before_the_step_is_seen_to_move(rest):
+    fit = cr.fit_output_error(after_an_earlier_step(rest, before=6)).fit
+    assert "not_at_rest" in codes(fit)
+    assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
+    # known to 0.1 s from rest; 0.2 s where a second and a half tell what the plant was doing
+    assert abs(fit.dead_time - 0.6) < 0.2
+    assert fit.total_delay == pytest.approx(6.6, rel=0.02)
+    assert fit.at_noise_level
+
+
+@pytest.mark.parametrize("rest", [2.0, 6.0])
+def test_a_drift_is_told_from_a_plant_that_moves(rest):
+    settled = after_an_earlier_step(rest, before=60)
+    fit = cr.fit_output_error(changed(settled, settled.output + 0.02 * settled.time)).fit
+    assert "drift" in codes(fit)
+    assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
+    assert fit.total_delay == pytest.approx(6.6, rel=0.02)
+
+
+def test_eight_bit_quantisation_is_seen_and_the_interval_covers():
+    clean = rigs.step_record(noise=0.0)
+    step = 16 * 1.2 / 128
+    fit = cr.fit_output_error(changed(clean, np.round(clean.output / step) * step)).fit
+    assert "coarse_quantisation" in codes(fit)
+    assert covers(fit, 37)
+
+
+def test_the_standard_error_knows_that_neighbours_are_rounded_alike():
+    rng = np.random.default_rng(0)
+    k = np.arange(1600)
+    scores = []
+    for delay in rng.uniform(30, 45, 40):
+        y = rigs.exact_step(rigs.R1, (k - 600 - delay) * TS) + 0.001 * rng.standard_normal(1600)
+        step = 1.25 / 256
+        y = step * np.round(y / step + rng.uniform())  # eight bits, five times the noise
+        fit = cr.fit_output_error(cr.Record(k * TS, 1.0 * (k >= 600), y), structures=[(1, 1)]).fit
+        scores.append((fit.delay - delay) / (fit.std_given_structure / TS))
+    # chi-square of forty: 55.8 is exceeded once in 20; 67 with the residual alone
+    assert np.sum(np.square(scores)) < 55.8
+
+
+def test_a_lag_of_a_tenth_of_a_sample_leaves_its_sample_open_and_one_of_two_samples_does_not():
+    k = np.arange(-100, 400)
+    noise = 0.001 * np.random.default_rng(0).standard_normal(k.size)
+    intervals = []
+    for slow in (0.1, 2.0):
+        y = -np.expm1(-np.maximum(k - 25.4, 0) / slow) + noise
+        fit = cr.fit_output_error(cr.Record(0.01 * k, (k >= 0).astype(float), y)).fit
+        assert covers(fit, 25.4)
+        intervals.append(fit.delay_interval)
+    assert intervals[0][1] == pytest.approx(26.0, abs=0.01)
+    assert intervals[1][1] < 25.5
+
+
+def test_an_inverse_response_is_found_with_its_zero():
+    w = 2 * np.pi * 5.0
+    fit = cr.fit_output_error(rigs.step_record(rigs.R3 * ct.tf([-1, w], [w]), noise=0.001)).fit
+    assert fit.structure == (3, 2)
+    assert abs(fit.delay - 37) < 1
+    assert "inverse_response" in codes(fit)
+    assert fit.zeros[0].real == pytest.approx(w, rel=0.1)
+
+
+def test_an_integrating_plant_gets_an_exact_integrator():
+    # 1/s times R2: the ramp lags by the lags of R2, 1/w1 + 1/w2.
+    record = rigs.step_record(rigs.R2, noise=0.0, before=1000, after=1500)
+    ramp = np.cumsum(record.output - record.output[0]) * TS
+    ramp = ramp + 0.002 * np.random.default_rng(0).standard_normal(ramp.size)
+    system = cr.fit_output_error(changed(record, ramp))
+    fit = system.fit
+    assert "integrating" in codes(fit)
+    assert np.any(fit.poles == 0)
+    assert fit.gain == pytest.approx(1.0, rel=0.01)
+    lags = (1 / 2.2 + 1 / 11.0) / (2 * np.pi * TS)
+    # the sum above integrates half a sample ahead
+    assert fit.total_delay / TS == pytest.approx(37 + lags - 0.5, abs=1.0)
+    assert covers(fit, 37)
+
+
+@pytest.mark.parametrize("before", [1, 12])
+def test_few_or_no_samples_before_the_step_suffice(before):
+    fit = cr.fit_output_error(rigs.step_record(noise=0.002, before=before)).fit
+    assert abs(fit.delay - 37) < 4 * 0.19
+    assert ("no_rest" in codes(fit)) == (before < 8)
+
+
+def test_correlated_noise_widens_the_interval():
+    record = rigs.step_record(noise=0.0)
+    rng = np.random.default_rng(2)
+    noise = np.zeros(record.n_samples)
+    for k in range(1, noise.size):
+        noise[k] = 0.9 * noise[k - 1] + 0.016 * 2 * np.sqrt(1 - 0.81) * rng.standard_normal()
+    coloured = cr.fit_output_error(changed(record, record.output + noise), structures=[(3, 3)]).fit
+    white = cr.fit_output_error(rigs.step_record(noise=0.002), structures=[(3, 3)]).fit
+    # (1 + 0.9) / (1 - 0.9) = 19 samples count as one: 4.4 times the standard error
+    assert coloured.correlation == pytest.approx(19, rel=0.4)
+    assert 3 < coloured.std_given_structure / white.std_given_structure < 6
+    assert covers(coloured, 37)
+
+
+def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_matters():
+    k = np.arange(1600)
+    flags, widths = [], []
+    for seed in range(4):
+        white = np.random.default_rng(seed).standard_normal(1800)
+        noise = np.zeros(1800)
+        for i in range(1, 1800):
+            noise[i] = 0.9 * noise[i - 1] + np.sqrt(1 - 0.81) * white[i]
+        y = rigs.exact_step(rigs.R3, (k - 637) * TS) + 0.005 * noise[200:]
+        fit = cr.fit_output_error(cr.Record(k * TS, 1.0 * (k >= 600), y)).fit
+        assert covers(fit, 37)
+        flags.append(codes(fit))
+        widths.append((fit.interval[1] - fit.interval[0]) / TS)
+    # 84 independent samples; where a parameter is charged no more than their log: 48 and all four
+    assert np.median(widths) < 40
+    assert sum("no_delay_resolved" in found for found in flags) <= 1
+    white = [cr.fit_output_error(rigs.step_record(noise=n, seed=1)).fit for n in (0.005, 0.03)]
+    assert ["structures_disagree" in codes(fit) for fit in white] == [False, True]
+
+
+def test_slow_noise_that_a_short_rest_hides_is_noise_all_the_same():
+    # 100 samples before the step, and noise of which 39 count as one.
+    plant = cr.delayed_ss(ct.tf([1.5], [1.6, 2.8, 1]), dead_time=1.3, dt=0.05)
+    t = 0.05 * np.arange(-100, 1100)
+    u = np.where(t < 0, 0.0, 2.0)
+    for seed in range(4):
+        e = 0.02 * np.random.default_rng(seed).standard_normal(t.size + 500)
+        slow = lfilter([1.0], [1.0, -0.95], e)[500:]
+        fit = cr.fit_output_error(cr.Record(t, u, plant.simulate(u) + slow)).fit
+        assert fit.at_noise_level
+        assert fit.interval[0] <= 1.3 <= fit.interval[1]
+
+
+def test_a_ramped_edge_and_a_noisy_input_are_taken_as_measured():
+    k = np.arange(2500)
+    u = np.clip((k - 999) / 20, 0, 1)
+    y = sum(rigs.exact_step(rigs.R3, (k - 1000 - 37 - j) * TS) / 20 for j in range(20))
+    rng = np.random.default_rng(5)
+    y = y + 0.002 * rng.standard_normal(2500)
+    for signal in (u, u + 0.01 * rng.standard_normal(2500)):
+        fit = cr.fit_output_error(cr.Record(k * TS, signal, y), structures=[(3, 3)]).fit
+        assert abs(fit.delay - 37) < 4 * 0.19
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "match"),
+    [
+        ({"structures": [(2, 3)]}, cr.errors.OrderError, "1 <= relative degree <= order"),
+        ({"structures": []}, cr.errors.OptionError, "empty"),
+        ({"structures": [3]}, cr.errors.OptionError, "relative_degree"),
+        ({"loss": "l1"}, cr.errors.OptionError, "choose one of"),
+        ({"max_delay": -1}, cr.errors.OptionError, "positive"),
+        ({"known": ct.tf([1], [1, -1])}, cr.errors.UnsuitableSystemError, "stable"),
+        ({"known": ct.tf([1], [1, -0.5], 0.1)}, cr.errors.UnsuitableSystemError, "continuous"),
+        ({"known": 3.0}, cr.errors.UnsuitableSystemError, "float"),
+    ],
+)
+def test_unusable_choices_are_refused(kwargs, error, match):
+    with pytest.raises(error, match=match):
+        cr.fit_output_error(rigs.step_record(before=50, after=200), **kwargs)
+
+
+def test_a_code_for_missing_samples_is_told_by_its_value():
+    record = rigs.step_record(noise=0.005)
+    y = record.output.copy()
+    y[[700, 2300]] = -9999.0
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y)).fit
+    message = next(str(flag) for flag in fit.flags if flag.code == "outliers")
+    assert "2 sample(s), the first at index 700, are -9999" in message
+    # One wild sample of each kind is no code.
+    y[2300] = 8888.0
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y)).fit
+    assert not any("missing value" in str(flag) for flag in fit.flags)
+
+
+DELAY, SLOW, FAST = 45.0, 180.0, 40.0
+T = np.arange(900.0)
+U = np.where(T < 100, 0.0, 1.0)
+
+
+def two_lags(seed=0, noise=0.003):
+    x = np.maximum(T - 100 - DELAY, 0)
+    y = 1 - (SLOW * np.exp(-x / SLOW) - FAST * np.exp(-x / FAST)) / (SLOW - FAST)
+    return cr.Record(T, U, 0.8 * y + noise * np.random.default_rng(seed).standard_normal(T.size))
+
+
+def one_lag(seed=0):
+    y = -np.expm1(-np.maximum(T - 100 - DELAY, 0) / SLOW)
+    return cr.Record(T, U, y + 0.003 * np.random.default_rng(seed).standard_normal(T.size))
+
+
+def told(system):
+    return {flag.code for flag in system.fit.flags}
+
+
+@pytest.fixture(scope="module")
+def forced():
+    return cr.identify(two_lags(), order=1)
+
+
+def test_a_first_order_model_of_two_lags_has_an_apparent_dead_time(forced):
+    fit = forced.fit
+    assert fit.interval[0] > DELAY + 5  # tight, and wrong
+    assert "apparent_dead_time" in told(forced)
+    assert (fit.better.order, fit.better.relative_degree) == (2, 2)
+    low, high = fit.better.interval
+    assert low <= DELAY <= high
+    assert fit.better.dead_time == pytest.approx(DELAY, abs=3)
+
+
+def test_the_result_says_what_the_better_structure_would(forced):
+    text = forced.fit.report()
+    assert text.startswith("Output-error fit: apparent dead time")
+    assert "were the structure right" in text
+    assert "order 2, relative degree 2 puts it at" in text
+    verdict = report.verdict_of(forced)
+    assert verdict.level != "good"
+    assert verdict.headline.startswith("Apparent dead time")
+
+
+@pytest.mark.parametrize(
+    ("record", "asked"),
+    [
+        (two_lags(1), {"order": 2}),
+        (one_lag(1), {"order": 1}),
+        (one_lag(2), {"order": 3}),
+        (one_lag(3), {"structures": [(2, 2)]}),
+    ],
+)
+def test_a_structure_that_holds_the_plant_is_not_objected_to(record, asked):
+    system = cr.identify(record, **asked)
+    assert system.fit.better is None
+    assert "apparent_dead_time" not in told(system)
+
+
+def test_a_search_of_all_structures_has_no_better_one():
+    assert cr.identify(two_lags()).fit.better is None
+
+
+def test_records_of_other_inputs_are_looked_at_too():
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.choice([-1.0, 1.0], 150), 4)
+    core = cr.design.ProcessModel(1.0, 12.0, 3.0, second_lag=6.0).system(1.0).delay_free
+    y = cr.delayed_ss(core, 3).simulate(u) + 0.01 * rng.standard_normal(u.size)
+    record = cr.Record(np.arange(u.size) * 1.0, u, y)
+    fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
+    assert fit.dead_time > 4
+    assert fit.better is not None
+    assert fit.better.dead_time == pytest.approx(3.0, abs=0.5)
+    assert cr.fit_output_error(record, structures=[(2, 2)]).fit.better is None
+
+
+S = 1j * np.array([0.1, 1.0, 7.0, 40.0, 300.0])
+
+
+def response(factor):
+    """Frequency response of a factor: numerator over the monic denominator."""
+    return np.polyval(factor.numerator, S) / np.polyval(np.atleast_1d(np.poly(factor.poles)), S)
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        lag(30.0),
+        pair(8.0, 0.7),
+        2.5 * lag(3.0) * pair(8.0, 0.1),
+        ct.tf([2.0, 3.0], [1, 4.0]),  # as many zeros as poles
+        ct.tf([-2.0, 6.0], [5, 4.0]),  # leading coefficients that are not one
+        ct.tf([0, 0, 4.0], [2.0, 1.0, 6.0]),  # leading zeros
+        ct.tf([3.0], [2.0]),  # a gain
+        ct.ss([[-2.0, 1.0], [0.0, -3.0]], [[0.0], [1.0]], [[4.0, 1.0]], [[0.0]]),
+    ],
+)
+def test_a_factor_has_the_response_of_its_system(system):
+    assert_allclose(response(known_factor(system)), system(S), rtol=1e-9)
+
+
+@pytest.mark.parametrize("times", [2, 3])
+def test_coinciding_poles_are_given_apart_by_a_thousandth(times):
+    system = lag(30.0) ** times
+    poles = known_factor(system).poles
+    gaps = np.abs(poles[:, None] - poles)[~np.eye(times, dtype=bool)] / (2 * np.pi * 30)
+    assert gaps.min() > 0.4e-3
+    assert gaps.max() < 4e-3
+    # the frequency response moves by no more than the poles do
+    assert_allclose(response(known_factor(system)), system(S), rtol=2e-3 * times)
+
+
+@pytest.mark.parametrize(
+    ("system", "match"),
+    [
+        (3.0, "float"),
+        (lag(3.0).sample(0.1), "dt=0.1"),
+        (ct.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2))), "2 inputs, 2 outputs"),
+        (ct.tf([1.0, 0, 0], [1, 1.0]), "more zeros than poles"),
+        (ct.tf([1.0], [1, -2.0]), r"2\+0j rad/s.*stable"),
+        (ct.tf([1.0], [1, 0.0]), "stable"),
+        (ct.tf([0.0], [1, 1.0]), "zero"),
+    ],
+)
+def test_what_cannot_be_known_dynamics_is_refused(system, match):
+    with pytest.raises(UnsuitableSystemError, match=match):
+        known_factor(system)

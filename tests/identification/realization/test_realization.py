@@ -1,0 +1,177 @@
+"""realize: exact data come back exactly, in python-control's own hands as well."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, DelayRangeError, OptionError, OrderError
+from ctrl_realize.identification.realization.realize import uses_feedthrough
+from ctrl_realize.numerics.state_space.responses import markov
+from tests.oracles.plants import modal, valve_pulse
+from tests.rigs import R3, TS, exact_step
+
+
+@pytest.fixture(scope="module")
+def valve():
+    """R3 behind 37 samples, sampled exactly: matrices and 3000 Markov parameters."""
+    plant = ct.ss(ct.c2d(ct.ss(R3), TS, "zoh"))
+    return plant, valve_pulse("clean", n=3000)
+
+
+@pytest.mark.parametrize("hankel", ["square", "padded"])
+def test_exact_third_order_plant_behind_37_samples_is_found_exactly(valve, hankel):
+    plant, pulse = valve
+    sys = cr.realize(pulse, 3, delay=37, hankel=hankel, dt=TS)
+    assert isinstance(sys, ct.StateSpace)
+    assert (sys.nstates, sys.delay, sys.delay_free.nstates) == (40, 37, 3)
+    omega = np.linspace(1e-3, np.pi / TS, 4000)
+    z = np.exp(1j * omega * TS)
+    assert_allclose(sys(z), plant(z) * z**-37, rtol=0, atol=1e-9)
+    time = np.arange(3000) * TS
+    response = ct.step_response(sys, time).outputs
+    assert_allclose(response, exact_step(R3, time - 37 * TS), rtol=0, atol=1e-9)
+
+
+def test_exact_proper_plant_needs_no_option():
+    A, B, C, D = modal(np.random.default_rng(3), 2)
+    pulse = np.r_[np.zeros(9), markov(A, B, C, D, 300)[0, 0]]
+    sys = cr.realize(pulse, 2, delay=9, dt=0.1)
+    assert sys.fit.feedthrough
+    assert_allclose(sys.markov(309), pulse, atol=1e-12 * np.abs(pulse).max())
+    proper = cr.realize(pulse, 2, delay=9, dt=0.1, feedthrough=False)
+    assert proper.delay_free.D == 0
+    assert_allclose(proper.markov(309)[10:], pulse[10:], atol=1e-12 * np.abs(pulse).max())
+
+
+@given(
+    order=st.integers(1, 6),
+    seed=st.integers(0, 1000),
+    delay=st.integers(0, 20),
+    channels=st.sampled_from([(1, 1), (2, 2), (1, 3)]),
+)
+def test_markov_parameters_of_a_minimal_system_are_returned(order, seed, delay, channels):
+    # five samples of 0.97**n would not do for the order-6 plants below
+    system = modal(np.random.default_rng(seed), order, *channels)
+    pulse = np.concatenate([np.zeros((*channels, delay)), markov(*system, 201)], axis=2)
+    sys = cr.realize(pulse[0, 0] if channels == (1, 1) else pulse, order, delay=delay, dt=1.0)
+    back = sys.markov(201 + delay).reshape(pulse.shape)
+    assert_allclose(back, pulse, rtol=0, atol=1e-12 * np.abs(pulse).max())
+
+
+def test_direct_term_within_the_noise_is_left_out():
+    rng = np.random.default_rng(1)
+    pulse, noise = (
+        valve_pulse("clean") + 1e-4 * rng.standard_normal(1101),
+        1e-4 * rng.standard_normal(500),
+    )
+    noisy = cr.ImpulseResponse(pulse, TS, noise=noise)
+
+    def direct_term(delay: int, **kwargs) -> float:
+        return cr.realize(noisy, 3, delay=delay, **kwargs).delay_free.D[0, 0]
+
+    assert direct_term(37) == 0
+    assert direct_term(37, feedthrough=True) == pulse[37]
+    assert direct_term(80) == pulse[80]  # 20 times the noise
+
+
+def codes(sys) -> set[str]:
+    return {flag.code for flag in sys.fit.flags}
+
+
+def test_flags_tell_what_to_distrust():
+    k = np.arange(300)
+    assert codes(cr.realize(1.001**k, 1, dt=1.0)) == {"unstable"}
+    assert codes(cr.realize((-0.8) ** k, 1, dt=1.0)) == {"negative_pole"}
+    # 0.99^k has fallen to 0.13 after 200 samples, 0.992^k to 0.2007
+    assert codes(cr.realize(0.99 ** np.arange(201), 1, dt=1.0)) == set()
+    assert codes(cr.realize(0.992 ** np.arange(201), 1, dt=1.0)) == {"not_died_away"}
+    assert "no_gap" in codes(cr.realize(np.random.default_rng(0).standard_normal(300), 3, dt=1.0))
+    causal = cr.data.FilterSpec(5, 50.0, zero_phase=False, dt=TS)
+    lagging = cr.realize(cr.ImpulseResponse(valve_pulse("clean"), TS, filter=causal), 3, delay=37)
+    assert codes(lagging) == {"filter_delay"}
+    assert "13.1 samples" in str(lagging.fit.flags[0])
+    assert codes(cr.realize(valve_pulse("clean"), 3, delay=37, dt=TS)) == set()
+
+
+@pytest.mark.parametrize("n", [400, 1200])  # complete and truncated decomposition
+def test_order_above_the_numerical_rank_is_refused_by_name(n):
+    pulse = valve_pulse("clean", n=n)
+    with pytest.raises(OrderError, match=r"order=4.*rank 3"):
+        cr.realize(pulse, 4, delay=37, dt=TS)
+
+
+@pytest.mark.parametrize(
+    ("pulse", "order", "kwargs", "error", "match"),
+    [
+        (np.zeros(50), 1, {}, OrderError, "rank 0.*pure gain"),
+        (np.ones(50), 2, {}, OrderError, "rank 1"),
+        (np.eye(60)[5], 6, {}, OrderError, "rank 5"),
+        (np.ones(50), 0, {}, OptionError, "order=0"),
+        (np.ones(50), 1.5, {}, OptionError, "order=1.5"),
+        (np.ones(50), 26, {}, OrderError, "1 <= order <= 24"),
+        (np.ones(50), 1, {"delay": -1}, OptionError, "delay=-1"),
+        (np.ones(50), 1, {"delay": 60}, DelayRangeError, "delay=60 needs more than 61 samples"),
+        (np.ones(50), 1, {"delay": 5, "samples": 50}, DelayRangeError, "need 56 samples.*has 50"),
+        (np.ones(50), 1, {"hankel": "round"}, OptionError, "'square', 'padded'"),
+        (np.ones(50), 1, {"dt": None}, OptionError, "dt="),
+        (np.ones(50), 1, {"dt": -1.0}, OptionError, "dt=-1"),
+        (np.r_[np.ones(9), np.nan], 1, {}, DataError, "index 9"),
+        (np.ones((5, 5)), 1, {}, DataError, "shape"),
+        (["a", "b", "c"], 1, {}, DataError, "real numbers"),
+        (cr.ImpulseResponse(np.ones(50), 0.5), 1, {}, OptionError, "leave dt out"),
+    ],
+)
+def test_unusable_input_is_refused_with_what_is_needed(pulse, order, kwargs, error, match):
+    with pytest.raises(error, match=match):
+        cr.realize(pulse, order, **{"dt": 1.0, **kwargs})
+
+
+def test_another_time_unit_scales_the_dead_time_and_nothing_else():
+    pulse = valve_pulse("zero-phase", n=500)
+    s, ms = cr.realize(pulse, 3, delay=37, dt=TS), cr.realize(pulse, 3, delay=37, dt=1e3 * TS)
+    assert ms.delay == s.delay
+    assert ms.dead_time == pytest.approx(1e3 * s.dead_time, rel=1e-15)
+    assert np.array_equal(ms.delay_free.A, s.delay_free.A)
+
+
+DT = 0.1
+K = np.arange(40)
+LAG = np.r_[np.zeros(4), 0.5**K]  # 1 at sample 4, then half of it and half of that
+
+
+def test_a_padded_matrix_bounds_the_error():
+    two = LAG + np.r_[np.zeros(4), 0.1 * 0.2**K]
+    fit = cr.realize(two, 1, delay=3, hankel="padded", dt=DT).fit
+    assert (fit.hankel, fit.samples) == ("padded", 40)
+    model = cr.realize(two, 1, delay=3, hankel="padded", dt=DT)
+    z = np.exp(1j * np.linspace(0.0, np.pi, 50))
+    off = np.abs(np.polyval(two[::-1], 1 / z) - model(z)).max()
+    assert 0 < off <= fit.error_bound < 0.1
+    assert fit.following < fit.singular_values[0]
+    for hankel in ("round", None):
+        with pytest.raises(OptionError, match="hankel="):
+            cr.realize(LAG, 1, dt=DT, hankel=hankel)
+
+
+# the direct term
+
+
+def impulse(noise, first=1.0):
+    return cr.ImpulseResponse(np.r_[0.5, first, np.zeros(20)], DT, noise=noise)
+
+
+def test_three_standard_deviations_are_needed_to_believe_it():
+    two = np.array([1.0, -1.0])  # a standard deviation of the square root of 2
+    for sign in (1, -1):
+        assert uses_feedthrough(impulse(two, sign * 4.2426), 1, None) is False
+        assert uses_feedthrough(impulse(two, sign * 4.2427), 1, None) is True
+    assert uses_feedthrough(impulse(two, 9.0), 0, None) is False  # at its own sample
+
+
+# what is left

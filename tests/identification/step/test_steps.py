@@ -1,0 +1,229 @@
+"""From a measured step to an impulse response."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, NoStepError, OptionError
+from ctrl_realize.numerics.signals.filters import low_pass
+from tests.rigs import R1, R3, TS, exact_step, step_record
+
+
+def record_of(u: np.ndarray, y: np.ndarray | None = None, dt: float = 0.01) -> cr.Record:
+    return cr.Record(dt * np.arange(u.size), u, np.zeros(u.size) if y is None else y)
+
+
+def step_input(n: int = 400, at: int = 100, low: float = 4.0, high: float = 20.0) -> np.ndarray:
+    return np.where(np.arange(n) < at, low, high)
+
+
+@given(
+    at=st.integers(1, 380),
+    low=st.floats(-1e3, 1e3),
+    jump=st.floats(1e-2, 1e3),
+    up=st.booleans(),
+)
+def test_a_clean_step_is_found_to_the_sample(at, low, jump, up):
+    high = low + jump if up else low - jump
+    edge = cr.detect_step(record_of(step_input(400, at, low, high)))
+    assert edge.index == at
+    assert edge.samples == 1
+    assert_allclose([edge.rest, edge.amplitude], [low, high - low], rtol=1e-9, atol=1e-9)
+
+
+@given(positions=st.lists(st.integers(0, 399), min_size=1, max_size=4), seed=st.integers(0, 99))
+def test_spikes_shorter_than_the_window_change_nothing(positions, seed):
+    rng = np.random.default_rng(seed)
+    u = step_input()
+    for k in positions:
+        # Two spikes closer than two windows may join to one that is longer than the window.
+        if all(abs(k - other) > 8 for other in positions if other != k) and abs(k - 100) > 8:
+            u[k : k + 3] += rng.choice([-30.0, 50.0])
+    edge = cr.detect_step(record_of(u))
+    assert (edge.index, edge.amplitude, edge.rest) == (100, 16.0, 4.0)
+
+
+@pytest.mark.parametrize("length", [2, 5, 12, 40])
+def test_a_ramp_is_found_from_its_first_sample_to_its_last(length):
+    k = np.arange(1000)
+    u = 4 + 16 * np.clip((k - 299) / length, 0, 1)
+    edge = cr.detect_step(record_of(u))
+    slack = int(np.ceil(0.02 * length))  # the level counts as left, and reached, within 2 %
+    assert abs(edge.index - 300) <= slack
+    assert abs(edge.samples - length) <= 2 * slack
+    assert_allclose([edge.rest, edge.amplitude], [4.0, 16.0], atol=1e-9)
+
+
+def test_all_edges_are_listed_and_the_first_large_one_is_taken():
+    u = np.concatenate([np.full(100, 9.0), np.full(80, 4.0), np.full(60, 8.0), np.full(90, 3.0)])
+    edge = cr.detect_step(record_of(u))
+    assert [e.index for e in edge.edges] == [100, 180, 240]
+    assert [e.amplitude for e in edge.edges] == [-5.0, 4.0, -5.0]
+    assert (edge.index, edge.start, edge.stop) == (100, 0, 180)
+    assert (edge.edges[1].start, edge.edges[1].stop) == (100, 240)
+    second = cr.unit_step(record_of(u, 2 * u), edge.edges[1])
+    assert_allclose(second.output, 2.0, atol=1e-12)
+    assert second.n_samples == 60
+
+
+def test_a_record_that_starts_at_its_step_is_understood():
+    u = np.full(500, 25.0)
+    u[0] = 0.0
+    edge = cr.detect_step(record_of(u))
+    assert (edge.index, edge.rest, edge.amplitude) == (1, 0.0, 25.0)
+
+
+@pytest.mark.parametrize(
+    "u",
+    [
+        np.full(200, 3.0),
+        np.zeros(200),
+        np.random.default_rng(0).standard_normal(2000),
+        1e-14 * np.random.default_rng(0).standard_normal(200) + 5.0,
+        np.where(np.arange(200) == 80, 10.0, 0.0),  # nothing but a spike
+    ],
+    ids=["constant", "zero", "noise", "rounding", "spike"],
+)
+def test_an_input_without_step_is_refused(u):
+    with pytest.raises(NoStepError, match="no step"):
+        cr.detect_step(record_of(u))
+
+
+def test_significant_drift_is_removed_and_noise_is_not_taken_for_drift():
+    base = step_record(noise=1e-3, seed=3)
+    slope = 0.02 * 16.0  # 2 % of the step per second
+    drifting = cr.Record(base.time, base.input, base.output + slope * base.time)
+    assert cr.unit_step(base).drift == 0.0
+    removed = cr.unit_step(drifting)
+    # Standard error of the slope: sigma sqrt(12 / n) / T = 0.016 * 0.056 / 3 s.
+    assert_allclose(removed.drift, slope, atol=5 * 3e-4)
+    assert cr.unit_step(drifting, remove_drift=False).drift == 0.0
+
+
+def test_backward_difference_sums_to_the_step():
+    step = cr.unit_step(step_record())
+    g = cr.impulse_from_step(step, cutoff_hz=None)
+    assert_allclose(np.cumsum(g.markov), step.output, rtol=0, atol=1e-12)
+    assert g.filter is None
+    assert g.sampling == "step-invariant"
+
+
+def test_central_difference_samples_the_impulse_response():
+    step = cr.unit_step(step_record(delay=37.0))
+    g = cr.impulse_from_step(step, cutoff_hz=None, difference="central")
+    h = 1e-7
+    k = np.arange(60, 500)
+    density = (exact_step(R3, (k - 37) * TS + h) - exact_step(R3, (k - 37) * TS - h)) / (2 * h)
+    # Fourth order: (w Ts)^4 / 30 of the largest, w = 50 rad/s.
+    assert_allclose(g.density[k], density, rtol=0, atol=1e-6 * density.max())
+    assert g.sampling == "impulse-invariant"
+
+
+def test_causal_filter_delays_by_its_group_delay_and_zero_phase_does_not():
+    step = cr.unit_step(step_record(after=6000))
+    k = np.arange(step.n_samples)
+
+    def centroid(**options):
+        g = cr.impulse_from_step(step, **options).markov
+        return (k * g).sum() / g.sum()
+
+    plain = centroid(cutoff_hz=None)
+    assert_allclose(centroid(cutoff_hz=50.0, zero_phase=False) - plain, 13.12, atol=0.02)
+    assert_allclose(centroid(cutoff_hz=50.0) - plain, 0.0, atol=0.02)
+
+
+def test_the_automatic_cutoff_is_13_bandwidths():
+    g = cr.impulse_from_step(cr.unit_step(step_record(noise=5e-3)))
+    # Bandwidth 2.19 Hz; rise time times bandwidth is 0.35 within 5 % for lags.
+    assert_allclose(g.filter.cutoff_hz, 13 * 2.19, rtol=0.1)
+
+
+def test_pre_step_noise_is_carried_along():
+    record = step_record(noise=0.01, seed=5, after=8000)
+    g = cr.impulse_from_step(cr.unit_step(record), cutoff_hz=50.0)
+    assert g.noise.size == 3840
+    # 50 Hz of noise over 3 s are 300 independent values: their spread is known to 4 %.
+    tail = g.markov[2000:-200]
+    assert_allclose(g.noise.std(), tail.std(), rtol=0.15)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"cutoff_hz": 640.0}, "below half the sample rate"),
+        ({"cutoff_hz": -1.0}, "positive"),
+        ({"cutoff_hz": "fast"}, "'auto'"),
+        ({"filter_order": 0}, "1...10"),
+        ({"difference": "forward"}, "'backward', 'central'"),
+    ],
+)
+def test_unusable_options_are_refused(options, match):
+    with pytest.raises(OptionError, match=match):
+        cr.impulse_from_step(cr.unit_step(step_record()), **options)
+
+
+@pytest.mark.parametrize("zero_phase", [True, False])
+def test_a_record_that_starts_at_its_step_is_filtered_as_if_it_had_rested(zero_phase):
+    def filtered(before):
+        step = cr.unit_step(step_record(R1, delay=0.0, before=before, after=2000))
+        return cr.impulse_from_step(step, cutoff_hz=50.0, zero_phase=zero_phase).markov
+
+    rested, largest = filtered(2000), np.abs(filtered(2000)).max()
+    # the filter starts at rest in either case, so that only rounding is left
+    assert_allclose(filtered(5), rested, rtol=0, atol=1e-12 * largest)
+
+
+def test_the_filter_that_is_left_is_recorded():
+    step = cr.unit_step(step_record())
+    g = cr.impulse_from_step(step, cutoff_hz=50.0, zero_phase=False)
+    assert g.filter == cr.data.FilterSpec(5, 50.0, False, TS)
+
+
+DT = 0.01
+
+
+def step(before=60, after=240, seed=0):
+    """A lag of 0.1 s behind 5 samples after a noisy rest."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(before + after)
+    u = 1.0 * (k >= before)
+    y = np.where(k >= before + 5, -np.expm1(-(k - before - 4) * DT / 0.1), 0.0)
+    return cr.unit_step(
+        cr.Record(DT * k, u, y + 0.01 * rng.standard_normal(k.size)), remove_drift=False
+    )
+
+
+def test_noise_is_the_rest_treated_as_the_response():
+    one = step()
+    plain = cr.impulse_from_step(one, cutoff_hz=None)
+    differences = np.r_[0.0, np.diff(one.pre)]  # the first has none before it
+    assert_allclose(plain.noise, differences, rtol=0, atol=1e-15)
+    assert_allclose(plain.markov, np.diff(np.r_[one.pre[-1], one.output]), rtol=0, atol=1e-15)
+    smooth = cr.impulse_from_step(one, cutoff_hz=10.0, filter_order=3, zero_phase=False)
+    expected = low_pass(differences, 3, 10.0, DT, zero_phase=False)
+    assert_allclose(smooth.noise, expected, rtol=0, atol=1e-15)
+
+
+def test_the_central_difference_of_the_rest_is_that_of_four_neighbours():
+    one = step()
+    noise = cr.impulse_from_step(one, cutoff_hz=None, difference="central").noise
+    pre = one.pre
+    five = (pre[:-4] - 8 * pre[1:-3] + 8 * pre[3:-1] - pre[4:]) / 12
+    assert_allclose(noise[2:-2], five, rtol=0, atol=1e-15)
+
+
+def test_what_is_no_step_response_is_named():
+    with pytest.raises(DataError, match="step is a list; needed is a StepResponse, see unit_step"):
+        cr.impulse_from_step([1.0, 2.0])
+    for order in (1, 10):
+        assert (
+            cr.impulse_from_step(step(), cutoff_hz=10.0, filter_order=order).filter.order == order
+        )
+    for order in (0, 11):
+        with pytest.raises(OptionError, match="filter_order"):
+            cr.impulse_from_step(step(), cutoff_hz=10.0, filter_order=order)

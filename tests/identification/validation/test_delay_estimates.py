@@ -1,0 +1,210 @@
+"""Ways to find one dead time, held against each other: simulated data, and views by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.identification.validation.delay_estimates_result import (
+    DelayComparison,
+    DelayEstimate,
+    common_dead_time,
+)
+from tests.rigs import R1, R2, step_record
+
+DT = 0.01
+
+
+def operating_record(plant=R2, delay=12.4, n=1500, seed=0):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], n // 10), 10)
+    y = cr.delayed_ss(plant, dead_time=delay * DT, dt=DT).simulate(u)
+    return cr.Record(DT * np.arange(n), 5 + u, 3 + y + 0.02 * rng.standard_normal(n))
+
+
+def frequency_response(plant=R2, dead_time=12.4 * DT, seed=0):
+    hz = np.geomspace(0.1, 20, 60)
+    w = 2 * np.pi * hz
+    rng = np.random.default_rng(seed)
+    noise = 0.002 * (rng.standard_normal(60) + 1j * rng.standard_normal(60))
+    values = plant(1j * w) * np.exp(-1j * w * dead_time) + noise
+    return cr.MeasuredFRF(values, hz, std=np.full(60, 0.002))
+
+
+def view(method, low, high, kind="dead time"):
+    return DelayEstimate(method, "test", kind, (low + high) / 2, low, high)
+
+
+@pytest.fixture(scope="module")
+def both():
+    return cr.validation.compare_delay_estimates(operating_record(), frf=frequency_response())
+
+
+def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(both):
+    assert [(v.method, v.source) for v in both.views] == [
+        ("output error", "record"),
+        ("scan", "record"),
+        ("cross-correlation", "record"),
+        ("FRF fit", "FRF"),
+        ("phase slope", "FRF"),
+    ]
+    assert both.agree
+    low, high = both.common
+    assert low <= 12.4 * DT <= high
+    assert both.conflicts == ()
+    assert "yes, on" in both.report()
+
+
+def test_a_step_is_seen_in_three_ways():
+    check = cr.validation.compare_delay_estimates(step_record(R1, noise=0.002))
+    assert [v.method for v in check.views] == ["output error", "first motion", "scan"]
+    fit, onset, scan = check.views
+    assert "not how far off" in scan.doubt  # its set holds the truth in 4 of 10 records
+    assert check.rely_on == "output error"
+    assert fit.low <= 37 * 7.8125e-4 <= fit.high
+    assert fit.value <= onset.high
+    assert check.table().loc["output error", "samples"] == pytest.approx(37, abs=0.5)
+
+
+def test_frequency_response_of_another_plant_does_not_agree(both):
+    other = cr.validation.compare_delay_estimates(frf=frequency_response(dead_time=0.4))
+    views = (*both.views[:3], *other.views)
+    common, conflicts = common_dead_time(list(views))
+    assert common is None
+    assert ("output error", "FRF fit") in conflicts
+    check = replace(both, views=views, agree=False, common=None, conflicts=conflicts)
+    assert "no: " in check.report()
+    assert "do not agree" in repr(check)
+
+
+def test_a_frequency_response_alone_is_enough():
+    check = cr.validation.compare_delay_estimates(frf=frequency_response())
+    assert [v.method for v in check.views] == ["FRF fit", "phase slope"]
+    fit, slope = check.views
+    assert fit.low <= 0.124 <= fit.high
+    # R2's lags are steep even at the top of the band: the bound is above the dead time
+    assert slope.high > 0.124
+    assert "samples" not in check.table().columns
+
+
+def test_the_verdict_is_the_intersection_of_dead_times_below_all_bounds():
+    views = [view("a", 1.0, 3.0), view("b", 2.0, 5.0), view("c", 0.0, 2.5, "upper bound")]
+    assert common_dead_time(views) == ((2.0, 2.5), ())
+    apart = [*views, view("d", 4.0, 5.0)]
+    common, conflicts = common_dead_time(apart)
+    assert common is None
+    assert set(conflicts) == {("a", "d"), ("d", "c")}
+
+
+def test_a_view_in_doubt_is_shown_and_does_not_count():
+    views = [view("a", 1.0, 3.0), view("b", 0.5, 4.0), view("c", 0.0, 2.5, "upper bound")]
+    doubted = [*views, replace(view("d", 8.0, 9.0), doubt="says so itself")]
+    assert common_dead_time(doubted) == common_dead_time(views) == ((1.0, 2.5), ())
+    check = DelayComparison(tuple(doubted), True, (1.0, 2.5), (), 0.1)
+    assert check.rely_on == "a"
+    assert "says so itself" in check.report()
+    assert "narrowest" in check.report()
+
+
+def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
+    rng = np.random.default_rng(0)
+    u, y = rng.standard_normal((2, 1500))
+    check = cr.validation.compare_delay_estimates(cr.Record(0.01 * np.arange(1500), u, y))
+    assert not check.agree
+    assert check.common is None
+    assert check.rely_on is None
+    assert "every view is in doubt" in check.report()
+    assert repr(check).endswith("that are in doubt>")
+
+
+@pytest.mark.parametrize(("plant", "low", "high"), [("hairdryer", 2, 3), ("gas_furnace", 2, 3)])
+def test_measured_plants_under_random_input_are_agreed_on(shared_data, plant, low, high):
+    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
+    record = cr.Record(*table.T)
+    check = cr.validation.compare_delay_estimates(record)
+    assert check.agree
+    assert low * record.dt <= check.common[1] * (1 + 1e-9)
+    assert check.common[0] <= high * record.dt
+
+
+def test_the_motor_has_its_step_and_its_frequency_response_in_one_table(shared_data):
+    folder = shared_data / "dc_motor_tacho"
+    record = cr.Record(*np.loadtxt(folder / "up.csv", delimiter=",", skiprows=1).T)
+    check = cr.validation.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
+    table = check.table()
+    # 2.5 ms from the step and 2.9 ms from the FRF, by the look of the data's keepers
+    assert 1.8e-3 < table.loc["output error", "value"] < 3.2e-3
+    assert 2.2e-3 < table.loc["FRF fit", "value"] < 3.4e-3
+    assert set(table["source"]) == {"record", "FRF"}
+    # Since the ripple is made white the step alone knows it to 0.7 ms, better than the FRF does.
+    assert check.agree
+    assert 1.9e-3 < check.common[0] < check.common[1] < 2.6e-3
+    assert check.rely_on == "output error"
+    assert "in doubt" in check.report()
+
+
+def test_the_circuit_without_delay_is_not_given_one_by_a_scan_that_doubts_itself(shared_data):
+    folder = shared_data / "rlc_zero_delay"
+    record = cr.Record(*np.loadtxt(folder / "up.csv", delimiter=",", skiprows=1).T)
+    check = cr.validation.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
+    table = check.table()
+    # The scan sees eight samples, and says that it cannot tell them from none.
+    assert table.loc["scan", "samples"] > 4
+    assert "do not tell a delay from none" in table.loc["scan", "doubt"]
+    assert check.agree
+    assert check.common[1] < record.dt
+    assert check.rely_on in {"output error", "FRF fit"}
+
+
+def seen(method, low, high, kind="dead time", doubt=""):
+    return DelayEstimate(method, "record", kind, (low + high) / 2, low, high, doubt)
+
+
+def bound(method, high):
+    return seen(method, 0.0, high, "upper bound")
+
+
+A, B = seen("a", 1.0, 3.0), seen("b", 2.5, 3.5)
+DOUBTED = replace(seen("c", 2.0, 2.1), doubt="of noise")
+
+
+def check(views, common=(2.5, 3.0), conflicts=(), dt=0.5, flags=()):
+    return DelayComparison(tuple(views), common is not None, common, tuple(conflicts), dt, flags)
+
+
+def test_intervals_that_touch_agree_on_where_they_touch():
+    assert common_dead_time([A, seen("b", 3.0, 5.0)]) == ((3.0, 3.0), ())
+    assert common_dead_time([A, bound("b", 1.0)]) == ((1.0, 1.0), ())
+    assert common_dead_time([A, seen("b", 3.01, 5.0)]) == (None, (("a", "b"),))
+    assert common_dead_time([seen("b", 3.01, 5.0), A]) == (None, (("b", "a"),))
+    assert common_dead_time([A, bound("b", 0.99)]) == (None, (("a", "b"),))
+
+
+def test_only_pairs_that_rule_each_other_out_are_in_conflict():
+    late = seen("late", 4.0, 5.0)
+    common, pairs = common_dead_time([A, B, late, bound("p", 2.0), bound("q", 4.5)])
+    assert common is None
+    assert pairs == (("a", "late"), ("b", "late"), ("b", "p"), ("late", "p"))
+    # those that touch do not
+    touching = [A, seen("b", 3.0, 3.5), seen("c", 3.5, 4.0)]
+    for order in (touching, touching[::-1]):
+        assert [set(pair) for pair in common_dead_time(order)[1]] == [{"a", "c"}]
+    # the interval of an upper bound begins where nothing is said: only its end counts
+    assert common_dead_time([A, seen("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
+
+
+def test_the_narrowest_dead_time_that_counts_is_relied_on():
+    assert check([A, B, DOUBTED, bound("d", 0.5)]).rely_on == "b"
+    assert check([A, B], None, [("a", "b")]).rely_on is None
+    assert check([bound("d", 0.5)], (0.0, 0.5)).rely_on is None
+    assert check([DOUBTED, bound("d", 0.5)], (0.0, 0.5)).rely_on is None
+
+
+def test_an_estimate_is_rounded_as_its_interval_is():
+    shown = check(
+        [DelayEstimate("a", "FRF", "dead time", 0.0123456, 0.012, 0.013)], dt=0.01
+    ).report()
+    assert "12.3 ms = 1.235 samples (12.0 to" in shown

@@ -1,0 +1,226 @@
+"""Residuals of models that are right and wrong, and simulation from an unknown start."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize.delayed.simulation import as_delayed, simulate_record
+from ctrl_realize.errors import DataError, UnsuitableSystemError
+from tests.rigs import DT, TWO_INPUTS, TWO_STATES
+
+MIMO = cr.DelayedStateSpace(TWO_INPUTS.delay_free, (2, 4), output_delay=(0, 3, 1))
+
+
+def record(
+    plant=TWO_STATES, n=1000, noise=0.05, seed=0, colour=0.0, skip=0, drive=0.0, label="rig"
+):
+    rng = np.random.default_rng(seed)
+    shape = (n + skip,) if plant.issiso() else (plant.ninputs, n + skip)
+    u = lfilter([1], [1, -drive], rng.standard_normal(shape))
+    y = plant.simulate(u)
+    e = lfilter([1], [1, -colour], noise * rng.standard_normal(y.shape))
+    return cr.Record(DT * np.arange(n), u[..., skip:], (7 + y + e)[..., skip:], name=label)
+
+
+@pytest.mark.parametrize("drive", [0.0, 0.9])
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_the_true_model_leaves_noise_and_raises_no_alarm(drive, colour):
+    alarms = []
+    for seed in range(25):
+        check = cr.validation.analyse_residuals(
+            TWO_STATES, record(seed=seed, colour=colour, drive=drive, skip=50), confidence=0.999
+        )
+        alarms.append(not check.independent or bool(check.flags))
+        assert check.white == (colour == 0)
+    assert sum(alarms) <= 1
+
+
+@pytest.mark.parametrize("plant", [TWO_STATES, MIMO], ids=["siso", "mimo"])
+def test_a_record_cut_out_of_the_middle_of_an_experiment_is_explained_from_its_start(plant):
+    one = record(plant, noise=0.0, skip=137, n=400)
+    check = cr.validation.analyse_residuals(plant, one)
+    # state, offset and what was inside the dead times are found from exact data
+    assert_allclose(check.residual, 0, atol=1e-9)
+    assert np.all(check.fit_percent > 100 - 1e-7)
+    rest = cr.validation.analyse_residuals(plant, one, start="rest")
+    assert np.all(rest.fit_percent < 99.9)
+    assert np.abs(rest.residual).max() > 0.05
+
+
+@pytest.mark.parametrize("delay", [4, 6])
+def test_a_delay_that_is_off_by_one_shows_in_the_cross_correlation(delay):
+    check = cr.validation.analyse_residuals(TWO_STATES.replace(delay=delay), record())
+    assert not check.independent
+    assert [flag.code for flag in check.flags] == ["input_in_residual"]
+    # the model's first response is missing, or comes too soon: G_1 = 0.1 at the sample after
+    # the shorter of the delays
+    assert np.abs(check.cross[0, 0, 25:]).argmax() in (5, 6, 7)
+
+
+def test_feedback_is_told_from_a_wrong_model():
+    rng = np.random.default_rng(0)
+    n = 2000
+    u, y, e = np.zeros(n), np.zeros(n), 0.3 * rng.standard_normal(n)
+    r = rng.standard_normal(n)
+    for k in range(1, n):
+        y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1] + (e[k] - 0.8 * e[k - 1])
+        u[k] = r[k] - 1.5 * y[k]
+    plant = ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], DT)
+    check = cr.validation.analyse_residuals(plant, cr.Record(DT * np.arange(n), u, y))
+    assert "feedback" in [flag.code for flag in check.flags]
+
+
+@pytest.mark.parametrize("integral", [0.0, 0.1])
+def test_a_controller_of_the_same_sample_is_feedback_and_no_wrong_delay(integral):
+    rng = np.random.default_rng(1)
+    n, total = 2000, 0.0
+    u, y, e = np.zeros(n), np.zeros(n), 0.3 * rng.standard_normal(n)
+    target = np.repeat(rng.choice([-1.0, 1.0], n // 20), 20)
+    state = 0.0
+    for k in range(n):
+        state = 0.8 * state + (0.2 * u[k - 4] if k > 3 else 0.0)
+        y[k] = state + e[k]
+        total += integral * (target[k] - y[k])
+        u[k] = target[k] - y[k] + total
+    core = ct.ss([[0.8]], [[1.0]], [[0.2 * 0.8]], [[0.2]], DT)
+    check = cr.validation.analyse_residuals(
+        cr.DelayedStateSpace(core, 4), cr.Record(DT * np.arange(n), u, y)
+    )
+    assert [flag.code for flag in check.flags] == ["feedback"]
+    assert check.independent
+    # a model that answers at once may be wrong at lag 0 itself
+    direct = ct.ss([[0.8]], [[1.0]], [[0.16]], [[0.2]], DT)
+    at_once = cr.validation.analyse_residuals(direct, cr.Record(DT * np.arange(n), u, y))
+    assert not at_once.independent
+
+
+@pytest.mark.parametrize(
+    ("direct", "shift", "told"),
+    [
+        (0.0, -1, "feedback"),
+        (0.0, 0, "feedback"),  # the model cannot answer at once, so a controller has
+        (0.0, 1, "input_in_residual"),
+        (2.0, -1, "feedback"),
+        (2.0, 0, "input_in_residual"),
+        (2.0, 1, "input_in_residual"),
+    ],
+)
+def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal(1002)
+    plant = ct.ss([[0.5]], [[1.0]], [[0.5]], [[direct]], DT)
+    y = cr.DelayedStateSpace(plant).simulate(u) + 0.1 * rng.standard_normal(1002)
+    # what is left follows the input of `shift` samples before: 0.1 of it, sigma is 0.03
+    y = (y + 0.03 * np.roll(u, shift))[1:-1]
+    for system in (plant, cr.DelayedStateSpace(plant)):
+        check = cr.validation.analyse_residuals(system, cr.Record(DT * np.arange(1000), u[1:-1], y))
+        assert [flag.code for flag in check.flags] == [told]
+        assert check.independent == (told == "feedback")
+        assert np.abs(check.cross[0, 0]).argmax() == 25 + shift
+
+
+def test_what_rounding_leaves_says_nothing_about_the_model():
+    one = record(noise=0.0)
+    for size, whether in ((1e-9, True), (1e-7, False)):
+        y = one.output + size * np.ptp(one.output) * np.sin(np.arange(1000))
+        check = cr.validation.analyse_residuals(TWO_STATES, cr.Record(one.time, one.input, y))
+        assert check.white == whether
+        assert np.all(check.residual == 0) == whether
+
+
+def test_predictions_fall_from_the_noise_model_to_the_simulation():
+    one = record(noise=0.1, colour=0.95, n=2000)
+    simulated = cr.validation.analyse_residuals(TWO_STATES, one).fit_percent[0]
+    fits = [cr.validation.predict(TWO_STATES, one, k).fit_percent[0] for k in (1, 5, 20, 200)]
+    assert fits[0] > fits[1] > fits[2]
+    assert abs(fits[-1] - simulated) < 2.0
+    prediction = cr.validation.predict(TWO_STATES, one, 1)
+    # what is left one step ahead is the innovation, of 0.1
+    assert_allclose(np.std(one.output - prediction.output), 0.1, rtol=0.06)
+    assert prediction.noise_order == (1,)
+    assert "1 samples ahead" in prediction.report()
+
+
+@pytest.mark.parametrize(
+    ("plant", "length", "order", "least"),
+    [("hairdryer", 60, 2, 91.0), ("gas_furnace", 30, 2, 55.0), ("exchanger", 250, 3, 62.0)],
+)
+def test_measured_plants_are_predicted_on_the_half_that_was_not_used(
+    shared_data, plant, length, order, least
+):
+    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
+    whole = cr.Record(*table.T, name=plant)
+    middle = whole.time[whole.n_samples // 2]
+    first, second = whole.between(0, middle), whole.between(middle, np.inf)
+    model = cr.estimate_delay(cr.impulse_from_io(first, length), order, max_delay=10)
+    assert cr.validation.analyse_residuals(model, second).fit_percent[0] > least
+    assert cr.validation.predict(model, second, 1).fit_percent[0] > least + 3
+
+
+TS = 0.1
+
+
+def core(pole=0.8, D=0.0, dt=TS):
+    return ct.ss([[pole]], [[1.0]], [[1 - pole]], [[D]], dt)
+
+
+def measured(u, y, dt=TS):
+    return cr.Record(dt * np.arange(np.shape(u)[-1]), u, y)
+
+
+def test_a_dead_time_longer_than_the_record_leaves_what_the_record_shows():
+    system = cr.DelayedStateSpace(core(), 50, output_delay=0)
+    rng = np.random.default_rng(0)
+    u = np.r_[np.repeat(rng.standard_normal(5), 10), rng.standard_normal(10)]
+    y = system.simulate(np.r_[u, np.zeros(10)])[50:60]
+    # ten samples of which each may have its own level inside the dead time
+    assert_allclose(simulate_record(system, measured(np.ones(10), y), "estimate")[0], y, atol=1e-9)
+    assert np.ptp(simulate_record(system, measured(np.ones(10), y), "rest")) == 0.0
+
+
+def test_each_output_has_its_own_offset_and_delay():
+    system = cr.DelayedStateSpace(
+        ct.ss([[0.8]], [[1.0]], [[1.0], [2.0]], np.zeros((2, 1)), TS), 0, output_delay=(0, 4)
+    )
+    u = np.random.default_rng(0).standard_normal(80)
+    y = system.simulate(u) + np.array([[3.0], [-5.0]])
+    one = measured(u[20:], y[:, 20:])
+    assert_allclose(simulate_record(system, one, "estimate"), one.output, rtol=0, atol=1e-9)
+
+
+def test_units_of_the_outputs_do_not_matter():
+    units = np.array([[1e9], [1.0]])
+    plant = ct.ss([[0.8]], [[1.0]], [[1.0], [2.0]], np.zeros((2, 1)), TS)
+    other = ct.ss(plant.A, plant.B, units * plant.C, plant.D, TS)
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal(60)
+    y = cr.DelayedStateSpace(plant, 3).simulate(u) + 0.1 * rng.standard_normal((2, 60))
+    found, scaled = (
+        simulate_record(cr.DelayedStateSpace(core, 3), measured(u[10:], of[:, 10:]), "estimate")
+        for core, of in ((plant, y), (other, units * y))
+    )
+    # 1e9 in 16 digits
+    assert_allclose(scaled / units, found, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("system", "error", "match"),
+    [
+        ("plant", UnsuitableSystemError, "a str; needed is a discrete"),
+        (core(dt=None), UnsuitableSystemError, "not discrete"),
+        (core(dt=0), UnsuitableSystemError, "not discrete"),
+        (core(dt=True), UnsuitableSystemError, "not discrete with a sample time"),
+        (core(dt=1.0011 * TS), DataError, r"0\.1 s, the system 0\.10011 s"),
+        (ct.ss([[0.5]], [[1.0, 1.0]], [[1.0]], np.zeros((1, 2)), TS), DataError, "the system 2"),
+        (ct.ss([[0.5]], [[1.0]], np.ones((2, 1)), np.zeros((2, 1)), TS), DataError, "1 and 2"),
+        (core(1 + 1.1e-6), UnsuitableSystemError, "unstable"),
+    ],
+)
+def test_systems_that_do_not_fit_the_record_are_refused(system, error, match):
+    with pytest.raises(error, match=match):
+        as_delayed(system, measured(np.ones(9), np.ones(9)))

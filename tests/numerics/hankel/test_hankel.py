@@ -1,0 +1,225 @@
+"""Hankel matrices: dense, by FFT, their norm, and leading eigenpairs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from ctrl_realize.numerics.hankel.lanczos import largest_magnitude, leading_eigenpairs
+from ctrl_realize.numerics.hankel.matrix import (
+    BlockHankel,
+    HankelStack,
+    fft_length,
+    hankel_matrix,
+    hankel_norm_squared,
+)
+from ctrl_realize.numerics.hankel.recurrence import extreme_pairs
+from ctrl_realize.numerics.hankel.svd import leading_triplets
+from tests.oracles import dense
+from tests.oracles.plants import modal, valve_pulse
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(7)
+
+
+@pytest.mark.parametrize(("p", "m"), [(1, 1), (2, 3), (3, 1)])
+@pytest.mark.parametrize(
+    ("rows", "columns", "length"), [(4, 4, 7), (5, 3, 7), (4, 6, 5), (1, 1, 1)]
+)
+def test_block_hankel_has_the_entries_of_its_definition(rng, p, m, rows, columns, length):
+    h = rng.standard_normal((p, m, length))
+    assert np.array_equal(hankel_matrix(h, rows, columns), dense.hankel(h, rows, columns))
+
+
+@pytest.mark.parametrize("size", [1, 2, 17, 500])
+@pytest.mark.parametrize("missing", [0, 3])
+def test_fft_product_is_the_dense_product(rng, size, missing):
+    h = rng.standard_normal((4, max(1, 2 * size - 1 - missing)))
+    v = rng.standard_normal((4, size))
+    expected = [hankel_matrix(row, size, size) @ x for row, x in zip(h, v, strict=True)]
+    # 500 terms of order one, each rounded at 1e-16
+    assert_allclose(HankelStack(h, size)(v), expected, rtol=0, atol=1e-12)
+
+
+def test_members_that_are_taken_keep_their_matrix(rng):
+    h, v = rng.standard_normal((5, 39)), rng.standard_normal((2, 20))
+    all_members = HankelStack(h, 20)
+    taken = all_members.take(np.array([1, 4]))(v)
+    expected = [hankel_matrix(h[i], 20, 20) @ x for i, x in zip((1, 4), v, strict=True)]
+    assert_allclose(taken, expected, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(("p", "m"), [(1, 1), (3, 2), (2, 5)])
+@pytest.mark.parametrize(
+    ("rows", "columns", "length"), [(30, 30, 59), (20, 41, 60), (30, 30, 40), (13, 13, 25)]
+)
+def test_block_products_are_the_dense_products(rng, p, m, rows, columns, length):
+    # 25 samples are transformed with 25 points, an odd number
+    h = rng.standard_normal((p, m, length))
+    H, fast = hankel_matrix(h, rows, columns), BlockHankel(h, rows, columns)
+    x, y = rng.standard_normal(H.shape[1]), rng.standard_normal(H.shape[0])
+    assert fast.shape == H.shape
+    assert_allclose(fast.times(x), H @ x, rtol=0, atol=1e-12)  # 200 terms of order one
+    assert_allclose(fast.transposed_times(y), H.T @ y, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("shape", "rows", "columns"), [((9,), 5, 5), ((2, 3, 9), 4, 7), ((4,), 9, 9)]
+)
+def test_norm_without_the_matrix_is_the_norm_of_the_matrix(rng, shape, rows, columns):
+    h = rng.standard_normal(shape)
+    expected = np.sum(hankel_matrix(h, rows, columns) ** 2)
+    assert hankel_norm_squared(h, rows, columns) == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("n", "length"), [(1, 1), (999, 1024), (1000, 1024), (1025, 1080), (513, 540)]
+)
+def test_fft_length_prefers_a_power_of_two_that_is_near(n, length):
+    assert fft_length(n) == length
+
+
+KINDS = ["clean", "zero-phase", "causal", "unfiltered"]
+
+
+def windows(pulse: np.ndarray, size: int, members: int) -> np.ndarray:
+    return np.lib.stride_tricks.sliding_window_view(pulse[1:], 2 * size - 1)[:members]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_pairs_satisfy_their_definition_to_the_tolerance(kind, count):
+    h = windows(valve_pulse(kind), 250, 20)
+    pairs = leading_eigenpairs(h, 250, count, tol=1e-9)
+    for d in range(20):
+        H = hankel_matrix(h[d], 250, 250)
+        dense = np.sort(np.abs(np.linalg.eigvalsh(H)))[::-1]
+        found = np.abs(pairs.values[d])
+        assert_allclose(
+            found, dense[:count], rtol=0, atol=1e-10 * dense[0]
+        )  # the promised accuracy
+        residual = np.linalg.norm(
+            H @ pairs.vectors[d].T - pairs.vectors[d].T * pairs.values[d], axis=0
+        )
+        # 1e-9 is what was asked for; 1e-13: rounding of products with a matrix of norm dense[0]
+        assert residual.max() <= 1e-9 * found[-1] + 1e-13 * dense[0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_vectors_are_orthonormal(kind):
+    pairs = leading_eigenpairs(windows(valve_pulse(kind), 400, 5), 400, 3)
+    gram = pairs.vectors @ pairs.vectors.transpose(0, 2, 1)
+    assert_allclose(gram, np.broadcast_to(np.eye(3), gram.shape), atol=1e-10)
+
+
+def test_values_inside_the_noise_cluster_are_the_dense_ones():
+    noise = np.random.default_rng(3).standard_normal(2 * 300 + 8)
+    h = windows(noise, 300, 8)
+    pairs = leading_eigenpairs(h, 300, 6)
+    for d in range(8):
+        dense = np.linalg.svd(hankel_matrix(h[d], 300, 300), compute_uv=False)
+        # nothing but noise: neighbours differ by a percent
+        assert_allclose(np.abs(pairs.values[d]), dense[:6], rtol=0, atol=1e-10 * dense[0])
+        assert dense[6] * 0.9 <= pairs.following[d] <= dense[6] * (1 + 1e-9)
+
+
+def test_same_input_gives_the_same_bits():
+    h = windows(valve_pulse("zero-phase"), 250, 30)
+    together, again = leading_eigenpairs(h, 250, 3), leading_eigenpairs(h, 250, 3)
+    assert np.array_equal(together.vectors, again.vectors)
+    assert np.array_equal(together.values, again.values)
+
+
+def test_a_power_of_two_scales_every_bit():
+    h = windows(valve_pulse("causal"), 200, 4)
+    plain, scaled = leading_eigenpairs(h, 200, 3), leading_eigenpairs(h * 2.0**-900, 200, 3)
+    assert np.array_equal(plain.vectors, scaled.vectors)
+    assert np.array_equal(plain.values * 2.0**-900, scaled.values)
+
+
+@pytest.mark.parametrize("size", [40, 100, 300])
+@pytest.mark.parametrize("rank", [0, 1, 2, 5])
+def test_beyond_the_numerical_rank_there_are_zeros(size, rank):
+    A, B, C, _ = modal(np.random.default_rng(rank), max(rank, 1))
+    pulse = np.array([(C @ np.linalg.matrix_power(A, k) @ B)[0, 0] for k in range(2 * size)])
+    pairs = leading_eigenpairs(windows(pulse * (rank > 0), size, 1), size, 8)
+    assert np.count_nonzero(pairs.values[0]) == rank
+    assert np.count_nonzero(np.abs(pairs.vectors[0]).max(axis=1)) == rank
+
+
+@pytest.mark.parametrize("size", [50, 200, 2000])  # dense, dense fallback, ARPACK
+def test_a_pulse_has_one_and_minus_one_many_times(size):
+    pulse = np.zeros(2 * size)
+    pulse[20] = 1.0
+    pairs = leading_eigenpairs(windows(pulse, size, 1), size, 8)
+    # one start vector sees each value once; the rest must not be taken for zero
+    assert_allclose(np.abs(pairs.values[0]), np.ones(8), rtol=1e-13)
+
+
+@pytest.mark.parametrize("place", [3, 40, 77])
+def test_a_pulse_on_a_smooth_response_does_not_hide_its_copies(place):
+    k = np.arange(2 * 150)
+    h = windows(0.99**k * np.cos(0.1 * k) + (k == 2 * place), 150, 1)
+    expected = np.linalg.svd(hankel_matrix(h[0], 150, 150), compute_uv=False)[:6]
+    found = np.abs(leading_eigenpairs(h, 150, 6).values[0])
+    assert_allclose(found, expected, rtol=0, atol=1e-10 * expected[0])
+
+
+def test_norm_to_three_digits():
+    noise = np.random.default_rng(5).standard_normal((3, 399))
+    dense = [np.linalg.norm(hankel_matrix(row, 200, 200), 2) for row in noise]
+    assert_allclose(largest_magnitude(noise, 200), dense, rtol=1e-3)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 30])
+@pytest.mark.parametrize("count", [1, 4, 40])
+def test_tridiagonal_pairs_are_those_of_the_full_decomposition(n, count):
+    rng = np.random.default_rng(n)
+    a, b = rng.standard_normal(n), rng.uniform(0.1, 1, max(n - 1, 0))
+    T = np.diag(a) + np.diag(b, 1) + np.diag(b, -1)
+    values, vectors = extreme_pairs(a.copy(), b.copy(), count)
+    expected = np.linalg.eigvalsh(T)
+    expected = expected[np.argsort(-np.abs(expected))][:count]
+    assert_allclose(values, expected, atol=1e-13)
+    assert_allclose(T @ vectors, vectors * values, atol=1e-12)
+
+
+@pytest.mark.parametrize(("p", "m"), [(2, 2), (3, 1), (2, 4)])
+@pytest.mark.parametrize("noise", [0.0, 1e-2, 1.0])
+def test_block_triplets_are_the_dense_ones(p, m, noise):
+    rng = np.random.default_rng(p + m)
+    A, B, C, _ = modal(rng, 6, p, m)
+    h = np.stack([C @ np.linalg.matrix_power(A, k) @ B for k in range(639)], axis=-1)
+    h = h + noise * rng.standard_normal(h.shape)
+    H = hankel_matrix(h, 320, 320)
+    expected = np.linalg.svd(H, compute_uv=False)
+    found = leading_triplets(h, 320, 320, 6)
+    assert not found.complete  # the matrix-free route
+    assert_allclose(found.values, expected[:6], rtol=0, atol=1e-12 * expected[0])
+    assert_allclose(H @ found.V, found.U * found.values, atol=1e-10 * expected[0])
+    assert_allclose(H.T @ found.U, found.V * found.values, atol=1e-10 * expected[0])
+
+
+@pytest.mark.parametrize("rank", [1, 3])
+def test_equal_channels_of_low_rank_are_not_taken_for_one(rank):
+    A, B, C, _ = modal(np.random.default_rng(rank), rank)
+    one = np.array([(C @ np.linalg.matrix_power(A, k) @ B)[0, 0] for k in range(639)])
+    h = np.kron(np.eye(3)[:, :, np.newaxis], one)
+    expected = np.linalg.svd(hankel_matrix(h, 320, 320), compute_uv=False)
+    found = leading_triplets(h, 320, 320, 3 * rank + 1)
+    assert not found.complete
+    assert_allclose(found.values[:-1], expected[: 3 * rank], rtol=0, atol=1e-12 * expected[0])
+    assert found.values[-1] == 0
+
+
+def test_equal_channels_have_every_singular_value_twice():
+    k = np.arange(639)
+    one = 0.9**k + 0.5 * 0.97**k * np.cos(0.3 * k)
+    h = np.kron(np.eye(2)[:, :, np.newaxis], one)
+    expected = np.linalg.svd(hankel_matrix(h, 320, 320), compute_uv=False)[:6]
+    found = leading_triplets(h, 320, 320, 6)
+    assert not found.complete
+    assert_allclose(found.values, expected, rtol=0, atol=1e-12 * expected[0])

@@ -1,0 +1,272 @@
+"""State-space matrices from Hankel pairs; responses and misfits of many models at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from ctrl_realize.numerics.hankel.delay_models import realize_at, realize_at_delays
+from ctrl_realize.numerics.hankel.iae import integrated_absolute_error, markov_stack
+from ctrl_realize.numerics.hankel.kung import realize_block, realize_symmetric, tail_bound
+from ctrl_realize.numerics.hankel.matrix import hankel_matrix
+from ctrl_realize.numerics.state_space.responses import markov
+from tests.oracles import dense
+from tests.oracles.plants import modal, valve_pulse
+
+
+@pytest.mark.parametrize("rank", [1, 2, 7])
+def test_matrix_free_realization_of_exact_data_ends_by_itself(rank):
+    g = exact(rank, 2, 2, 800, rank)
+    model = realize_at(g, 0, 799, rank, padded=False)
+    assert model.singular_values.size == rank  # too large for the complete decomposition
+    back = markov(model.A, model.B, model.C, g[:, :, 0], 800)
+    assert_allclose(back, g, rtol=0, atol=1e-12 * np.abs(g).max())
+    beyond = realize_at(g, 0, 799, rank + 2, padded=False)
+    assert np.count_nonzero(beyond.singular_values) == rank
+
+
+def exact(order: int, p: int, m: int, count: int, seed: int) -> np.ndarray:
+    return markov(*modal(np.random.default_rng(seed), order, p, m), count)
+
+
+def test_paper_formulas_with_the_misprints_corrected_return_the_markov_parameters():
+    g = exact(3, 1, 1, 41, 0)
+    H = hankel_matrix(g[0, 0, 1:], 20, 20)
+    values, vectors = np.linalg.eigh(H)
+    lead = np.argsort(-np.abs(values))[:3]
+    A, B, C = realize_symmetric(
+        values[np.newaxis, lead], vectors.T[np.newaxis, lead], g[0, :, 21:41]
+    )
+    model = markov(A[0], B[0][:, np.newaxis], C, g[:, :, 0], 41)
+    assert_allclose(model, g, rtol=0, atol=1e-13 * np.abs(g).max())
+
+
+def test_model_without_hankel_products_is_the_textbook_model():
+    g = valve_pulse("causal")[np.newaxis, np.newaxis, :401]
+    A, B, C, _ = dense.kung(g, 30, 300, 4)
+    values, vectors = np.linalg.eigh(hankel_matrix(g[0, 0, 31:], 150, 150))
+    lead = np.argsort(-np.abs(values))[:4]
+    fast = realize_symmetric(
+        values[np.newaxis, lead], vectors.T[np.newaxis, lead], g[0, :, 181:331]
+    )
+    turn = np.sign(B[:, 0])  # the textbook leaves the signs of the vectors open
+    # cond(S) is 100 here
+    assert_allclose(fast[0][0], turn[:, np.newaxis] * A * turn, atol=1e-12)
+    assert_allclose(fast[1][0], turn * B[:, 0], atol=1e-14)
+    assert_allclose(fast[2][0], turn * C[0], atol=1e-14)
+
+
+@pytest.mark.parametrize("padded", [False, True])
+def test_lower_orders_are_leading_parts_of_higher_ones(padded):
+    g = valve_pulse("unfiltered")[np.newaxis, np.newaxis]
+    high = realize_at(g, 20, 500, 8, padded=padded)
+    for order in range(1, 8):
+        low = realize_at(g, 20, 500, order, padded=padded)
+        # vectors converge to 1e-12 of a singular value, in a cluster with gaps of a percent
+        assert_allclose(high.A[:order, :order], low.A, atol=1e-9)
+        assert_allclose(high.B[:order], low.B, atol=1e-9)
+        assert_allclose(high.C[:, :order], low.C, atol=1e-9)
+
+
+@given(
+    order=st.integers(1, 8),
+    seed=st.integers(0, 10_000),
+    odd=st.booleans(),
+    channels=st.sampled_from([(1, 1), (2, 3), (3, 1), (1, 2)]),
+    delay=st.integers(0, 50),
+)
+def test_exact_markov_parameters_come_back_square(order, seed, odd, channels, delay):
+    g = np.concatenate(
+        [np.zeros((*channels, delay)), exact(order, *channels, 240 + odd, seed)], axis=2
+    )
+    model = realize_at(g, delay, 239 + odd, order, padded=False)
+    back = markov(model.A, model.B, model.C, g[:, :, delay], 240 + odd)
+    # poles inside 0.97 and far apart: cond of the modes below 1e3
+    assert_allclose(back, g[:, :, delay:], rtol=0, atol=1e-12 * np.abs(g).max())
+
+
+@given(
+    order=st.integers(1, 8),
+    seed=st.integers(0, 10_000),
+    odd=st.booleans(),
+    channels=st.sampled_from([(1, 1), (2, 2)]),
+)
+def test_exact_markov_parameters_come_back_padded(order, seed, odd, channels):
+    A, B, C, D = modal(np.random.default_rng(seed), order, *channels, radius=0.85)
+    n = 260 + odd  # 0.85**260 = 5e-19: the padding cuts off nothing
+    g = markov(A, B, C, D, n)
+    model = realize_at(g, 0, n - 1, order, padded=True)
+    back = markov(model.A, model.B, model.C, D, n)
+    assert_allclose(back, g, rtol=0, atol=1e-12 * np.abs(g).max())
+
+
+@pytest.mark.parametrize("size", [150, 700])  # below and above the complete decomposition
+@pytest.mark.parametrize("kind", ["zero-phase", "unfiltered"])
+def test_padded_error_is_below_the_bound_and_poles_are_inside_for_every_order(size, kind):
+    g = valve_pulse(kind, seed=size)[: size + 1]
+    omega = np.linspace(0, np.pi, 1500)
+    z = np.exp(1j * omega)
+    # the data's own response, by Horner; the direct term is in both
+    data = np.polyval(g[::-1], 1 / z)
+    for order in (1, 2, 3, 5, 8):
+        model = realize_at(g[np.newaxis, np.newaxis], 0, size, order, padded=True)
+        assert np.abs(np.linalg.eigvals(model.A)).max() < 1
+        states = np.linalg.solve(
+            z[:, np.newaxis, np.newaxis] * np.eye(order) - model.A, np.tile(model.B, (z.size, 1, 1))
+        )
+        error = np.abs(data - g[0] - (model.C @ states)[:, 0, 0])
+        assert error.max() <= model.rest_bound
+        full = np.linalg.svd(hankel_matrix(g[1:], size, size), compute_uv=False)
+        assert model.rest_bound >= 2 * full[order:].sum() * (1 - 1e-12)
+
+
+@given(scale=st.floats(1e-9, 1e9), seed=st.integers(0, 100))
+def test_data_times_c_scale_values_and_gain_and_nothing_else(scale, seed):
+    g = exact(4, 1, 1, 301, seed) + 1e-3 * np.random.default_rng(seed).standard_normal(301)
+    one = realize_at(g, 0, 300, 3, padded=False)
+    other = realize_at(scale * g, 0, 300, 3, padded=False)
+    largest = scale * one.singular_values[0]
+    assert_allclose(other.singular_values, scale * one.singular_values, atol=1e-13 * largest)
+    assert_allclose(other.A, one.A, atol=1e-8)  # gaps of the noisy data magnify 1e-12
+    assert_allclose(
+        np.linalg.norm(other.B) * np.linalg.norm(other.C),
+        scale * np.linalg.norm(one.B) * np.linalg.norm(one.C),
+        rtol=1e-8,
+    )
+
+
+@pytest.mark.parametrize("delays", [[0, 1, 2, 3, 4, 5], [5, 0, 3], [2]])
+@pytest.mark.parametrize("channels", [(1, 1), (2, 2)])
+def test_many_delays_together_are_the_single_realizations(channels, delays):
+    rng = np.random.default_rng(4)
+    g = np.concatenate([np.zeros((*channels, 3)), exact(3, *channels, 460, 1)], axis=2)
+    g += 1e-3 * rng.standard_normal(g.shape)
+    together = realize_at_delays(g, np.array(delays), 450, 3, padded=False, tol=1e-12)
+    for i, d in enumerate(delays):
+        alone = realize_at(g, d, 450, 3, padded=False)
+        assert_allclose(together.A[i], alone.A, atol=1e-9)
+        assert_allclose(together.singular_values[i], alone.singular_values[:3], rtol=1e-12)
+
+
+def test_states_beyond_the_rank_do_nothing():
+    g = exact(2, 1, 1, 200, 1)
+    model = realize_at_delays(g, np.array([0]), 199, 5, padded=False)
+    assert np.count_nonzero(model.singular_values) == 2
+    assert not model.A[0, 2:].any()
+    assert not model.A[0, :, 2:].any()
+    assert not model.B[0, 2:].any()
+
+
+def test_block_formulas_agree_with_the_textbook():
+    g = exact(4, 2, 3, 81, 2) + 0.01 * np.random.default_rng(0).standard_normal((2, 3, 81))
+    A, B, C, s = dense.kung(g, 0, 80, 3)
+    H = hankel_matrix(g[:, :, 1:], 40, 40)
+    U, values, Vt = np.linalg.svd(H)
+    last = g[:, :, 41:81].transpose(0, 2, 1).reshape(2, -1)
+    fast = realize_block(U[:, :3], values[:3], Vt[:3].T, (2, 3), last)
+    want = markov(A, B, C, g[:, :, 0], 80)
+    assert_allclose(markov(*fast, g[:, :, 0], 80), want, atol=1e-12)
+    assert_allclose(values, s, rtol=0, atol=1e-12 * s[0])
+
+
+def test_tail_bound_is_exact_for_equal_values_and_never_too_small():
+    rng = np.random.default_rng(2)
+    values = np.r_[5.0, 3.0, np.full(20, 0.5)]
+    assert tail_bound(float(values @ values), values[:2], 22) == pytest.approx(2 * 20 * 0.5)
+    for _ in range(20):
+        values = np.sort(rng.exponential(size=30) ** 3)[::-1]
+        assert tail_bound(float(values @ values), values[:4], 30) >= 2 * values[4:].sum()
+    assert tail_bound(1.0, np.ones(1), 1) == 0
+    assert tail_bound(1.25, np.ones(1), 2) == pytest.approx(2 * 0.5)  # a single value is left
+
+
+def test_tail_bound_never_falls_below_the_rounding_of_the_norm():
+    # leading values that make up the whole norm, by 1e-16 of it
+    for scale in (1e-20, 1.0, 1e20):
+        values = scale * np.array([3.0, 4.0])
+        bound = tail_bound(float(values @ values), values, 7)
+        assert bound == pytest.approx(2 * 5 * scale * np.sqrt(5 * 4e-16))
+
+
+def test_signs_of_singular_vectors_do_not_matter():
+    g = exact(4, 2, 3, 81, 2)
+    U, values, Vt = np.linalg.svd(hankel_matrix(g[:, :, 1:], 40, 40))
+    last = g[:, :, 41:81].transpose(0, 2, 1).reshape(2, -1)
+    models = []
+    for turn in (np.ones(4), -np.ones(4), np.array([1, -1, -1, 1])):
+        models.append(
+            realize_block(turn * U[:, :4], values[:4], (turn[:, None] * Vt[:4]).T, (2, 3), last)
+        )
+    for other in models[1:]:
+        for one, two in zip(models[0], other, strict=True):
+            assert_allclose(one, two, atol=1e-13)
+    # the input that moves a state most moves it up
+    B = models[0][1]
+    assert np.all(B[np.arange(4), np.abs(B).argmax(axis=1)] > 0)
+
+
+def stack(models: int, order: int, radius: float = 0.97):
+    rng = np.random.default_rng(order)
+    parts = [modal(rng, order, radius=radius) for _ in range(models)]
+    return (
+        np.stack([A for A, *_ in parts]),
+        np.stack([B[:, 0] for _, B, *_ in parts]),
+        np.stack([C[0] for *_, C, _ in parts]),
+    )
+
+
+def stepped(A, B, C, count):
+    out, x = np.empty(count), B.copy()
+    for k in range(count):
+        out[k] = C @ x
+        x = A @ x
+    return out
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 31, 32, 33, 1100])
+@pytest.mark.parametrize("order", [1, 3, 8])
+def test_block_powers_step_the_states(count, order):
+    A, B, C = stack(4, order)
+    expected = [stepped(*model, count) for model in zip(A, B, C, strict=True)]
+    # 1100 steps, each rounded at 1e-16 of a state of order ten
+    assert_allclose(markov_stack(A, B, C, count), expected, atol=1e-12)
+
+
+def test_defective_matrices_are_no_special_case():
+    A = np.array([[[0.9, 1.0], [0.0, 0.9]]])
+    k = np.arange(200)
+    expected = k * 0.9 ** (k - 1.0)
+    response = markov_stack(A, np.array([[0.0, 1.0]]), np.array([[1.0, 0.0]]), 200)
+    assert_allclose(response[0], expected, atol=1e-13 * expected.max())
+
+
+@pytest.mark.parametrize("delays", [[0, 3, 17, 40], [5], [0], [40, 0], [3, 4, 5, 6], [4, 3]])
+def test_misfit_is_the_sum_over_one_window_for_all_delays(delays):
+    A, B, C = stack(len(delays), 3)
+    rng = np.random.default_rng(1)
+    data, D = rng.standard_normal(90), rng.standard_normal(len(delays))
+    expected = []
+    for i, d in enumerate(delays):
+        model = np.r_[np.zeros(d), D[i], stepped(A[i], B[i], C[i], 89 - d)]
+        expected.append(np.abs(data - model).sum())
+    misfit = integrated_absolute_error(data, np.array(delays), (A, B, C, D))
+    assert_allclose(misfit, expected, rtol=1e-13)
+
+
+def test_a_model_that_leaves_the_range_of_floats_has_an_infinite_misfit():
+    # two states that grow beyond all bounds and cancel: inf - inf
+    A = np.array([np.diag([1e30, 1e30]), np.diag([0.5, 0.5])])
+    B, C = np.ones((2, 2)), np.array([[1.0, -1.0], [1.0, -1.0]])
+    misfit = integrated_absolute_error(np.ones(50), np.array([0, 1]), (A, B, C, np.ones(2)))
+    assert misfit[0] == np.inf
+    assert np.isfinite(misfit[1])
+
+
+def test_the_data_are_not_changed():
+    data = np.arange(20.0)
+    data.flags.writeable = False
+    A, B, C = stack(1, 2)
+    integrated_absolute_error(data, np.array([2]), (A, B, C, np.zeros(1)))

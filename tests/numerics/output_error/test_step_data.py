@@ -1,0 +1,295 @@
+"""From the record of a step to least-squares problems; long records condensed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+from ctrl_realize.numerics.output_error.condensed import MOST_LAGS, condensed
+from ctrl_realize.numerics.output_error.step_data import (
+    StepData,
+    fixed_regressors,
+    step_data,
+    stop_at,
+    window,
+)
+from ctrl_realize.numerics.regression.normal_equations import normal_equations
+from ctrl_realize.numerics.separable.profile_ends import profile_limits
+from ctrl_realize.numerics.separable.responses import SampledInput
+from ctrl_realize.numerics.separable.varpro import KnownFactor
+from ctrl_realize.numerics.signals.noise import hum_frequencies, rest_noise, winsorised_sigma
+from ctrl_realize.numerics.signals.onset import first_motion
+from tests import rigs
+
+EDGE, DELAY, LAG, DT = 200, 40, 60.0, 0.5
+
+
+def data(*, height: float = 2.0, noise: float = 1e-3, quantum: float = 0.0) -> StepData:
+    """One lag of 60 samples, 40 samples after a step at sample 200 of 1400."""
+    k = np.arange(1400.0)
+    after = np.clip(k - EDGE - DELAY, 0, None)
+    y = height * -np.expm1(-after / LAG) + noise * np.random.default_rng(0).standard_normal(k.size)
+    y = np.round(y / quantum) * quantum if quantum else y
+    return step_data(y, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
+
+
+def reached(part: float) -> float:
+    return EDGE + DELAY - LAG * np.log1p(-part)
+
+
+@pytest.mark.parametrize("height", [2.0, -2.0])
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.63, 0.9])
+def test_a_fit_stops_where_a_part_of_the_excursion_is_made(height, part):
+    # means over nine samples; near its start the response is too short to stop in
+    assert stop_at(data(height=height), part) == pytest.approx(reached(part), abs=5)
+
+
+def weights(made: StepData) -> tuple[np.ndarray, np.ndarray]:
+    found = window(made, 1400, KnownFactor())
+    return found.bins.width, np.square(found.problem.root_weight)
+
+
+def test_means_weigh_what_they_hold_and_of_coarsely_rounded_samples_hardly_more():
+    width, weight = weights(data())
+    np.testing.assert_allclose(weight, width)
+    assert width.max() > 9
+    made = data(noise=1e-4, quantum=0.05)
+    assert made.coarse
+    width, weight = weights(made)
+    assert weight[width == 1] == pytest.approx(1.0)
+    assert weight.max() < 2.0
+    assert weight[np.argmax(width)] > 1.8
+
+
+def test_regressors_are_a_level_a_drift_that_may_end_and_the_hum():
+    made = replace(data(), drift=0.1)
+    level, slope = fixed_regressors(made).T
+    np.testing.assert_array_equal(level, 1.0)
+    np.testing.assert_allclose(np.diff(slope), 1 / 1400)
+    assert slope[EDGE] == 0
+    ended = fixed_regressors(replace(made, ending=True))[:, 1]
+    np.testing.assert_allclose(ended[EDGE + 2 * EDGE :], ended[-1])
+    np.testing.assert_array_equal(ended[: EDGE + 2 * EDGE], slope[: EDGE + 2 * EDGE])
+    assert fixed_regressors(replace(made, hum=[0.1])).shape == (1400, 4)
+
+
+def test_hum_is_found_at_rest_and_taken_off_before_the_noise_is_measured():
+    k = np.arange(1400.0)
+    line = 0.05 * np.sin(2 * np.pi * 0.063 * k + 1)
+    made = step_data(data().output + line, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
+    assert made.hum == pytest.approx([0.063], rel=1e-3)
+    assert made.sigma == pytest.approx(1e-3, rel=0.2)
+    assert made.motion.crossing == pytest.approx(data().motion.crossing, abs=2)
+    # rounding is not less noise than it is
+    coarse = np.round((data().output + line) / 0.02) * 0.02
+    found = step_data(coarse, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
+    assert found.sigma >= 0.02 / np.sqrt(12) * (1 - 1e-9)
+
+
+def test_a_record_that_begins_while_the_plant_moves_has_a_free_response_of_its_own():
+    k = np.arange(1400.0)
+    moving = data().output + 0.8 * np.exp(-k / LAG)
+    made = step_data(moving, 1.0 * (k >= EDGE), DT, [(EDGE, 1)])
+    assert made.relaxing
+    assert made.drift == 0.0
+    # a rough curve is taken off before the noise is measured: of 0.8 little is left
+    assert 0.8e-3 < made.sigma < 6e-3
+    assert made.motion.crossing == pytest.approx(data().motion.crossing, abs=3)
+    found = window(made, 1400, KnownFactor())
+    means, every = found.problem.stretches, found.own
+    assert found.columns.shape == (1400, 0)
+    np.testing.assert_array_equal(every.edges, [0, 1400])
+    np.testing.assert_allclose(every.clock, DT * np.arange(1400))
+    np.testing.assert_array_equal(every.regressors, np.ones((1400, 1)))
+    np.testing.assert_array_equal(means.edges, [0, found.bins.first.size])
+    np.testing.assert_allclose(means.clock, found.bins.average(DT * np.arange(1400.0)))
+    np.testing.assert_array_equal(means.regressors, np.ones((found.bins.first.size, 1)))
+    assert window(data(), 1400, KnownFactor()).own is None
+
+
+def white(n, seed=0):
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9, 0.97])
+def test_slow_noise_is_no_drift(pole):
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(40):
+        slow = lfilter([1.0], [1.0, -pole], rng.standard_normal(1200))[200:]
+        found.append(rest_noise(slow[:500], slow, 0.0)[1])
+    # five standard errors: none of 40, where white ones make 10 and 24 of 40 a drift
+    assert not np.any(found)
+    assert rest_noise(slow[:500] + 0.5 * np.arange(500), slow, 0.0)[1] == pytest.approx(
+        0.5, abs=0.05
+    )
+
+
+def test_a_slope_before_the_step_has_three_explanations_and_a_brief_one_may_be_nothing():
+    k = np.arange(1000)
+
+    def ways(edge):
+        output = 0.05 * k + 0.01 * white(1000) + 200.0 * (k >= edge + 20)
+        return step_data(output, 1.0 * (k >= edge), 1.0, [(edge, 1)]).explanations()
+
+    level, slope = fixed_regressors(ways(100)[0]).T
+    assert_allclose(level, 1.0)
+    assert_allclose(np.diff(slope), slope[1] - slope[0])
+    ending = np.diff(fixed_regressors(ways(100)[1])[:, 1])
+    assert_allclose(ending[:299], ending[0])
+    assert_allclose(ending[300:], 0.0)
+    moving = ways(100)[2]
+    assert moving.relaxing
+    assert fixed_regressors(moving).shape == (1000, 1)
+    assert len(ways(100)) == 3
+    # 47 samples are less than a twentieth of the 953 that follow
+    assert [bool(way.drift) for way in ways(47)] == [True, True, False, False]
+    assert len(ways(48)) == 3
+    assert len(step_data(white(1000), 1.0 * (k >= 100), 1.0, [(100, 1)]).explanations()) == 1
+
+
+def test_noise_is_found_beside_outliers_drift_and_quantisation():
+    clean = white(2000)
+    assert winsorised_sigma(clean, 0.0) == pytest.approx(1.0, rel=0.05)
+    spoiled = clean.copy()
+    spoiled[::50] += 30
+    assert winsorised_sigma(spoiled, 0.0) == pytest.approx(1.0, rel=0.12)
+    drifting = clean + 0.01 * np.arange(2000)
+    sigma, drift = rest_noise(drifting, drifting, 0.0)
+    assert sigma == pytest.approx(1.0, rel=0.05)
+    assert drift == pytest.approx(0.01, rel=0.05)
+    # a signal that rests on one level: the rounding itself, q / sqrt(12)
+    assert rest_noise(np.zeros(100), np.zeros(300), 0.5)[0] == pytest.approx(0.5 / np.sqrt(12))
+
+
+def test_without_rest_the_third_differences_tell_the_noise():
+    response = 50 * (1 - np.exp(-np.arange(800) / 60)) + white(800)
+    assert rest_noise(response[:0], response, 0.0)[0] == pytest.approx(1.0, rel=0.1)
+
+
+def test_hum_is_found_to_a_small_part_of_a_period_over_the_record():
+    index = np.arange(3840)
+    frequency = 50 / 1280 * 1.0007
+    found = hum_frequencies(2 * np.sin(2 * np.pi * frequency * index + 1) + white(3840))
+    assert len(found) == 1
+    # Cramer-Rao bound of the frequency: sqrt(24) / (2 pi A n^1.5) for unit noise, A = 2
+    assert abs(found[0] - frequency) < 4 * np.sqrt(24) / (2 * np.pi * 2 * 3840**1.5)
+    for seed in range(20):
+        assert hum_frequencies(white(1000, seed)) == []
+
+
+def test_first_motion_is_not_a_spike_and_not_a_glitch():
+    time = rigs.TS * np.arange(-400, 1200)
+    output = rigs.exact_step(rigs.R1, time - 60 * rigs.TS) + 0.002 * white(1600)
+    output[420:424] += 0.2  # 20 samples after the step, 4 samples long
+    found = first_motion(output, 400, 0.002, 0.0, 0.0)
+    assert 60 <= found.crossing <= 64
+    assert abs(found.onset - 60) < 1.5
+    assert found.sign == 1
+
+
+def test_profile_limits_are_where_a_parabola_crosses():
+    delay = np.linspace(-4, 8, 13)
+    low, high = profile_limits(delay, ((delay - 2) / 1.5) ** 2)
+    # the root of the excess is linear, so that interpolation is exact
+    assert_allclose([low, high], [2 - 1.5 * np.sqrt(3.84), 2 + 1.5 * np.sqrt(3.84)])
+    assert profile_limits(delay, np.zeros(13)) == (-4, 8)
+
+
+FINE = 0.01
+LAGS = 40
+
+
+def record(samples, seed=0, pulse=None, noise=0.1):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], samples // 3 + 1), 3)[:samples]
+    g = 0.9 ** np.arange(LAGS) if pulse is None else pulse
+    return lfilter(g, [1.0], u) + noise * rng.standard_normal(samples), u
+
+
+def test_the_condensed_misfit_differs_from_that_of_all_samples_by_a_constant():
+    # two records, one of them longer than what is summed at a time
+    both = [record(3000), record(140_000, seed=1)]
+    rng = np.random.default_rng(5)
+    y = [output + 0.0 for output, _ in both]
+    found = condensed(y, [u for _, u in both], FINE, LAGS, huber=False)
+    models = [0.9 ** np.arange(LAGS) + 0.01 * rng.standard_normal(LAGS) for _ in range(4)]
+    short = [float(np.sum((found.data - found.drive.factor @ g) ** 2)) for g in models]
+    assert found.noise_lags == 0  # white noise is left as it is
+    whole = []
+    for g in models:
+        total = 0.0
+        for output, u in zip(y, (u for _, u in both), strict=True):
+            error = (output - lfilter(g, [1.0], u))[LAGS - 1 :]
+            pieces = np.array_split(error, -(-error.size // 2**17))
+            total += sum(float(np.sum((piece - piece.mean()) ** 2)) for piece in pieces)
+        whole.append(total)
+    # the pieces with a level of their own begin elsewhere, by a sample or so
+    assert_allclose(np.diff(short), np.diff(whole), rtol=1e-4)
+    assert abs(found.noise / 0.1 - 1) < 0.01
+
+
+def test_the_drive_is_the_response_to_a_pulse_times_the_factor():
+    y, u = record(3000)
+    found = condensed([y], [u], FINE, LAGS, huber=False)
+    tau, poles = np.array([0.023, 0.1]), np.array([[-3.0, -8 + 5j], [-20.0, -1.0 + 0j]])
+    pulse = np.zeros(LAGS)
+    pulse[0] = 1.0
+    exact = SampledInput(pulse, FINE).modes(tau, poles)
+    for one, other in zip(found.drive.modes(tau, poles), exact, strict=True):
+        assert_allclose(one, np.einsum("ml,bl...->bm...", found.drive.factor, other), atol=1e-9)
+
+
+def test_coloured_noise_is_made_white_and_leaves_the_response_as_it_is():
+    y, u = record(60_000, noise=0.0)
+    noise = lfilter([1.0], [1.0, -0.95], 0.1 * np.random.default_rng(3).standard_normal(y.size))
+    found = condensed([y + noise], [u], FINE, LAGS, huber=False)
+    assert found.noise_lags >= 1
+    assert abs(found.noise / 0.1 - 1) < 0.02
+    left = found.data - found.drive.factor @ 0.9 ** np.arange(LAGS)
+    # chi-square of as many rows as there are
+    assert abs(np.mean(left**2) / found.noise**2 - 1) < 5 * np.sqrt(2 / left.size)
+
+
+def test_outliers_count_for_little_with_hubers_loss():
+    y, u = record(30_000)
+    spikes = np.random.default_rng(4).integers(0, y.size, 300)
+    y[spikes] += 50.0
+    size = {}
+    for huber in (False, True):
+        found = condensed([y], [u], FINE, LAGS, huber=huber)
+        size[huber] = found.noise
+    assert size[False] > 10 * 0.1
+    assert size[True] < 1.2 * 0.1
+
+
+def test_levels_that_differ_from_record_to_record_do_not_matter():
+    y, u = record(5000)
+    one = condensed([y], [u], FINE, LAGS, huber=False)
+    other = condensed([y + 1e3], [u - 50.0], FINE, LAGS, huber=False)
+    g = 0.5 ** np.arange(LAGS)
+    costs = [np.sum((c.data - c.drive.factor @ g) ** 2) for c in (one, other)]
+    assert costs[1] == pytest.approx(costs[0], rel=1e-6)
+
+
+def test_directions_that_are_not_excited_have_no_row():
+    # two lines: four directions
+    k = np.arange(20_000)
+    u = np.sin(0.3 * k) + np.sin(0.8 * k)
+    y = lfilter(0.9 ** np.arange(LAGS), [1.0], u) + 0.1 * np.random.default_rng(0).standard_normal(
+        k.size
+    )
+    found = condensed([y], [u], FINE, LAGS, huber=False)
+    assert found.data.size == 4
+    sums = normal_equations(u[None], y[None], LAGS)
+    assert_allclose(found.drive.factor.T @ found.drive.factor, sums.gram, atol=1e-6 * sums.rows)
+
+
+@pytest.mark.parametrize(("samples", "lags"), [(500, LAGS), (30_000, MOST_LAGS + 1), (3000, 1)])
+def test_what_cannot_be_condensed_is_left(samples, lags):
+    y, u = record(samples)
+    assert condensed([y], [u], FINE, lags, huber=True) is None

@@ -1,0 +1,184 @@
+"""Chains of nearly equal lags, and dispersing flows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.special import gammainc
+from scipy.stats import invgauss
+
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.dispersion import fit_flows, flow_modes, flow_profile
+from ctrl_realize.numerics.separable.lag_chains import (
+    SHORTEST,
+    LagChain,
+    fit_chains,
+    fit_diffusion,
+    still_improving,
+)
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.profile_ends import profile_limits
+from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.structures import Candidate, Scales, parameter_bounds, search
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure, fit_batch
+
+SIGMA = 1e-3
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """Six equal lags of 12 samples behind a dead time of 20, and a third-order fit of them."""
+    k = np.arange(-300, 600, dtype=float)
+    y = gammainc(6, np.clip(k - 20, 0, None) / 12)
+    y += SIGMA * np.random.default_rng(3).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(300, 1)])
+    scales = step_scales(data, k.size, None)
+    problem = window(data, k.size, KnownFactor()).problem
+    structure = Structure(3, 3)
+    start = np.append(40.0, parameters_from_poles(-np.array([0.04, 0.05, 0.06], complex)))
+    bounds = parameter_bounds(Structure(3, 3), scales)
+    parameters, cost = fit_batch(problem, structure, start[None], bounds)
+    return problem, Candidate(structure, parameters[0], float(cost[0])), scales
+
+
+def fitted(problem, penalty: float = 7.0) -> list[LagChain]:
+    data, like, scales = problem
+    return fit_chains(data, like, scales, SIGMA**2, penalty)
+
+
+def test_the_chain_of_the_right_length_fits_best_and_has_the_delay(problem):
+    chains = fitted(problem)
+    best = min(chains, key=lambda chain: chain.criterion)
+    assert best.candidate.structure == Structure(6, 6)
+    assert abs(best.candidate.delay - 20) < 3 * best.error
+    assert best.error < 0.5
+    rates = -best.candidate.poles.real
+    # As far as the delay is off, the six lags make up for it: 1.5 samples in 72.
+    assert np.mean(1 / rates) == pytest.approx(12.0, rel=0.02)
+
+
+def made(criteria: list[float]) -> list[LagChain]:
+    return [
+        LagChain(Candidate(Structure(n, n), np.zeros(n + 1), 0.0), value, 1.0)
+        for n, value in enumerate(criteria, SHORTEST)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("criteria", "more"),
+    [
+        ([700, 500, 350, 250, 180], True),
+        ([2100, 1600, 1050, 520, 2], True),  # straight down: no end in sight
+        ([900, 300, 60, 20, 30], False),  # rises again
+        ([5000, 2500, 900, 200, 2], False),  # the bottom of a parabola
+        ([900, 300, 60], False),  # ended before the longest
+        ([], False),
+    ],
+)
+def test_chains_are_open_ended_while_they_improve_up_to_the_longest(criteria, more):
+    assert still_improving(made(criteria)) is more
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.5])
+def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
+    """Forty modes with rates (k - c)^2 behind a dead time of 20."""
+    k = np.arange(-300, 900, dtype=float)
+    after = np.clip(k - 20, 0, None)
+    numbers = (np.arange(1, 41) - shift) / (1 - shift)
+    rates = 0.01 * numbers**2
+    others = [np.delete(rates, i) for i in range(rates.size)]
+    weights = np.array([np.prod(o / (o - r)) for o, r in zip(others, rates, strict=True)])
+    y = np.where(after > 0, 1 - weights @ np.exp(-np.outer(rates, after)), 0.0)
+    y += 1e-4 * np.random.default_rng(2).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(300, 1)])
+    scales = step_scales(data, k.size, None)
+    problem = window(data, k.size, KnownFactor()).problem
+    start = np.append(25.0, parameters_from_poles(-np.array([0.01, 0.06], complex)))
+    bounds = parameter_bounds(Structure(2, 2), scales)
+    parameters, cost = fit_batch(problem, Structure(2, 2), start[None], bounds)
+    like = Candidate(Structure(2, 2), parameters[0], float(cost[0]))
+    (chain,) = fit_diffusion(problem, like, scales, 1e-8, 7.0)
+    beyond = float(np.sum(1 / rates[8:]))
+    # Modes beyond the eighth are a delay but for their spread; 0.05 samples are seen.
+    assert abs(chain.candidate.delay - beyond - 20) < 0.2
+    # What comes after the forty modes of this plant: 1 / (k - c)^2 sums to 1 / (40.5 - c).
+    endless = beyond + (1 - shift) ** 2 / (40.5 - shift) / 0.01
+    assert chain.hidden == pytest.approx(endless, rel=0.05)
+
+
+def residence(mean: float, spread: float):
+    """Inverse Gaussian distribution of a mean and a coefficient of variation."""
+    return invgauss(mu=spread**2, scale=mean / spread**2)
+
+
+@pytest.mark.parametrize("spread", [0.1, 0.45, 1.0, 3.0])
+def test_what_has_passed_is_the_distribution_of_the_residence_times(spread):
+    time = 0.08 * np.geomspace(1e-3, 50, 40)
+    passed, _ = flow_modes(time, 0.08, spread, np.empty(0, dtype=complex))
+    assert_allclose(passed, residence(0.08, spread).cdf(time), rtol=1e-9, atol=1e-14)
+
+
+@pytest.mark.parametrize("pole", [-3.0, -300.0, -5000.0, -20 + 40j])
+@pytest.mark.parametrize("time", [0.02, 0.08, 0.3])
+def test_a_mode_behind_a_flow_is_its_convolution_with_the_residence_times(pole, time):
+    flow = residence(0.08, 0.45)
+    _, modes = flow_modes(np.array([time]), 0.08, 0.45, np.array([pole]))
+    recent = [max(time - 8 / abs(pole), 1e-9)]
+
+    def part(take):
+        return quad(
+            lambda s: take(np.exp(pole * (time - s))) * flow.pdf(s),
+            0,
+            time,
+            points=recent,
+            limit=400,
+        )[0]
+
+    assert_allclose(
+        modes[0, 0], part(np.real) + 1j * part(np.imag), rtol=1e-6, atol=1e-8
+    )  # of the quadrature
+
+
+def flow_problem(
+    *, known: KnownFactor | None = None, lag: float = 0.0, noise: float = 1e-3
+) -> tuple[Problem, Scales, Candidate]:
+    """Two moves through a flow of 80 ms behind 37.3 ms, and what two lags make of the record."""
+    dt = 1e-3
+    time = dt * np.arange(1200.0)
+    flow, size = residence(0.08, 0.6), np.array([1.0, -0.4])
+    fine = np.arange(0.0, 1.6, 1e-4)
+    step = flow.cdf(fine)
+    if lag:
+        kernel = np.exp(-fine / lag) * 1e-4 / lag
+        step = np.convolve(step, kernel)[: fine.size] - 0.5 * (step * kernel[0])
+    y = sum(
+        s * np.interp(time - at - 0.0373, fine, step, left=0.0)
+        for s, at in zip(size, (0.1, 0.6), strict=True)
+    )
+    y = 5 + 2 * y + noise * np.random.default_rng(3).standard_normal(y.size)
+    train = MoveTrain(time, np.ones(time.size, dtype=np.int64), dt, np.array([0.1, 0.6]), size)
+    factor = known or KnownFactor()
+    problem = Problem(y, np.ones(y.size), train, np.ones((y.size, 1)), factor)
+    scales = Scales(onset=0.05, rise=0.1, length=1.1, dt=dt, latest=0.08)
+    lags = Structure(2, 2)
+    return problem, scales, search(problem, [lags], scales)[lags]
+
+
+def test_a_flow_is_found_behind_its_dead_time():
+    problem, scales, like = flow_problem()
+    flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
+    assert flow.lag == 0.0
+    # Means over residence times of 48 ms at a noise of 0.05 %: a tenth of a millisecond.
+    assert_allclose([flow.delay, flow.mean, flow.spread], [0.0373, 0.08, 0.6], rtol=0, atol=1.5e-3)
+    assert flow.peclet == pytest.approx(2 / 0.36, rel=0.02)
+    low, high = profile_limits(*flow_profile(problem, flow, scales, 1e-6))
+    assert low < 0.0373 < high
+    assert high - low < 2e-3
+
+
+def test_a_lag_behind_a_flow_is_told_from_it():
+    problem, scales, like = flow_problem(lag=0.03)
+    flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
+    assert_allclose([flow.delay, flow.mean, flow.lag], [0.0373, 0.08, 0.03], rtol=0, atol=3e-3)

@@ -1,0 +1,206 @@
+"""Level, drift and initial state of every stretch, noise and criterion of its fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from ctrl_realize.numerics.separable.compared_fits import at_delay
+from ctrl_realize.numerics.separable.local_terms import FixedTerms, OwnTerms, Stretches
+from ctrl_realize.numerics.separable.poles import poles_from_parameters
+from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput, SeveralInputs
+from ctrl_realize.numerics.separable.structures import Candidate, Scales
+from ctrl_realize.numerics.separable.varpro import (
+    KnownFactor,
+    Problem,
+    Structure,
+    evaluate,
+    respond,
+)
+from ctrl_realize.numerics.separable.window import Window
+from ctrl_realize.numerics.signals.bins import response_bins
+
+CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
+EDGES = np.array([0, 70, 180])
+SHAPES = np.stack([np.ones(180), CLOCK], axis=1)
+STRETCHES = Stretches(EDGES, CLOCK, SHAPES)
+# real; a ringing pair; the same pair just on either side of critical damping; all of them
+THETA = {
+    "real": [-3.0],
+    "ringing": [np.log(0.3), np.log(0.1)],
+    "below critical": [np.log(0.1), -1e-9],
+    "above critical": [np.log(0.1), 1e-9],
+    "three": [-3.0, np.log(0.3), np.log(0.1)],
+}
+
+
+@pytest.mark.parametrize("theta", THETA.values(), ids=THETA.keys())
+def test_what_a_record_has_for_itself_disappears(theta):
+    poles, _ = poles_from_parameters(np.array([theta]))
+    rng = np.random.default_rng(0)
+    own = OwnTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
+    data = np.zeros(180)
+    for rows in STRETCHES.rows:
+        # every real free response: with conjugate amplitudes
+        amplitudes = rng.normal(size=poles.shape[1]) + 1j * rng.normal(size=poles.shape[1])
+        free = (np.exp(CLOCK[rows, None] * poles[0]) @ amplitudes).real
+        data[rows] = free + rng.normal() + rng.normal() * CLOCK[rows]
+    left = own.without(data[None, :, None])[0, :, 0]
+    assert_allclose(left, 0.0, atol=1e-9 * np.abs(data).max())
+
+
+@pytest.mark.parametrize("theta", THETA.values(), ids=THETA.keys())
+def test_own_terms_are_continued_at_other_times(theta):
+    poles, _ = poles_from_parameters(np.array([theta]))
+    between = Stretches(np.array([0, 50, 90]), np.r_[:50.0, :40.0] + 0.5, np.ones((90, 1)))
+    level = Stretches(EDGES, CLOCK, np.ones((180, 1)))
+    weight = np.linspace(1, 2, 180)
+    own = OwnTerms(FixedTerms(level, weight), poles)
+    slow = np.array([1.0, 3.0])  # of the two records, beside their levels 5 and 7
+    data, expected = (
+        np.repeat(slow, sizes) * np.exp(clock[:, None] * poles[0]).sum(axis=1).real
+        + np.repeat([5.0, 7.0], sizes)
+        for sizes, clock in (([70, 110], CLOCK), ([50, 40], between.clock))
+    )
+    found = own.fitted((weight * data)[None], between)[0]
+    assert_allclose(found, expected, rtol=1e-7)
+
+
+def test_nothing_else_disappears_and_records_do_not_mix():
+    poles, _ = poles_from_parameters(np.array([THETA["three"]]))
+    own = OwnTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
+    data = np.zeros(180)
+    data[:70] = np.random.default_rng(0).normal(size=70)
+    left = own.without(data[None, :, None])[0, :, 0]
+    assert np.all(left[70:] == 0)
+    # five own terms of the first stretch, three of them of the plant
+    columns = np.concatenate([SHAPES[:70], np.exp(CLOCK[:70, None] * poles[0])], axis=1)
+    expected = data[:70] - (columns @ np.linalg.lstsq(columns, data[:70] + 0j, rcond=None)[0]).real
+    assert_allclose(left[:70], expected, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("n", "r"), [(1, 1), (2, 1), (3, 3)])
+def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, r):
+    theta = {1: [np.log(0.05)], 2: np.log([0.05, 0.7]), 3: np.log([0.03, 0.2, 0.3])}[n]
+    rng = np.random.default_rng(n)
+    parts = tuple(SampledInput(rng.normal(size=size // 10).repeat(10), 1.0) for size in (90, 130))
+    drive = SeveralInputs(parts, (20, 20))
+    walk = rng.normal(size=180).cumsum()
+    nothing = np.empty((180, 0))
+    x = np.concatenate([[7.3], theta])[None]
+
+    def problem(data):
+        return Problem(data, np.ones(180), drive, nothing, KnownFactor(), STRETCHES)
+
+    structure = Structure(n, r)
+    data = walk - evaluate(problem(walk), structure, x).residual[0]
+    exact = problem(data)
+    state = evaluate(exact, structure, x)
+    assert np.abs(state.residual).max() < 1e-9 * np.abs(data).max()
+    for q in range(n + 1):
+        step = np.zeros_like(x)
+        step[0, q] = 1e-5
+        ahead = evaluate(exact, structure, x + step).residual
+        behind = evaluate(exact, structure, x - step).residual
+        derivative = (behind - ahead)[0] / 2e-5
+        # central differences of step 1e-5: 1e-10 from curvature, 1e-7 from rounding
+        scale = np.abs(derivative).max()
+        assert_allclose(state.jacobian[0, :, q], derivative, rtol=0, atol=5e-6 * scale)
+    assert exact.own_count(n) == 2 * (2 + n)
+
+
+ONE, TWO, ZERO = Structure(1, 1), Structure(2, 2), Structure(2, 1)
+SIZE, EDGE, DT = 120, 20, 0.5
+SCALES = Scales(onset=4.0, rise=5.0, length=50.0, dt=DT, latest=6.0)
+TRUTH = np.array([3.7, np.log(0.2)])  # delay and rate, in s and 1/s
+
+
+def drive(first, width):
+    return MoveTrain(DT * first, width, DT, np.array([EDGE * DT]), np.ones(1))
+
+
+def windows():
+    """One lag behind a delay on a level of 3: on bins, and sample by sample."""
+    index, single = np.arange(SIZE), np.ones(SIZE, dtype=np.int64)
+    every = drive(index.astype(float), single)
+    output = 3.0 + respond(every, KnownFactor(), np.array([0.4]), TRUTH)
+    bins = response_bins(SIZE, [EDGE], 8)
+    assert bins.width.max() > 1
+    level = np.ones((SIZE, 1))
+    means = Problem(
+        bins.average(output),
+        np.sqrt(bins.width),
+        drive(bins.first.astype(float), bins.width),
+        np.ones((bins.first.size, 1)),
+        KnownFactor(),
+    )
+    samples = Problem(output, np.ones(SIZE), every, level, KnownFactor())
+    return (
+        Window(EDGE, output, means, every, level, bins),
+        Window(EDGE, output, samples, every, level, None),
+    )
+
+
+@pytest.mark.parametrize("window", windows(), ids=["bins", "samples"])
+def test_a_model_is_predicted_at_every_sample(window):
+    exact = window.predict(window.problem, Candidate(ONE, TRUTH, 0.0))
+    assert exact == pytest.approx(window.output, abs=1e-12)
+    # of other parameters gain and level are those of the problem's data
+    other = window.predict(window.problem, Candidate(ONE, np.array([4.7, np.log(0.27)]), 0.0))
+    assert 1e-3 < np.abs(other - window.output).max() < 0.5
+    half = window.with_output(0.5 * window.output)
+    assert window.predict(half, Candidate(ONE, TRUTH, 0.0)) == pytest.approx(0.5 * window.output)
+
+
+def test_a_free_response_is_predicted_at_every_sample():
+    means, _ = windows()
+    clock = DT * np.arange(SIZE)
+    free = 2.0 * np.exp(-0.2 * clock)
+    # in the middle of bins, of which those with one sample alone count here
+    middle = means.bins.average(clock)
+    single = 1.0 * (means.bins.width == 1)
+    none = np.ones((means.bins.first.size, 0))
+    level = np.ones((SIZE, 1))
+    own = Stretches(np.array([0, SIZE]), clock, level)
+    problem = replace(
+        means.problem,
+        data=means.bins.average(means.output + free),
+        root_weight=single,
+        regressors=none,
+        stretches=Stretches(np.array([0, middle.size]), middle, means.bins.average(level)),
+    )
+    window = replace(means, problem=problem, columns=np.ones((SIZE, 0)), own=own)
+    found = window.predict(problem, Candidate(ONE, TRUTH, 0.0))
+    assert found == pytest.approx(means.output + free, abs=1e-10)
+
+
+# --- what the best of the candidates leaves
+
+
+def noise(size=1000, seed=0):
+    return np.random.default_rng(seed).standard_normal(size)
+
+
+def test_a_model_with_a_given_delay_is_the_best_one_with_it():
+    window, _ = windows()
+    kept = Candidate(ONE, TRUTH, 0.0)
+    moved = at_delay(window.problem, kept, SCALES, 4.7)
+    assert moved.structure == ONE
+    assert moved.delay == 4.7
+    assert TRUTH[0] == 3.7
+    # less delay, less lag: a second later the response must be faster
+    assert moved.poles[0].real < -0.2
+    left = window.predict(window.problem, moved) - window.output
+    assert moved.cost == pytest.approx(
+        np.sum(window.bins.width * window.bins.average(left) ** 2), rel=1e-9
+    )
+    rates = -moved.poles[0].real * np.array([0.99, 1.0, 1.01])
+    starts = np.stack([np.full(3, 4.7), np.log(rates)], axis=1)
+    slower, best, faster = evaluate(window.problem, ONE, starts).cost
+    assert best < min(slower, faster)
+
+
+# --- residuals

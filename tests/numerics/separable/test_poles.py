@@ -1,0 +1,264 @@
+"""Poles and their derivatives, structures made of them, responses of their modes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput, SeveralInputs
+from ctrl_realize.numerics.separable.structures import (
+    FASTEST,
+    PLAUSIBLE,
+    SLOWER_WITH_ZEROS,
+    Candidate,
+    Scales,
+    choose,
+    needless_parameters,
+    parameter_bounds,
+    plausible,
+    search,
+)
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
+
+GAP = 0.01  # relative distance that coinciding poles of one pair are given
+
+
+def ordered(poles):
+    return np.array(sorted(poles, key=lambda p: (round(abs(p), 9), p.imag)))
+
+
+SETS = [
+    [-3.0],
+    [-1.0, -4.0],
+    [-2.0, -1.0, -5.0],
+    [-9.0, -1.0, -5.0, -2.0],
+    [-3 + 4j, -3 - 4j],
+    [-3 + 4j, -3 - 4j, -2.0],
+    [-1.0, -6 + 1j, -6 - 1j, -2.0, -0.1 + 30j, -0.1 - 30j],
+]
+
+
+@pytest.mark.parametrize("poles", SETS)
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_poles_come_back_in_any_unit_of_time(poles, unit):
+    poles = unit * np.array(poles, dtype=complex)
+    theta = parameters_from_poles(poles)
+    assert theta.shape == (poles.size,)
+    back = poles_from_parameters(theta[np.newaxis])[0][0]
+    assert_allclose(ordered(back / unit), ordered(poles / unit), rtol=1e-9)
+
+
+def test_parameters_are_logarithms_of_frequency_and_damping():
+    assert_allclose(parameters_from_poles(np.array([-3 + 4j, -3 - 4j])), np.log([5, 0.6]))
+    # two real poles: their geometric mean, and a damping above one
+    assert_allclose(parameters_from_poles(np.array([-4.0 + 0j, -1.0])), np.log([2, 1.25]))
+    # an odd one stands first; it is the slowest of the real ones
+    three = parameters_from_poles(np.array([-4.0 + 0j, -0.5, -1.0]))
+    assert_allclose(three, np.log([0.5, 2, 1.25]))
+
+
+@given(
+    zeta=st.one_of(st.floats(0.01, 0.98), st.floats(1.02, 50)),
+    omega=st.floats(1e-3, 1e3),
+    rate=st.floats(1e-3, 1e3),
+)
+def test_derivatives_are_those_of_differences(zeta, omega, rate):
+    theta = np.log([rate, omega, zeta])
+    poles, derivative = poles_from_parameters(theta[np.newaxis])
+    h = 1e-6
+    for q in range(3):
+        step = h * (np.arange(3) == q)
+        up = poles_from_parameters((theta + step)[np.newaxis])[0]
+        down = poles_from_parameters((theta - step)[np.newaxis])[0]
+        size = np.abs(poles).max()
+        if np.abs(poles[0, 0] - poles[0, 1:]).min() < 0.02 * rate:
+            continue  # moved apart, which the derivative does not follow
+        # curvature of the root near a damping of one: h / (zeta - 1)
+        assert_allclose(derivative[0, :, q], ((up - down) / (2 * h))[0], atol=1e-4 * size)
+
+
+@pytest.mark.parametrize("zeta", [1.0, 1 - 1e-9, 1 + 1e-9, 1 - 1e-5, 1 + 1e-5])
+def test_a_double_pole_is_given_apart(zeta):
+    poles = poles_from_parameters(np.log([[7.0, zeta]]))[0][0]
+    apart = (poles[0] - poles[1]) / 7
+    # 1 / (zeta + root) for zeta - root: their product is not quite one, by root^2
+    assert_allclose(abs(apart), GAP, rtol=GAP / 2)
+    # below a damping of one they stay a pair
+    assert bool(abs(apart.imag) > 0) == (zeta < 1)
+    assert_allclose(poles.mean(), -7, rtol=1e-4)
+
+
+@pytest.mark.parametrize("zeta", [1e-3, 0.3, 30.0, 1e6])
+def test_nothing_cancels_far_from_a_double_pole(zeta):
+    poles = poles_from_parameters(np.log([[7.0, zeta]]))[0][0]
+    assert_allclose(np.prod(poles), 49, rtol=1e-12)
+
+
+def real_poles(*rates):
+    return poles_from_parameters(parameters_from_poles(-np.array(rates) + 0j)[np.newaxis])[0][
+        0
+    ].real
+
+
+def test_equal_poles_of_different_factors_are_moved_to_faster_ones():
+    found = np.sort(-real_poles(3.0, 3.0, 9.0))
+    assert_allclose(found, [3.0, 3.0 * (1 + GAP), 9.0], rtol=1e-9)
+    many = np.sort(-real_poles(3.0, 3.0, 3.0, 3.0, 3.0))
+    assert np.min(np.diff(many)) > 0.4 * GAP * 3
+    assert many[0] > 3 * (1 - GAP)
+    assert many[-1] < 3 * (1 + 6 * GAP)
+
+
+SCALES = Scales(onset=2.0, rise=0.5, length=10.0, dt=0.01, latest=3.0, earliest=0.25)
+
+
+def candidate(n: int, r: int, cost: float = 1.0, poles: object = None) -> Candidate:
+    at = -np.arange(1.0, n + 1) if poles is None else np.asarray(poles)
+    found = np.concatenate([[1.5], parameters_from_poles(at.astype(np.complex128))])
+    return Candidate(Structure(n, r), found, cost)
+
+
+def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
+    low, high = (
+        getattr(parameter_bounds(Structure(1, 1), SCALES), side) for side in ("low", "high")
+    )
+    assert_allclose([low[0], high[0]], [0.25, 3.0])
+    assert_allclose(np.exp([low[1], high[1]]), [1e-5, FASTEST / 0.01])
+    beside_a_zero = parameter_bounds(Structure(3, 2), SCALES)
+    assert_allclose(
+        np.exp(beside_a_zero.low), np.exp([0.25, np.log(1e-5), np.log(1e-3), np.log(0.005)])
+    )
+    assert_allclose(np.exp(beside_a_zero.high[1:3]), SLOWER_WITH_ZEROS / 0.01)
+
+
+def test_zeros_and_a_fourth_pole_must_be_worth_it():
+    assert [needless_parameters(Structure(n, r)) for n, r in ((3, 3), (3, 1), (4, 4), (5, 4))] == [
+        0, 12, 4, 14,
+    ]  # fmt: skip
+    simple, zero, fourth = Structure(3, 3), Structure(3, 2), Structure(4, 4)
+    assert choose({simple: 100.0, zero: 94.5, fourth: 96.5}) == simple
+    assert choose({simple: 100.0, zero: 93.5, fourth: 96.5}) == zero
+    assert choose({simple: 100.0, zero: 94.5, fourth: 95.5}) == fourth
+
+
+def test_what_is_near_the_best_is_plausible_and_so_are_lags_that_fit_no_worse():
+    chosen = candidate(3, 2, 100.0)
+    shapes = [(3, 2), (1, 1), (2, 2), (2, 1), (4, 4), (5, 5)]
+    all_of = {Structure(n, r): candidate(n, r, 1000.0) for n, r in shapes}
+    all_of[chosen.structure] = chosen
+    all_of[Structure(2, 2)] = candidate(2, 2, 100.0 + PLAUSIBLE * 0.5)
+    all_of[Structure(4, 4)] = candidate(4, 4, 50.0)
+    values = dict(zip(all_of, [60.0, 900.0, 900.0, 69.0, 900.0, 71.0], strict=True))
+    left = plausible(all_of, values, 0.5, chosen, 60.0)
+    # itself; lags within 10 variances; within 10 of the best. Not: more, or four lags that fit
+    assert set(left) == {chosen.structure, Structure(2, 2), Structure(2, 1)}
+    # a chosen one whose simplicity counts: others have theirs counted as well
+    assert Structure(5, 5) not in plausible(all_of, values, 0.5, chosen, 68.0)
+    assert Structure(5, 5) in plausible(all_of, values, 0.5, chosen, 70.0)
+
+
+def step_problem(noise: float = 1e-3):
+    """One lag of 30 samples behind 20, and the candidates of a search in it."""
+    k = np.arange(700.0)
+    y = -np.expm1(-np.clip(k - 120, 0, None) / 30)
+    y = y + noise * np.random.default_rng(0).standard_normal(k.size)
+    made = step_data(y, 1.0 * (k >= 100), 1.0, [(100, 1)])
+    return window(made, 700, KnownFactor()).problem, step_scales(made, 700, None)
+
+
+def test_a_search_finds_the_lag_and_its_neighbours_cost_no_more():
+    problem, scales = step_problem()
+    shapes = [Structure(2, 1), Structure(1, 1), Structure(2, 2)]
+    found = search(problem, shapes, scales)
+    assert list(found) == [Structure(1, 1), Structure(2, 2), Structure(2, 1)]
+    lag = found[Structure(1, 1)]
+    assert lag.delay == pytest.approx(20.0, abs=0.1)
+    assert_allclose(lag.poles, [-1 / 30], rtol=0.01)
+    assert found[Structure(2, 1)].cost <= lag.cost * (1 + 1e-9)
+    assert found[Structure(2, 1)].cost <= found[Structure(2, 2)].cost * (1 + 1e-9)
+
+
+POLES = np.array([[-0.4 + 0j, -0.3 + 2j, -0.3 - 2j], [-1.1 + 0j, -0.2 + 0.1j, -0.2 - 0.1j]])
+
+
+def by_definition(time, moves, sizes, tau, poles):
+    """H, E and T at times (m,), summed over the moves that have arrived."""
+    since = time[:, None] - moves - tau
+    arrived = since > 0
+    waves = np.exp(poles * np.where(arrived, since, 0.0)[:, :, None])
+    sizes = np.where(arrived, sizes, 0.0)
+    return (
+        sizes.sum(axis=1),
+        np.einsum("ml,mlj->mj", sizes, waves),
+        np.einsum("ml,ml,mlj->mj", sizes, since, waves),
+    )
+
+
+def close(found, expected):
+    # products of a few exponentials; those of a bin are means of up to forty
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def train(first, width, moves, sizes, dt=0.1):
+    first = dt * np.asarray(first, dtype=float)
+    return MoveTrain(first, np.asarray(width), dt, np.array(moves), np.array(sizes))
+
+
+@pytest.mark.parametrize("poles", [POLES, np.array([[-0.4 + 0j, -3.0], [-1.1, -0.02]])])
+def test_a_mode_is_the_sum_over_the_moves_that_have_arrived(poles):
+    moves, sizes = [0.35, 0.4, 2.0, 2.71], [1.0, -0.5, 2.0, 0.3]
+    tau = np.array([0.0, 1.234])
+    found = train(range(60), [1] * 60, moves, sizes).modes(tau, poles)
+    for row in range(2):
+        expected = by_definition(0.1 * np.arange(60), moves, sizes, tau[row], poles[row])
+        for one, values in zip(found, expected, strict=True):
+            close(one[row], values)
+    # all three are there before the first arrival, as nothing
+    assert not any(one[1, :16].any() for one in found)
+
+
+@pytest.mark.parametrize("widest", [2, 40])
+@pytest.mark.parametrize("poles", [POLES, np.array([[-0.4 + 0j, -3.0], [-1.1, -1e-9]])])
+def test_means_over_bins_are_those_of_their_samples(poles, widest):
+    moves, sizes = [0.35, 0.4, 2.0, 2.71], [1.0, -0.5, 2.0, 0.3]
+    tau = np.array([0.0, 1.234])
+    width = np.array([1, 2, 1, 7, 7, 20, 2, 40] if widest == 40 else [1, 1] + [2] * 39)
+    first = np.concatenate([[0], np.cumsum(width)[:-1]])
+    found = train(first, width, moves, sizes).modes(tau, poles)
+    for row in range(2):
+        samples = by_definition(0.1 * np.arange(80), moves, sizes, tau[row], poles[row])
+        for one, values in zip(found, samples, strict=True):
+            sums = np.add.reduceat(values, first, axis=0)
+            means = (sums.T / width).T
+            # a pole of 1e-9: a series to the second order, a ten-millionth of it
+            np.testing.assert_allclose(one[row], means, rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [5, 100])
+@pytest.mark.parametrize("rate", [0.99e-4, 1.01e-4, 1e-6, 0.3])
+def test_the_mean_of_a_slow_mode_is_as_right_as_that_of_a_fast_one(rate, count):
+    pole = -rate / count / 0.1
+    _, mode, slope = train([1], [count], [0.0], [1.0]).modes(
+        np.array([0.0]), np.array([[pole + 0j]])
+    )
+    time = 0.1 * np.arange(1, 1 + count)
+    # the next term of the series is (1e-4)^2 / 6; above, rounding is divided by 1e-4
+    assert mode[0, 0, 0] == pytest.approx(np.exp(pole * time).mean(), rel=3e-9)
+    assert slope[0, 0, 0] == pytest.approx((time * np.exp(pole * time)).mean(), rel=1e-8)
+
+
+def test_several_records_stand_one_after_the_other_without_their_first_samples():
+    rng = np.random.default_rng(1)
+    parts = tuple(SampledInput(rng.standard_normal(n), 0.1) for n in (7, 5, 9))
+    tau = np.array([0.12, 0.2])
+    found = SeveralInputs(parts, (2, 0, 3)).modes(tau, POLES)
+    alone = [part.modes(tau, POLES) for part in parts]
+    for i, one in enumerate(found):
+        assert one.shape[1] == 5 + 5 + 6
+        pieces = [alone[0][i][:, 2:], alone[1][i], alone[2][i][:, 3:]]
+        assert np.array_equal(one, np.concatenate(pieces, axis=1))

@@ -1,0 +1,188 @@
+"""Misfit over a delay that is held, and minima that are found to the bottom."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import least_squares
+
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.compared_fits import converged, on_new_data
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.polish import polish, settle, solve_level
+from ctrl_realize.numerics.separable.profile import delay_error, delay_profile
+from ctrl_realize.numerics.separable.profile_ends import profile_limits
+from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds, search
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate, fit_batch
+
+SIGMA, DEAD, LAGS = 0.01, 20.3, (12.0, 30.0)
+
+
+@pytest.fixture
+def found():
+    """Two lags behind a dead time, in noise, and their fit."""
+    k = np.arange(-300, 600, dtype=float)
+    late = np.clip(k - DEAD, 0, None)
+    fast, slow = LAGS
+    y = 1 - (slow * np.exp(-late / slow) - fast * np.exp(-late / fast)) / (slow - fast)
+    y = y + SIGMA * np.random.default_rng(3).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(300, 1)])
+    scales = step_scales(data, k.size, None)
+    problem = window(data, k.size, KnownFactor()).problem
+    structure = Structure(2, 2)
+    start = np.append(DEAD, parameters_from_poles(-1 / np.array(LAGS, dtype=complex)))
+    parameters, cost = fit_batch(
+        problem, structure, start[None], parameter_bounds(structure, scales)
+    )
+    return problem, Candidate(structure, parameters[0], float(cost[0])), scales
+
+
+def test_the_profile_is_the_misfit_of_the_best_lags_at_each_delay(found):
+    problem, candidate, scales = found
+    variance = SIGMA**2
+    delay, excess = delay_profile(problem, candidate, variance, scales)
+    assert np.all(np.diff(delay) >= 0)
+    assert (delay[0], delay[-1]) == (scales.earliest, scales.latest)
+    assert excess[np.flatnonzero(delay == candidate.delay)].min() == pytest.approx(0, abs=1e-6)
+    assert excess.min() == 0
+
+    def cost(lags, held):
+        theta = np.append(held, lags)[None]
+        return evaluate(problem, candidate.structure, theta).cost
+
+    for i in np.flatnonzero(np.abs(delay - candidate.delay) < 3)[::4]:
+        best = least_squares(
+            lambda lags, held: np.sqrt(cost(lags, held)),
+            candidate.parameters[1:],
+            args=(delay[i],),
+            x_scale=0.1,
+        )
+        least = float(cost(best.x, delay[i])[0])
+        # a search without derivatives of a root ends within a hundredth of a chi-square
+        assert excess[i] == pytest.approx((least - candidate.cost) / variance, abs=0.02)
+
+
+def test_near_the_optimum_it_is_the_parabola_of_the_standard_error(found):
+    problem, candidate, scales = found
+    error = delay_error(problem, candidate, SIGMA**2)
+    low, high = profile_limits(*delay_profile(problem, candidate, SIGMA**2, scales))
+    # the parabola bends a little over two standard errors
+    assert (high - low) / (2 * 1.96) == pytest.approx(error, rel=0.05)
+    assert low < DEAD < high
+    # twice the noise, twice the interval
+    wide = profile_limits(*delay_profile(problem, candidate, 4 * SIGMA**2, scales))
+    assert wide[1] - wide[0] == pytest.approx(2 * (high - low), rel=0.05)
+
+
+LOW_NOISE, SHORT_DEAD = 0.01, 20.3
+
+
+def problem_of(lags=(12.0, 30.0), unit=1.0, seed=3, delay=SHORT_DEAD):
+    """Lags behind a dead time, in noise; times in samples of `unit` seconds."""
+    k = np.arange(-300, 600, dtype=float)
+    rates = 1 / np.array(lags)
+    shares = [1 / np.prod(1 - p / np.delete(rates, i)) for i, p in enumerate(rates)]
+    late = np.clip(k - delay, 0, None)
+    y = 1 - np.exp(-np.outer(late, rates)) @ np.array(shares)
+    y = y + LOW_NOISE * np.random.default_rng(seed).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), unit, [(300, 1)])
+    return window(data, k.size, KnownFactor()).problem, step_scales(data, k.size, None)
+
+
+def start(delay: float, *lags: float) -> np.ndarray:
+    return np.append(delay, parameters_from_poles(-1 / np.array(lags, dtype=complex)))
+
+
+def test_all_starts_come_to_one_minimum():
+    problem, scales = problem_of()
+    structure = Structure(2, 2)
+    bounds = parameter_bounds(structure, scales)
+    starts = np.array([start(d, 8.0, 35.0) for d in (15.0, 20.0, 23.0)])
+    ends, _ = polish(problem, structure, starts, bounds, scales.dt)
+    fits = [settle(problem, structure, end, bounds, scales.dt) for end in ends]
+    for x, cost in fits[1:]:
+        # rounding: of the cost, and its square root in standard errors of the parameters
+        assert cost == pytest.approx(fits[0][1], rel=1e-12)
+        assert_allclose(x, fits[0][0], atol=1e-5)
+
+
+@pytest.mark.parametrize(("order", "degree"), [(2, 2), (2, 1), (3, 3), (3, 2)])
+def test_at_the_minimum_nothing_slopes(order, degree):
+    problem, scales = problem_of()
+    structure = Structure(order, degree)
+    bounds = parameter_bounds(structure, scales)
+    first = start(20.0, *np.linspace(8, 35, order))[None]
+    near = polish(problem, structure, first, bounds, scales.dt)[0][0]
+    x, _ = settle(problem, structure, near, bounds, scales.dt)
+    state = evaluate(problem, structure, x[None])
+    slope = state.jacobian[0].T @ state.residual[0]
+    size = np.linalg.norm(state.jacobian[0], axis=0) * LOW_NOISE
+    free = (x > bounds.low) & (x < bounds.high)
+    # in standard errors, were the others known
+    assert np.all(np.abs(slope)[free] <= 1e-4 * size[free] + 1e-12)
+
+
+def test_a_minimum_in_a_kink_is_at_the_sample_and_both_of_its_sides_rise():
+    # A first-order response begins with a slope: with little noise many minima are at samples.
+    structure, kinks = Structure(1, 1), 0
+    for seed in range(20):
+        problem, scales = problem_of((3.0,), seed=seed, delay=20.0)
+        bounds = parameter_bounds(structure, scales)
+        near = polish(problem, structure, start(20.0, 3.0)[None], bounds, scales.dt)[0][0]
+        x, cost = settle(problem, structure, near, bounds, scales.dt)
+        beside = np.tile(x, (2, 1))
+        beside[:, 0] += [-1e-4, 1e-4]
+        assert np.all(evaluate(problem, structure, beside).cost > cost)
+        kinks += x[0] == round(x[0])
+    assert 0 < kinks < 20
+
+
+def test_the_unit_of_time_changes_delay_and_lags_and_nothing_else():
+    structure, found = Structure(2, 2), []
+    for unit in (1.0, 1e-3, 60.0):
+        problem, scales = problem_of(unit=unit)
+        bounds = parameter_bounds(structure, scales)
+        first = start(18.0 * unit, 10.0 * unit, 40.0 * unit)
+        near = polish(problem, structure, first[None], bounds, scales.dt)[0][0]
+        x, cost = settle(problem, structure, near, bounds, scales.dt)
+        found.append([x[0] / unit, x[1] + np.log(unit), x[2], cost])
+    assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)
+
+
+@pytest.mark.parametrize(("order", "degree"), [(2, 2), (2, 1)])
+def test_a_level_is_met_by_the_least_cost_at_that_delay(order, degree):
+    problem, scales = problem_of()
+    structure = Structure(order, degree)
+    bounds = parameter_bounds(structure, scales)
+    near = polish(problem, structure, start(20.0, 10.0, 30.0)[None], bounds, scales.dt)[0][0]
+    x, cost = settle(problem, structure, near, bounds, scales.dt)
+    goal = cost + 3.84 * LOW_NOISE**2
+    aside = x.copy()
+    aside[0] -= 0.5
+    found = solve_level(problem, structure, aside, bounds, scales.dt, goal, LOW_NOISE**2)
+    assert found is not None
+    assert found[0] < x[0]
+    held = found[None].copy()
+    held[:, 1:] = x[1:]
+    again, _ = polish(problem, structure, held, bounds, scales.dt, delay_fixed=True)
+    least = settle(problem, structure, again[0], bounds, scales.dt, delay_fixed=True)[1]
+    assert least == pytest.approx(goal, abs=1e-5 * LOW_NOISE**2)
+
+
+def test_what_is_compared_has_no_slope_and_the_cost_of_the_data_of_now():
+    problem, scales = problem_of()
+    shapes = [Structure(1, 1), Structure(2, 2), Structure(2, 1), Structure(3, 3), Structure(3, 2)]
+    rough = search(problem, shapes, scales)
+    found = converged(problem, rough, scales, LOW_NOISE**2, 600.0)
+    for shape in shapes:
+        assert found[shape].cost <= rough[shape].cost
+    # nested: a pole more, or a zero more, is never worse
+    assert found[Structure(2, 1)].cost <= found[Structure(2, 2)].cost * (1 + 1e-9)
+    assert found[Structure(3, 2)].cost <= found[Structure(2, 2)].cost * (1 + 1e-9)
+    moved = replace(problem, data=problem.data + 0.1 * np.sin(np.arange(problem.data.size)))
+    for shape, candidate in on_new_data(moved, found).items():
+        state = evaluate(moved, shape, candidate.parameters[None])
+        assert candidate.cost == float(state.cost[0])

@@ -1,0 +1,346 @@
+"""The separable fit: responses, derivatives, optimum; batches of starts against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from ctrl_realize.numerics.separable.local_terms import Stretches
+from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput
+from ctrl_realize.numerics.separable.structures import Scales, parameter_bounds, search
+from ctrl_realize.numerics.separable.varpro import (
+    Bounds,
+    KnownFactor,
+    Problem,
+    Structure,
+    evaluate,
+    fit_batch,
+    partial_fractions,
+    respond,
+)
+from ctrl_realize.numerics.signals.bins import response_bins
+from tests import rigs
+
+ONES = np.ones(300, dtype=np.int64)
+TRAIN = MoveTrain(np.arange(300.0), ONES, 1.0, np.array([0.0, 50.0]), np.array([1.0, 0.5]))
+RANDOM = SampledInput(np.random.default_rng(0).normal(size=30).repeat(10), 1.0)
+KNOWN = KnownFactor(np.array([-0.3 + 0j]), np.array([0.2, 0.3]))
+THETA = {
+    1: [np.log(0.03)],
+    2: np.log([0.05, 0.7]),
+    3: np.log([0.03, 0.05, 0.7]),
+    4: np.log([0.05, 0.7, 0.1, 1.2]),
+    5: np.log([0.03, 0.05, 0.7, 0.1, 1.2]),
+}
+
+
+@pytest.mark.parametrize("drive", [TRAIN, RANDOM], ids=["steps", "random input"])
+@pytest.mark.parametrize(("n", "r"), [(1, 1), (2, 2), (2, 1), (3, 3), (3, 1), (4, 2), (5, 5)])
+def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, r, drive):
+    # Kaufman's form leaves out a term that is proportional to the residual: it is exact where
+    # the residual vanishes. Data: what the model itself makes of a random walk.
+    x, structure = np.concatenate([[37.3], THETA[n]])[None], Structure(n, r)
+    walk = np.random.default_rng(n).normal(size=300).cumsum()
+    first = Problem(walk, np.ones(300), drive, np.ones((300, 1)), KNOWN)
+    data = walk - evaluate(first, structure, x).residual[0]
+    problem = Problem(data, np.ones(300), drive, np.ones((300, 1)), KNOWN)
+    state = evaluate(problem, structure, x)
+    assert np.abs(state.residual).max() < 1e-11 * np.abs(data).max()
+    for q in range(n + 1):
+        step = np.zeros_like(x)
+        step[0, q] = 1e-5
+        ahead = evaluate(problem, structure, x + step).residual
+        behind = evaluate(problem, structure, x - step).residual
+        derivative = (behind - ahead)[0] / 2e-5
+        scale = np.abs(derivative).max()
+        # central differences of step 1e-5: 1e-10 from curvature, 1e-7 from rounding
+        assert_allclose(state.jacobian[0, :, q], derivative, rtol=0, atol=2e-6 * scale)
+
+
+def test_the_response_is_the_closed_form_at_any_fraction_of_a_sample():
+    poles = rigs.R3.poles().astype(complex)
+    time = rigs.TS * np.arange(-50, 900)
+    drive = MoveTrain(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
+    for delay in (0.0, 36.25, 37.0, 41.9):
+        x = np.concatenate([[delay * rigs.TS], parameters_from_poles(poles)])
+        ours = respond(drive, KnownFactor(), np.array([np.prod(-poles).real]), x)
+        assert_allclose(ours, rigs.exact_step(rigs.R3, time - delay * rigs.TS), atol=1e-12)
+
+
+def test_means_over_bins_are_means_of_samples_also_where_moves_arrive():
+    moves, sizes = np.array([5.0, 6.0, 7.0, 100.0, 103.0]), np.array([0.3, 0.4, 0.3, -0.5, 1.0])
+    width = np.array([1] * 40 + [3, 5, 7, 4, 1, 2, 20, 60, 158])
+    first = np.concatenate([[0], np.cumsum(width)[:-1]])
+    poles, _ = poles_from_parameters(np.log([[0.03, 0.1, 0.2], [1e-7, 0.3, 0.02]]))
+    tau = np.array([7.3, 41.9])
+    bins = MoveTrain(first.astype(float), width, 1.0, moves, sizes).modes(tau, poles)
+    samples = MoveTrain(np.arange(300.0), ONES, 1.0, moves, sizes).modes(tau, poles)
+    for mean, values in zip(bins, samples, strict=True):
+        expected = np.add.reduceat(values, first, axis=1)
+        expected = expected / width.reshape(1, -1, *[1] * (values.ndim - 2))
+        # the slowest pole is at 1e-7: one minus its exponential keeps nine digits
+        assert_allclose(mean, expected, rtol=1e-8, atol=1e-10)
+
+
+def test_a_few_moves_and_the_sampled_input_that_they_make_give_the_same_modes():
+    signal = np.zeros(300)
+    signal[5:], signal[100:] = 1.0, -0.5
+    train = MoveTrain(np.arange(300.0), ONES, 1.0, np.array([5.0, 100.0]), np.array([1.0, -1.5]))
+    poles, _ = poles_from_parameters(np.log([[0.03, 0.1, 0.2]]))
+    for a, b in zip(
+        train.modes(np.array([7.3]), poles),
+        SampledInput(signal, 1.0).modes(np.array([7.3]), poles),
+        strict=True,
+    ):
+        assert_allclose(a, b, atol=1e-11)
+
+
+@given(
+    st.lists(st.floats(-3, 2), min_size=1, max_size=5),
+    st.lists(st.floats(-4, 1.5), min_size=2, max_size=2),
+)
+def test_pole_parameters_and_poles_go_back_and_forth(speeds, dampings):
+    theta = np.array(speeds)
+    theta[theta.size % 2 + 1 :: 2] = dampings[: theta.size // 2]
+    poles, _ = poles_from_parameters(theta[None])
+    again, _ = poles_from_parameters(parameters_from_poles(poles[0])[None])
+    assert np.all(poles.real < 0)
+    # coinciding poles are moved apart by up to one per cent, once more on the way back
+    assert_allclose(np.prod(again), np.prod(poles), rtol=0.15 if theta.size > 2 else 0.02)
+
+
+def test_bins_cover_every_sample_once_and_are_single_samples_at_the_onset():
+    bins = response_bins(6440, [3840], 60)
+    assert bins.first[0] == 0
+    assert bins.first[-1] + bins.width[-1] == 6440
+    assert np.array_equal(bins.first[1:], (bins.first + bins.width)[:-1])
+    near = (bins.first >= 3880) & (bins.first < 3920)
+    assert np.all(bins.width[near] == 1)
+    assert bins.first.size < 300
+
+
+@pytest.mark.parametrize("zeta", [0.05, 0.7, 1.3])
+def test_exact_data_give_their_own_parameters_back(zeta):
+    poles = (rigs.lag(2.2) * rigs.pair(8.0, zeta)).poles().astype(complex)
+    time = rigs.TS * np.arange(-50, 900)
+    drive = MoveTrain(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
+    truth = np.concatenate([[36.4 * rigs.TS], parameters_from_poles(poles)])
+    data = 2.0 + respond(drive, KnownFactor(), np.array([np.prod(-poles).real]), truth)
+    problem = Problem(data, np.ones(950), drive, np.ones((950, 1)), KnownFactor())
+    scales = Scales(50 * rigs.TS, 80 * rigs.TS, 900 * rigs.TS, rigs.TS, 100 * rigs.TS)
+    found = search(problem, [Structure(3, 3)], scales)[Structure(3, 3)]
+    polished, _ = fit_batch(
+        problem,
+        Structure(3, 3),
+        found.parameters[None],
+        parameter_bounds(Structure(3, 3), scales),
+        tolerance=1e-13,
+    )
+    assert_allclose(polished[0, 0], truth[0], rtol=1e-6)
+
+
+def test_no_random_start_beats_the_few_that_are_tried():
+    # The starts are ten; thirty random ones from the whole box must not find a lower cost.
+    worse = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        time = rigs.TS * np.arange(-20, 480)
+        delay = rng.uniform(30, 45)
+        data = rigs.exact_step(rigs.R3, time - delay * rigs.TS)
+        data = data + 0.003 * rng.standard_normal(time.size)
+        drive = MoveTrain(time, np.ones(500, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
+        problem = Problem(data, np.ones(500), drive, np.ones((500, 1)), KnownFactor())
+        scales = Scales(52 * rigs.TS, 90 * rigs.TS, 480 * rigs.TS, rigs.TS, 75 * rigs.TS)
+        found = search(problem, [Structure(3, 3)], scales)[Structure(3, 3)]
+        box = parameter_bounds(Structure(3, 3), scales)
+        starts = rng.uniform(box.low, box.high, size=(30, 4))
+        _, cost = fit_batch(problem, Structure(3, 3), starts, box, most_iterations=60)
+        worse += found.cost > cost.min() * (1 + 1e-4)
+    assert worse == 0
+
+
+ONE, TWO, ZERO, JUMP = Structure(1, 1), Structure(2, 2), Structure(2, 1), Structure(1, 0)
+SIZE, DT = 90, 0.5
+TIME = DT * np.arange(SIZE)
+NOTHING = KnownFactor()
+LAG = 2.5
+TRUTH = np.array([3.3, -np.log(LAG)])
+BOX = Bounds(np.array([0.0, np.log(0.02)]), np.array([9.0, np.log(4.0)]))
+
+
+def train(unit=1.0, at=2.0):
+    ones = np.ones(SIZE, dtype=np.int64)
+    return MoveTrain(unit * TIME, ones, unit * DT, np.array([unit * at]), np.ones(1))
+
+
+def problem(data, **changed):
+    given = {
+        "root_weight": np.ones(SIZE),
+        "drive": train(),
+        "regressors": np.ones((SIZE, 1)),
+        "known": NOTHING,
+    } | changed
+    return Problem(data, **given)
+
+
+def lag(time, rate):
+    return -np.expm1(-rate * np.clip(time, 0, None))
+
+
+def noisy(gain=2.0, level=5.0, noise=0.02, seed=0):
+    clean = level + gain * lag(TIME - 2.0 - TRUTH[0], 1 / LAG)
+    return clean + noise * np.random.default_rng(seed).standard_normal(SIZE)
+
+
+# --- responses
+
+
+def test_known_dynamics_stand_in_cascade():
+    # 1.2 / (s + 0.4) behind (6 + s) / (s + 3): by partial fractions, static gain 6
+    known = KnownFactor(np.array([-3.0 + 0j]), np.array([1.0, 6.0]))
+    found = respond(train(), known, np.array([1.2]), np.array([3.3, np.log(0.4)]))
+    since = TIME - 5.3
+    slow = 1.2 * 5.6 / (-0.4 * 2.6)
+    fast = 1.2 * 3.0 / (-3.0 * -2.6)
+    expected = 6.0 + slow * np.exp(-0.4 * since) + fast * np.exp(-3.0 * since)
+    assert 6.0 + slow + fast == pytest.approx(0.0, abs=1e-12)
+    assert found == pytest.approx(np.where(since > 0, expected, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("known", [np.ones(1), np.array([0.2, 0.0, 0.3])])
+def test_partial_fractions_add_up(known):
+    poles = np.array([[-0.4 + 0j, -0.3 + 2j, -0.3 - 2j], [-1.0, -2.0, -7.0]])
+    residues, gain, moved = partial_fractions(poles, known, 2 if known.size > 1 else 3)
+    s = 0.7 + 0.3j
+    for row, p in enumerate(poles):
+        for i in range(residues.shape[2]):
+            whole = s ** (i - 1) * np.polyval(known, s) / np.prod(s - p)
+            parts = gain[row, i] / s + np.sum(residues[row, :, i] / (s - p))
+            assert parts == pytest.approx(whole, rel=1e-12)
+            # the derivative of its numerator, s^(i-1) K, at every pole; over a' there
+            slope = np.array([np.prod(x - np.delete(p, j)) for j, x in enumerate(p)])
+            ahead, behind = ((p + h) ** (i - 1.0) * np.polyval(known, p + h) for h in (1e-6, -1e-6))
+            # central differences of a step of 1e-6
+            expected = (ahead - behind) / 2e-6 / slope
+            assert moved[row, :, i] == pytest.approx(expected, rel=1e-7, abs=1e-8)
+
+
+# --- elimination
+
+
+def test_the_residual_is_that_of_weighted_least_squares():
+    data, weight = noisy(), np.linspace(0.5, 2.0, SIZE)
+    trials = TRUTH + np.array([[0.0, 0.0], [0.7, 0.2], [-1.0, -0.5]])
+    state = evaluate(problem(data, root_weight=weight), ONE, trials)
+    for row, (delay, rate) in enumerate(trials):
+        columns = np.stack([lag(TIME - 2.0 - delay, np.exp(rate)), np.ones(SIZE)], axis=1)
+        best = np.linalg.lstsq(columns * weight[:, None], data * weight, rcond=None)[0]
+        left = weight * (data - columns @ best)
+        assert state.residual[row] == pytest.approx(left, abs=1e-12)
+        assert state.cost[row] == pytest.approx(left @ left)
+        # b over s + a has the static gain b / a
+        assert state.numerator[row, 0] / np.exp(rate) == pytest.approx(best[0])
+        assert state.regression[row, 0] == pytest.approx(best[1])
+
+
+def test_a_whitener_stands_in_for_the_weights():
+    data = noisy()
+    white = np.tril(np.random.default_rng(0).standard_normal((SIZE, SIZE))) + 3 * np.eye(SIZE)
+    columns = np.random.default_rng(1).standard_normal((2, SIZE, 3))
+    made = problem(data, whitener=white)
+    assert made.weighted(columns) == pytest.approx(np.stack([white @ one for one in columns]))
+    assert made.weighted_data == pytest.approx(white @ data)
+    diagonal = problem(data, whitener=np.diag(np.linspace(0.5, 2, SIZE)))
+    weighted = problem(data, root_weight=np.linspace(0.5, 2, SIZE))
+    both = [evaluate(one, ONE, TRUTH[None]).residual for one in (diagonal, weighted)]
+    assert both[0] == pytest.approx(both[1], abs=1e-12)
+
+
+@pytest.mark.parametrize("structure", [ONE, JUMP, TWO, ZERO])
+def test_sensitivity_is_the_size_of_the_derivative_of_the_model(structure):
+    pair = [-np.log(LAG), np.log(1.2)][: structure.order]
+    x = np.concatenate([[3.37], pair])
+    weight = np.linspace(0.5, 2.0, SIZE)
+    made = problem(noisy(), root_weight=weight)
+    state = evaluate(made, structure, x[None])
+    b = state.numerator[0]
+    for q in range(x.size):
+        step = 1e-6 * (np.arange(x.size) == q)
+        change = respond(train(), NOTHING, b, x + step) - respond(train(), NOTHING, b, x - step)
+        size = np.linalg.norm(weight * change / 2e-6)
+        # no sample lies where the response breaks off; central differences of 1e-6
+        assert state.sensitivity[0, q] == pytest.approx(size, rel=1e-6)
+
+
+def test_own_terms_are_taken_out_of_data_and_model():
+    # a free response of the plant and a level of its own in each of two stretches
+    free = np.concatenate([4.0 * np.exp(-TIME[:40] / LAG), 1.0 - 2 * np.exp(-TIME[:50] / LAG)])
+    clock = np.concatenate([TIME[:40], TIME[:50]])
+    pieces = Stretches(np.array([0, 40, SIZE]), clock, np.ones((SIZE, 1)))
+    data = respond(train(), NOTHING, np.array([0.8]), TRUTH) + free
+    none = np.empty((SIZE, 0))
+    weight = np.linspace(0.5, 2.0, SIZE)
+    made = problem(data, regressors=none, stretches=pieces, root_weight=weight)
+    state = evaluate(made, ONE, TRUTH[None])
+    assert state.cost[0] < 1e-20
+    assert state.numerator[0] == pytest.approx([0.8])
+    # the lag of the free response moves along with that of the model
+    h = 1e-5
+    for q in range(2):
+        step = h * (np.arange(2) == q)
+        ahead, behind = (evaluate(made, ONE, (TRUTH + d)[None]).residual[0] for d in (step, -step))
+        expected = (behind - ahead) / (2 * h)
+        # central differences of 1e-5: 1e-10 of curvature and 1e-7 of rounding
+        assert np.abs(state.jacobian[0, :, q] - expected).max() < 2e-6 * np.abs(expected).max()
+
+
+# --- steps
+
+
+def fitted(data, start, bounds=BOX, **settings):
+    x, cost = fit_batch(problem(data), ONE, np.atleast_2d(start), bounds, **settings)
+    return x[0], cost[0]
+
+
+def test_a_delay_that_is_fixed_is_kept_wherever_it_is():
+    for delay in (1.0, 3.3, 11.0):
+        x, _ = fitted(noisy(), [delay, 0.0], delay_fixed=True, tolerance=1e-12)
+        assert x[0] == delay
+        rates = np.clip(x[1] + 1e-2 * np.array([-1, 0, 1]), BOX.low[1], BOX.high[1])
+        trials = np.stack([np.full(3, delay), rates], axis=1)
+        slower, at, faster = evaluate(problem(noisy()), ONE, trials).cost
+        assert at <= min(slower, faster)
+
+
+def test_no_start_gets_worse_and_the_callers_are_kept():
+    starts = np.array([[1.0, -1.0], [6.0, 1.0], [3.0, -3.5]])
+    kept = starts.copy()
+    first = evaluate(problem(noisy()), ONE, starts).cost
+    last = first
+    for turns in (1, 2, 5):
+        x, cost = fit_batch(problem(noisy()), ONE, starts, BOX, most_iterations=turns)
+        assert np.all(cost <= last)
+        assert cost == pytest.approx(evaluate(problem(noisy()), ONE, x).cost)
+        last = cost
+    assert np.all(last < first)
+    assert np.array_equal(starts, kept)
+
+
+def test_steps_do_not_depend_on_the_unit_of_time():
+    # no start lies between two samples in one unit and on a sample in another
+    start = np.array([[5.1, 0.3], [1.1, -2.0]])
+    data = noisy()
+    for unit in (1e3, 1e-6):
+        shift = np.array([0.0, np.log(unit)])
+        scale = np.array([unit, 1.0])
+        box = Bounds(BOX.low * scale - shift, BOX.high * scale - shift)
+        ours, cost = fit_batch(problem(data), ONE, start, BOX, most_iterations=4)
+        other = problem(data, drive=train(unit))
+        theirs, same = fit_batch(other, ONE, start * scale - shift, box, most_iterations=4)
+        # four steps, each a solution of equations of condition 1e3
+        assert (theirs + shift) / scale == pytest.approx(ours, rel=1e-9)
+        assert same == pytest.approx(cost, rel=1e-9)

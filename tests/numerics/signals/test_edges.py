@@ -1,0 +1,202 @@
+"""Edges of an input, its moves, and where in a long record it moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from ctrl_realize.numerics.signals.edges import Edge, despike, difference_noise, find_edges
+from ctrl_realize.numerics.signals.excitation import lively_start
+from ctrl_realize.numerics.signals.step_sequence import input_moves
+
+
+def white(n, seed=0):
+    return np.random.default_rng(seed).standard_normal(n)
+
+
+def levels(*pairs):
+    """Levels that hold for some samples each."""
+    return np.concatenate([np.full(length, value, dtype=float) for value, length in pairs])
+
+
+def test_the_noise_level_does_not_see_steps_drift_and_spikes():
+    assert difference_noise(2.5 * white(10_000)) == pytest.approx(2.5, rel=0.03)
+    spoiled = white(10_000) + 50 * (np.arange(10_000) > 4000) + 0.01 * np.arange(10_000)
+    spoiled[::100] += 40
+    assert difference_noise(spoiled) == pytest.approx(1, rel=0.05)
+    assert difference_noise(levels((0, 50), (3, 50))) == 0
+    assert difference_noise(np.array([1.0, 4.0])) == 0
+    # three samples are enough for two differences: 1, 3 about 2
+    assert difference_noise(np.array([0.0, 1.0, 4.0])) == pytest.approx(1 / 0.6745 / np.sqrt(2))
+
+
+def test_spikes_up_to_the_given_length_go_and_edges_stay():
+    values = levels((1, 20), (9, 3), (1, 20), (5, 20))
+    assert_array_equal(despike(values, 3), levels((1, 43), (5, 20)))
+    assert_array_equal(despike(values, 2), values)
+    assert_array_equal(despike(levels((0, 1), (5, 20)), 3), levels((0, 1), (5, 20)))
+    assert despike(values, 0) is values
+    assert_array_equal(despike(levels((1, 9), (7, 1), (1, 9)), 1), np.ones(19))
+
+
+def test_one_clean_edge_is_described_in_full():
+    assert find_edges(levels((2, 30), (5, 70)), 3, 0.5) == [Edge(30, 3.0, 2.0, 1, 0, 100)]
+    assert find_edges(levels((2, 30), (-5, 70)), 0, 0.5) == [Edge(30, -7.0, 2.0, 1, 0, 100)]
+
+
+def test_neighbouring_edges_bound_each_other():
+    found = find_edges(levels((0, 50), (4, 60), (1, 70), (5, 80)), 3, 0.3)
+    assert [(e.index, e.amplitude, e.rest) for e in found] == [
+        (50, 4, 0),
+        (110, -3, 4),
+        (180, 4, 1),
+    ]
+    assert [(e.start, e.stop) for e in found] == [(0, 110), (50, 180), (110, 260)]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [np.full(50, 4.0), np.zeros(50), white(500), 1e6 + 1e-5 * white(50), levels((4, 50))],
+    ids=["constant", "zero", "noise", "rounding", "level"],
+)
+@pytest.mark.parametrize("spike", [0, 3])
+def test_an_input_that_holds_still_has_no_edge(values, spike):
+    assert find_edges(values, spike, 0.5) == []
+
+
+@given(length=st.integers(1, 60), up=st.booleans(), spike=st.integers(0, 6))
+def test_a_ramp_is_measured_from_first_to_last_sample(length, up, spike):
+    k = np.arange(400)
+    values = (1 if up else -1) * np.clip((k - 199) / length, 0, 1)
+    found = find_edges(values, spike, 0.1)
+    # medians over s + 1 samples see s + 1 samples' rise, up to a tenth of the range
+    assert len(found) == (length <= 10 * (spike + 1))
+    if not found:
+        return
+    (found,) = found
+    slack = int(np.ceil(0.02 * length))  # left, and reached, within 2 %
+    assert abs(found.index - 200) <= slack
+    assert abs(found.index + found.samples - (200 + length)) <= slack
+    assert_allclose([found.rest, found.amplitude], [0, values[-1]], atol=1e-12)
+
+
+@given(
+    scale=st.floats(1e-6, 1e6),
+    offset=st.floats(-100, 100),
+    spike=st.integers(0, 4),
+    up=st.booleans(),
+)
+def test_edges_do_not_depend_on_the_unit(scale, offset, spike, up):
+    base = levels((0, 40), (1, 40), (0.4, 40), (2, 40)) * (1 if up else -1)
+    plain = find_edges(base, spike, 0.25)
+    moved = find_edges(scale * (base + offset), spike, 0.25)
+    assert [(e.index, e.samples, e.start, e.stop) for e in moved] == [
+        (e.index, e.samples, e.start, e.stop) for e in plain
+    ]
+    assert_allclose(
+        [(e.amplitude, e.rest) for e in moved],
+        [(scale * e.amplitude, scale * (e.rest + offset)) for e in plain],
+        rtol=1e-9,
+        atol=1e-10 * scale,
+    )
+
+
+def test_edges_are_found_anywhere_in_a_long_record():
+    # longer than what is looked at together; edges on, before and after where that ends
+    edges = [1000, 2**20 - 1, 2**20 + 60, 2**21, 2**21 + 5000]
+    signal = np.zeros(2**21 + 6000)
+    for i, edge in enumerate(edges):
+        signal[edge:] = (i + 1) % 2
+    found = find_edges(signal, 5, 0.1)
+    assert [edge.index for edge in found] == edges
+    assert [edge.amplitude for edge in found] == [1.0, -1.0, 1.0, -1.0, 1.0]
+
+
+def test_no_more_edges_are_looked_for_than_are_wanted():
+    signal = np.repeat(np.random.default_rng(0).permutation(np.arange(300) % 2), 20).astype(float)
+    whole = find_edges(signal, 3, 0.1)
+    some = find_edges(signal, 3, 0.1, most=12)
+    assert len(whole) > 100
+    assert [edge.index for edge in some] == [edge.index for edge in whole[:13]]
+
+
+def moving(samples: int) -> np.ndarray:
+    return np.random.default_rng(1).choice([-1.0, 1.0], samples)
+
+
+@pytest.mark.parametrize("level", [0.0, 1e6])
+def test_an_input_that_moves_from_the_beginning_is_taken_from_there(level):
+    assert lively_start(level + moving(5000)[None], 400) == 0
+
+
+@pytest.mark.parametrize("rest", [450, 1000, 3999])
+@pytest.mark.parametrize("level", [0.0, 1e6])
+def test_a_rest_is_left_out(rest, level):
+    signal = level + np.concatenate([np.zeros(rest), moving(2000), np.zeros(3000)])
+    start = lively_start(signal[None], 400)
+    # half of the variance there is: the stretch begins up to half its length before
+    assert rest - 300 <= start <= rest + 100
+
+
+def test_of_two_inputs_both_move_in_it():
+    inputs = np.zeros((2, 4000))
+    inputs[0, :3000] = moving(3000)
+    inputs[1, 2000:] = moving(2000)
+    assert 1600 <= lively_start(inputs, 400) <= 2600
+
+
+def test_a_short_record_is_taken_from_its_start():
+    assert lively_start(np.concatenate([np.zeros(300), moving(100)])[None], 400) == 0
+
+
+def test_an_input_that_moves_at_the_very_end_gives_the_end():
+    signal = np.zeros(1000)
+    signal[-1] = 1.0
+    assert lively_start(signal[None], 300) == 700
+
+
+NOISE = 0.01
+N = 1000
+K = np.arange(N)
+NOISY = (K >= 100) + NOISE * np.random.default_rng(0).standard_normal(N)
+
+
+def written(index, size, n=N):
+    """The input that the moves describe, from its first level on."""
+    signal = np.zeros(n)
+    np.add.at(signal, index, size)
+    return np.cumsum(signal)
+
+
+def test_a_clean_input_is_written_exactly_as_its_moves():
+    signal = np.zeros(100)
+    signal[10:], signal[40:], signal[41:] = 2.0, 1.5, 1.0
+    index, size = input_moves(signal, [(10, 1), (40, 2)], 100)
+    assert_array_equal(index, [10, 40, 41])
+    assert_allclose(size, [2.0, -0.5, -0.5], rtol=0)
+
+
+def test_a_ramp_in_noise_keeps_its_samples():
+    ramp = NOISY + np.clip((K - 99) / 4, 0, 1) - (K >= 100)
+    index, size = input_moves(ramp, [(100, 4)], N)
+    assert_array_equal(index, [100, 101, 102, 103])
+    assert_allclose(written(index, size)[100:103], (ramp - np.median(ramp[:100]))[100:103])
+    # the last sample of the ramp is the first of the level that follows
+    assert written(index, size)[103] == pytest.approx(1, abs=5 * NOISE / np.sqrt(100))
+
+
+def test_a_drooping_input_is_followed_by_means_that_grow():
+    drooping = NOISY - 0.2 * (K >= 100) * (1 - np.exp(-(K - 100.0) / 150))
+    index, size = input_moves(drooping, [(100, 1)], N)
+    assert_array_equal(np.diff(index)[:4], [8, 8, 8, 12])  # then half as long as all before
+    assert index.size == 12
+    assert np.sum(size) == pytest.approx(0.8, abs=0.02)
+    # each mean of n samples is right to its noise, about the droop's own mean
+    clean = drooping - NOISY + (K >= 100)
+    start, stop = index[3], index[4]
+    assert written(index, size)[start] == pytest.approx(
+        clean[start:stop].mean(), abs=4 * NOISE / np.sqrt(stop - start)
+    )

@@ -1,0 +1,233 @@
+"""Responses of state-space models and of sums of sections, and their fit."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from ctrl_realize.numerics.state_space import responses, sampling
+from ctrl_realize.numerics.state_space.responses import markov, simulate
+from ctrl_realize.numerics.state_space.section_fit import Experiment, fit_sections
+from ctrl_realize.numerics.state_space.sections import in_sections, motion
+
+
+def system(seed: int, n: int = 4, m: int = 2, p: int = 3, radius: float = 0.95):
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((n, n))
+    A *= radius / np.abs(np.linalg.eigvals(A)).max()
+    return (
+        A,
+        rng.standard_normal((n, m)),
+        rng.standard_normal((p, n)),
+        rng.standard_normal((p, m)),
+    )
+
+
+def recursion(A, B, C, D, u, x):
+    out = np.empty((C.shape[0], u.shape[1]))
+    for k in range(u.shape[1]):
+        out[:, k] = C @ x + D @ u[:, k]
+        x = A @ x + B @ u[:, k]
+    return out
+
+
+@given(seed=st.integers(0, 10**6), n=st.integers(1, 12), m=st.integers(1, 3), p=st.integers(1, 3))
+def test_frequency_response_equals_the_solve(seed, n, m, p):
+    A, B, C, D = system(seed, n, m, p)
+    z = np.exp(1j * np.linspace(0.01, np.pi, 9))
+    direct = np.stack([C @ np.linalg.solve(x * np.eye(n) - A, B) + D for x in z], axis=-1)
+    fast = responses.frequency_response(responses.schur_form(A), B, C, D, z)
+    # Poles inside 0.95: the resolvent is at most about 1/0.05^2 for near-defective A.
+    assert_allclose(fast, direct, rtol=0, atol=1e-10 * np.abs(direct).max())
+
+
+def test_units_of_the_states_do_not_change_the_response():
+    A, B, C, D = system(3)
+    units = 2.0 ** np.linspace(-40, 40, A.shape[0]).round()  # exact in binary
+    z = np.exp(1j * np.linspace(0.01, np.pi, 9))
+    plain = responses.frequency_response(responses.schur_form(A), B, C, D, z)
+    scaled = responses.frequency_response(
+        responses.schur_form(units[:, None] * A / units), units[:, None] * B, C / units, D, z
+    )
+    # balanced with another start the rounding is another
+    assert_allclose(scaled, plain, rtol=0, atol=1e-11 * np.abs(plain).max())
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 64, 65, 66, 129, 500])
+def test_markov_parameters_are_powers_of_a(count):
+    A, B, C, D = system(0)
+    expected = [D] + [C @ np.linalg.matrix_power(A, k) @ B for k in range(count - 1)]
+    assert_allclose(
+        responses.markov(A, B, C, D, count), np.stack(expected, axis=-1), rtol=0, atol=1e-12
+    )
+
+
+@given(seed=st.integers(0, 10**6), samples=st.integers(1, 200))
+def test_simulation_equals_the_recursion(seed, samples):
+    A, B, C, D = system(seed)
+    rng = np.random.default_rng(seed)
+    u, x = rng.standard_normal((2, samples)), rng.standard_normal(4)
+    expected = recursion(A, B, C, D, u, x)
+    fast = responses.simulate(A, B, C, D, u, x)
+    assert_allclose(fast, expected, rtol=0, atol=1e-11 * max(1.0, np.abs(expected).max()))
+
+
+def test_a_long_step_keeps_its_digits():
+    # One pole at 1 - 1e-6: a running sum of a million Markov parameters would lose digits.
+    A, B, C, D = (np.array([[v]]) for v in (1 - 1e-6, 1e-6, 1.0, 0.0))
+    step = responses.step_response(A, B, C, D, 1_000_000)[0, 0]
+    k = np.arange(1_000_000)
+    # A has 1e-16 / 1e-6 of rounding in its distance from 1.
+    assert_allclose(step, -np.expm1(k * np.log1p(-1e-6)), rtol=0, atol=1e-9)
+
+
+@given(dt=st.floats(1e-3, 1.0), fraction=st.floats(0.0, 5.0))
+def test_sampling_is_that_of_the_continuous_step(dt, fraction):
+    plant = ct.ss(ct.tf([3.0], [0.5, 1.0]))
+    *model, delay = sampling.sample_with_dead_time(
+        plant.A, plant.B, plant.C, plant.D, dt, fraction * dt
+    )
+    k = np.arange(40)
+    exact = np.clip(3 * -np.expm1(-np.clip(k - fraction, 0, None) * dt / 0.5), 0, None)
+    step = np.zeros(40)
+    step[delay:] = responses.step_response(*model, 40)[0, 0, : 40 - delay]
+    assert_allclose(step, exact, rtol=0, atol=1e-8)
+    assert delay in (int(np.floor(fraction)), int(np.floor(fraction)) + 1)
+
+
+def test_integrators_are_sampled_exactly():
+    A, B, C, D = np.zeros((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1))
+    *model, delay = sampling.sample_with_dead_time(A, B, C, D, 0.5, 0.75)
+    step = responses.step_response(*model, 6)[0, 0]
+    assert delay == 2
+    assert_allclose(step, 0.5 * np.arange(6) + 0.25, atol=1e-15)
+
+
+SAMPLES = 60
+
+
+def some_model(seed, order, p=2, m=3):
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((order, order))
+    A *= 0.95 / max(np.abs(np.linalg.eigvals(A)).max(initial=0.0), 0.5)
+    B, C = rng.standard_normal((order, m)), rng.standard_normal((p, order))
+    return A, B, C, rng.standard_normal((p, m))
+
+
+models = st.builds(some_model, st.integers(0, 300), st.integers(1, 7))
+
+
+@given(models)
+def test_a_model_in_sections_is_the_same_model(model):
+    sections = in_sections(*model)
+    matrices = sections.matrices()
+    assert matrices[0].shape == model[0].shape
+    expected = markov(*model, SAMPLES)
+    # eigenvectors of random matrices of order 7 lose up to six digits
+    assert_allclose(
+        markov(*matrices, SAMPLES), expected, rtol=0, atol=1e-9 * np.abs(expected).max()
+    )
+    poles = np.linalg.eigvals(model[0])
+    distance = np.abs(sections.poles[:, None] - poles)
+    assert distance.min(axis=0).max() < 1e-7
+    assert sections.poles.size == poles.size
+
+
+@given(models)
+def test_the_motion_is_the_simulation(model):
+    v = np.random.default_rng(1).standard_normal((3, SAMPLES))
+    sections = in_sections(*model)
+    ours = motion(sections, v).output(sections, v)
+    theirs = ct.forced_response(ct.ss(*model, 1.0), inputs=v).outputs
+    assert_allclose(ours, theirs, rtol=0, atol=1e-9 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_slopes_are_differences_of_outputs(order):
+    v = np.random.default_rng(1).standard_normal((3, SAMPLES))
+    sections = in_sections(*some_model(3, order))
+    mine = motion(sections, v)
+    slopes = np.stack([mine.slopes(sections, v, a, slice(0, SAMPLES)) for a in range(2)])
+    for k in np.flatnonzero(sections.free(direct=True)):
+        step = np.zeros(slopes.shape[1])
+        step[k] = 1e-6
+        ahead, behind = sections.moved(step), sections.moved(-step)
+        change = motion(ahead, v).output(ahead, v) - motion(behind, v).output(behind, v)
+        # a central difference of 1e-6 keeps seven digits or so
+        assert_allclose(slopes[:, k], change / 2e-6, rtol=0, atol=1e-6 * np.abs(slopes).max())
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_starts_are_free_responses(order):
+    model = some_model(5, order)
+    sections = in_sections(*model)
+    A, _, C, _ = sections.matrices()
+    kept = np.arange(2 * sections.a.shape[0])
+    if order % 2:
+        kept = np.delete(kept, -2)
+    found = motion(sections, np.zeros((3, 9))).starts(sections)[:, kept]
+    expected = np.stack([C @ np.linalg.matrix_power(A, k) for k in range(9)], axis=-1)
+    assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+PLANT = (
+    np.array([[0.7, 0.3, 0.0], [-0.3, 0.7, 0.2], [0.0, 0.0, 0.4]]),
+    np.array([[1.0, 0.3], [0.2, 1.0], [0.5, -0.4]]),
+    np.array([[1.0, 0.0, 0.5], [0.3, 1.0, -0.2]]),
+    np.zeros((2, 2)),
+)
+NOISE = np.array([0.05, 0.5])
+
+
+def experiment(seed, samples=500, noise=NOISE, level=0.0):
+    rng = np.random.default_rng(seed)
+    v = rng.standard_normal((2, samples))
+    y = simulate(*PLANT, v, rng.standard_normal(3)) + level
+    return Experiment(v, y + noise[:, None] * rng.standard_normal(y.shape))
+
+
+def near():
+    return in_sections(PLANT[0] * 0.9, PLANT[1], PLANT[2], PLANT[3])
+
+
+def test_exact_data_give_the_plant_back_whatever_level_and_state_they_start_from():
+    data = [experiment(k, 200, 0 * NOISE, level=k) for k in (0, 5)]
+    found = fit_sections(data, near(), direct=False).model
+    # the squares of what is left end at rounding, 1e-12 of the output
+    assert_allclose(markov(*found.matrices(), 40), markov(*PLANT, 40), rtol=0, atol=1e-8)
+
+
+def test_errors_are_those_that_the_cramer_rao_bound_allows():
+    # 24 records: the mean of chi-square over degrees of freedom is 1 within 3 x 0.08
+    truth = in_sections(*PLANT)
+    ratios = []
+    for seed in range(24):
+        data = experiment(seed, 300)
+        found = fit_sections([data], near(), direct=False)
+        own = motion(truth, data.v)
+        wrong = motion(found.model, data.v).output(found.model, data.v) - own.output(truth, data.v)
+        linear = own.starts(truth)
+        levels = np.broadcast_to(np.eye(2)[:, :, None], (2, 2, 300))
+        base = np.concatenate([linear, levels], axis=1) / NOISE[:, None, None]
+        base = base.transpose(0, 2, 1).reshape(600, -1)
+        error = (wrong / NOISE[:, None]).ravel()
+        error -= base @ np.linalg.lstsq(base, error, rcond=None)[0]
+        ratios.append(error @ error / (3 * 4))  # n (p + m) parameters of the response
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.24)
+
+
+def test_samples_that_are_missing_are_left_out():
+    data = experiment(0)
+    y = data.y.copy()
+    y[0, 50:90], y[1, 7] = np.nan, np.nan
+    spoiled = data.y.copy()
+    spoiled[0, 50:90] = 1e3
+    gaps = fit_sections([Experiment(data.v, y)], near(), direct=False)
+    assert gaps.counts.tolist() == [460.0, 499.0]
+    assert_allclose(markov(*gaps.model.matrices(), 30), markov(*PLANT, 30), atol=0.2)
+    wrong = fit_sections([Experiment(data.v, spoiled)], near(), direct=False)
+    assert np.abs(markov(*wrong.model.matrices(), 30) - markov(*PLANT, 30)).max() > 0.2

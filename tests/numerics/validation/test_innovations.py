@@ -1,0 +1,239 @@
+"""Feedback, nonlinearity, change and repetition, seen in what a model leaves over."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize.numerics.validation.held_output import held_share, longest_hold, samples_at_limit
+from ctrl_realize.numerics.validation.innovations import feedback_chance, nonlinear_chance
+from ctrl_realize.numerics.validation.parameter_change import parameter_change
+from ctrl_realize.numerics.validation.white_step import white_step
+
+N = 600
+SURE = 1e-6
+
+
+def levels(rng):
+    return np.repeat(rng.choice([-1.0, 0.0, 1.0], N // 12), 12)
+
+
+def first_order(drive, delay=5):
+    late = np.concatenate([np.zeros(delay), drive[:-delay]])
+    return lfilter([0.0, 0.1], [1, -0.9], late)
+
+
+def loop(rng, gain, integral, disturbance):
+    """First-order plant with a delay of five samples under a PI controller."""
+    target = np.repeat(rng.choice([-1.0, 0.0, 1.0], N // 60), 60)
+    u, y, state, total = np.zeros(N), np.zeros(N), 0.0, 0.0
+    for k in range(N):
+        y[k] = state + disturbance[k]
+        total += integral * (target[k] - y[k])
+        u[k] = gain * (target[k] - y[k]) + total
+        state = 0.9 * state + 0.1 * (u[k - 5] if k >= 5 else 0.0)
+    return u, y
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_no_feedback_is_found_in_open_loop(seed, pole):
+    rng = np.random.default_rng(seed)
+    u = levels(rng)
+    noise = 0.05 * lfilter([1.0], [1, -pole], rng.standard_normal(N))
+    assert feedback_chance(first_order(u) + noise, u, 20) > 1e-3
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("gain", "integral"), [(1.0, 0.0), (0.5, 0.03)])
+def test_a_controller_is_found_by_the_noise_that_it_passes_on(seed, gain, integral):
+    rng = np.random.default_rng(seed)
+    noise = 0.05 * lfilter([1.0], [1, -0.9], rng.standard_normal(N))
+    u, y = loop(rng, gain, integral, noise)
+    assert feedback_chance(y, u, 20) < SURE
+
+
+def test_set_points_that_move_the_input_more_than_noise_hide_no_feedback():
+    rng = np.random.default_rng(0)
+    u, y = loop(rng, 2.0, 0.0, 0.02 * rng.standard_normal(N))
+    assert feedback_chance(y, u, 20) < SURE
+
+
+def test_an_input_that_its_own_past_tells_says_nothing_of_feedback():
+    rng = np.random.default_rng(0)
+    u = np.sin(0.1 * np.arange(N))
+    y = first_order(u) + 0.05 * rng.standard_normal(N)
+    assert feedback_chance(y, u, 20) == 1.0
+
+
+def test_units_change_no_chance():
+    rng = np.random.default_rng(3)
+    u, y = loop(rng, 0.3, 0.01, 0.05 * rng.standard_normal(N))
+    one = feedback_chance(y, u, 20)
+    assert feedback_chance(1e3 * y + 7, 1e-3 * u - 2, 20) == pytest.approx(one, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_linear_plant_is_not_called_nonlinear(seed):
+    rng = np.random.default_rng(seed)
+    u = levels(rng)
+    y = first_order(u) + 0.02 * rng.standard_normal(N)
+    assert nonlinear_chance(y, u, 40)[0] > 1e-3
+
+
+@pytest.mark.parametrize("bent", [lambda u: u + 0.4 * u**2, lambda u: np.sign(u) * u**2 + 0.3 * u])
+def test_a_static_nonlinearity_is_found(bent):
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, -0.5, 0.0, 0.5, 1.0], N // 12), 12)
+    y = first_order(bent(u)) + 0.01 * rng.standard_normal(N)
+    chance, part = nonlinear_chance(y, u, 40)
+    assert chance < 1e-5
+    assert 0.05 < part < 1
+
+
+def test_records_too_short_for_the_regression_say_nothing():
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(80)
+    assert feedback_chance(u, u, 20) == 1.0
+    assert nonlinear_chance(u, u, 20) == (1.0, 0.0)
+
+
+TIME = np.arange(300)
+RISE = np.where(TIME > 100, -np.expm1(-(TIME - 100) / 40), 0.0)
+
+
+@pytest.mark.parametrize("period", [2, 5, 12])
+def test_an_output_held_for_a_period_repeats_all_samples_but_one(period):
+    held = RISE[TIME - TIME % period]
+    assert held_share(held, RISE) == pytest.approx((period - 1) / period, abs=0.05)
+    assert longest_hold(held, RISE) == period - 1
+
+
+def test_rest_is_no_holding():
+    assert held_share(RISE, RISE) == 0
+    assert held_share(np.zeros(300), np.zeros(300)) == 0
+
+
+def test_an_output_that_is_cut_off_stands_without_noise():
+    noisy = RISE + 0.01 * np.random.default_rng(0).standard_normal(300)
+    assert samples_at_limit(noisy) == 0
+    cut = np.minimum(noisy, 0.6)
+    assert samples_at_limit(cut) == np.count_nonzero(cut == 0.6) - _strays(cut)
+    assert samples_at_limit(np.minimum(RISE, 0.6)) == 0  # nothing in it has noise
+
+
+def _strays(cut):
+    """Samples at the limit before it is reached for good: short runs do not count."""
+    below = np.flatnonzero(cut < 0.6)
+    return int(np.count_nonzero(cut[: below[-1]] == 0.6))
+
+
+SAMPLES = 900
+THIRDS = 3 * np.arange(SAMPLES) // SAMPLES
+
+
+def response(rng):
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0], SAMPLES // 15), 15)
+    return lfilter([0.0, 0.15], [1, -0.85], u)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_parts_of_one_plant_do_not_differ(seed, pole):
+    rng = np.random.default_rng(seed)
+    noise = 0.03 * lfilter([1.0], [1, -pole], rng.standard_normal(SAMPLES))
+    assert parameter_change(noise, response(rng), THIRDS).chance > 1e-3
+
+
+def test_a_gain_that_falls_is_measured_part_by_part():
+    rng = np.random.default_rng(0)
+    model = response(rng)
+    truth = np.array([0.2, 0.0, -0.2])
+    residual = truth[THIRDS] * model + 0.01 * rng.standard_normal(SAMPLES)
+    found = parameter_change(residual, model, THIRDS)
+    assert found.chance < 1e-6
+    assert np.all(np.abs(found.gains - truth) < 4 * found.gain_errors + 0.02)
+
+
+def test_a_delay_that_depends_on_the_direction_is_measured():
+    rng = np.random.default_rng(0)
+    model = response(rng)
+    rising = (np.gradient(model) > 0).astype(int)
+    late = np.array([0.5, -0.5])  # samples; small, the regression being one on the derivative
+    residual = -late[rising] * np.gradient(model) + 0.002 * rng.standard_normal(SAMPLES)
+    found = parameter_change(residual, model, rising)
+    assert found.chance < 1e-6
+    assert found.shifts == pytest.approx(late, abs=0.1)
+
+
+def test_one_group_or_no_motion_is_no_comparison():
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal(SAMPLES)
+    assert parameter_change(noise, response(rng), np.zeros(SAMPLES, dtype=int)) is None
+    assert parameter_change(np.zeros(SAMPLES), response(rng), THIRDS) is None
+
+
+DT = 0.05
+LENGTH = 800
+TRUE = np.poly([-1.2, -4.0])  # 3 (1 + 0.3 s) behind two lags and 0.32 s
+NUMERATOR = 3 * TRUE[-1] * np.array([1.0, 0.3])
+DELAY = 0.32
+TOTAL = DELAY + 1 / 1.2 + 1 / 4.0 - 0.3
+
+
+def record(seed, size, pole):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0], LENGTH // 20), 20)
+    plant = cr.delayed_ss(ct.tf(NUMERATOR[::-1], TRUE), dead_time=DELAY, dt=DT)
+    noise = lfilter([np.sqrt(1 - pole**2)], [1, -pole], rng.standard_normal(LENGTH + 300))[300:]
+    return u, np.ravel(plant.simulate(u)) + size * noise
+
+
+def step(u, y, *, late=0.0, slow=1.0, gain=1.0):
+    poles = np.array([-1.2 / slow, -4.0], dtype=complex)
+    b = gain * NUMERATOR / slow
+    return white_step(y, u, DT, DELAY + late, poles, b)
+
+
+def test_a_step_from_a_neighbouring_model_leads_to_the_plant():
+    u, y = record(0, 0.05, 0.0)
+    found = step(u, y, late=0.005, slow=1.01, gain=0.98)
+    assert abs(found.delay - DELAY) < 3 * found.delay_error < 0.01
+    assert abs(found.gain - 3.0) < 3 * found.gain_error < 0.1
+    assert abs(found.total - TOTAL) < 3 * found.total_error < 0.1
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.95])
+def test_errors_are_those_that_come(pole):
+    scores = []
+    for seed in range(24):
+        found = step(*record(seed, 0.2, pole))
+        scores.append(
+            [
+                (found.delay - DELAY) / found.delay_error,
+                (found.gain - 3.0) / found.gain_error,
+                (found.total - TOTAL) / found.total_error,
+            ]
+        )
+    spread = np.sqrt(np.mean(np.square(scores), axis=0))
+    # 24 records: chi-square leaves 0.72 to 1.28; the colour is estimated along.
+    assert np.all((spread > 0.6) & (spread < 1.5))
+
+
+def test_units_are_carried_through():
+    u, y = record(3, 0.1, 0.9)
+    one = step(u, y)
+    other = white_step(
+        10 * y, u / 2, DT, DELAY, np.array([-1.2, -4.0], dtype=complex), 20 * NUMERATOR
+    )
+    assert other.gain == pytest.approx(20 * one.gain, rel=1e-6)
+    assert other.delay_error == pytest.approx(one.delay_error, rel=1e-6)
+    assert other.total_error == pytest.approx(one.total_error, rel=1e-6)
+
+
+def test_too_few_data_give_no_step():
+    u, y = record(0, 0.1, 0.0)
+    assert step(u[:45], y[:45]) is None
