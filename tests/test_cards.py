@@ -115,4 +115,4 @@ def test_no_card_shows_nan_or_inf(case):
 
 def test_the_verdict_on_one_record_knows_no_scatter():
     facts = dict(campaign_verdict(single()).facts)
-    assert facts["scatter (std)"] == "unknown: one record has none"
+    assert facts["scatter (std)"] == "unknown: a single record has no scatter"

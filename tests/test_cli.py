@@ -270,7 +270,7 @@ def test_an_interruption_is_told_and_leaves_nothing(folder, tmp_path, capsys, mo
     monkeypatch.setattr("ctrl_realize.cli.identify_command.identify_record", interrupted)
     assert main(["identify", str(folder / "step_0.csv"), "-o", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err == (
-        "ctrl-realize: interrupted; what was not finished is not written\n"
+        "ctrl-realize: interrupted; unfinished results were not written\n"
     )
     assert list(tmp_path.iterdir()) == []
 
@@ -302,7 +302,7 @@ def test_the_demo_does_the_paper_from_end_to_end(tmp_path, capsys):
     content = json.loads((out / "model.json").read_text(encoding="utf-8"))
     assert content["provenance"]["settings"]["simulated"] is True
     said = capsys.readouterr().out
-    assert "simulated; nothing here is measured" in said
+    assert "simulated; none are measured" in said
     assert "simulated data" in (out / "report.html").read_text(encoding="utf-8")
     record = cr.read_record(out / "record_simulated.csv")
     assert record.n_samples == 6400

@@ -244,7 +244,7 @@ def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(csv_
     said, complained = process.communicate(timeout=60)
     assert (process.returncode, said) == (143, "")
     assert complained.splitlines()[-1] == (
-        "ctrl-realize: terminated; what was not finished is not written"
+        "ctrl-realize: terminated; unfinished results were not written"
     )
     assert {path.name for path in out.iterdir()} == {"rows"}
     assert all(path.name.startswith("row-") for path in (out / "rows").iterdir())

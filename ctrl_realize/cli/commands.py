@@ -43,7 +43,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def _common(
     version: bool = typer.Option(
-        False, "--version", callback=_version, is_eager=True, help="Say the version and stop."
+        False, "--version", callback=_version, is_eager=True, help="Show the version and exit."
     ),
 ) -> None:
     """Models with dead time from measured responses, as python-control state-space systems."""
@@ -75,18 +75,18 @@ def run(words: Sequence[str]) -> int:
             complain(one_line(error))
             return 2
         except MemoryError as error:
-            complain(f"the memory is exhausted: {one_line(error) or 'no more is given'}")
+            complain(f"out of memory: {one_line(error) or 'no details'}")
             return 2
         except Exception as error:
             # Typer's errors of usage: which package they come from depends on its version.
             if not hasattr(error, "format_message"):
                 complain("".join(traceback.format_exception(error)))
-                complain("this is a defect of the program; please report it with the lines above")
+                complain("this is a bug in the program; please report it with the lines above")
                 return DEFECT
             complain(one_line(error.format_message()) + " (see --help)")
             return 2
     if code == INTERRUPTED:  # typer tells of it by an exception or by the code
         code = ending.code or INTERRUPTED
         how = "interrupted" if code == INTERRUPTED else "terminated"
-        complain(f"{how}; what was not finished is not written")
+        complain(f"{how}; unfinished results were not written")
     return code if isinstance(code, int) else 0

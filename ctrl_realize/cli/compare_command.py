@@ -30,25 +30,30 @@ class Hold(str, Enum):  # noqa: UP042  # typer shows the values of a plain str E
 
 
 def compare(
-    model: Annotated[Path, typer.Argument(help="Model, as identify writes it: model.json.")],
+    model: Annotated[Path, typer.Argument(help="Model file written by identify: model.json.")],
     frf: Annotated[Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")],
     output: Annotated[
-        Path | None, _OPTION("--output", "-o", help="Folder for table, report and figures.")
+        Path | None, _OPTION("--output", "-o", help="Output folder for table, report and figures.")
     ] = None,
     min_coherence: Annotated[
-        float | None, _OPTION(help="Coherence from which a point is trusted. Default: 0.95.")
+        float | None, _OPTION(help="Smallest coherence of a trusted point. Default: 0.95.")
     ] = None,
     band: Annotated[
         tuple[float, float] | None, _OPTION(metavar="LOW HIGH", help="Compare in this band, in Hz.")
     ] = None,
     hold: Annotated[
-        Hold, _OPTION(help="zoh takes the hold out of the model; auto does where it is in.")
+        Hold,
+        _OPTION(
+            help=(
+                "zoh divides the zero-order hold out of the model; auto does so for sampled models."
+            )
+        ),
     ] = Hold.auto,
     frequency_unit: Annotated[str | None, _OPTION(help="Hz, kHz, MHz or rad/s.")] = None,
     magnitude_unit: Annotated[str | None, _OPTION(help="abs or dB.")] = None,
     phase_unit: Annotated[str | None, _OPTION(help="deg or rad.")] = None,
     overwrite: Annotated[
-        bool, _OPTION("--overwrite", help="Replace the results of another run in the folder.")
+        bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
     ] = False,
 ) -> int:
     """Compare a model with a measured frequency response.

@@ -19,11 +19,11 @@ _OPTION = typer.Option
 
 
 def demo(
-    output: Annotated[Path, _OPTION("--output", "-o", help="Folder for the results.")],
-    seed: Annotated[int, _OPTION(min=0, help="Seed of everything random.")] = 1,
-    jobs: Annotated[int, _OPTION(help="Processes; -1: all cores.")] = 1,
+    output: Annotated[Path, _OPTION("--output", "-o", help="Output folder.")],
+    seed: Annotated[int, _OPTION(min=0, help="Seed of the random numbers.")] = 1,
+    jobs: Annotated[int, _OPTION(help="Number of processes; -1: all cores.")] = 1,
     overwrite: Annotated[
-        bool, _OPTION("--overwrite", help="Replace the results of another run in the folder.")
+        bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
     ] = False,
 ) -> int:
     """Do the paper from end to end, on simulated data.
@@ -42,7 +42,7 @@ def demo(
     with appearing(output, run) as folder:
         result = run_demo(seed, jobs)
         names = write_demo_files(folder, result)
-    say("All data are simulated; nothing here is measured.\n")
+    say("All data are simulated; none are measured.\n")
     say("Table 1, delays in samples: simulated valve | as printed in the paper")
     say(table_1(result))
     say()

@@ -75,30 +75,31 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
         Sketch(
             "fit",
             "All forty records, one model",
-            "Mean of the records and the output-error fit; below, where the dead time can be.",
+            "Mean of the records and the output-error fit. Below: the dead times that the "
+            "data allow.",
             lambda figure: plots.fit_plot(result.fitted, ax=figure),
             (6.2, 3.6 + evidence_height(result.fitted.fit)),
         ),
         Sketch(
             "fig8_final_model",
             "Fig. 8: stepped sine and models",
-            "The paper's model carries the lag of its causal filter; the fit of the raw records "
-            "does not.",
+            "The model of the paper contains the lag of its causal filter; the fit of the "
+            "raw records does not.",
             lambda figure: plots.frf_plot(final, ax=figure),
             (6.2, 5.6),
         ),
         Sketch(
             "fig8_error",
             "Error of the fitted model",
-            "Against the stepped sine; shaded is the band of good coherence.",
+            "Against the stepped sine; the band of good coherence is shaded.",
             lambda figure: plots.comparison_plot(result.comparisons["fitted"], ax=figure),
             (6.2, 4.6),
         ),
         Sketch(
             "table1_delays",
             "Table 1 as a picture",
-            "The paper's method on every record. Its bias is common to all: averaging estimates "
-            "does not remove it.",
+            "The paper's method on every record. Its bias is the same for all records: "
+            "averaging does not remove it.",
             lambda figure: plots.campaign_plot(
                 result.campaign, truth=result.valve.truth.delay, trim=3, ax=figure
             ),
@@ -128,7 +129,7 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
         Sketch(
             "fig5_singular_values",
             "Fig. 5: first 30 singular values of the Hankel matrix",
-            "With the level of nothing but noise, from the rest before the step.",
+            "With the level of pure noise, from the baseline before the step.",
             lambda figure: plots.singular_value_plot(
                 scan, count=paper.SETTINGS.singular_values_shown, ax=figure
             ),
@@ -142,7 +143,7 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
         Sketch(
             "fig7_impulse",
             "Fig. 7: impulse response and realization",
-            "Differentiated and filtered data, and the model behind the best delay.",
+            "Differentiated and filtered data, and the model at the best delay.",
             lambda figure: plots.impulse_plot(scan.impulse, row, ax=figure),
         ),
     ]
@@ -182,11 +183,13 @@ def demo_page(result: DemoResult, sketches: list[Sketch]) -> Page:
 def _outcome(result: DemoResult) -> Table:
     columns = tuple(Column(name, "number" if name else "text") for name in OUTCOME)
     return Table(
-        "What came out",
+        "Results",
         tuple(Row(row) for row in outcome_rows(result)),
         columns,
-        note="Printed: measured on the real valve, whose dynamics are not known in full. "
-        "All else: simulated.",
+        note=(
+            "Paper: measured on the real valve, whose dynamics are not fully known. "
+            "Everything else is simulated."
+        ),
     )
 
 
@@ -196,7 +199,9 @@ def _table_1(result: DemoResult) -> Table:
         "Table 1: delays in samples",
         tuple(Row(tuple(row)) for row in table_1_rows(result)),
         columns,
-        note="Left: the paper's method on the simulated valve. Right: as the paper prints it.",
+        note=(
+            "Left: the method of the paper on the simulated valve. Right: as printed in the paper."
+        ),
     )
 
 
@@ -212,7 +217,7 @@ def _settings() -> list[tuple[str, str]]:
         ("samples", str(chosen.samples)),
         ("delays", f"0 to {chosen.max_delay} samples"),
         ("sample time", f"{chosen.sample_time:.6g} s"),
-        ("left out at each end of Table 1", str(chosen.trim)),
+        ("removed at each end in Table 1", str(chosen.trim)),
     ]
 
 

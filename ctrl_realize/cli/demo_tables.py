@@ -9,7 +9,7 @@ from ..numerics.arrays import FloatArray
 from .demo_run import DemoResult
 from .terminal import table
 
-OUTCOME = ("", "printed", "paper's way", "all records together", "truth (simulated)")
+OUTCOME = ("", "printed", "paper's method", "all records together", "truth (simulated)")
 
 
 def simulated_table(result: DemoResult) -> FloatArray:
@@ -64,7 +64,7 @@ def outcome_rows(result: DemoResult) -> list[tuple[str, ...]]:
             f"{low:.2f} to {high:.2f}",
             "",
         ),
-        ("less the filter's delay", "", f"{mine.mean - lag:.2f}", "", ""),
+        ("without the filter's delay", "", f"{mine.mean - lag:.2f}", "", ""),
         (
             "total delay [ms]",
             "",

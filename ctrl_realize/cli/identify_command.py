@@ -36,21 +36,21 @@ class Method(str, Enum):  # noqa: UP042  # typer shows the values of a plain str
 
 def identify(
     files: Annotated[list[Path], typer.Argument(help="Records: CSV, TSV, .mat, .npz, Parquet.")],
-    output: Annotated[Path, _OPTION("--output", "-o", help="Folder for the results.")],
+    output: Annotated[Path, _OPTION("--output", "-o", help="Output folder.")],
     method: Annotated[
-        Method, _OPTION(help="output_error fits the raw record; scan and paper realize.")
+        Method, _OPTION(help="output_error fits the raw record; scan and paper use realization.")
     ] = Method.output_error,
     order: Annotated[
-        int | None, _OPTION(min=1, help="Order without the delay. Default: from the data.")
+        int | None, _OPTION(min=1, help="Model order without the delay. Default: estimated.")
     ] = None,
     max_delay: Annotated[
         int | None, _OPTION(min=1, help="Largest delay to consider, in samples.")
     ] = None,
     frf: Annotated[
-        Path | None, _OPTION(help="Measured frequency response to hold the model against.")
+        Path | None, _OPTION(help="Measured frequency response to compare the model with.")
     ] = None,
     separate: Annotated[
-        bool, _OPTION("--separate", help="Records of different plants: a folder for each.")
+        bool, _OPTION("--separate", help="Treat the records as different plants: one folder each.")
     ] = False,
     time: Annotated[str | None, _OPTION(help="Time column, name or number from 0.")] = None,
     input_column: Annotated[
@@ -64,18 +64,21 @@ def identify(
     ] = None,
     time_unit: Annotated[str | None, _OPTION(help="s, ms, us, ns, min, h or day.")] = None,
     delimiter: Annotated[
-        str | None, _OPTION(help="Between columns: ',' ';' tab. Default: found out.")
+        str | None, _OPTION(help="Column separator: ',' ';' tab. Default: detected.")
     ] = None,
-    decimal: Annotated[str | None, _OPTION(help="'.' or ','. Default: found out.")] = None,
-    skip_rows: Annotated[int, _OPTION(min=0, help="Lines to leave out at the start.")] = 0,
+    decimal: Annotated[str | None, _OPTION(help="'.' or ','. Default: detected.")] = None,
+    skip_rows: Annotated[int, _OPTION(min=0, help="Lines to skip at the start.")] = 0,
     resample: Annotated[
-        bool, _OPTION("--resample", help="Put samples that jitter onto a uniform time axis.")
+        bool, _OPTION("--resample", help="Resample jittering samples onto a uniform time axis.")
     ] = False,
     jobs: Annotated[
-        int | None, _OPTION(help="Processes; -1: all cores. Default: all from 12 records on.")
+        int | None,
+        _OPTION(
+            help="Number of processes; -1: all cores. Default: all cores for 12 records or more."
+        ),
     ] = None,
     overwrite: Annotated[
-        bool, _OPTION("--overwrite", help="Replace the results of another run in the folder.")
+        bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
     ] = False,
 ) -> int:
     """Identify a model with dead time from one record, or from many of one plant.
@@ -195,7 +198,7 @@ def _refuse_useless(campaign: Campaign) -> None:
     try:
         _ = campaign.dt
     except DataError as error:
-        raise DataError(f"{error}; --separate identifies each by itself") from error
+        raise DataError(f"{error}; --separate identifies each record on its own") from error
 
 
 def _each_alone(
@@ -242,5 +245,5 @@ def unique_names(names: list[str]) -> list[str]:
         seen[name] = seen.get(name, 0) + 1
         out.append(name if seen[name] == 1 else f"{name}_{seen[name]}")
     if len(set(out)) != len(out):
-        raise OptionError(f"the files have names that cannot be told apart: {', '.join(names)}")
+        raise OptionError(f"the files have the same name: {', '.join(names)}")
     return out

@@ -93,8 +93,8 @@ def kept_rows(output: Path) -> Iterator[CampaignStore]:
         store.forget_attempts()
         if len(store):
             complain(
-                f"{len(store)} finished records are kept in {printable(str(store.folder))}; the "
-                "same command goes on from them"
+                f"{len(store)} finished records are kept in {printable(str(store.folder))}; "
+                "run the same command again to continue"
             )
         else:
             _remove_rows(store, made)

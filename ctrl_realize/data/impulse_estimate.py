@@ -86,7 +86,7 @@ class ImpulseEstimate(ImpulseResponse, Result):
             ("length", f"{self.n_samples} samples of {in_time(self.dt, 6)}, {self.rows} equations"),
             ("sum (gain)", ", ".join(f"{g:.4g}" for g in gains.ravel())),
             ("largest std", f"{self.std.max():.3g}"),
-            ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
+            ("residual std", ", ".join(f"{s:.3g}" for s in self.noise_std)),
         ]
 
     def __repr__(self) -> str:

@@ -73,7 +73,9 @@ class DelayedCards(CoreAndDelays):
         ]
         if self._core.issiso():
             gain = float(np.real(self._core.dcgain()))
-            rows.append(("DC gain", f"{gain:.6g}" if np.isfinite(gain) else "none: it integrates"))
+            rows.append(
+                ("DC gain", f"{gain:.6g}" if np.isfinite(gain) else "none: the model integrates")
+            )
         if self.fit is not None:
             rows.append(("fit", self._fit_line().strip("<>")))
         return html_card(f"DelayedStateSpace{name}", rows)

@@ -92,8 +92,9 @@ def delayed_ss(
         _check_span(system, wait or 0.0, step)
         if delay is None and split_dead_time(wait or 0.0, step)[1] and np.any(system.D):
             raise UnsuitableSystemError(
-                "the core has a direct term D, whose response jumps between two samples when the "
-                f"dead time is {(wait or 0.0) / step:.6g} samples; use a whole number of samples"
+                "the core has a feedthrough D, whose response jumps between two samples when "
+                f"the dead time is {(wait or 0.0) / step:.6g} samples; use a whole number of "
+                "samples"
             )
         *sampled, samples = sample_with_dead_time(
             system.A, system.B, system.C, system.D, step, wait or 0.0

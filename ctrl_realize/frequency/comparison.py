@@ -131,9 +131,9 @@ class FRFComparison(Result):
         inside = self.trusted
         worst = int(np.argmax(np.where(inside, self.relative_error, -1.0)))
         source = {
-            "coherence": "where the coherence is good",
-            "std": "where the standard deviation is small",
-            "all": "all points: no coherence, no std",
+            "coherence": "high coherence",
+            "std": "small standard deviation",
+            "all": "all points: no coherence or std given",
         }[self.band_from]
         rows = [
             ("trusted band", f"{hertz(self.band_hz[0])} to {hertz(self.band_hz[1])} ({source})"),
@@ -153,7 +153,7 @@ class FRFComparison(Result):
                 "hold",
                 "zero-order hold divided out of the model (half a sample of lag)"
                 if self.hold
-                else "none divided out",
+                else "not divided out",
             )
         )
         return rows

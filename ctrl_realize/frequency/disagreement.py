@@ -23,14 +23,16 @@ def disagreement(comparison: FRFComparison) -> Flag | None:
     beyond = float(np.sqrt(max(error**2 - noise**2, 0.0)))
     if beyond < CLOSE:
         return None
-    said = f"{100 * error:.3g} % (rms) off the measured frequency response, {_worst(comparison)}"
+    said = (
+        f"{100 * error:.3g} % (rms) away from the measured frequency response, {_worst(comparison)}"
+    )
     if beyond < FAR:
         return Flag("frf_differs", f"the model is {said}")
     return Flag(
         "frf_disagrees",
-        f"the measured frequency response contradicts the model, which is {said}: another "
-        "operating point or direction, a nonlinear plant, or a model that is wrong. Compare both "
-        "where the controller works before one is designed",
+        f"the measured frequency response contradicts the model, which is {said}: the "
+        "operating point or the direction differs, the plant is nonlinear, or the model is "
+        "wrong. Compare both at the intended operating point before designing a controller",
     )
 
 
@@ -43,12 +45,12 @@ def _worst(comparison: FRFComparison) -> str:
     limit = FAR if np.sqrt(np.mean(error**2)) >= FAR else CLOSE
     off = running_median(error, _SMOOTHED_POINTS) > limit
     if not off.any():
-        return f"most of all {at}"
+        return f"largest error {at}"
     band = hz[widest_run(off, hz)]
     decibels, degrees = (
         values[inside][worst] for values in (comparison.gain_error_db, comparison.phase_error_deg)
     )
     return (
-        f"by more than {100 * limit:.0f} % from {hertz(band[0])} to {hertz(band[-1])}, most of "
-        f"all {at} ({decibels:+.1f} dB, {degrees:+.0f} deg)"
+        f"by more than {100 * limit:.0f} % from {hertz(band[0])} to {hertz(band[-1])}, "
+        f"largest error {at} ({decibels:+.1f} dB, {degrees:+.0f} deg)"
     )

@@ -166,7 +166,7 @@ class FRFFit(Result):
         ]
         hold = []
         if self.hold_time is not None:
-            hold.append(("hold", f"that of samples every {in_time(self.hold_time)}, divided out"))
+            hold.append(("hold", f"zero-order hold of {in_time(self.hold_time)}, divided out"))
         return [
             ("dead time", f"{time_within(self.dead_time, *self.interval)}, {self._std_in_words()}"),
             ("95 % interval", interval_in_time(*self.interval)),
@@ -193,7 +193,7 @@ class FRFFit(Result):
         # At a bound, or with a superfluous zero, the curvature says nothing; the interval does.
         if self.std_given_structure > 2 * (high - low):
             return "its standard deviation is not determined"
-        return f"std {in_time(self.std_given_structure, 2)} in this structure"
+        return f"std {in_time(self.std_given_structure, 2)} given this structure"
 
     def __repr__(self) -> str:
         low, high = self.interval

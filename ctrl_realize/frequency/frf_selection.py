@@ -87,8 +87,8 @@ def chosen_model(
         flags.append(
             Flag(
                 "misfit",
-                f"the residual is {misfit:.2g} times the measured noise: the plant is not exactly "
-                f"of order {n}, or not linear; the interval is widened by that",
+                f"the residual is {misfit:.2g} times the measured noise: the plant is not "
+                f"exactly of order {n}, or is nonlinear; the interval is widened accordingly",
             )
         )
     flags.extend(_leading_phase(data, fits, chosen, unit))
@@ -152,8 +152,9 @@ def _whole_samples(dead_time: float, dt: float) -> tuple[float, list[Flag]]:
     return used, [
         Flag(
             "dead_time_rounded",
-            "a model with direct term takes whole samples: its dead time is "
-            f"{1e3 * used:.5g} ms, not {1e3 * dead_time:.5g} ms; a shorter dt rounds less",
+            "a model with feedthrough needs a whole number of samples: its dead time is "
+            f"{1e3 * used:.5g} ms, not {1e3 * dead_time:.5g} ms; a shorter dt reduces the "
+            "rounding",
         )
     ]
 
@@ -180,10 +181,11 @@ def _leading_phase(
     return [
         Flag(
             "phase_leads",
-            f"the response comes before its input: at order {n} a dead time of "
-            f"{1e3 * dead_time / unit:.3g} ms, which no plant has, leaves "
-            f"{100 * np.sqrt(earlier.cost / min(as_is)):.2g} % of the misfit; the FRF's time axis "
-            "starts late, perhaps because a delay was taken out: put it back before the fit",
+            f"the response is non-causal: at order {n} a negative dead time of "
+            f"{1e3 * dead_time / unit:.3g} ms leaves "
+            f"{100 * np.sqrt(earlier.cost / min(as_is)):.2g} % of the misfit; the FRF's time "
+            "axis starts late, perhaps because a delay was taken out: put it back before the "
+            "fit",
         )
     ]
 
@@ -238,9 +240,9 @@ def _cover(
         flags.append(
             Flag(
                 "structures_disagree",
-                "structures that fit as well split the phase otherwise between dead time and "
-                f"lags: the interval is {1e3 * (high - low):.3g} ms wide, within the chosen "
-                f"structure {1e3 * (interval[1] - interval[0]):.3g} ms",
+                "structures that fit equally well split the phase differently between dead "
+                f"time and lags: the interval is {1e3 * (high - low):.3g} ms wide, within the "
+                f"chosen structure {1e3 * (interval[1] - interval[0]):.3g} ms",
             )
         )
     return (low, high), flags

@@ -180,8 +180,8 @@ def _flags(
         flags.append(
             Flag(
                 "unexplained",
-                f"{100 * unexplained:.2g} % of the response's power is not explained: it is noise, "
-                "or the response lasts longer than the length asked for",
+                f"{100 * unexplained:.2g} % of the power of the response is not explained: "
+                "noise, or the response is longer than the given length",
             )
         )
     f = points.frequency_hz
@@ -192,8 +192,8 @@ def _flags(
             Flag(
                 "ends_early",
                 f"at {f[-1]:.4g} Hz, the highest frequency, the response is still "
-                f"{100 * last:.2g} % of its largest; up to {0.5 / dt:.4g} Hz the prior speaks: "
-                "take a longer dt, or fit_frf",
+                f"{100 * last:.2g} % of its largest value; above it, up to {0.5 / dt:.4g} Hz, "
+                "only the prior determines the estimate: use a longer dt, or fit_frf",
             )
         )
     duration = markov.size * dt
@@ -201,8 +201,8 @@ def _flags(
         flags.append(
             Flag(
                 "starts_late",
-                f"the lowest frequency of {f[0]:.4g} Hz has {f[0] * duration:.2g} periods in the "
-                f"{duration:.4g} s asked for: gain and slow modes are extrapolated",
+                f"the lowest frequency of {f[0]:.4g} Hz has {f[0] * duration:.2g} periods in "
+                f"the requested {duration:.4g} s: gain and slow modes are extrapolated",
             )
         )
     tail = markov[-max(2, markov.size // 10) :]
@@ -212,7 +212,7 @@ def _flags(
             Flag(
                 "cut_off",
                 f"the last tenth still reaches {100 * left:.2g} % of the largest value: the "
-                "response has not died away; ask for a larger length",
+                "response has not decayed; use a larger length",
             )
         )
     return tuple(flags)

@@ -29,7 +29,7 @@ def lively_parts(
     flag = Flag(
         "cut",
         f"{share} samples were fitted, from sample {starts[longest]} on, of a record of "
-        f"{lengths[longest]}; give the best part with `between`",
+        f"{lengths[longest]}; select the best part with `between`",
     )
     return parts, (flag,)
 

@@ -195,16 +195,18 @@ def _scan(
 ) -> DelayedStateSpace:
     impulse = impulse_from_step(step, cutoff_hz=cutoff_hz)
     choices = [
-        "backward difference: the model reproduces the sampled step response behind the hold"
+        "backward difference: step-invariant, the model reproduces the sampled step response "
+        "of plant and zero-order hold"
     ]
     if impulse.filter is None:
-        choices.append("no filter: the record is coarse for its rise, or none was asked for")
+        choices.append("no filter: the rise takes few samples, or none was requested")
     else:
         choices.append(f"filter: {impulse.filter} (13 times the bandwidth where automatic)")
     reach = _half_risen(step) if max_delay is None else max_delay
     if max_delay is None:
         choices.append(
-            f"delays up to {reach} samples tried: by then the step response has risen by half"
+            f"delays up to {reach} samples were tried: by then the step response has reached "
+            "half of its final value"
         )
     if order is None:
         # A Hankel matrix of few samples holds few orders.
@@ -255,9 +257,9 @@ def _paper(
         feedthrough=True if feedthrough is None else feedthrough,
     )
     choices = [
-        "as printed: five-point central difference (half a sample early as a step), "
-        f"{impulse.filter or 'no filter'}, order {system.fit.order}, "
-        f"{behind} samples, delays 0...{reach}"
+        "as in the paper: five-point central difference (half a sample early in a step "
+        f"response), {impulse.filter or 'no filter'}, order {system.fit.order}, {behind} "
+        f"samples, delays 0...{reach}"
     ]
     return _named(system, choices, step)
 
@@ -288,4 +290,7 @@ def _against_noise(orders: Any) -> str:
     value = orders.last_singular_value(orders.order)
     if orders.noise_floor:
         return f"{value / orders.noise_floor:.1f} times that of the noise before the step"
-    return f"{value:.3g}, and none fits better by 10 % (the noise before the step is not known)"
+    return (
+        f"{value:.3g}, and no higher order fits better by 10 % (the noise before the step is "
+        "unknown)"
+    )

@@ -73,9 +73,12 @@ def with_modes_judged(
     why = "nothing else could be fitted"
     outlying = fit.repeatability is not None and fit.repeatability.outlying
     if asked:
-        why = "identify without order and structures, or fit_state_space, tries any modes and zeros"
+        why = (
+            "identify without order and structures, or fit_state_space, also tries "
+            "state-space models"
+        )
     elif outlying:
-        why = "the records are not of one plant, so that no other model was tried"
+        why = "the records do not agree on one plant, so no other model was tried"
     else:
         try:
             found = from_starts(records, most_starts=MOST_STARTS, enough=MOST_SAMPLES)
@@ -89,13 +92,14 @@ def with_modes_judged(
                 else f"a model of {found.system.fit.order} states (fit_state_space) is no better"
             )
         except (DataError, OrderError) as refused:
-            why = f"for modes and zeros, {refused}"
+            why = f"no state-space model: {refused}"
     if left is None:
         return system
     flag = Flag(
         "input_in_residual",
-        f"the residual of {sum(follows)} of {len(follows)} record(s) still follows the input: the "
-        f"plant is more than lags behind a dead time, or not linear; {why}",
+        f"the residual of {sum(follows)} of {len(follows)} record(s) is still correlated with "
+        "the input: the plant has more dynamics than this transfer function with dead time, "
+        f"or is nonlinear; {why}",
     )
     return system.replace(fit=replace(fit, flags=(*fit.flags, flag)))
 
@@ -163,17 +167,19 @@ def _chosen(
         flags.append(
             Flag(
                 "structures_disagree",
-                f"modes put the dead time in {interval_in_time(dt * own[0], dt * own[1])}, lags "
-                f"behind a dead time in {interval_in_time(*lags.interval)}",
+                "the state-space model gives a dead time of "
+                f"{interval_in_time(dt * own[0], dt * own[1])}, the transfer function with "
+                f"dead time {interval_in_time(*lags.interval)}",
             )
         )
     reasons = (
-        f"{modes.order} states with zeros (fit_state_space) instead of {lags.order} lags behind a "
-        f"dead time: the residual of the lags follows the input in {following} of "
-        f"{len(lags.records)} record(s), and on the same samples, with autoregressive noise for "
-        f"both, BIC is {gain:.0f} smaller",
-        "dead time: whole samples, behind a hold; interval: where models of this order are not "
-        "ruled out, and that of the lags unless they leave twice as much",
+        f"{modes.order} states (fit_state_space) instead of a transfer function of order "
+        f"{lags.order} with dead time: the residual of the latter is correlated with the "
+        f"input in {following} of {len(lags.records)} record(s), and on the same samples, "
+        f"with autoregressive noise for both, BIC is {gain:.0f} smaller",
+        "dead time: whole samples, sampled with a zero-order hold; interval: delays at which "
+        "a model of this order is not ruled out, joined with the interval of the transfer "
+        "function unless its residual is twice as large",
     )
     fit = replace(
         modes,

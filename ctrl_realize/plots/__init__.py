@@ -145,8 +145,8 @@ def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
             return _DRAWN_BY[kind.__name__](result, **kwargs)
     if type(result).__name__ == "FitSummary":
         raise errors.OptionError(
-            "a model file keeps the report of a fit and not its curves; identify the record "
-            "again to draw them"
+            "a model file keeps the report of a fit but not its curves; identify the record "
+            "again to plot them"
         )
     raise errors.OptionError(
         f"there is no picture of a {type(result).__name__}; there is one of "

@@ -96,7 +96,7 @@ def uncertainty_plot(
             axes, hertz, found.spread, color=style.MEASURED, label="spread of the systems"
         )
         lines += _positive_loglog(
-            axes, hertz, found.delay_part, color=style.BAND, label="unsure dead time"
+            axes, hertz, found.delay_part, color=style.BAND, label="uncertain dead time"
         )
         axes.axhline(1, color=style.INPUT, linewidth=1)
         axes.set(xlabel="frequency [Hz]", ylabel="relative error")

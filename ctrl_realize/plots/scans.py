@@ -76,7 +76,7 @@ def delay_plot(
         )  # fmt: skip
         _misfit_axes(axes)
         if result.impulse.filter is not None and result.impulse.filter.group_delay > 0:
-            inside = f", {result.impulse.filter.group_delay:.1f} of them the filter's"
+            inside = f", {result.impulse.filter.group_delay:.1f} of them from the filter"
             axes.set_xlabel(axes.get_xlabel() + inside)
         return style.finished([axes], [lines], loc="over")
 

@@ -265,8 +265,8 @@ def write_comparison(
     """
     return _write(
         path,
-        title=f"{system.name} beside {frf.name}",
-        subtitle="a model and a measured frequency response",
+        title=f"{system.name} and {frf.name}",
+        subtitle="model and measured frequency response",
         verdict=comparison_verdict(system, comparison),
         sketches=frf_sketches([system], frf, comparison),
         tables=[
@@ -311,7 +311,7 @@ def _write(
 def _kind(system: DelayedStateSpace) -> str:
     names = {
         "OutputErrorFit": "output-error fit of the raw record",
-        "StateSpaceFit": "output-error fit of all channels",
+        "StateSpaceFit": "state-space fit of all channels",
         "DelayScan": "delay scan by approximate realization",
         "Realization": "approximate realization",
     }

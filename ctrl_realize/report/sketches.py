@@ -100,7 +100,7 @@ def identification_sketches(
         sketches.append(
             Sketch(
                 "onset",
-                "The first moments after the step",
+                "Start of the response",
                 "Dead time of the model (line) and its interval (band).",
                 lambda figure: plots.onset_plot(step, system, ax=figure),
             )
@@ -110,7 +110,7 @@ def identification_sketches(
         Sketch(
             "record",
             "The record",
-            "As it was measured: output above, input below.",
+            "As measured: output above, input below.",
             lambda figure: plots.record_plot(record, ax=figure),
         )
     )
@@ -126,9 +126,9 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
         sketches.append(
             Sketch(
                 "fit",
-                "Data, model and what is left",
-                "The residual should look like noise. Below: where each structure and view puts "
-                "the dead time; the band is the interval.",
+                "Data, model and residual",
+                "The residual should look like noise. Below: the dead time of each structure "
+                "and delay estimate; the band is the interval.",
                 lambda figure: plots.fit_plot(fit, ax=figure),
                 (6.2, 3.6 + evidence_height(fit)),
             )
@@ -138,7 +138,7 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
             Sketch(
                 "step",
                 "Response to a unit step",
-                "Measured, and the model's on top.",
+                "Measured, with the response of the model on top.",
                 lambda figure: plots.step_plot(step, system, ax=figure),
             )
         )
@@ -149,14 +149,15 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
         sketches += [
             Sketch(
                 "delay",
-                "Misfit against the delay",
-                "One model for every delay; a flat valley means a delay that the data do not fix.",
+                "IAE against the delay",
+                "One model for every delay; a flat minimum means that the data do not "
+                "determine the delay.",
                 lambda figure: plots.delay_plot(fit, ax=figure),
             ),
             Sketch(
                 "impulse",
                 "Impulse response",
-                "Differentiated data, and the realization.",
+                "Differentiated data and the realization.",
                 lambda figure: plots.impulse_plot(fit.impulse, system, ax=figure),
             ),
         ]
@@ -165,7 +166,7 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
             Sketch(
                 "singular_values",
                 "Singular values of the Hankel matrix",
-                "What stands above the noise can be modelled.",
+                "Only values above the noise level can be modelled.",
                 lambda figure: plots.singular_value_plot(fit, ax=figure),
             )
         )
@@ -176,7 +177,8 @@ def _output_sketch(fit: Any, output: int, label: str) -> Sketch:
     return Sketch(
         f"output_{output}",
         f"The output {label}",
-        "Measured and simulated; below, what is left: beside its own past, and beside the input.",
+        "Measured and simulated. Below: autocorrelation of the residual, and its "
+        "cross-correlation with the input.",
         lambda figure: plots.channel_fit_plot(fit, output=output, ax=figure),
         (6.2, 5.4),
     )
@@ -186,7 +188,7 @@ def frf_sketches(
     systems: list[Any],
     frf: ct.FrequencyResponseData | None,
     comparison: FRFComparison | None = None,
-    caption: str = "Measured, and the model on top. It was not used to find the model.",
+    caption: str = "Measured, with the model on top. These data were not used for the fit.",
 ) -> list[Sketch]:
     """List the figures in frequency: the models alone, or beside a measurement."""
     if not all(system.issiso() for system in systems):
@@ -215,8 +217,8 @@ def frf_sketches(
         sketches.append(
             Sketch(
                 "frf_error",
-                "Error of the model in frequency",
-                "Model against measurement; the band that can be trusted is shaded.",
+                "Relative error against frequency",
+                "Model against measurement; the trusted band is shaded.",
                 lambda figure: plots.comparison_plot(comparison, ax=figure),
                 (6.2, 4.6),
             )
@@ -243,14 +245,14 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
         sketches += [
             Sketch(
                 "onset",
-                "The first moments after the step, all records",
+                "Start of the response, all records",
                 "Dead time of the final model (line) and its interval (band).",
                 lambda figure: plots.onset_plot(steps, system, ax=figure),
             ),
             Sketch(
                 "step",
                 "Responses to a unit step, all records",
-                "Each divided by its own step; the final model on top.",
+                "Each divided by its own step amplitude; the final model on top.",
                 lambda figure: plots.step_plot(steps, system, ax=figure),
             ),
         ]

@@ -22,7 +22,7 @@ from .provenance import file_sha256, record_sha256
 Paths = Sequence[str | os.PathLike[str]]
 
 
-def fit_tables(fit: Any, title: str = "How it was found") -> list[Table]:
+def fit_tables(fit: Any, title: str = "Details of the fit") -> list[Table]:
     """Tell how a model was found, what was chosen and why."""
     if not isinstance(fit, Result):
         return []
@@ -31,7 +31,7 @@ def fit_tables(fit: Any, title: str = "How it was found") -> list[Table]:
 
 
 def comparison_tables(
-    comparison: FRFComparison | None, title: str = "Against the measured frequency response"
+    comparison: FRFComparison | None, title: str = "Comparison with the measured frequency response"
 ) -> list[Table]:
     """Tell how far a model is from a measurement, where there is one."""
     return [] if comparison is None else [pairs(title, comparison._rows())]
@@ -44,7 +44,7 @@ def model_table(system: DelayedStateSpace) -> Table:
         ("x[k+1] = A x[k] + B u[k-d]", f"d = {system.delay}, dt = {system.dt!r} s"),
         *((name, _matrix(getattr(core, name))) for name in "ABCD"),
     ]
-    return pairs("Matrices of the model without its delay", rows, mono=True)
+    return pairs("State-space matrices of the model without its delay", rows, mono=True)
 
 
 def _matrix(values: Any) -> str:
@@ -128,7 +128,9 @@ def campaign_table(campaign: Campaign) -> Table:
             ", ".join([*remarks, *row.warnings]),
         )
         rows.append(Row(cells, "best" if row.name == best else ""))
-    return Table("Records", tuple(rows), columns, note="In bold: the record of least misfit.")
+    return Table(
+        "Records", tuple(rows), columns, note="In bold: the record with the smallest misfit."
+    )
 
 
 def dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
@@ -149,7 +151,7 @@ def amplitude_table(campaign: Campaign) -> Table:
         Column("mean delay [samples]", "number"),
         Column("std [samples]", "number"),
         Column("gain", "number"),
-        Column("std of the gain", "number"),
+        Column("std of gain", "number"),
     )
     rows = tuple(
         Row(
@@ -162,8 +164,8 @@ def amplitude_table(campaign: Campaign) -> Table:
         for amplitude, line in table.iterrows()
     )
     return Table(
-        "By the height of the step",
+        "By step amplitude",
         rows,
         columns,
-        note="Delays or gains that follow the height are the sign of a nonlinear plant.",
+        note="Delays or gains that change with the amplitude indicate a nonlinear plant.",
     )

@@ -34,13 +34,13 @@ WRONG_DELAY = frozenset(
 """Flags after which the dead time should not be used as it stands."""
 
 SCANNED = (
-    "the dead time is where the misfit of a scan is least, and the interval tells how flat the "
-    "misfit is there; neither knows a probability, and fast lags that the order leaves out count "
-    "as dead time. The output-error fit gives a 95 % interval"
+    "the dead time is the delay with the smallest IAE, and the interval shows how flat the "
+    "IAE curve is there; it is not a confidence interval, and fast lags that the model order "
+    "leaves out count as dead time. The output-error fit gives a 95 % interval"
 )
 """What any scan leaves open, however good the record."""
 
-INTEGRATING = "none: it integrates"
+INTEGRATING = "none: the model integrates"
 
 _REAL, _AT_ONE = 1e-12, 1e-9
 """Imaginary part of a pole of z that is rounding, and distance to 1 of an integrator."""
@@ -48,12 +48,12 @@ _REAL, _AT_ONE = 1e-12, 1e-9
 Level = Literal["good", "caution", "poor"]
 
 _JUDGEMENTS: dict[Level, str] = {
-    "good": "No objection found: the data carry this model.",
-    "caution": "Use it with care: read the remarks below.",
-    "poor": "Do not trust the dead time as it stands: read why below.",
+    "good": "No problems found: the data support this model.",
+    "caution": "Use with care: see the remarks below.",
+    "poor": "Do not rely on this dead time: see the reasons below.",
 }
-_WRONG_MODEL = "Do not trust the model as it stands: read why below."
-_CONTRADICTION = "The measured frequency response contradicts this model: read where below."
+_WRONG_MODEL = "Do not rely on this model: see the reasons below."
+_CONTRADICTION = "The measured frequency response contradicts this model: see the reasons below."
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Ve
     >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
     >>> verdict = report.verdict_of(system)
     >>> print(verdict.level, "-", verdict.judgement)
-    caution - Use it with care: read the remarks below.
+    caution - Use with care: see the remarks below.
     """
     flags = (*more_flags, *_flags_of(system))
     return Verdict(
@@ -103,13 +103,13 @@ def campaign_verdict(campaign: Campaign, more_flags: Sequence[Flag] = ()) -> Ver
     own = tuple(campaign.flags)
     flags = (*more_flags, *own, *_flags_of(system))
     summary = campaign.statistics()
-    scatter = "unknown: one record has none"
+    scatter = "unknown: a single record has no scatter"
     if np.isfinite(summary.variance):
         scatter = f"{np.sqrt(summary.variance):.2g} samples"
     facts = [
         ("records", f"{len(campaign.good)} of {len(campaign.rows)} identified"),
         (
-            "trimmed mean of their delays",
+            "trimmed mean of the delays",
             f"{summary.mean:.2f} samples, {in_time(summary.mean * campaign.dt, 4)}",
         ),
         ("scatter (std)", scatter),
@@ -133,9 +133,9 @@ def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> 
     if level == "good" and flags:
         level = "caution"
     judgement = {
-        "good": f"A close model: less than {100 * CLOSE:.0f} % off.",
-        "caution": "Use it with care: read errors and remarks below.",
-        "poor": f"More than {100 * FAR:.0f} % off: model and measurement disagree.",
+        "good": f"Model and measurement agree: the error is below {100 * CLOSE:.0f} %.",
+        "caution": "Use with care: see the errors and remarks below.",
+        "poor": f"Model and measurement disagree: the error is above {100 * FAR:.0f} %.",
     }[level]
     return Verdict(level, headline, facts_of(system), _reasons(flags), judgement)
 
@@ -155,16 +155,16 @@ def headline_of(system: DelayedStateSpace) -> str:
     order = system.delay_free.nstates
     gain = _gain(system)
     if not _gain_is_resolved(system):
-        return f"{sentence}; behind it a model of order {order}, whose gain is not resolved."
-    behind = "an integrating model" if gain == INTEGRATING else f"a model of gain {gain} and"
-    return f"{sentence}; behind it {behind} of order {order}."
+        return f"{sentence}. Model without the delay: order {order}, gain not determined."
+    behind = "integrating" if gain == INTEGRATING else f"gain {gain}"
+    return f"{sentence}. Model without the delay: order {order}, {behind}."
 
 
 def interval_name(system: DelayedStateSpace) -> str:
     """Name the interval for what it is."""
     # A scan knows how flat its curve is, and no probability.
     if hasattr(system.fit, "iae"):
-        return "within 5 % of the least misfit"
+        return "within 5 % of the smallest IAE"
     return str(getattr(system.fit, "interval_label", "95 % interval"))
 
 
@@ -176,16 +176,16 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
         name = interval_name(system)
         facts.append((name, interval_in_time(*interval)))
     for attribute, label in (
-        ("std_given_structure", "standard error, structure given"),
+        ("std_given_structure", "standard error for this structure"),
         ("onset", "visible onset"),
-        ("total_delay", "total delay of slow signals"),
+        ("total_delay", "total delay at DC"),
     ):
         value = getattr(system.fit, attribute, None)
         if attribute == "total_delay" and _gain(system) == INTEGRATING:
             continue
         if isinstance(value, float) and np.isfinite(value):
             facts.append((label, _with_interval(system, attribute, value)))
-    facts.append(("order without the delay", str(system.delay_free.nstates)))
+    facts.append(("order (without the delay)", str(system.delay_free.nstates)))
     facts.append(("gain", _gain_with_interval(system)))
     facts.append(("poles", poles_of(system)))
     facts.append(("sample time", in_time(system.dt, 6)))
@@ -225,7 +225,7 @@ def _gain_with_interval(system: DelayedStateSpace) -> str:
 def _with_interval(system: DelayedStateSpace, attribute: str, value: float) -> str:
     low, high = getattr(system.fit, f"{attribute}_interval", (np.nan, np.nan))
     if high == np.inf:
-        return "not resolved by this record"
+        return "not determined by this record"
     if np.isnan(high):
         return in_time(value, 4)
     return f"{time_within(value, low, high)} ({interval_in_time(low, high)})"

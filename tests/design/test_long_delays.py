@@ -90,7 +90,7 @@ def test_controllers_of_delays_beyond_dense_matrices_are_made():
     law = cr.design.predictor_lqr(plant, 1.0, 1.0)
     assert law.gain.shape == (1, delay + 1)
     assert law.check.stable
-    assert "on its own model" in law.report()
+    assert "on the design model" in law.report()
 
 
 def test_what_does_not_fit_into_memory_is_refused_with_what_to_do():

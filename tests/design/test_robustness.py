@@ -194,7 +194,7 @@ def test_performance_is_told_in_words():
     )
     assert "set-point error stays" in repr(performance(plant(), 0.5))
     assert repr(UNSTABLE) == (
-        "<Performance: set-point error stays, load error stays, overshoot unknown, never settled>"
+        "<Performance: set-point error stays, load error stays, overshoot unknown, does not settle>"
     )
 
 

@@ -335,7 +335,7 @@ def test_an_output_that_is_one_spike_at_the_start_is_refused():
     # the first samples are left out, and what was left had a noise level of 0
     u = np.random.default_rng(0).standard_normal(26)
     y = np.where(np.arange(26) == 0, 482.0, 0.0)
-    with pytest.raises(DataError, match="the output does not follow the input"):
+    with pytest.raises(DataError, match="the output does not respond to the input"):
         cr.identify(cr.Record(np.arange(26.0), u, y))
 
 

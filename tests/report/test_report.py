@@ -119,7 +119,7 @@ def test_a_report_needs_no_network_and_has_only_its_own_script(page):
 def test_the_verdict_comes_first_with_dead_time_and_interval(page, fitted):
     text = parsed(page).text
     verdict = text.index(f"Dead time {1e3 * fitted.fit.dead_time:.4g} ms")
-    assert verdict < text.index("Figures") < text.index("How it was found")
+    assert verdict < text.index("Figures") < text.index("Details of the fit")
     low, high = fitted.fit.interval
     assert interval_in_time(low, high) in text
     assert text.index("simulated data") < verdict
@@ -160,7 +160,7 @@ def test_a_report_of_several_channels_draws_every_output(tmp_path):
     text = path.read_text(encoding="utf-8")
     assert "The output level" in text
     assert "The output heat" in text
-    assert "output-error fit of all channels" in text
+    assert "state-space fit of all channels" in text
 
 
 def test_hostile_names_stay_text(tmp_path, record, fitted):
@@ -251,7 +251,7 @@ def test_a_scan_is_never_trusted_without_a_remark(record):
     assert not scanned.fit.flags  # an easy record
     verdict = verdict_of(scanned)
     assert verdict.level == "caution"
-    assert verdict.reasons[0].startswith("The dead time is where the misfit of a scan is least")
+    assert verdict.reasons[0].startswith("The dead time is the delay with the smallest IAE")
 
 
 def test_the_checksum_of_a_record_is_that_of_its_samples(record):

@@ -74,8 +74,8 @@ class DataLoop:
                 Flag(
                     "band_ends_early",
                     f"|L| is still {abs(self.values[-1]):.3g} at the last point "
-                    f"({self.omega[-1]:.4g} rad/s): crossovers above it are not seen, and "
-                    "stability cannot be told",
+                    f"({self.omega[-1]:.4g} rad/s): crossovers at higher frequencies are "
+                    "missed, and stability cannot be decided",
                 )
             )
         if self.integrators == 0 and abs(np.sin(np.angle(self.values[0]))) > 0.5:
@@ -84,7 +84,7 @@ class DataLoop:
                     "band_starts_late",
                     f"the phase at the first point ({self.omega[0]:.4g} rad/s) is "
                     f"{np.degrees(np.angle(self.values[0])):.3g} deg, far from the real axis: "
-                    "the count assumes that it goes there directly",
+                    "the encirclement count assumes that it goes there directly",
                 )
             )
         return tuple(found)

@@ -72,10 +72,10 @@ class LoopCheck(Result):
         """List what was found, for the card of a controller."""
         found = self.margins
         if not found.stable:
-            return [("on its own model", "UNSTABLE")]
+            return [("on the design model", "UNSTABLE")]
         rows = [
             (
-                "on its own model",
+                "on the design model",
                 f"stable, Ms {found.ms:.3g}, phase margin {found.phase_margin:.3g} deg, "
                 f"{in_time(found.delay_margin, 3)} more dead time until it is unstable",
             )
@@ -87,7 +87,7 @@ class LoopCheck(Result):
         return rows
 
     def _title(self) -> str:
-        return "Loop on its own model"
+        return "Closed loop on the design model"
 
     def _rows(self) -> list[tuple[str, str]]:
         return self.rows()
@@ -96,8 +96,11 @@ class LoopCheck(Result):
         word = "stable" if self.stable else "unstable"
         inside = ""
         if self.robustness is not None:
-            inside = f", {'stable' if self.robustness.stable else 'unstable'} over the interval"
-        return f"<LoopCheck {word} on its own model{inside}>"
+            inside = (
+                f", {'stable' if self.robustness.stable else 'unstable'} over the dead-time "
+                "interval"
+            )
+        return f"<LoopCheck {word} on the design model{inside}>"
 
 
 def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck:
@@ -124,8 +127,8 @@ def _unstable_inside(found: DelayRobustness) -> Flag:
     low, high = found.dead_time_interval
     return Flag(
         "unstable_within_interval",
-        f"the loop is unstable for some dead time in {low:.4g}...{high:.4g} s, the interval that "
-        f"the identification gave (stable from {found.stable_from:.4g} to "
+        f"the loop is unstable for some dead time in {low:.4g}...{high:.4g} s, the interval "
+        f"from the identification (stable from {found.stable_from:.4g} to "
         f"{found.stable_to:.4g} s)",
     )
 
@@ -141,7 +144,7 @@ def warn_of(check: LoopCheck, advice: str, *, stacklevel: int = 4) -> None:
 
 
 def refuse_unstable(check: LoopCheck, what: str, advice: str) -> None:
-    """Refuse a controller whose loop is not stable on its own model.
+    """Refuse a controller whose loop is not stable on the design model.
 
     Raises
     ------
@@ -158,8 +161,8 @@ def refuse_poles(poles: ComplexArray, what: str, advice: str) -> None:
 
 
 def _refuse(count: int, what: str, advice: str) -> None:
-    state = f"has {count} unstable pole(s)" if count else "is on the border of stability"
+    state = f"has {count} unstable pole(s)" if count else "is on the stability boundary"
     raise UnsuitableSystemError(
-        f"{what} is unstable on the model that it was designed for: the closed loop {state}. "
-        f"{advice}"
+        f"{what} does not stabilize the model that it was designed for: the closed loop "
+        f"{state}. {advice}"
     )

@@ -114,7 +114,7 @@ class Margins(Result):
         verdict = "stable" if self.stable else f"UNSTABLE ({self.unstable_poles} poles)"
         delay = in_time(self.delay_margin, 4)
         if np.isnan(self.delay_margin):
-            delay = "none: the loop is unstable as it is"
+            delay = "none: the closed loop is unstable"
         elif self.dt and np.isfinite(self.delay_margin):
             delay += f" = {self.delay_margin_samples:.4g} samples"
         rows = [

@@ -206,16 +206,15 @@ def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
         return (
             Flag(
                 "marginal",
-                "a closed-loop pole lies on the border of stability, as far as double precision "
-                "can tell",
+                "a closed-loop pole is on the stability boundary, within double precision",
             ),
         )
     if count:
         return (
             Flag(
                 "unstable",
-                f"the closed loop has {count} unstable poles; the margins say how far it is from "
-                "being stable",
+                f"the closed loop has {count} unstable poles; the margins show how far it is "
+                "from stability",
             ),
         )
     return ()
@@ -257,8 +256,8 @@ def _from_data(loop: DataLoop) -> Margins:
     if plain.stable and intervals["modulus_margin"][0] == 0:
         unsure = Flag(
             "within_noise",
-            "-1 lies within the noise of the response: another measurement may find the closed "
-            "loop unstable",
+            "the point -1 is within the noise of the response: another measurement may find "
+            "the closed loop unstable",
         )
         flags = (*flags, unsure)
     return replace(plain, intervals=intervals, flags=flags)

@@ -65,7 +65,7 @@ class Performance:
             )
         )
         over = "unknown" if np.isnan(self.overshoot) else f"{100 * self.overshoot:.3g} %"
-        settled = "never settled"
+        settled = "does not settle"
         if np.isfinite(self.settling_time):
             settled = f"settled after {in_time(self.settling_time)}"
         return f"<Performance: {', '.join(errors)}, overshoot {over}, {settled}>"

@@ -138,7 +138,10 @@ class RobustnessCheck(Result):
         return [
             ("nominal loop", "stable" if self.nominal.stable else "UNSTABLE"),
             ("all plants within the bound", "stable" if self.robust else "NOT guaranteed"),
-            ("bound may grow by", f"{self.margin:.4g} (at {self.omega_critical:.4g} rad/s)"),
+            (
+                "largest factor on the bound",
+                f"{self.margin:.4g} (at {self.omega_critical:.4g} rad/s)",
+            ),
             ("worst sensitivity peak", f"{worst} (nominal {self.nominal.ms:.4g})"),
         ]
 

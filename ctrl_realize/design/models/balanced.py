@@ -60,7 +60,7 @@ class BalancedReduction(Result):
     def _rows(self) -> list[tuple[str, str]]:
         return [
             ("order", f"{self.full_order} -> {self.order}"),
-            ("kept as they are", f"{self.kept_unstable} (on or outside the unit circle)"),
+            ("unstable poles kept", f"{self.kept_unstable} (on or outside the unit circle)"),
             ("largest error at any frequency", f"{self.error_bound:.4g}"),
         ]
 

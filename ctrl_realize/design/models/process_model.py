@@ -116,7 +116,7 @@ class ProcessModel(Result):
         return "Process model"
 
     def _rows(self) -> list[tuple[str, str]]:
-        rows = [("model", self.formula), ("found by", self.method)]
+        rows = [("model", self.formula), ("method", self.method)]
         if np.isfinite(self.error):
             rows.append(("step error (rms)", f"{100 * self.error:.3g} %"))
         return rows

@@ -233,7 +233,7 @@ def _assemble(
     solve = 1 + Dc[0, 0] * taps[0]
     if abs(solve) < 1e-12:
         raise UnsuitableSystemError(
-            "controller and direct term of the core make an algebraic loop of gain -1"
+            "controller and feedthrough of the core make an algebraic loop of gain -1"
         )
     out = [Dc @ block / solve for block in into]
     out[0][0, :nc] += Cc[0] / solve

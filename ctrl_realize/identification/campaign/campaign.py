@@ -84,8 +84,8 @@ class Campaign(Result):
         times = {row.dt for row in self.good}
         if not times:
             raise DataError(
-                f"none of the {len(self.rows)} records could be identified; "
-                f"the first says: {self.rows[0].error}"
+                f"none of the {len(self.rows)} records could be identified; the error of the "
+                f"first: {self.rows[0].error}"
             )
         if max(times) > min(times) * (1 + 1e-6):
             raise DataError(
@@ -119,7 +119,7 @@ class Campaign(Result):
         _ = self.dt
         drop = min(3, count // 4) if trim is None else whole(trim, "trim", 0)
         if 2 * drop >= count:
-            raise DataError(f"trim={drop} leaves nothing of {count} delays")
+            raise DataError(f"trim={drop} removes all {count} delays")
         return trimmed_statistics(self.delays, drop, ddof=ddof)
 
     @property
@@ -243,18 +243,18 @@ class Campaign(Result):
             ("variance", f"{summary.variance:.3g} samples^2"),
             (
                 "95 % interval of the mean",
-                f"{summary.interval[0]:.2f}...{summary.interval[1]:.2f} samples (scatter between "
-                "records only: a bias that all share is not in it)",
+                f"{summary.interval[0]:.2f}...{summary.interval[1]:.2f} samples (scatter "
+                "between records only; a bias common to all records is not included)",
             ),
         ]
         if not np.isfinite(summary.variance):
-            spread = [("scatter", "unknown: one record has none")]
+            spread = [("scatter", "unknown: a single record has no scatter")]
         return [
             ("identified", f"{len(self.good)} of {len(self.rows)} records"),
             (
                 "delay, trimmed mean",
                 f"{summary.mean:.2f} samples = {in_time(summary.mean * self.dt, 4)} "
-                f"({summary.dropped} of {len(self.good)} left out)",
+                f"({summary.dropped} of {len(self.good)} removed)",
             ),
             *spread,
             ("best record", f"{best.name} (misfit {best.misfit:.3g})"),

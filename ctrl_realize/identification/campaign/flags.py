@@ -43,14 +43,14 @@ def _different_gains(rows: Rows) -> list[Flag]:
     told = f"chi-square {statistic:.3g}, p = {chance:.2g}"
     if not np.isfinite(errors).any():
         # A scan knows no error of its gain; what noise leaves of it is a few percent.
-        differ, told = apart > NO_COMMON_GAIN, "no error of them is known"
+        differ, told = apart > NO_COMMON_GAIN, "their errors are unknown"
     if not differ:
         return []
     flags = [
         Flag(
             "gains_differ",
-            f"the gain differs from record to record, {gains.min():.3g} to {gains.max():.3g} "
-            f"({told}): the plant is not linear, or not the same",
+            f"the gains of the records differ, {gains.min():.3g} to {gains.max():.3g} "
+            f"({told}): the plant is nonlinear, or has changed between the records",
         )
     ]
     if apart > NO_COMMON_GAIN:
@@ -58,8 +58,8 @@ def _different_gains(rows: Rows) -> list[Flag]:
             0,
             Flag(
                 "no_common_gain",
-                f"no one gain follows all records: they have {gains.min():.3g} to "
-                f"{gains.max():.3g}; identify those of one operating point by themselves",
+                f"no single gain fits all records: the gains are {gains.min():.3g} to "
+                f"{gains.max():.3g}; identify the records of each operating point separately",
             ),
         )
     return flags
@@ -70,7 +70,7 @@ def _different_times(rows: Rows) -> list[Flag]:
     flags = []
     for code, what, name, ends in (
         ("records_differ", "dead time", "dead_time", "interval"),
-        ("lags_differ", "total delay (dead time and lags)", "total_delay", "total_delay_interval"),
+        ("lags_differ", "total delay (dead time plus lags)", "total_delay", "total_delay_interval"),
     ):
         values = np.array([getattr(row, name) for row in rows])
         low, high = np.array([getattr(row, ends) for row in rows]).reshape(-1, 2).T
@@ -83,10 +83,10 @@ def _different_times(rows: Rows) -> list[Flag]:
             flags.append(
                 Flag(
                     code,
-                    f"the {what} differs from record to record by more than the intervals allow, "
+                    f"the {what} differs between records by more than the intervals allow, "
                     f"{in_time(values.min())} to {in_time(values.max())} (chi-square "
-                    f"{statistic:.3g}, p = {chance:.2g}): trigger jitter, friction, or a plant "
-                    "that is not linear or not the same",
+                    f"{statistic:.3g}, p = {chance:.2g}): trigger jitter, friction, or a "
+                    "plant that is nonlinear or has changed",
                 )
             )
     return flags
@@ -99,7 +99,8 @@ def _failed(rows: Rows, failed: Rows) -> Flag | None:
     more = "" if len(failed) <= 5 else f" and {len(failed) - 5} more"
     return Flag(
         "failed_records",
-        f"{len(failed)} of {len(rows)} records failed: {names}{more}; the table tells why",
+        f"{len(failed)} of {len(rows)} records failed: {names}{more}; see the table for the "
+        "reasons",
     )
 
 
@@ -117,8 +118,8 @@ def _same_records(rows: Rows) -> Flag | None:
     more = "" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)"
     return Flag(
         "same_records",
-        f"{extra} of {len(rows)} records are others over again: {names} have the same results to "
-        f"the last digit{more}; the scatter and its interval are too small",
+        f"{extra} of {len(rows)} records are duplicates: {names} have the same results to the "
+        f"last digit{more}; the scatter and its interval are too small",
     )
 
 
@@ -148,12 +149,15 @@ def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
     # Noise is larger beside a smaller step: a scan's bias grows with it, a fit misses fast lags.
     doubt = ""
     if method != "output_error":
-        doubt = "; or the bias of the scan, which grows with the noise: method='output_error' tells"
+        doubt = (
+            "; or the bias of the scan, which grows with the noise: check with "
+            "method='output_error'"
+        )
     elif len({row.order for row in rows if np.isfinite(row.delay)}) > 1:
-        doubt = "; or a lag that only large steps show above the noise, as the orders differ"
+        doubt = "; or a lag that only large steps show above the noise, since the orders differ"
     return Flag(
         "amplitude_trend",
-        f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, chance "
-        f"{chance:.1g}): friction, a slew limit or another nonlinearity, for which one linear "
-        f"model cannot hold at all amplitudes{doubt}",
+        f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, p = "
+        f"{chance:.1g}): friction, a rate limit or another nonlinearity; no single linear "
+        f"model is valid at all amplitudes{doubt}",
     )

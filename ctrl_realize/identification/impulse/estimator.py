@@ -58,14 +58,15 @@ def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice
     arx_error = _error(group, splits, arx, count)
     better = arx_error < CLEARLY * smooth_error
     reason = (
-        f"on the last third of the data, unseen, the regularized estimate misses "
-        f"{100 * smooth_error:.3g} % of the output, OKID {_percent(arx_error)}"
+        "on the last third of the data, not used for estimation, the error is "
+        f"{100 * smooth_error:.3g} % of the output for the regularized estimate, "
+        f"{_percent(arx_error)} for OKID"
     )
     return Choice("okid" if better else "regularized", kernels, reason)
 
 
 def _percent(error: float) -> str:
-    return f"{100 * error:.3g} %" if error < 10 else "all of it (unstable, or nearly)"
+    return f"{100 * error:.3g} %" if error < 10 else "100 % or more (unstable, or nearly)"
 
 
 def _until(record: Record, split: int) -> Record:

@@ -219,9 +219,9 @@ def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
     return (
         Flag(
             "not_died_away",
-            f"at the end of {count} samples the response is still {100 * share[alive].max():.0f} % "
-            "of its largest; what comes later is missing, and disturbs what is here. Choose a "
-            "larger length, or method='okid'",
+            f"at the end of {count} samples the response is still "
+            f"{100 * share[alive].max():.0f} % of its largest value; the part cut off biases "
+            "the rest. Choose a larger length, or method='okid'",
         ),
     )
 

@@ -99,7 +99,8 @@ def with_prior(
     if excited < wanted:
         note = Flag(
             "partly_excited",
-            f"the input excites {excited} of {wanted} lags; the rest is what the prior says",
+            f"the input excites {excited} of {wanted} lags; the others are determined by the "
+            "prior alone",
         )
         flags = (note,)
     single = [

@@ -75,9 +75,9 @@ def _fit(
     found = fit_sampled(outputs, inputs, dt, latest=latest, **ways)
     if found.explained < FOLLOWS:
         raise DataError(
-            f"{_named(records)}: the output does not follow the input (the best of all models "
-            f"lowers the squares by {found.explained:.3g} variances of the noise, {FOLLOWS:g} are "
-            "needed); are the channels right, does the input excite the plant?"
+            f"{_named(records)}: the output does not respond to the input (the best model "
+            f"lowers the sum of squares by {found.explained:.3g} noise variances, expected at "
+            f"least {FOLLOWS:g}); check the columns, and whether the input excites the plant"
         )
     return found
 
@@ -87,8 +87,8 @@ def _check_moves(record: Record) -> None:
         moves = float(np.ptp(values))
         if moves < LEAST_MOVE:
             raise DataError(
-                f"the {name} of {named('record', record.name)} moves by {moves:.3g} in all: there "
-                "is nothing to fit"
+                f"the {name} of {named('record', record.name)} is constant (range "
+                f"{moves:.3g}): there is nothing to fit"
             )
 
 
@@ -146,8 +146,8 @@ def _summary(
     sums = found.condensed
     reason = (
         f"all {sums.samples} samples, condensed to {sums.data.size} sums of products over "
-        f"{sums.drive.factor.shape[1]} lags (noise made white by {sums.noise_lags} lags of its "
-        "own); time, measured and fitted show a stretch of them"
+        f"{sums.drive.factor.shape[1]} lags (prewhitened with a noise model of "
+        f"{sums.noise_lags} lags); time, measured and fitted show a part of them"
     )
     return replace(result, choices=(reason, *result.choices))
 
@@ -169,7 +169,8 @@ def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) 
     return (
         Flag(
             "cut",
-            f"{size} samples were fitted, from sample {offset} on, of a record of {whole}{others}; "
-            "give the best part with `between`, or pieces as several records",
+            f"{size} samples were fitted, from sample {offset} on, of a record of "
+            f"{whole}{others}; select the best part with `between`, or pass parts as several "
+            "records",
         ),
     )

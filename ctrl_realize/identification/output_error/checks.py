@@ -133,9 +133,10 @@ def _white_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
     return [
         Flag(
             "gain_open",
-            f"disturbances are coloured: with weights for that, gain and total delay are "
-            f"{step.gain:.3g} -+ {gain:.2g} and {in_time(step.total)} -+ {in_time(total)}: "
-            "neither is firm; a longer record, or one with less disturbance, tells them",
+            "the disturbances are coloured: weighted accordingly, gain and total delay are "
+            f"{step.gain:.3g} +- {gain:.2g} and {in_time(step.total)} -+ {in_time(total)}: "
+            "neither is well determined; use a longer record, or one with smaller "
+            "disturbances",
         )
     ]
 
@@ -157,10 +158,10 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...
     return (
         Flag(
             "feedback",
-            f"what is new in the input goes with what is new in the output (p = "
-            f"{min(chances):.1g}): a controller or an operator closes a loop, or the output "
-            "answers within the same sample; dead time, gain and lags may be those of the "
-            "controller turned round: move the input by hand",
+            f"the innovations of input and output are correlated (p = {min(chances):.1g}): a "
+            "controller or an operator closes the loop, or the output responds within the "
+            "same sample; dead time, gain and lags may be those of the inverse of the "
+            "controller: repeat the test in open loop",
         ),
     )
 
@@ -180,8 +181,8 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
         flags.append(
             Flag(
                 "time_varying",
-                f"from third to third of the record, {told}: the plant changes with time; what "
-                "is reported is a mean",
+                f"between the thirds of the record, {told}: the plant is time-varying; the "
+                "model reported is an average",
             )
         )
     for what, groups in (
@@ -193,7 +194,8 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
             flags.append(
                 Flag(
                     "not_linear",
-                    f"by {what}, {told}: the plant is not linear; what is reported is a mean",
+                    f"depending on the {what}, {told}: the plant is nonlinear; the model "
+                    "reported is an average",
                 )
             )
             break
@@ -217,9 +219,10 @@ def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...
     return (
         Flag(
             "not_linear",
-            f"products of past inputs predict {100 * part:.0f} % of what is new in the output (p "
-            f"= {chance:.1g}): the plant is not linear, or its dead time depends on the level; "
-            "what is reported is a mean. Fit records about one level each",
+            f"products of past inputs predict {100 * part:.0f} % of the innovations of the "
+            f"output (p = {chance:.1g}): the plant is nonlinear, or its dead time depends on "
+            "the level; the model reported is an average. Fit records of one operating point "
+            "each",
         ),
     )
 
@@ -241,8 +244,8 @@ def _told(change: ParameterChange | None, delay: float) -> str:
     gains = ", ".join(f"{100 * gain:+.2g}" for gain in change.gains)
     shifts = ", ".join(f"{shift:+.2g}" for shift in change.shifts)
     return (
-        f"the residual asks for gains of {gains} % and delays of {shifts} samples beside the "
-        f"common ones (p = {change.chance:.1g})"
+        f"the gain deviates by {gains} % and the delay by {shifts} samples from the common "
+        f"values (p = {change.chance:.1g})"
     )
 
 
@@ -254,9 +257,9 @@ def _held_flags(shown: Shown, dt: float) -> tuple[list[Flag], float]:
     hold = dt * longest_hold(shown.output, shown.fitted)
     flag = Flag(
         "held_output",
-        f"while the output moves, {100 * share:.0f} % of its samples repeat the one before: it is "
-        "held, by an analyser or a historian's dead band, and comes late by that; the dead time "
-        f"may be up to {in_time(hold)} shorter",
+        f"while the output moves, {100 * share:.0f} % of its samples repeat the previous one: "
+        "the output is held (by an analyser, or by the dead band of a historian) and "
+        f"recorded late; the dead time may be up to {in_time(hold)} shorter",
     )
     return [flag], hold
 
@@ -268,8 +271,8 @@ def _limit_flags(output: FloatArray) -> list[Flag]:
     return [
         Flag(
             "output_at_limit",
-            f"{count} samples stand at the highest or lowest value, without noise: the output is "
-            "cut off there, and gain and lags are those of what is left",
+            f"{count} samples are at the highest or lowest value, without noise: the output "
+            "saturates there, and gain and lags are those of the clipped signal",
         )
     ]
 
@@ -281,13 +284,14 @@ def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
     moving = "not_at_rest" in codes
     if "no_delay_resolved" not in codes or not (moving or rest < fit.total_delay):
         return []
-    why = "the output was moving" if moving else f"there is {in_time(rest)} of record"
+    why = "the output was moving" if moving else f"only {in_time(rest)} was recorded"
     return [
         Flag(
             "earlier_input",
-            f"the output moves as the input does, and {why} before: a move of the input before "
-            "the record explains that as well, with any dead time; gain and lags are then wrong "
-            "too. Let the plant rest longer before the step",
+            f"the output starts to move together with the input, and {why} before the step: "
+            "an input change before the record began would explain the response as well, "
+            "with any dead time; gain and lags would then be wrong too. Let the plant settle "
+            "for longer before the step",
         )
     ]
 

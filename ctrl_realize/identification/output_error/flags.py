@@ -42,8 +42,9 @@ def sampled_flags(
         found.append(
             Flag(
                 "coloured_residual",
-                f"{fit.correlation:.3g} samples of the residual count as one: disturbances, or "
-                "dynamics that the model lacks; the interval is widened by that",
+                f"{fit.correlation:.3g} neighbouring samples of the residual carry the "
+                "information of one independent sample: coloured disturbances, or unmodelled "
+                "dynamics; the interval is widened accordingly",
             )
         )
     return tuple(flag for flag in found if flag is not None)
@@ -77,11 +78,11 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
     other = fit.better
     return Flag(
         "apparent_dead_time",
-        f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was asked "
-        f"for and is ruled out: {time_within(fit.delay, fit.low, fit.high)} is an apparent dead "
-        "time, with lags of the plant in it or left out of it, and its interval holds only if the "
-        f"structure is right; order {other.structure.order}, relative degree "
-        f"{other.structure.relative_degree} puts it at "
+        f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was "
+        f"requested and is ruled out by the data: {time_within(fit.delay, fit.low, fit.high)} "
+        "is an apparent dead time, which makes up for lags that the model lacks or has too "
+        "many of, and its interval holds only if the structure is right; order "
+        f"{other.structure.order}, relative degree {other.structure.relative_degree} gives "
         f"{time_within(other.delay, other.low, other.high)} "
         f"({interval_in_time(other.low, other.high)})",
     )
@@ -103,12 +104,13 @@ def _misfit(fit: OutputErrorEstimate) -> Flag | None:
         return None
     return Flag(
         "structured_misfit",
-        f"no model leaves only noise (residual {fit.misfit:.2g} times the noise in means over "
-        "bins): the plant is not linear or has more dynamics than the model; "
+        "no model fits down to the noise level (the residual, averaged over bins, is "
+        f"{fit.misfit:.2g} times the noise): the plant is nonlinear or has unmodelled "
+        "dynamics; "
         + (
-            "the dead time is the median of five views and the interval spans them"
+            "the dead time is the median of five delay estimates and the interval is their range"
             if fit.views
-            else "the interval holds only if the structures given are right"
+            else "the interval is valid only if a given structure is that of the plant"
         ),
     )
 
@@ -123,16 +125,16 @@ def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None
             for key, delay in fit.views
             if not _near(fit, delay)
         ]
-        return Flag("views_disagree", "far from the median lie: " + ", ".join(apart))
+        return Flag("views_disagree", "delay estimates far from their median: " + ", ".join(apart))
     low, high = profile_limits(*fit.profile)
     wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
     if fit.open_start or not wide or fit.high - fit.low <= 2 * (high - low):
         return None
     return Flag(
         "structures_disagree",
-        f"the chosen structure puts the dead time in {interval_in_time(low, high)}, others "
-        f"that the data cannot rule out in {interval_in_time(fit.low, fit.high)}: dead time and "
-        f"fast lags look alike{firm}",
+        f"the chosen structure gives a dead time of {interval_in_time(low, high)}, other "
+        f"structures that the data cannot rule out {interval_in_time(fit.low, fit.high)}: a "
+        f"dead time and fast lags can hardly be told apart{firm}",
     )
 
 
@@ -152,15 +154,15 @@ def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
     if fit.chain and fit.like_flow and not fit.endless:
         return Flag(
             "many_lags",
-            f"the model is a {model_words(fit.chain)}: a flow that disperses looks the same and "
-            f"begins {in_time(flow_lead(fit.poles))} earlier{firm}",
+            f"the model is a {model_words(fit.chain)}: a flow that disperses looks the same "
+            f"and begins {in_time(flow_lead(fit.poles))} shorter{firm}",
         )
     if not fit.endless:
         return None
     return Flag(
         "many_lags",
-        "chains of lags fit the better the longer they are, up to the longest that was tried: any "
-        f"part of the dead time may be more of such lags{firm}",
+        "models with more equal lags keep fitting better, up to the highest order tried: any "
+        f"part of the dead time may be further lags of this kind{firm}",
     )
 
 
@@ -171,19 +173,21 @@ def _dispersed(fit: OutputErrorEstimate) -> Flag | None:
         return None
     behind = f" and a lag of {in_time(flow.lag)}" if flow.lag else ""
     kind = (
-        f"a flow that disperses (mean residence time {in_time(flow.mean)}, Peclet number "
+        f"an axial-dispersion model (mean residence time {in_time(flow.mean)}, Peclet number "
         f"{flow.peclet:.2g}{behind})"
     )
     if fit.follows_flow:
         return Flag(
             "dispersed_flow",
-            f"{kind} explains the response clearly better than lags: the dead time is that "
-            "before it, and poles and zeros of the model have no meaning of their own",
+            f"{kind} fits the response clearly better than a transfer function with lags: the "
+            "dead time is that of the dispersion model, and the poles and zeros of the model "
+            "have no physical meaning",
         )
     return Flag(
         "dispersed_flow",
-        f"{kind} behind a dead time of {in_time(flow.delay)} fits better than lags: "
-        "where something flows through the plant, that is the likelier dead time",
+        f"{kind} after a dead time of {in_time(flow.delay)} fits better than a transfer "
+        "function with lags: if something flows through the plant, that dead time is the "
+        "more likely one",
     )
 
 
@@ -192,9 +196,9 @@ def _open_start(fit: OutputErrorEstimate, firm: str) -> Flag | None:
         return None
     return Flag(
         "onset_open",
-        "the best model has a zero, which imitates a smooth beginning: how much of the time up to "
-        f"the first motion is dead time is open, {interval_in_time(fit.low, fit.high)}"
-        f"{firm}",
+        "the best model has a zero, which can imitate a smooth onset: how much of the time "
+        "before the visible onset is dead time is not identifiable; it is between "
+        f"{interval_in_time(fit.low, fit.high)}{firm}",
     )
 
 
@@ -204,23 +208,24 @@ def _gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
     if fit.static is None or not low <= 0 <= high:
         return None
     if fit.static.resolved:
-        why = f"95 % of it lie in {low:.3g} to {high:.3g}"
+        why = f"its 95 % interval is {low:.3g} to {high:.3g}"
     else:
         why = (
             f"its slowest time constant is {in_time(float(1 / np.abs(fit.poles).min()))} in a "
-            f"record of {in_time(length)}, and the standard error {fit.static.gain_std:.3g}"
+            f"record of {in_time(length)}, and the standard error of the gain is "
+            f"{fit.static.gain_std:.3g}"
         )
     return Flag(
         "gain_not_resolved",
-        f"the record does not resolve the gain, nor its sign: the model has {fit.static.gain:.4g}, "
-        f"but {why}. A longer record, or larger moves of the input, would tell",
+        "the record determines neither the gain nor its sign: the gain of the model is "
+        f"{fit.static.gain:.4g}, but {why}. Record for longer, or move the input further",
     )
 
 
 def _only_total(fit: OutputErrorEstimate) -> str:
     """Say that the total delay is firm, where it is."""
     firm = fit.static is None or is_firm(fit.static.total, fit.total_ends)
-    return "; only the total delay is firm" if firm else ""
+    return "; only the total delay is well determined" if firm else ""
 
 
 def _inverse(fit: OutputErrorEstimate) -> Flag | None:
@@ -233,8 +238,9 @@ def _inverse(fit: OutputErrorEstimate) -> Flag | None:
         return None
     return Flag(
         "inverse_response",
-        f"the model starts in the wrong direction (zero at {right[np.argmin(abs(right))]:.3g} "
-        "rad/s): its dead time ends where that begins",
+        "inverse response: the model first moves in the wrong direction (right half-plane "
+        f"zero at {right[np.argmin(abs(right))]:.3g} rad/s); the dead time ends where that "
+        "initial motion begins",
     )
 
 
@@ -244,8 +250,8 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
         flags.append(
             Flag(
                 "no_rest",
-                f"{data.edge} samples before the step: the noise is taken from differences of "
-                "neighbours, slow disturbances are not seen in it",
+                f"{data.edge} samples before the step: the noise is estimated from "
+                "differences of neighbouring samples, which do not show slow disturbances",
             )
         )
     if fit.relaxing:
@@ -253,20 +259,32 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
             Flag(
                 "not_at_rest",
                 "the output was still moving before the step, as after an earlier input: the "
-                "model's free response was fitted along",
+                "free response of the model was estimated together with the model",
             )
         )
     elif data.drift:
-        flags.append(Flag("drift", f"a drift of {data.drift / data.dt:.3g} per s was fitted along"))
+        flags.append(
+            Flag(
+                "drift",
+                (
+                    f"a drift of {data.drift / data.dt:.3g} per s was estimated together with the "
+                    "model"
+                ),
+            )
+        )
     if data.hum:
         lines = ", ".join(f"{f / data.dt:.4g} Hz" for f in data.hum)
-        flags.append(Flag("hum", f"a line at {lines} was fitted along"))
+        flags.append(
+            Flag(
+                "hum", f"a sinusoidal disturbance at {lines} was estimated together with the model"
+            )
+        )
     if data.coarse:
         flags.append(
             Flag(
                 "coarse_quantisation",
-                f"the output moves in steps of {data.quantum:.3g}, more than its noise: "
-                "averaging does not remove the rounding",
+                f"the output is quantised in steps of {data.quantum:.3g}, more than its "
+                "noise: averaging does not remove the quantisation error",
             )
         )
     error = data.output - fit.fitted
@@ -276,7 +294,13 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
         flags.append(Flag("outliers", code))
     elif fit.adequate and wild > 0.002:
         flags.append(
-            Flag("outliers", f"{100 * wild:.2g} % of the samples lie 5 sigma or more off the model")
+            Flag(
+                "outliers",
+                (
+                    f"{100 * wild:.2g} % of the samples are outliers, 5 standard deviations or "
+                    "more from the model"
+                ),
+            )
         )
     return flags
 
@@ -290,7 +314,7 @@ def _code(output: FloatArray) -> str:
     if not far.size or high == low or np.ptp(output[far]) > 0:
         return ""
     return (
-        f"{far.size} sample(s), the first at index {far[0]}, are {output[far[0]]:g}, "
-        f"{_BEYOND:g} times the range of the others or more beyond them: if that stands for a "
-        "missing value, interpolate there before the fit, which they spoil"
+        f"{far.size} sample(s), the first at index {far[0]}, are {output[far[0]]:g}, at least "
+        f"{_BEYOND:g} times the range of the other samples away from them: if this value "
+        "marks missing data, interpolate these samples before the fit, since they distort it"
     )

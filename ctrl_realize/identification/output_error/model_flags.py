@@ -26,19 +26,21 @@ def slow_modes(fit: OutputErrorEstimate, length: float) -> Flag | None:
     if slowest < INTEGRATOR:
         return Flag(
             "integrating",
-            "the output goes on with a constant slope: a pole is taken as an integrator, the "
-            "total delay is that of the other lags",
+            "the output keeps rising with a constant slope: one pole is taken as an "
+            "integrator, and the total delay is that of the other lags",
         )
     seen = max(length - fit.delay, 0.0)
     unseen = _not_died_away(fit.poles, seen)
     if not unseen.size:
         return None
     constants = seen * float(np.min(-unseen.real))
-    pair = " of a pair of which less than a period was seen" if np.any(unseen.imag) else ""
+    pair = (
+        " of a pole pair of which less than one period was recorded" if np.any(unseen.imag) else ""
+    )
     return Flag(
         "not_settled",
-        f"the record ends {constants:.2g} of the slowest time constant{pair} after the response "
-        "has begun: gain, total delay and slowest lag are extrapolated",
+        f"the record ends {constants:.2g} of the slowest time constant{pair} after the onset "
+        "of the response: gain, total delay and slowest time constant are extrapolated",
     )
 
 
@@ -53,8 +55,9 @@ def open_gain(fit: OutputErrorEstimate) -> Flag | None:
     return Flag(
         "gain_open",
         f"structures that the data cannot rule out have gains of {gains.min():.3g} to "
-        f"{gains.max():.3g} and total delays of {interval_in_time(totals.min(), totals.max())}: "
-        "neither is firm; a longer record, or one with less disturbance, tells them",
+        f"{gains.max():.3g} and total delays of "
+        f"{interval_in_time(totals.min(), totals.max())}: neither is well determined; use a "
+        "longer record, or one with smaller disturbances",
     )
 
 
@@ -85,8 +88,9 @@ def cancelled_pair(fit: OutputErrorEstimate) -> Flag | None:
         if np.any(np.abs(zeros - pole) < _CANCELLED * abs(pole)):
             return Flag(
                 "cancelled_pair",
-                f"zeros nearly cancel a pair of poles at {abs(pole) / (2 * np.pi):.3g} Hz: the "
-                "output swings there by itself, which takes two poles from what follows the "
-                "input; dead time and lags may be wrong: take the line out of the output first",
+                f"zeros nearly cancel a pair of poles at {abs(pole) / (2 * np.pi):.3g} Hz: "
+                "the output oscillates there independently of the input, and the model "
+                "spends two poles on it; dead time and lags may be wrong: remove this "
+                "oscillation from the output first",
             )
     return None

@@ -20,15 +20,18 @@ def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
     flags = []
     if result.outlying:
         flags.append(
-            Flag("outlying_records", "left out of the mean: " + ", ".join(result.outlying))
+            Flag(
+                "outlying_records",
+                "outlying records, excluded from the mean: " + ", ".join(result.outlying),
+            )
         )
     if result.p_value < 0.01:
         flags.append(
             Flag(
                 "records_differ",
-                f"delays differ from record to record by more than their noise (chi-square "
-                f"{result.chi_square:.3g}, p = {result.p_value:.2g}): trigger jitter, friction "
-                "or a changing plant; the interval is widened by that",
+                "the dead times of the records differ by more than their noise explains "
+                f"(chi-square {result.chi_square:.3g}, p = {result.p_value:.2g}): trigger "
+                "jitter, friction or a changing plant; the interval is widened accordingly",
             )
         )
     flags += _response_flags(result)
@@ -36,8 +39,8 @@ def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
         flags.append(
             Flag(
                 "amplitude_trend",
-                f"the delay changes with the amplitude ({result.trend:.2g} +- "
-                f"{result.trend_error:.2g} s per unit): the plant is not linear",
+                f"the dead time changes with the step amplitude ({result.trend:.2g} +- "
+                f"{result.trend_error:.2g} s per unit): the plant is nonlinear",
             )
         )
     return tuple(flags)
@@ -52,18 +55,19 @@ def _response_flags(result: Repeatability) -> list[Flag]:
         flags.append(
             Flag(
                 "no_common_gain",
-                f"the gain of the model is that of no record: they have {_range(result.gains)} "
-                f"times as much, and are followed to {followed.min(initial=100):.3g} to "
-                f"{followed.max(initial=0):.3g} %; fit those of one operating point by themselves",
+                f"no single gain fits all records: their gains are {_range(result.gains)} "
+                f"times that of the model, with fits of {followed.min(initial=100):.3g} to "
+                f"{followed.max(initial=0):.3g} %; fit the records of each operating point "
+                "separately",
             )
         )
     if chance < BY_CHANCE and result.gain_spread > SAME:
         flags.append(
             Flag(
                 "gains_differ",
-                f"the gain differs from record to record by more than its noise, "
-                f"{_range(result.gains)} times the common one (chi-square {statistic:.3g}, p = "
-                f"{chance:.2g}): the plant is not linear, or not the same",
+                "the gains of the records differ by more than their noise explains, "
+                f"{_range(result.gains)} times the common gain (chi-square {statistic:.3g}, p "
+                f"= {chance:.2g}): the plant is nonlinear, or has changed between the records",
             )
         )
     statistic, chance = result.lag_test
@@ -71,9 +75,9 @@ def _response_flags(result: Repeatability) -> list[Flag]:
         flags.append(
             Flag(
                 "lags_differ",
-                f"the time constants differ from record to record by more than their noise, "
-                f"{_range(result.lags)} times the common ones (chi-square {statistic:.3g}, p = "
-                f"{chance:.2g}): the plant is not linear, or not the same",
+                "the time constants of the records differ by more than their noise explains, "
+                f"{_range(result.lags)} times the common ones (chi-square {statistic:.3g}, p "
+                f"= {chance:.2g}): the plant is nonlinear, or has changed between the records",
             )
         )
     return flags
@@ -90,7 +94,7 @@ def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:
     for i, record in enumerate(records, 1):
         values = record.output.tobytes()
         if values in first:
-            again.append(f"the {i}. is the {first[values]}.")
+            again.append(f"no. {i} is no. {first[values]}")
         first.setdefault(values, i)
     if not again:
         return ()
@@ -98,7 +102,8 @@ def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:
     return (
         Flag(
             "same_records",
-            f"{len(again)} of {len(records)} records are others over again ({', '.join(again[:3])}"
-            f"{more}): the standard error counts their noise as independent",
+            f"{len(again)} of {len(records)} records are duplicates "
+            f"({', '.join(again[:3])}{more}): the standard error assumes independent noise "
+            "and is too small",
         ),
     )

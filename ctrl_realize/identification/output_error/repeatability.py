@@ -105,7 +105,7 @@ class Repeatability:
         """List the numbers for a report."""
         scatter = float(self.delays.std(ddof=1)) if self.delays.size > 1 else 0.0
         rows = [
-            ("records", f"{len(self.names)}, {len(self.outlying)} of them left out"),
+            ("records", f"{len(self.names)}, {len(self.outlying)} of them excluded"),
             ("scatter of delays", f"{in_time(scatter)} between records"),
             (
                 "chi-square",
@@ -120,17 +120,17 @@ class Repeatability:
                 rows.append(
                     (
                         what,
-                        f"{ratios.min():.3g} to {ratios.max():.3g} of the common value "
+                        f"{ratios.min():.3g} to {ratios.max():.3g} times the common value "
                         f"(chi-square {statistic:.3g}, p = {chance:.2g})",
                     )
                 )
         followed = list(zip(self.names, self.fit_percent, self.gains, strict=False))
         rows += [
-            (f"record {name}", f"{fit:.1f} % followed, gain {gain:.3g} of the common one")
+            (f"record {name}", f"{fit:.1f} % fit, gain {gain:.3g} times the common one")
             for name, fit, gain in followed[:_MOST_NAMED]
         ]
         if self.trend_error > 0:
             rows.append(
-                ("trend over amplitude", f"{self.trend:.2g} +- {self.trend_error:.2g} s per unit")
+                ("trend with amplitude", f"{self.trend:.2g} +- {self.trend_error:.2g} s per unit")
             )
         return rows

@@ -194,8 +194,8 @@ class OutputErrorFit(Result):
     def interval_label(self) -> str:
         """What `interval` is: a confidence interval only where one model leaves only noise."""
         if self.better is not None:
-            return "95 % interval, were the structure right"
-        return "95 % interval" if self.at_noise_level else "interval spanned by the views"
+            return "95 % interval if the structure is right"
+        return "95 % interval" if self.at_noise_level else "range of the delay estimates"
 
     @property
     def structure(self) -> tuple[int, int]:
@@ -217,15 +217,15 @@ class OutputErrorFit(Result):
     def _total_in_words(self) -> str:
         low, high = self.total_delay_interval
         if high == np.inf:
-            return "not resolved: the record ends long before the slowest time constant"
+            return "not determined: the record is much shorter than the slowest time constant"
         if np.isnan(high):
-            return f"{in_time(self.total_delay, 5)} (dead time and lags)"
+            return f"{in_time(self.total_delay, 5)} (dead time plus lags)"
         doubted = any(flag.code in _TOTAL_IN_DOUBT for flag in self.flags)
         if not doubted and is_firm(self.total_delay, self.total_delay_interval):
             said = time_within(self.total_delay, low, high)
-            return f"{said} (dead time and lags: firm, {interval_in_time(low, high)})"
+            return f"{said} (dead time plus lags; well determined, {interval_in_time(low, high)})"
         said = time_within(self.total_delay, low, high)
-        return f"{said} (dead time and lags: {interval_in_time(low, high)})"
+        return f"{said} (dead time plus lags; {interval_in_time(low, high)})"
 
     def _title(self) -> str:
         return f"Output-error fit: {self._kind()} {time_within(self.dead_time, *self.interval)}"
@@ -237,14 +237,19 @@ class OutputErrorFit(Result):
         rows = [
             (self._kind(), f"{wait} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
-            *([("first motion", in_time(self.onset, 4))] if self.onset == self.onset else []),
+            *([("visible onset", in_time(self.onset, 4))] if self.onset == self.onset else []),
             ("total delay", self._total_in_words()),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", poles_in_words(self.poles)),
             ("gain", gain_in_words(self.gain, self.gain_interval)),
-            ("residual", f"{self.residual:.3g}, noise {self.noise:.3g} (misfit {self.misfit:.3g})"),
+            (
+                "residual",
+                (f"{self.residual:.3g}, noise {self.noise:.3g} (normalised rms {self.misfit:.3g})"),
+            ),
         ]
-        rows += [(f"view: {name}", in_time(value, 4)) for name, value in self.views.items()]
+        rows += [
+            (f"delay estimate: {name}", in_time(value, 4)) for name, value in self.views.items()
+        ]
         if self.repeatability is not None:
             rows += self.repeatability.rows()
         return rows
@@ -261,9 +266,9 @@ def gain_in_words(gain: float, interval: tuple[float, float]) -> str:
     low, high = interval
     if np.isfinite(low) != np.isfinite(high):
         said = f"at least {low:.3g}" if np.isfinite(low) else f"at most {high:.3g}"
-        return f"{said}: more is extrapolated (the model has {gain:.4g})"
+        return f"{said}, the rest is extrapolated (gain of the model: {gain:.4g})"
     if np.isinf(low):
-        return f"not resolved by this record (the model has {gain:.4g})"
+        return f"not determined by this record (gain of the model: {gain:.4g})"
     if np.isnan(low):
         return f"{gain:.6g}"
     number, *ends = numbers_alike((gain, low, high), low, high)

@@ -118,29 +118,37 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     )
     if fit.follows_flow:
         reasons = [
-            f"dead time: that of a flow that disperses, which fits clearly better than all "
-            f"{len(fit.structures)} structures; {kind}: follows it with the fewest parameters"
+            "dead time: that of an axial-dispersion model, which fits clearly better than "
+            f"all {len(fit.structures)} structures; {kind}: approximates it with the fewest "
+            "parameters"
         ]
     else:
         reasons = [
-            f"{kind}: lowest information criterion of {len(fit.structures)} structures{simple}, "
-            "where zeros and a fourth pole must be worth it"
+            f"{kind}: lowest information criterion of {len(fit.structures)} "
+            f"structures{simple}, with a penalty on zeros and on a fourth pole"
         ]
     if fit.views:
-        reasons.append("dead time: median of five views, as no model leaves only noise")
+        reasons.append(
+            "dead time: median of five delay estimates, since no model fits down to the noise level"
+        )
     else:
         reasons.append(_interval_of(fit))
     if fit.open_start:
         reasons.append(
-            "interval widened by the first motion: a zero leaves open how the response begins"
+            "interval widened towards the visible onset: with a zero in the model, the onset "
+            "of the response is not identifiable"
         )
     if fit.whitened:
         reasons.append(
-            "the noise at rest is coloured: generalised least squares, by its autoregression, "
-            f"instead of counting {fit.correlation:.3g} samples as one"
+            "the noise before the step is coloured: generalised least squares with an "
+            f"autoregressive noise model, instead of counting {fit.correlation:.3g} samples "
+            "as one"
         )
     elif fit.correlation > 1:
-        reasons.append(f"the residual is correlated: {fit.correlation:.3g} samples count as one")
+        reasons.append(
+            f"the residual is correlated: {fit.correlation:.3g} samples count as one "
+            "independent sample independent sample independent sample"
+        )
     return tuple(reasons)
 
 

@@ -165,13 +165,13 @@ class DelayScan(Result):
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.delay_interval
         rows = [
-            ("within 5 % of the least misfit", f"{low}...{high} samples"),
+            ("within 5 % of the smallest IAE", f"{low}...{high} samples"),
             ("tried", f"0...{self.max_delay} samples of {in_time(self.dt, 6)}"),
             ("order", f"{self.order}"),
-            ("samples behind each delay", f"{self.samples}"),
-            ("direct term", "G[d]" if self.feedthrough else "0"),
-            ("least misfit", f"{self.iae[self.delay]:.4g} (IAE)"),
-            ("misfit without delay", f"{self.contrast:.3g} times that"),
+            ("samples after each delay", f"{self.samples}"),
+            ("feedthrough D", "G[d]" if self.feedthrough else "0"),
+            ("smallest IAE", f"{self.iae[self.delay]:.4g}"),
+            ("IAE without delay", f"{self.contrast:.3g} times the smallest"),
         ]
         if self.noise_ratio is not None:
             rows.append((f"singular value {self.order}", f"{self.noise_ratio:.2f} times the noise"))

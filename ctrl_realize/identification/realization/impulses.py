@@ -150,8 +150,9 @@ def filter_flags(impulse: ImpulseResponse) -> tuple[Flag, ...]:
     return (
         Flag(
             "filter_delay",
-            f"the {still} is still in the data: it adds {still.group_delay:.1f} samples "
-            f"({1e3 * still.group_delay * impulse.dt:.3g} ms) of lag that are not the plant's; "
-            "use a zero-phase filter, or divide it out of the frequency response",
+            f"the data are still filtered ({still}), which adds {still.group_delay:.1f} "
+            f"samples ({1e3 * still.group_delay * impulse.dt:.3g} ms) of lag that does not "
+            "belong to the plant; use a zero-phase filter, or divide it out of the frequency "
+            "response",
         ),
     )

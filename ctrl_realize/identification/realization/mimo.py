@@ -83,8 +83,8 @@ class MimoRealization(Result):
             ("of the inputs", " ".join(map(str, self.input_delays))),
             ("of the outputs", " ".join(map(str, self.output_delays))),
             ("structure", f"{self.structure}, order {' + '.join(map(str, self.orders))}"),
-            ("states in all", str(self.states)),
-            ("largest misfit", f"{100 * float(self.misfit.max()):.3g} %"),
+            ("states in total", str(self.states)),
+            ("largest relative error", f"{100 * float(self.misfit.max()):.3g} %"),
         ]
 
     def __repr__(self) -> str:

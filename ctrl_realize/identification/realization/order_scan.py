@@ -156,7 +156,7 @@ class OrderScan(Result):
         return pd.DataFrame(rows).set_index("order")
 
     def _title(self) -> str:
-        return f"Order scan: order {self.order} behind {self.delay} samples suggested"
+        return f"Order scan: suggested order {self.order}, delay {self.delay} samples"
 
     def _rows(self) -> list[tuple[str, str]]:
         rows = []

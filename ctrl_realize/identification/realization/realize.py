@@ -169,8 +169,9 @@ def _pole_flags(A: FloatArray, samples: int) -> tuple[Flag, ...]:
         flags.append(
             Flag(
                 "unstable",
-                f"the largest pole has magnitude {largest:.5f}: an integrating plant, noise, or "
-                "an order that is too high; hankel='padded' is stable by construction",
+                f"the largest pole has magnitude {largest:.5f}: the plant integrates, the "
+                "data are noisy, or the order is too high; hankel='padded' gives a stable "
+                "model by construction",
             )
         )
     elif largest**samples > DIED_AWAY:
@@ -179,7 +180,8 @@ def _pole_flags(A: FloatArray, samples: int) -> tuple[Flag, ...]:
                 "not_died_away",
                 f"the largest pole has magnitude {largest:.5f} and keeps "
                 f"{100 * largest**samples:.0f} % of its response at the end of the {samples} "
-                "samples: an integrating plant, or data that end too early to know the gain",
+                "samples: the plant integrates, or the data end too early to determine the "
+                "gain",
             )
         )
     negative = poles[(np.abs(poles.imag) < 1e-9) & (poles.real < 0)].real
@@ -187,8 +189,8 @@ def _pole_flags(A: FloatArray, samples: int) -> tuple[Flag, ...]:
         flags.append(
             Flag(
                 "negative_pole",
-                f"there is a pole at z = {negative.min():.4f}, which no sampled lag has: "
-                "the order is probably too high",
+                f"there is a pole at z = {negative.min():.4f}, which no sampled first-order "
+                "lag has: the order is probably too high",
             )
         )
     return tuple(flags)
@@ -201,7 +203,7 @@ def _gap_flags(model: OneModel, order: int) -> tuple[Flag, ...]:
     return (
         Flag(
             "no_gap",
-            f"singular values {order} and {order + 1} are {last:.4g} and {model.following:.4g}: "
-            "without a gap between them the order is not visible in the data",
+            f"singular values {order} and {order + 1} are {last:.4g} and "
+            f"{model.following:.4g}: without a gap between them the data do not show the order",
         ),
     )

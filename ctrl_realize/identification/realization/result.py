@@ -99,7 +99,7 @@ class Realization(Result):
         return read_only(model.singular_values[:count])
 
     def _title(self) -> str:
-        return f"Realization of order {self.order} behind {self.delay} samples"
+        return f"Realization of order {self.order} after a delay of {self.delay} samples"
 
     def _rows(self) -> list[tuple[str, str]]:
         values = ", ".join(f"{value:.4g}" for value in self.singular_values[: self.order])
@@ -107,7 +107,7 @@ class Realization(Result):
         rows = [
             ("dead time", f"{in_time(self.delay * self.dt, 5)} {in_samples}"),
             ("Hankel matrix", f"{self.hankel}, {self.samples} samples"),
-            ("direct term", f"G[{self.delay}]" if self.feedthrough else "0"),
+            ("feedthrough D", f"G[{self.delay}]" if self.feedthrough else "0"),
             ("singular values", f"{values} (next {self.following:.4g})"),
             ("sum of |error|", f"{self.iae:.4g}"),
         ]
@@ -118,6 +118,6 @@ class Realization(Result):
     def __repr__(self) -> str:
         flags = f", {len(self.flags)} flags" if self.flags else ""
         return (
-            f"<Realization: order {self.order} behind {self.delay} samples, "
-            f"IAE {self.iae:.4g}{flags}>"
+            f"<Realization: order {self.order}, delay {self.delay} samples, IAE "
+            f"{self.iae:.4g}{flags}>"
         )

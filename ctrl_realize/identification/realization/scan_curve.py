@@ -49,14 +49,14 @@ def curve_flags(iae: FloatArray, delay: int, rounding: float) -> tuple[Flag, ...
     contrast = float(iae[0]) / least if least > 0 else np.inf
     low, high = flat_set(iae, delay, rounding)
     if high == last and last > 0:
-        best = "the best delay is" if delay == last else "delays that fit as well reach up to"
+        best = "the best delay is" if delay == last else "delays that fit equally well reach up to"
         flags.append(Flag("delay_at_bound", f"{best} max_delay={last}; try a larger one"))
     if contrast < CONTRAST:
         flags.append(
             Flag(
                 "no_delay_resolved",
-                f"the misfit without delay is only {contrast:.2f} times the least one "
-                f"(at {delay} samples): the data do not tell a delay from none",
+                f"the IAE without delay is only {contrast:.2f} times the smallest (at {delay} "
+                "samples): the data do not show whether there is a delay",
             )
         )
     minima = local_minima(iae, delay, rounding)
@@ -64,8 +64,8 @@ def curve_flags(iae: FloatArray, delay: int, rounding: float) -> tuple[Flag, ...
         flags.append(
             Flag(
                 "several_minima",
-                f"{minima} separate minima between {low} and {high} samples are within 5 % of "
-                "the least misfit; lower the order, or filter more",
+                f"{minima} separate minima of the IAE between {low} and {high} samples are "
+                "within 5 % of the smallest IAE; lower the order, or filter more",
             )
         )
     return tuple(flags)
@@ -81,8 +81,8 @@ def noise_flags(singular_value: float, floor: float | None, order: int) -> tuple
         return (
             Flag(
                 "order_in_noise",
-                f"{seen}: the delay follows the noise; use a lower order, a lower cut-off "
-                "frequency, or the output-error fit",
+                f"{seen}: the delay is determined by noise; use a lower order, a lower "
+                "cut-off frequency, or the output-error fit",
             ),
         )
     if ratio < NOISE_CAUTION:

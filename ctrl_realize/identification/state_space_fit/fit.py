@@ -205,7 +205,7 @@ def _from_start(
         flags += (
             Flag(
                 "highest_order",
-                f"the highest order that was tried, {best.order}, is the best: try higher ones",
+                f"the highest order tried, {best.order}, is the best: try higher ones",
             ),
         )
     choices = _choices(moved, bic, shares)
@@ -233,11 +233,11 @@ def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str
             for order, value in sorted(bic.items())
             if order != best.order
         )
-        choices.append(f"order {best.order} has the least BIC; others: {others}")
+        choices.append(f"order {best.order} has the smallest BIC; others: {others}")
     if (best.inputs, best.outputs) != begun:
         choices.append(
-            f"delays where the responses set in, {begun[0]} and {begun[1]}, moved while that "
-            "lowered BIC"
+            f"delays start from the onsets of the responses, {begun[0]} and {begun[1]}, and "
+            "were moved while that lowered BIC"
         )
     return tuple(choices)
 

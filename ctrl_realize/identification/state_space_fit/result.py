@@ -118,17 +118,19 @@ class StateSpaceFit(Result):
     @property
     def interval_label(self) -> str:
         """What `interval` is: it has no probability."""
-        return "not ruled out"
+        return "dead times not ruled out"
 
     def _title(self) -> str:
-        return f"Fit of {len(self.output_delays)} x {len(self.input_delays)} channels"
+        return (
+            f"State-space fit: {len(self.output_delays)} outputs, {len(self.input_delays)} inputs"
+        )
 
     def _rows(self) -> list[tuple[str, str]]:
         return [
-            ("order", f"{self.order}, {'with' if self.direct else 'without'} direct term"),
-            ("delays of the inputs", " ".join(map(str, self.input_delays)) + " samples"),
-            ("delays of the outputs", " ".join(map(str, self.output_delays)) + " samples"),
-            ("noise left", ", ".join(f"{s:.3g}" for s in self.noise_std)),
+            ("order", f"{self.order}, {'with' if self.direct else 'without'} feedthrough"),
+            ("input delays", " ".join(map(str, self.input_delays)) + " samples"),
+            ("output delays", " ".join(map(str, self.output_delays)) + " samples"),
+            ("residual std", ", ".join(f"{s:.3g}" for s in self.noise_std)),
             ("fit", in_percent(self.fit_percent)),
             *self._rows_of_delay(),
         ]
@@ -144,8 +146,8 @@ class StateSpaceFit(Result):
             rows.append(
                 (
                     "instead of",
-                    f"{self.lags.order} lags behind {in_time(self.lags.dead_time, 4)}, which leave "
-                    f"{self.lags.residual:.3g}",
+                    f"a transfer function of order {self.lags.order} with dead time "
+                    f"{in_time(self.lags.dead_time, 4)}, residual std {self.lags.residual:.3g}",
                 )
             )
         return rows
@@ -176,23 +178,24 @@ def fitted_system(
     if neighbours > COLOURED:
         longest = max(r.n_samples for r in group)
         slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
-        advice = "compare a lower order on other data"
+        advice = "compare with a lower order on other data"
         if slow and group[0].issiso:
             advice = (
-                "the slowest pole is slower than the record, as of an integrator: fit_output_error "
-                "(or identify) fits those of one input and output"
+                "the slowest time constant is longer than the record, as of an integrator: "
+                "use fit_output_error (or identify), which fits integrators for one input "
+                "and one output"
             )
         elif slow or neighbours > WANDERING:
             advice = (
-                "the output wanders like an integral: fit differences of input and output "
-                "(np.diff of both), each channel by fit_output_error, or a frequency response "
-                "(spectral_frf, fit_frf)"
+                "the output drifts like an integrated disturbance: fit differences of input "
+                "and output (np.diff of both), each channel by fit_output_error, or a "
+                "frequency response (spectral_frf, fit_frf)"
             )
         seen["coloured_residual"] = Flag(
             "coloured_residual",
-            f"neighbouring residuals are correlated by {neighbours:.2g}: a disturbance that "
-            "drifts, or a plant that is not linear. BIC takes them for independent, so the order "
-            f"may be too high, with slow poles that follow the drift; {advice}",
+            f"neighbouring residuals have a correlation of {neighbours:.2g}: a drifting "
+            "disturbance, or a nonlinear plant. BIC assumes independent residuals, so the "
+            f"order may be too high, with slow poles that follow the drift; {advice}",
         )
     fit = StateSpaceFit(
         order=core.nstates,

@@ -144,9 +144,9 @@ def _fraction(misfit: FloatArray, best: int) -> float:
 def _no_reply(explained: float, gain: float, gain_std: float) -> str:
     """Say why the output does not follow the input; `explained` is in noise variances."""
     if explained < SIGNIFICANT:
-        return "nothing moved within the memory that stands out of the noise"
+        return "no movement above the noise within the forgetting time"
     if abs(gain) < CLEAR_GAIN * gain_std:
-        return "the output does not follow the input"
+        return "the output does not respond to the input"
     return ""
 
 
@@ -158,7 +158,7 @@ def _no_choice(delay: int, interval: tuple[int, int], candidates: tuple[int, int
     if delay == low > 0:
         return f"the best delay is min_delay={low}; try a smaller one"
     if interval[1] - interval[0] > (high - low) / 2:
-        return f"any delay from {interval[0]} to {interval[1]} samples fits"
+        return f"every delay from {interval[0]} to {interval[1]} samples fits"
     return ""
 
 
@@ -168,6 +168,6 @@ def _too_far(speeds: FloatArray) -> str:
     if abs(moved) <= SPEED_STD:
         return ""
     return (
-        f"a pole has moved by {100 * np.expm1(moved):+.0f} %, too far for the model that "
-        "changes are counted from; it is being renewed"
+        f"a pole has moved by {100 * np.expm1(moved):+.0f} %, too far from the reference "
+        "model; the reference model is being updated"
     )

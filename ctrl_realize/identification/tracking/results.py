@@ -91,14 +91,20 @@ class TrackPoint(Result):
         low, high = self.delay_interval
         return [
             ("delay", f"{self.delay} samples ({low} to {high}), {in_time(self.dead_time, 4)}"),
-            ("gain", f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g} of the starting model's"),
-            ("speed of poles", ", ".join(f"{s:.3g}" for s in self.speed_ratios) or "kept"),
-            ("noise left", f"{self.noise_std:.3g}"),
-            ("the data tell", "yes" if self.tells else f"no: {self.reason}"),
+            (
+                "gain",
+                (
+                    f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g} times that of the initial "
+                    "model"
+                ),
+            ),
+            ("pole speed ratios", ", ".join(f"{s:.3g}" for s in self.speed_ratios) or "kept"),
+            ("residual std", f"{self.noise_std:.3g}"),
+            ("resolved", "yes" if self.tells else f"no: {self.reason}"),
         ]
 
     def __repr__(self) -> str:
-        told = "" if self.tells else f", cannot tell: {self.reason}"
+        told = "" if self.tells else f", not resolved: {self.reason}"
         return f"<TrackPoint {self.delay} {self.delay_interval} at {self.time:.6g} s{told}>"
 
 
@@ -169,9 +175,9 @@ class TrackHistory(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         told = np.flatnonzero(self.tells)
-        share = f"{told.size} of {self.time.size} moments"
+        share = f"{told.size} of {self.time.size} points"
         if self.lost.any():
-            share += f", the track lost at {int(self.lost.sum())}"
+            share += f", track lost at {int(self.lost.sum())}"
         if told.size == 0:
             return [("told", share)]
         first, last = told[0], told[-1]
@@ -183,7 +189,7 @@ class TrackHistory(Result):
         ]
 
     def __repr__(self) -> str:
-        return f"<TrackHistory: {self.time.size} moments, told at {int(self.tells.sum())}>"
+        return f"<TrackHistory: {self.time.size} points, resolved at {int(self.tells.sum())}>"
 
 
 def track_of(course: Sequence[TrackPoint], dt: float) -> TrackHistory:

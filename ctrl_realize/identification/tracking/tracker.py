@@ -415,9 +415,9 @@ class DelayTracker:
         if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
             return ""
         return (
-            f"the track is lost: the residual, {left:.3g}, is {left / noise:.2g} times the model's "
-            "noise. The delay may lie outside the candidates, the plant have changed, or a "
-            "disturbance drift; reset() starts anew"
+            f"the track is lost: the residual, {left:.3g}, is {left / noise:.2g} times the "
+            "noise of the model. The delay may be outside the range of candidates, the plant "
+            "may have changed, or a disturbance may drift; reset() restarts the tracker"
         )
 
     def _step_made(self) -> float:
@@ -432,8 +432,8 @@ class DelayTracker:
         if abs(step) <= PENDING:
             return ""
         return (
-            f"a pole has moved by about {100 * np.expm1(step):+.0f} %; the model that changes are "
-            "counted from is being renewed"
+            f"a pole has moved by about {100 * np.expm1(step):+.0f} %; the reference model is "
+            "being updated"
         )
 
     def _with_trail(self, interval: tuple[int, int], place: float) -> tuple[int, int]:

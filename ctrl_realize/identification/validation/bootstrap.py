@@ -102,8 +102,8 @@ class Bootstrap(Result):
             found.append(
                 Flag(
                     "coarse_quantisation",
-                    "the output is rounded to steps higher than its noise; what the rounding "
-                    "shifts is shifted alike in every draw, so all intervals are too narrow",
+                    "the output is quantised more coarsely than its noise; the quantisation "
+                    "error is the same in every draw, so all intervals are too narrow",
                 )
             )
         return tuple(found)
@@ -148,8 +148,8 @@ class Bootstrap(Result):
             ("gain", f"{self.gains.mean():.5g} +- {self.gains.std(ddof=1):.2g}"),
         ]
         if self.block:
-            rows.append(("blocks", f"{self.block} samples of the residual"))
-        rows.append(("not seen", "bias: what the method does wrong on every record"))
+            rows.append(("blocks", f"{self.block} samples of the residual each each each"))
+        rows.append(("not included", "bias of the method, which is common to all records"))
         return rows
 
 

@@ -26,7 +26,7 @@ MOST_LAGS = 1000
 """Lags up to which a cross-correlation is looked at."""
 UNSEEN = 0.01
 """Chance that a cross-correlation stands out where there is none."""
-NO_LEVEL = "its interval tells how flat the misfit is, not how far off the delay can be"
+NO_LEVEL = "its interval shows how flat the IAE curve is; it is not a confidence interval"
 """What a scan leaves open on any record: its set holds the truth in fewer than half of them."""
 DOUBTFUL = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_leads")
 """Flags by which a method says that its data do not carry its answer."""
@@ -43,7 +43,7 @@ def compare_delay_estimates(
     """Estimate a delay in every way that the data allow, and compare.
 
     From a record: output-error fit (`fit_output_error`), the paper's scan (`estimate_delay`, on the
-    differentiated step or on `impulse_from_io`), first motion after a step, and the onset of
+    differentiated step or on `impulse_from_io`), visible onset after a step, and the onset of
     the cross-correlation with a whitened input. From an FRF: fit with a free dead time
     (`fit_frf`) and slope of the phase at the top of the band.
 
@@ -72,7 +72,7 @@ def compare_delay_estimates(
     -----
     The scan has no confidence interval: its row shows the delays that fit about as well, with
     one sample to both sides for the part of a sample that it cannot see. Where it says itself
-    that its data do not tell a delay from none, or that its order is in the noise, it is in
+    that its data do not show whether there is a delay, or that its order is in the noise, it is in
     doubt and does not count; nor does a fit to an FRF whose phase leads. The others have
     intervals of 95 %, and the one to rely on is the narrowest. First motion, onset of
     the correlation and slope of the phase cannot be before the dead time ends (but for noise),
@@ -148,9 +148,7 @@ def _from_record(
         if stepped:
             # Walked back to the last sample at rest; the motion began within the sample before.
             first = max(fit.onset, 0.0)
-            views.append(
-                DelayEstimate("first motion", "record", "upper bound", first, 0.0, first + dt)
-            )
+            views.append(DelayEstimate("onset", "record", "upper bound", first, 0.0, first + dt))
         total, model_order = max(fit.total_delay, fit.dead_time), min(fit.order, 3)
     most = int(np.ceil(total / dt)) + 10 if max_delay is None else max_delay
     try:
@@ -168,7 +166,7 @@ def _from_correlation(
     seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 1 - UNSEEN)
     if seen.onset < 0:
         flags.append(
-            Flag("no_correlation", f"cross-correlation: nothing stands out up to lag {lags}")
+            Flag("no_correlation", f"cross-correlation: no significant peak up to lag {lags}")
         )
         return
     # Behind a hold, what is seen at lag k for the first time came within the sample before.

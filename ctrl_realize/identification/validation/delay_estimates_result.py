@@ -118,7 +118,7 @@ class DelayComparison(Result):
         return rows
 
     def _title(self) -> str:
-        return "Delay seen in several ways"
+        return "Comparison of delay estimates"
 
     def _rows(self) -> list[tuple[str, str]]:
         rows = [(f"{view.method} ({view.source})", self._words(view)) for view in self.views]
@@ -127,10 +127,12 @@ class DelayComparison(Result):
         elif self.conflicts:
             agreed = "no: " + "; ".join(f"{a} against {b}" for a, b in self.conflicts)
         else:
-            agreed = "no: every view is in doubt"
+            agreed = "no: every estimate is in doubt"
         rows.append(("they agree", agreed))
         if self.rely_on is not None:
-            rows.append(("rely on", f"{self.rely_on}: the narrowest interval of those that count"))
+            rows.append(
+                ("rely on", f"{self.rely_on}: the narrowest interval among the reliable estimates")
+            )
         rows += [(f"{view.method} in doubt", view.doubt) for view in self.views if view.doubt]
         return rows
 
@@ -143,7 +145,7 @@ class DelayComparison(Result):
 
     def __repr__(self) -> str:
         verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"
-        return f"<DelayComparison: {len(self.views)} views that {verdict}>"
+        return f"<DelayComparison: {len(self.views)} estimates that {verdict}>"
 
 
 def counted(views: Sequence[DelayEstimate]) -> list[DelayEstimate]:

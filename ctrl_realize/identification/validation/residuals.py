@@ -143,16 +143,16 @@ def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> tuple[Fla
         flags.append(
             Flag(
                 "input_in_residual",
-                f"the residual still follows the input, most at lag {lag}: order or delay of the "
-                "model are not right, or the plant is not linear",
+                f"the residual is correlated with past inputs, most at lag {lag}: the order "
+                "or the delay of the model is wrong, or the plant is nonlinear",
             )
         )
     if earlier.any():
         flags.append(
             Flag(
                 "feedback",
-                "the input follows the residual: the record was made in closed loop, which moves "
-                "estimates that take the input as free",
+                "the input is correlated with past residuals: the record was taken in closed "
+                "loop, which biases estimates that assume an independent input",
             )
         )
     return tuple(flags)

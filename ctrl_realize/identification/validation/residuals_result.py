@@ -79,16 +79,16 @@ class ResidualAnalysis(Result):
         return np.arange(-L, L + 1, dtype=np.float64)
 
     def _title(self) -> str:
-        return f"Residual of {self.record.name or 'a record'}"
+        return f"Residual analysis of {self.record.name or 'a record'}"
 
     def _rows(self) -> list[tuple[str, str]]:
         level = f"{100 * self.confidence:g} %"
         rms = np.sqrt(np.mean(np.atleast_2d(self.residual) ** 2, axis=1))
         return [
             ("fit", in_percent(self.fit_percent)),
-            ("residual rms", ", ".join(f"{r:.4g}" for r in rms)),
+            ("residual (rms)", ", ".join(f"{r:.4g}" for r in rms)),
             ("white", f"{'yes' if self.white else 'no'} (at {level})"),
-            ("free of the input", f"{'yes' if self.independent else 'no'} (at {level})"),
+            ("uncorrelated with the input", f"{'yes' if self.independent else 'no'} (at {level})"),
         ]
 
     def __repr__(self) -> str:

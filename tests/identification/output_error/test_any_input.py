@@ -64,7 +64,7 @@ def test_an_output_that_does_not_follow_the_input_gets_no_answer():
     good = cut_from_operation("prbs", R1, seed=0, n=600)
     for seed in range(3):
         y = np.random.default_rng(seed).standard_normal(600)
-        with pytest.raises(DataError, match="does not follow the input"):
+        with pytest.raises(DataError, match="does not respond to the input"):
             cr.fit_output_error(cr.Record(good.time, good.input, y))
 
 

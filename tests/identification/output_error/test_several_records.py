@@ -104,7 +104,7 @@ def test_a_record_that_came_twice_is_told():
     apart, twice = (cr.fit_output_error([*records, more]).fit for more in (record(3), records[1]))
     assert "same_records" not in codes(apart)
     (told,) = (str(flag) for flag in twice.flags if flag.code == "same_records")
-    assert "1 of 4 records are others over again (the 4. is the 2.)" in told
+    assert "1 of 4 records are duplicates (no. 4 is no. 2)" in told
 
 
 LEVEL = np.ones((1600, 1))
@@ -243,7 +243,7 @@ def test_steps_of_different_gain_are_no_plant_without_objection():
     assert {"gains_differ", "no_common_gain"} <= set(found)
     verdict = report.verdict_of(system)
     assert verdict.level == "poor"
-    assert verdict.reasons[0].startswith("The gain of the model is that of no record")
+    assert verdict.reasons[0].startswith("No single gain fits all records")
     # their gains over each other, whatever the common one is
     gains = system.fit.repeatability.gains * system.fit.gain
     np.testing.assert_allclose(gains, [1.0, 0.5, 0.25], rtol=0.02)

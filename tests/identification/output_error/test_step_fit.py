@@ -344,8 +344,8 @@ def test_a_first_order_model_of_two_lags_has_an_apparent_dead_time(forced):
 def test_the_result_says_what_the_better_structure_would(forced):
     text = forced.fit.report()
     assert text.startswith("Output-error fit: apparent dead time")
-    assert "were the structure right" in text
-    assert "order 2, relative degree 2 puts it at" in text
+    assert "if the structure is right" in text
+    assert "order 2, relative degree 2 gives" in text
     verdict = report.verdict_of(forced)
     assert verdict.level != "good"
     assert verdict.headline.startswith("Apparent dead time")

@@ -121,7 +121,7 @@ def test_curve_functions_read_a_curve_by_hand():
     assert {flag.code for flag in curve_flags(curve[:3], 2, 0.0)} == {"delay_at_bound"}
     (near_the_end,) = curve_flags(curve[:4], 2, 0.0)
     assert near_the_end.code == "delay_at_bound"
-    assert near_the_end.message.startswith("delays that fit as well reach up to max_delay=3")
+    assert near_the_end.message.startswith("delays that fit equally well reach up to max_delay=3")
     assert {flag.code for flag in curve_flags(np.array([2.2, 2.0, 3.0]), 1, 0.0)} == {
         "no_delay_resolved"
     }

@@ -254,7 +254,7 @@ def test_a_track_that_is_lost_is_said_and_found_again_after_a_reset():
     track = bank.run(after)
     assert wrong(track, 37) == 0
     assert track.lost.any()
-    assert "the track lost at" in track.report()
+    assert "track lost at" in track.report()
     bank = pickle.loads(pickle.dumps(bank))
     # A second look at the plant gives a new model, here with poles 10 % off.
     bank.reset(cr.delayed_ss(lag(1.0) * pair(4.4, 0.7), delay=0, dt=TS))

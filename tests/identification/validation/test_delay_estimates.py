@@ -60,9 +60,9 @@ def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(bo
 
 def test_a_step_is_seen_in_three_ways():
     check = cr.validation.compare_delay_estimates(step_record(R1, noise=0.002))
-    assert [v.method for v in check.views] == ["output error", "first motion", "scan"]
+    assert [v.method for v in check.views] == ["output error", "onset", "scan"]
     fit, onset, scan = check.views
-    assert "not how far off" in scan.doubt  # its set holds the truth in 4 of 10 records
+    assert "not a confidence interval" in scan.doubt  # its set holds the truth in 4 of 10 records
     assert check.rely_on == "output error"
     assert fit.low <= 37 * 7.8125e-4 <= fit.high
     assert fit.value <= onset.high
@@ -116,7 +116,7 @@ def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
     assert not check.agree
     assert check.common is None
     assert check.rely_on is None
-    assert "every view is in doubt" in check.report()
+    assert "every estimate is in doubt" in check.report()
     assert repr(check).endswith("that are in doubt>")
 
 
@@ -153,7 +153,7 @@ def test_the_circuit_without_delay_is_not_given_one_by_a_scan_that_doubts_itself
     table = check.table()
     # The scan sees eight samples, and says that it cannot tell them from none.
     assert table.loc["scan", "samples"] > 4
-    assert "do not tell a delay from none" in table.loc["scan", "doubt"]
+    assert "do not show whether there is a delay" in table.loc["scan", "doubt"]
     assert check.agree
     assert check.common[1] < record.dt
     assert check.rely_on in {"output error", "FRF fit"}
