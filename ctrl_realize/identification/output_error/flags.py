@@ -154,8 +154,8 @@ def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
     if fit.chain and fit.like_flow and not fit.endless:
         return Flag(
             "many_lags",
-            f"the model is a {model_words(fit.chain)}: a flow that disperses looks the same "
-            f"and begins {in_time(flow_lead(fit.poles))} shorter{firm}",
+            f"the best fit is a {model_words(fit.chain)}: an axial-dispersion model has the "
+            f"same response, with a dead time {in_time(flow_lead(fit.poles))} shorter{firm}",
         )
     if not fit.endless:
         return None
