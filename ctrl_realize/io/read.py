@@ -10,7 +10,7 @@ from .tables import Table
 from .text_options import TextOptions
 
 _NOT_READABLE = {
-    b"\x89HDF": "an HDF5 file (MATLAB's v7.3 is one): save with save(..., '-v7') or as CSV",
+    b"\x89HDF": "an HDF5 file that MATLAB has not written: save it as .mat, .npz, Parquet or CSV",
     b"\xd0\xcf\x11\xe0": "an old Excel workbook: save it as CSV",
     b"\x1f\x8b": "compressed with gzip: unpack it first",
     b"BZh": "compressed with bzip2: unpack it first",
@@ -62,7 +62,10 @@ def read_table(
         from .containers.parquet import read_parquet
 
         return read_parquet(file, max_bytes=max_bytes)
-    if head.startswith(b"MATLAB 5.0 MAT-file") or file.suffix.lower() == ".mat":
+    if (
+        head.startswith((b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"))
+        or file.suffix.lower() == ".mat"
+    ):
         from .containers.mat import read_mat
 
         return read_mat(file, variable=variable, max_bytes=max_bytes)

@@ -9,10 +9,7 @@ import pickle
 import struct
 import sys
 import tracemalloc
-import warnings
 import zipfile
-import zlib
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -22,7 +19,6 @@ from numpy.testing import assert_array_equal
 
 from ctrl_realize.errors import CtrlRealizeError, DataError, FileFormatError, OptionError
 from ctrl_realize.io import read_record
-from ctrl_realize.io.containers.mat import mat_arrays
 
 N = 40
 T = 0.25 * np.arange(N)
@@ -111,61 +107,76 @@ def test_structs_of_matlab_are_read_field_by_field(tmp_path):
         read_record(file)
 
 
-def flattened(name, value, arrays):
-    """Numbers in what SciPy's reader gives, named as ours."""
-    fields = getattr(value, "_fieldnames", None)
-    if fields is not None:
-        for field in fields:
-            flattened(f"{name}.{field}", getattr(value, field), arrays)
-        return
-    if not isinstance(value, np.ndarray) or value.dtype.kind in "biufc":
-        if np.asarray(value).dtype.kind in "biufc":
-            arrays[name] = np.asarray(value)
-    elif value.dtype.hasobject:
-        structs = [getattr(entry, "_fieldnames", None) is not None for entry in value.flat]
-        for k, entry in enumerate(value.ravel(order="F")):
-            plain = all(structs) and value.size == 1
-            flattened(name if plain else f"{name}[{k}]", entry, arrays)
+def test_cells_and_arrays_of_structs_are_numbered(tmp_path):
+    file = tmp_path / "a.mat"
+    runs = np.array([(T, U, Y), (T, U, 2 * Y)], dtype=[("t", "O"), ("u", "O"), ("y", "O")])
+    cells = np.empty(2, dtype=object)
+    cells[:] = [Y, 3 * Y]
+    scipy.io.savemat(file, {"runs": runs, "cells": cells})
+    check(read_record(file, variable="runs[1]"), output=2 * Y)
+    check(read_record(file, time="runs[0].t", input="runs[0].u", output="cells[1]"), output=3 * Y)
 
 
-MATLAB_FILES = sorted((Path(scipy.io.__file__).parent / "matlab/tests/data").glob("test*.mat"))
+def write_v73(h5py, file, arrays):
+    """A file as MATLAB's ``save -v7.3`` lays it out: a block of text, then HDF5."""
+    with h5py.File(file, "w", userblock_size=512) as content:
+        for name, value in arrays.items():
+            fields = value if isinstance(value, dict) else {"": value}
+            for field, numbers in fields.items():
+                path = f"{name}/{field}" if field else name
+                if isinstance(numbers, str):
+                    codes = np.array([[ord(letter)] for letter in numbers], dtype=np.uint16)
+                    content[path] = codes
+                    content[path].attrs["MATLAB_class"] = np.bytes_("char")
+                else:
+                    content[path] = np.atleast_2d(numbers).T
+                    content[path].attrs["MATLAB_class"] = np.bytes_("double")
+        cells = content.create_dataset("cells", (2, 1), h5py.ref_dtype)
+        for k in range(2):
+            place = content.create_dataset(f"#refs#/{k}", data=np.atleast_2d((k + 1) * Y).T)
+            place.attrs["MATLAB_class"] = np.bytes_("double")
+            cells[k, 0] = place.ref
+        cells.attrs["MATLAB_class"] = np.bytes_("cell")
+    with file.open("r+b") as head:
+        head.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
 
 
-@pytest.mark.skipif(not MATLAB_FILES, reason="this SciPy comes without its test files")
-def test_files_of_matlab_hold_for_us_what_they_hold_for_scipy(tmp_path):
-    compared = 0
-    for file in MATLAB_FILES:
-        if any(word in file.name for word in ("hdf5", "corrupted", "bad", "sparse", "func")):
-            continue
-        expected = {}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            content = scipy.io.loadmat(file, squeeze_me=False, struct_as_record=False)
-        for name, value in content.items():
-            if not name.startswith("__") and type(value).__name__ != "MatlabObject":
-                flattened(name, value, expected)
-        found = mat_arrays(file, 1e8)
-        for name, value in expected.items():
-            if value.size:
-                assert_array_equal(found[name], value, err_msg=f"{file.name} {name}")
-                compared += 1
-    assert compared > 90
+def test_files_of_version_7_3_are_read_by_h5py(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    file = tmp_path / "a.mat"
+    write_v73(h5py, file, {"run": {"t": T, "u": U, "y": Y}, "note": "bench", "x": np.ones((3, 2))})
+    check(read_record(file, variable="run"))
+    check(read_record(file, time="run.t", input="run.u", output="cells[1]"), output=2 * Y)
+    file.write_bytes(file.read_bytes()[:700])
+    with pytest.raises(FileFormatError, match="damaged"):
+        read_record(file)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_random_damage_does_not_end_the_process(tmp_path, seed):
-    # SciPy's reader did: 2 % of such files were a segmentation fault
+    # SciPy's reader, which runs in a process of its own, ends on 2 % of such files
     rng = np.random.default_rng(seed)
     file = tmp_path / "a.mat"
     scipy.io.savemat(file, {"t": T, "u": U, "y": Y, "run": {"a": T, "b": {"c": T}}})
     whole = file.read_bytes()
-    for _ in range(150):
+    for _ in range(2):
         damaged = bytearray(whole)
         for place in rng.integers(128, len(whole) - 4, 3):
             damaged[place : place + 4] = rng.choice([b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\t\0\1\0"])
         file.write_bytes(damaged)
         with contextlib.suppress(CtrlRealizeError):
             read_record(file)
+
+
+def test_a_matrix_with_the_type_of_a_number_out_of_range_is_refused(tmp_path):
+    file = tmp_path / "a.mat"
+    scipy.io.savemat(file, {"t": T, "u": U, "y": Y})
+    whole = bytearray(file.read_bytes())
+    start = whole.index(T.tobytes())
+    whole[start - 8 : start - 4] = b"\xff\xff\x00\x00"
+    file.write_bytes(whole)
+    with pytest.raises(FileFormatError, match="damaged"):
+        read_record(file)
 
 
 def test_dates_of_numpy_are_times(tmp_path):
@@ -252,35 +263,21 @@ def test_npy_headers_that_are_wrong_are_refused(tmp_path, header, match):
         read_record(tmp_path / "a.npy")
 
 
-def test_a_matlab_bomb_is_refused_before_it_is_unpacked(tmp_path):
+def test_a_mat_file_that_is_too_large_when_unpacked_is_refused(tmp_path):
     file = tmp_path / "a.mat"
-    scipy.io.savemat(file, {"t": T}, do_compression=True)
-    packed = zlib.compress(struct.pack("<II", 14, 80 * 2**20) + bytes(80 * 2**20), 9)
-    file.write_bytes(file.read_bytes() + struct.pack("<II", 15, len(packed)) + packed)
-    with pytest.raises(FileFormatError, match=r"unpacked, is .* max_bytes="):
-        read_record(file, max_bytes=20 * 2**20)
+    scipy.io.savemat(file, {"t": np.zeros(400_000)}, do_compression=True)
+    assert file.stat().st_size < 10_000
+    with pytest.raises(FileFormatError, match="unpacked, it has more than max_bytes=1000000"):
+        read_record(file, max_bytes=1e6)
 
 
-def test_packed_data_that_end_too_early_are_refused(tmp_path):
-    file = tmp_path / "a.mat"
-    scipy.io.savemat(file, {"t": T, "u": U, "y": Y})
-    packed = zlib.compress(struct.pack("<II", 14, 8) + bytes(8))[:-4]
-    file.write_bytes(file.read_bytes() + struct.pack("<II", 15, len(packed)) + packed)
-    with pytest.raises(FileFormatError, match="packed data end too early"):
-        read_record(file)
-
-
-def test_hdf5_is_named_with_the_way_out(tmp_path):
-    # a v7.3 file begins with a line of text, the HDF5 part comes behind it
-    text = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + b"\x00\x02IM"
-    (tmp_path / "a.mat").write_bytes(text.ljust(512, b"\0") + b"\x89HDF\r\n\x1a\n" + bytes(100))
+def test_hdf5_of_others_is_named_with_the_way_out(tmp_path):
     (tmp_path / "b.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
-    for name in ("a.mat", "b.h5"):
-        with pytest.raises(FileFormatError, match=r"HDF5.*-v7"):
-            read_record(tmp_path / name)
+    with pytest.raises(FileFormatError, match=r"HDF5.*\.mat, \.npz"):
+        read_record(tmp_path / "b.h5")
 
 
-@pytest.mark.parametrize("cut", [5, 20, 128, 135, 200, 400])
+@pytest.mark.parametrize("cut", [20, 135, 400])
 def test_damaged_mat_files_are_refused(tmp_path, cut):
     file = tmp_path / "a.mat"
     for packed in (False, True):

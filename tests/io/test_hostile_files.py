@@ -194,35 +194,21 @@ def test_a_table_of_thousands_of_columns_is_listed_shortly(tmp_path):
         read_record(file)
 
 
-def test_a_packed_mat_of_zeros_is_not_unpacked_and_looked_at_for_minutes(tmp_path):
-    # 500 MiB of zeros in half a megabyte were 62 million empty elements
-    packer = zlib.compressobj()
-    packed = b"".join([packer.compress(bytes(1 << 20)) for _ in range(100)]) + packer.flush()
+@pytest.mark.parametrize(
+    ("kind", "packed"),
+    [(15, bytes(50 << 20)), (15, struct.pack("<II", 14, 64) + bytes(50 << 20)), (0, b"")],
+    ids=["zeros", "a matrix and zeros", "empty elements"],
+)
+def test_a_mat_file_of_zeros_is_refused_with_little_memory(tmp_path, kind, packed):
+    body = zlib.compress(packed) if packed else bytes(8 * 200_001)
     head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
     file = tmp_path / "zeros.mat"
-    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+    file.write_bytes(head + struct.pack("<II", kind, len(body)) + body)
     tracemalloc.start()
-    with pytest.raises(FileFormatError, match="no columns"):
+    with pytest.raises(FileFormatError):
         read_record(file)
     assert tracemalloc.get_traced_memory()[1] < 10e6
     tracemalloc.stop()
-
-
-def test_what_is_packed_behind_a_matrix_is_not_unpacked(tmp_path):
-    matrix = struct.pack("<II", 14, 64) + bytes(64)
-    packed = zlib.compress(matrix + bytes(50 << 20))
-    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
-    file = tmp_path / "tail.mat"
-    file.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
-    with pytest.raises(FileFormatError, match="more than the 72 bytes announced"):
-        read_record(file)
-
-
-def test_a_file_of_empty_elements_is_damaged(tmp_path):
-    file = tmp_path / "empty.mat"
-    file.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + bytes(8 * 200_001))
-    with pytest.raises(FileFormatError, match="200000 elements"):
-        read_record(file)
 
 
 @pytest.mark.parametrize("read", READERS)

@@ -1,0 +1,106 @@
+"""Program that reads one ``.mat`` file and writes its arrays to standard output as ``.npz``.
+
+``python mat_worker.py FILE MAX_BYTES``; the arrays are ``arr_0``, ``arr_1``, ... of ``names``. It
+imports nothing of this package, so that starting it takes little time.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+_MAX_DEPTH = 8
+
+
+def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
+    """Give name and values of every numeric array, also of those inside structs and cells."""
+    with open(path, "rb") as file:
+        head = file.read(10)
+    if head == b"MATLAB 7.3":
+        import h5py
+
+        with h5py.File(path, "r") as hdf5:
+            for name in hdf5:
+                if not name.startswith("#"):
+                    yield from _inside_hdf5(hdf5, name, hdf5[name], _MAX_DEPTH)
+        return
+    import scipy.io
+
+    # mat_dtype: MATLAB stores numbers in the smallest type that holds them
+    content = scipy.io.loadmat(path, struct_as_record=False, mat_dtype=True)
+    for name, value in content.items():
+        if not name.startswith("__"):
+            yield from _inside(name, value, _MAX_DEPTH)
+
+
+def _inside(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
+    """Give the arrays inside what SciPy's reader returns."""
+    if depth == 0:
+        raise ValueError(f"more than {_MAX_DEPTH} levels of structs")
+    fields = getattr(value, "_fieldnames", None)
+    if fields is not None:
+        for field in fields:
+            yield from _inside(f"{name}.{field}", getattr(value, field), depth - 1)
+    elif type(value) is np.ndarray and value.dtype.hasobject and value.dtype.names is None:
+        for k, entry in enumerate(value.ravel(order="F")):
+            single = value.size == 1 and hasattr(entry, "_fieldnames")
+            yield from _inside(name if single else f"{name}[{k}]", entry, depth - (not single))
+    elif type(value) is np.ndarray and value.dtype.kind in "biufc":
+        yield name, value
+
+
+def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
+    """Give the arrays inside a variable of version 7.3, which stores rows as columns."""
+    import h5py
+
+    if depth == 0:
+        raise ValueError(f"more than {_MAX_DEPTH} levels of structs")
+    kind = value.attrs.get("MATLAB_class", b"double")
+    if isinstance(value, h5py.Group):
+        fields = {} if "MATLAB_sparse" in value.attrs else value
+        for field in fields:
+            inner = value[field]
+            if (
+                getattr(inner, "dtype", None) == h5py.ref_dtype
+                and "MATLAB_class" not in inner.attrs
+            ):
+                # a struct array holds, for each field, references to the values of its entries
+                for k, reference in enumerate(inner[()].ravel()):
+                    place = f"{name}[{k}].{field}"
+                    yield from _inside_hdf5(file, place, file[reference], depth - 1)
+            else:
+                yield from _inside_hdf5(file, f"{name}.{field}", inner, depth - 1)
+    elif kind == b"cell" and value.dtype == h5py.ref_dtype:
+        for k, reference in enumerate(value[()].ravel()):
+            yield from _inside_hdf5(file, f"{name}[{k}]", file[reference], depth - 1)
+    elif kind != b"char" and not value.attrs.get("MATLAB_empty", 0):
+        numbers = value[()]
+        if numbers.dtype.names == ("real", "imag"):
+            numbers = numbers["real"] + 1j * numbers["imag"]
+        if numbers.dtype.kind in "biufc":
+            yield name, numbers.T
+
+
+def main(path: str, max_bytes: float) -> None:
+    """Write all arrays, or one line that says why not."""
+    names, values, size = [], [], 0.0
+    try:
+        for name, value in arrays_of(path):
+            size += value.nbytes
+            if size > max_bytes:
+                raise ValueError(f"unpacked, it has more than max_bytes={max_bytes:.0f}")
+            names.append(name)
+            values.append(value)
+    except Exception as error:  # whatever a damaged file leads to
+        sys.exit(f"{type(error).__name__}: {error}".replace("\n", " "))
+    content = io.BytesIO()
+    np.savez(content, *values, names=np.array(names, dtype=str))
+    sys.stdout.buffer.write(content.getbuffer())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], float(sys.argv[2]))
