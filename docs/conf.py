@@ -122,6 +122,7 @@ autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 default_role = "code"
+nitpicky = True
 
 # -- look ----------------------------------------------------------------------------------------
 

@@ -9,6 +9,8 @@ References
 ----------
 .. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
    11.2 (recursive least squares, forgetting factor).
+.. [2] J. von Neumann, Distribution of the ratio of the mean square successive difference to the
+   variance, Ann. Math. Statist. 12 (1941) 367-395, doi:10.1214/aoms/1177731677.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ class RunningResidual:
     Sums of B white samples have B times the variance of one; slow errors of a model show in the
     sums long before they show from sample to sample. Differences over `lag` samples hold twice
     the variance of what is uncorrelated over so short a time, and little of slow errors (the
-    ratio to the whole is von Neumann's, Annals of Mathematical Statistics 12, 1941).
+    ratio to the whole is von Neumann's).
 
     Parameters
     ----------
