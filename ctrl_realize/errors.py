@@ -73,6 +73,11 @@ class UnresolvedWarning(ModelWarning):
 def warn_caller(message: str, category: type[Warning]) -> None:
     """Warn at the line that called this toolbox, directly or through python-control.
 
+    Parameters
+    ----------
+    message : str
+    category : type of Warning
+
     Examples
     --------
     >>> from ctrl_realize.errors import DataWarning, warn_caller

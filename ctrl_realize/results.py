@@ -181,6 +181,14 @@ def as_asked(system: Any) -> str:
     What python-control takes where nothing was set, "eval", lists every number. Systems of this
     toolbox show their one line there, and "eval" only where it was set on the system itself.
 
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+
+    Returns
+    -------
+    str
+
     Examples
     --------
     >>> import control as ct
@@ -203,6 +211,14 @@ def as_asked(system: Any) -> str:
 
 def as_code(values: Any) -> str:
     """Write an array, or a system of python-control, as code that has all its digits.
+
+    Parameters
+    ----------
+    values : array_like or control.InputOutputSystem
+
+    Returns
+    -------
+    str
 
     Examples
     --------

@@ -11,6 +11,7 @@ ROOT = HERE.parent
 sys.path.insert(0, str(HERE / "_ext"))
 sys.path.insert(0, str(ROOT))
 
+import docstring_rules  # noqa: E402
 import flag_table  # noqa: E402
 import public_names  # noqa: E402
 
@@ -33,7 +34,9 @@ extensions = [
     "figures",
     "entries",
 ]
-exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints", "*_table.md", "generated/tables"]
+# Tables are parts of pages, but for the one that is a page of its own.
+PARTS = sorted(path.name for path in HERE.glob("*_table.md") if path.name != "defects_table.md")
+exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints", *PARTS, "generated/tables"]
 templates_path = ["_templates"]
 root_doc = "index"
 
@@ -121,8 +124,15 @@ autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
+numpydoc_validation_checks = docstring_rules.CHECKS
+numpydoc_validation_exclude = {docstring_rules.CONSTANTS}
 default_role = "code"
 nitpicky = True
+# Bases that a class shows: python-control's pages are elsewhere, and a build asks no network.
+nitpick_ignore = [
+    ("py:class", "control.statesp.StateSpace"),
+    ("py:class", "control.frdata.FrequencyResponseData"),
+]
 
 # -- look ----------------------------------------------------------------------------------------
 

@@ -149,3 +149,19 @@ def test_every_flag_has_its_words_on_the_page_of_flags():
     for _, function, _ in listed_flags:
         home, _, name = f"ctrl_realize.{function}".rpartition(".")
         assert callable(getattr(import_module(home), name)), function
+
+
+def test_docstrings_of_everything_public_are_those_of_numpydoc(reference):
+    validate = pytest.importorskip("numpydoc.validate", reason="numpydoc checks them").validate
+    spec = importlib.util.spec_from_file_location("rules", DOCS / "_ext" / "docstring_rules.py")
+    rules = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(rules)
+    faults = []
+    for entry in sorted(listed(reference)):
+        module, _, name = entry.rpartition(".")
+        if re.search(rules.CONSTANTS, entry):
+            continue
+        function = inspect.isroutine(getattr(import_module(module), name))
+        left_out = set(rules.NOT_ASKED) - set(rules.ASKED_OF_FUNCTIONS if function else ())
+        faults += [(entry, *e) for e in validate(entry)["errors"] if e[0] not in left_out]
+    assert not faults

@@ -65,6 +65,14 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
     input_delays, output_delays : tuple of int
     fit : object or None
 
+    Raises
+    ------
+    UnsuitableSystemError
+        A core that is not a discrete state-space system with a sample time.
+    DelayRangeError
+        Delays that are negative, no whole numbers, not one for each signal, or more than ten
+        million samples; and where matrices of more than 20 000 states are asked for.
+
     Notes
     -----
     ``sys(z) == sys.delay_free(z) * z**-sys.delay`` to rounding, whatever the delay.
@@ -81,14 +89,6 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
 
     ``repr(sys)`` is one line. A `repr_format` that is set on the system, or another than "eval" in
     ``ct.config.defaults["iosys.repr_format"]``, is followed; "eval" is core and delay as a call.
-
-    Raises
-    ------
-    UnsuitableSystemError
-        A core that is not a discrete state-space system with a sample time.
-    DelayRangeError
-        Delays that are negative, no whole numbers, not one for each signal, or more than ten
-        million samples; and where matrices of more than 20 000 states are asked for.
 
     Examples
     --------

@@ -49,17 +49,17 @@ class DelayLineController(DeferredMatrices):
         ``(A_p, B_p, C_p)`` where column i of ``[E; h]`` is ``C_p A_p^(i-1) B_p`` for all but the
         last, as predictions give: long lines are then evaluated in closed form.
 
-    Raises
-    ------
-    DelayRangeError
-        Where A, B, C or D of more than 20 000 states are asked for.
-
     Attributes
     ----------
     line_length : int
         d.
     inner_poles : ndarray, shape (n,)
         Eigenvalues of A. They are not the controller's poles: the line closes a loop around them.
+
+    Raises
+    ------
+    DelayRangeError
+        Where A, B, C or D of more than 20 000 states are asked for.
 
     Examples
     --------
@@ -211,7 +211,8 @@ class DelayLineController(DeferredMatrices):
 
         Returns
         -------
-        forward, back : ndarray, shape (K,)
+        tuple of ndarray, shapes (K,), (K,)
+            Forward, back.
         """
         A, B, C, D, _, _ = self._parts
         n = A.shape[0]

@@ -91,15 +91,15 @@ def read_frf(
     -------
     MeasuredFRF
 
-    Warns
-    -----
-    DataWarning
-        The last line was cut off while it was written; it is left out.
-
     Raises
     ------
     MissingFileError, FileFormatError, DataError, OptionError
         As for `read_record`.
+
+    Warns
+    -----
+    DataWarning
+        The last line was cut off while it was written; it is left out.
 
     Examples
     --------

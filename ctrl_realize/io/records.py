@@ -112,11 +112,6 @@ def read_record(
     -------
     Record
 
-    Warns
-    -----
-    DataWarning
-        The last line was cut off while it was written; it is left out.
-
     Raises
     ------
     MissingFileError
@@ -129,6 +124,11 @@ def read_record(
         Time jitters, has gaps, repeats or runs back.
     OptionError
         The columns are not clear, or the asked ones are not there.
+
+    Warns
+    -----
+    DataWarning
+        The last line was cut off while it was written; it is left out.
 
     Examples
     --------

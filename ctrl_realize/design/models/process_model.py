@@ -97,7 +97,7 @@ class ProcessModel(Result):
 
     @property
     def normalized_dead_time(self) -> float:
-        """dead_time / (dead_time + lag): near 0 lag-dominated, near 1 delay-dominated."""
+        """Part of the dead time in dead time and lag: near 0 lag-, near 1 delay-dominated."""
         return self.dead_time / (self.dead_time + self.lag) if self.dead_time else 0.0
 
     @property

@@ -61,12 +61,6 @@ def smith_predictor(
         the loop on `system` itself, and ``robustness``, its `DelayRobustness` at the ends of the
         identified interval of the dead time (None if the system does not carry one).
 
-    Warns
-    -----
-    ModelWarning
-        The closed loop is unstable for some dead time within the interval that the
-        identification gave.
-
     Raises
     ------
     UnsuitableSystemError
@@ -75,6 +69,12 @@ def smith_predictor(
         multi-channel system. A controller that makes the loop unstable on `system` itself.
     OptionError
         A filter that is no filter.
+
+    Warns
+    -----
+    ModelWarning
+        The closed loop is unstable for some dead time within the interval that the
+        identification gave.
 
     Notes
     -----

@@ -85,11 +85,6 @@ def pid(
         `check`, a `LoopCheck`, tells what the loop does on `system` itself, not on what the rule
         made of it, and over the interval of dead times that an identified system carries.
 
-    Warns
-    -----
-    ModelWarning
-        The loop is unstable for some dead time within that interval.
-
     Raises
     ------
     OptionError
@@ -97,6 +92,11 @@ def pid(
     UnsuitableSystemError
         An unstable plant, several channels, an integrating plant for a rule that has no answer;
         a rule whose controller makes the loop unstable on `system` itself.
+
+    Warns
+    -----
+    ModelWarning
+        The loop is unstable for some dead time within that interval.
 
     Notes
     -----

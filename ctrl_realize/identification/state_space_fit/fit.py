@@ -88,7 +88,7 @@ def fit_state_space(
     See Also
     --------
     fit_output_error : One input and output, with a delay between samples and its interval.
-    refine_state_space : The last step by itself, from any model.
+    identification.refine_state_space : The last step by itself, from any model.
 
     Notes
     -----
