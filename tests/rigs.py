@@ -65,7 +65,7 @@ def step_record(
     seed: int = 0,
     amplitude: float = 16.0,
     rest_input: float = 4.0,
-    rest_output: float = 0.3,
+    baseline: float = 0.3,
     before: int = 3840,
     after: int = 2600,
     dt: float = TS,
@@ -75,5 +75,5 @@ def step_record(
     k = np.arange(before + after)
     u = rest_input + amplitude * (k >= before)
     y = amplitude * exact_step(plant, (k - before - delay) * dt)
-    y = rest_output + y + noise * amplitude * rng.standard_normal(k.size)
+    y = baseline + y + noise * amplitude * rng.standard_normal(k.size)
     return cr.Record(k * dt, u, y, name="simulated")

@@ -24,8 +24,8 @@ def constant():
 
 
 def untold():
-    tracker = cr.DelayTracker(PLANT.replace(delay=4), max_delay=20, memory=3.0)
-    return tracker.run(cr.Record(0.001 * np.arange(200), np.zeros(200), np.zeros(200)))
+    tracker = cr.DelayTracker(PLANT.replace(delay=4), max_delay=20, forgetting_time=3.0)
+    return tracker.track(cr.Record(0.001 * np.arange(200), np.zeros(200), np.zeros(200)))
 
 
 def single():

@@ -109,7 +109,7 @@ MEASURED = ct.FrequencyResponseData(np.array([1.0, 0.5, 0.1]), [1.0, 2.0, 3.0])
         lambda: cr.design.hankel_singular_values(broken()),
         lambda: cr.delayed_ss(broken(), 3),
         lambda: cr.DelayedStateSpace(broken(), 3),
-        lambda: cr.DelayTracker(broken(), max_delay=5, memory=5.0),
+        lambda: cr.DelayTracker(broken(), max_delay=5, forgetting_time=5.0),
     ],
 )
 def test_a_system_that_is_not_finite_is_refused_in_words(use):

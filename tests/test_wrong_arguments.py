@@ -36,7 +36,7 @@ MAIN = {
     "compare_frf": lambda odd: cr.compare_frf(odd, FRF),
     "identify_campaign": lambda odd: cr.identify_campaign(odd),
     "bootstrap": lambda odd: cr.validation.bootstrap(odd, cr.fit_output_error),
-    "DelayTracker": lambda odd: cr.DelayTracker(odd, max_delay=5, memory=10.0),
+    "DelayTracker": lambda odd: cr.DelayTracker(odd, max_delay=5, forgetting_time=10.0),
     "read_record": lambda odd: cr.read_record(odd),
     "load_model": lambda odd: cr.load_model(odd),
 }

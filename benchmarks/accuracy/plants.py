@@ -39,7 +39,7 @@ def record(
         noise=noise,
         seed=seed + 10_000,
         amplitude=float(rng.choice([-3.0, 0.2, 16.0])),
-        rest_output=float(10 * rng.normal()),
+        baseline=float(10 * rng.normal()),
         before=BEFORE // coarser,
         after=AFTER // coarser,
         dt=coarser * rigs.TS,

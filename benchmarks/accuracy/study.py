@@ -124,7 +124,7 @@ def measured_table(folder: Path) -> list[str]:
         stamps = data[0, 0] + np.arange(len(data)) * np.ptp(data[:, 0]) / (len(data) - 1)
         fit = cr.fit_output_error(cr.Record(stamps, data[:, 1], data[:, 2])).fit
         low, high = fit.delay_interval
-        level = "noise level" if fit.at_noise_level else f"{fit.misfit:.2g}"
+        level = "noise level" if fit.at_noise_level else f"{fit.normalized_rms:.2g}"
         lines.append(
             f"| {path.parent.name}/{path.stem} | {fit.delay:.1f} | {low:.1f} ... {high:.1f} "
             f"| {fit.onset / fit.dt:.1f} | {fit.order}, {fit.relative_degree} | {level} |"

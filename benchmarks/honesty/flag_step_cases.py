@@ -327,7 +327,7 @@ CASES: list[FlagCase] = [
          not_due="R1 to R4, coloured noise 0.1 to 2 %", quiet=coloured),
     _fit("structured_misfit", "static friction, noise 0.1 and 0.5 %",
          wrong("static friction", LOW)),
-    _fit("views_disagree", "slew limit, noise 0.1 and 0.5 %", wrong("slew limit", LOW)),
+    _fit("estimates_disagree", "slew limit, noise 0.1 and 0.5 %", wrong("slew limit", LOW)),
     _fit("structures_disagree", "R4, noise 2 %: an interval of half the dead time or more",
          lambda s: fit(step_case("white", "R4", 0.02, s).record),
          not_due="R1, noise 0.1 %",

@@ -10,7 +10,7 @@ from .worlds import DT, NOISES, PLANTS, WRONG, step_case
 STRUCTURES = {"R1": (1, 1), "R2": (2, 2), "R3": (3, 3), "R4": (4, 4)}
 DOUBTS = (
     "structured_misfit",
-    "views_disagree",
+    "estimates_disagree",
     "structures_disagree",
     "no_delay_resolved",
     "many_lags",

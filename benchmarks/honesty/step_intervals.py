@@ -71,7 +71,7 @@ def view_coverage(check: cr.validation.DelayComparison, truth: float) -> dict[st
         f"compare_delay_estimates: {view.method}": float(
             (view.kind == "upper bound" or view.low <= truth) and truth <= view.high
         )
-        for view in check.views
+        for view in check.estimates
         if view.method != "output error"
     }
     if check.common is not None:
@@ -172,11 +172,11 @@ def tracked(kind: str, plant: str, noise: float, seed: int) -> Seen:
     y = np.ravel(exact.simulate(u - u[0]))
     y = _disturbed(kind, y, noise, rng)
     start = exact.replace(delay=3)
-    tracker = cr.DelayTracker(start, max_delay=25, memory=1000 * coarse)
+    tracker = cr.DelayTracker(start, max_delay=25, forgetting_time=1000 * coarse)
     for pair in zip(u, y, strict=True):
         tracker.update(float(pair[0]), float(pair[1]))
     told = tracker.estimate()
-    if not told.tells:
+    if not told.resolved:
         return Seen("tracked", kind, plant, noise, seed, {}, {"untold": 1.0})
     near = (told.gain_ratio - 1.96 * told.gain_std, told.gain_ratio + 1.96 * told.gain_std)
     covered = {

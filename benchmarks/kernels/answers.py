@@ -28,7 +28,9 @@ def answer(record: cr.Record) -> Answer:
         return {"structure": type(error).__name__, "flags": [], "times": []}
     fit = system.fit
     kind = "lags" if isinstance(fit, cr.identification.OutputErrorFit) else "modes"
-    shape = [fit.order, fit.relative_degree] if kind == "lags" else [fit.order, bool(fit.direct)]
+    shape = (
+        [fit.order, fit.relative_degree] if kind == "lags" else [fit.order, bool(fit.feedthrough)]
+    )
     return {
         "structure": " ".join(map(str, [kind, *shape])),
         "flags": sorted(flag.code for flag in fit.flags),

@@ -83,7 +83,7 @@ def _task(record: cr.Record, band: tuple[float, float]) -> Task:
     still = edge.index if edge.index >= 10 else 20
     rest = float(np.mean(record.output[:still]))
     height = float(np.mean(record.output[-max(record.n_samples // 50, 5) :])) - rest
-    u = (record.input - edge.rest) / edge.amplitude
+    u = (record.input - edge.baseline) / edge.amplitude
     y = (record.output - rest) / height
     limit = max(int(np.ceil(2 * band[1])), 10)
     rough = tuple(int(d) for d in np.unique(np.round(np.linspace(0, limit, 26))))

@@ -70,8 +70,8 @@ def main() -> None:
         print(f"{kernel} kernel, 1e5 samples, 1000 lags, hyper-parameters found: {spent:.2f} s")
     short = record(5000)
     core = ct.ss([[0.98]], [[1.0]], [[0.02]], [[0.0]], 0.01)
-    tracker = cr.DelayTracker(core, max_delay=100, memory=10.0)
-    ours = cpu(lambda: tracker.run(short)) / short.n_samples
+    tracker = cr.DelayTracker(core, max_delay=100, forgetting_time=10.0)
+    ours = cpu(lambda: tracker.track(short)) / short.n_samples
     bank = cpu(lambda: recursive_bank(short, 101, 0.999)) / short.n_samples
     print(
         f"tracker, 101 delays with gain, offset and a pole: {1e6 * ours:.0f} us a sample; "

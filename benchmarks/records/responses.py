@@ -99,7 +99,8 @@ def hydrophone() -> Row:
         "hydrophone, 1 to 60 MHz",
         "-",
         f"answers {1e9 * (PUT_BACK - fit.dead_time):.1f} ns before its input; with "
-        f"{1e9 * PUT_BACK:.0f} ns put back order 4 leaves {100 * fit.misfit:.1f} % of the response",
+        f"{1e9 * PUT_BACK:.0f} ns put back order 4 leaves {100 * fit.weighted_rms:.1f} % of "
+        "the response",
         f"as it is no dead time fits, which is said ({codes})",
     )
 

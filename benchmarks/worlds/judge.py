@@ -34,7 +34,7 @@ MODEL = frozenset(
 """Flags that doubt the model as a whole. That nothing was told about a residual but that it is
 coloured does not count, nor that no delay is resolved: that gives an upper end of its own."""
 DELAY = MODEL | {
-    "views_disagree",
+    "estimates_disagree",
     "structures_disagree",
     "many_lags",
     "dispersed_flow",

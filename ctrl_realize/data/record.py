@@ -164,9 +164,8 @@ class Record:
         """Number of values of input and output that are NaN."""
         return int(np.isnan(self.input).sum() + np.isnan(self.output).sum())
 
-    @property
     def issiso(self) -> bool:
-        """One input and one output."""
+        """Whether there is one input and one output."""
         return self.ninputs == 1 and self.noutputs == 1
 
     def between(self, start: float, stop: float) -> Record:
@@ -262,7 +261,7 @@ class Record:
             self.time,
             self.output,
             inputs=self.input,
-            issiso=self.issiso,
+            issiso=self.issiso(),
             sysname=self.name or "record",
             input_labels=list(self.input_labels),
             output_labels=list(self.output_labels),

@@ -13,7 +13,7 @@ class StepEdge:
     """Where and how far an input stepped.
 
     ``input[index - 1]`` is still at rest, ``input[index]`` has moved, and from
-    ``index + samples - 1`` on the input stays at ``rest + amplitude``.
+    ``index + samples - 1`` on the input stays at ``baseline + amplitude``.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class StepEdge:
         Time of that sample in s.
     amplitude : float
         New level minus rest level, in the unit of the input.
-    rest : float
+    baseline : float
         Level before the edge.
     samples : int
         Samples that the edge takes; 1 is an ideal step.
@@ -40,14 +40,14 @@ class StepEdge:
     >>> t = 0.01 * np.arange(300)
     >>> u = np.where(t < 1.0, 4.0, 12.0)
     >>> edge = cr.detect_step(cr.Record(t, u, np.where(t < 1.2, 0.0, 3.0)))
-    >>> edge.index, edge.time, edge.rest, edge.amplitude, edge.samples
+    >>> edge.index, edge.time, edge.baseline, edge.amplitude, edge.samples
     (100, 1.0, 4.0, 8.0, 1)
     """
 
     index: int
     time: float
     amplitude: float
-    rest: float
+    baseline: float
     samples: int
     start: int
     stop: int
@@ -58,7 +58,7 @@ class StepEdge:
 class StepResponse:
     """Response to a unit step, cut out of a record.
 
-    ``output[k] = (y[edge.index + k] - rest_output - drift * k * dt) / amplitude``; `pre` is the
+    ``output[k] = (y[edge.index + k] - baseline - drift * k * dt) / amplitude``; `pre` is the
     same before the edge, so it holds the noise of the measurement in the same unit.
 
     Attributes
@@ -75,7 +75,7 @@ class StepResponse:
         Sample time in s.
     amplitude : float
         Input step that the data were divided by.
-    rest_output : float
+    baseline : float
         Output level before the edge.
     drift : float
         Slope of the output before the edge that was removed, per s; 0 when none was significant.
@@ -91,7 +91,7 @@ class StepResponse:
     >>> t = 0.01 * np.arange(300)
     >>> u = np.where(t < 1.0, 4.0, 12.0)
     >>> step = cr.unit_step(cr.Record(t, u, np.where(t < 1.2, 5.0, 29.0)))
-    >>> print(step.amplitude, step.rest_output, step.output[[19, 20]])
+    >>> print(step.amplitude, step.baseline, step.output[[19, 20]])
     8.0 5.0 [0. 3.]
     """
 
@@ -101,7 +101,7 @@ class StepResponse:
     pre: FloatArray
     dt: float
     amplitude: float
-    rest_output: float
+    baseline: float
     drift: float
     edge: StepEdge
     name: str = ""

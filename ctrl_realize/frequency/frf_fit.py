@@ -48,8 +48,8 @@ class FRFFit(Result):
 
     ``response(omega) == core(1j * omega) * exp(-1j * omega * dead_time)`` minimises
     ``sum |(measured - response) / sigma|^2`` over poles, numerator and dead time, and
-    ``misfit**2`` is that sum divided by the degrees of freedom (points minus half of the number
-    of parameters). `interval` also covers the other structures, by their evidence
+    ``weighted_rms**2`` is that sum divided by the degrees of freedom (points minus half of the
+    number of parameters). `interval` also covers the other structures, by their evidence
     ``exp(-bic / 2)``.
 
     Attributes
@@ -68,7 +68,7 @@ class FRFFit(Result):
         Standard deviation that weighted each point; where the FRF had none, a relative one.
     noise_known : bool
         Whether `sigma` is the measured standard deviation.
-    misfit : float
+    weighted_rms : float
         Size of the residuals in units of `sigma`; 1 is a fit down to the noise if it is known.
     matrices : tuple of ndarray
         A, B, C, D of the continuous core.
@@ -107,7 +107,7 @@ class FRFFit(Result):
     measured: ComplexArray
     sigma: FloatArray
     noise_known: bool
-    misfit: float
+    weighted_rms: float
     matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
     poles: ComplexArray
     pole_std: FloatArray
@@ -181,9 +181,9 @@ class FRFFit(Result):
             ),
             (
                 "misfit",
-                f"{self.misfit:.3g} x {unit}"
+                f"{self.weighted_rms:.3g} x {unit}"
                 if self.noise_known
-                else f"{100 * self.misfit:.3g} % of {unit}",
+                else f"{100 * self.weighted_rms:.3g} % of {unit}",
             ),
             *hold,
         ]

@@ -109,7 +109,7 @@ def chosen_model(
         measured=locked(points.response),
         sigma=read_only(points.sigma),
         noise_known=noise_known,
-        misfit=misfit,
+        weighted_rms=misfit,
         matrices=(read_only(A * unit), read_only(B * unit), read_only(C), read_only(D)),
         poles=locked(poles * unit),
         pole_std=read_only(pole_std * unit),

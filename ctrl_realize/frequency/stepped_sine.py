@@ -137,7 +137,7 @@ def _as_points(records: Sweep) -> list[list[Record]]:
     for point in points:
         for record in point:
             check_complete(record, "stepped_sine_frf")
-            if not record.issiso:
+            if not record.issiso():
                 raise DataError(
                     f"{record!r} has several signals; stepped_sine_frf takes one input and one "
                     "output"

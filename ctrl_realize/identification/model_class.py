@@ -129,7 +129,7 @@ def _gain(
     starts = len(records)
     # parameters, dead time, and the initial states
     lags = 2 * fit.order - fit.relative_degree + 2 + starts * fit.order
-    other = 2 * modes.order + modes.direct + 1 + starts * modes.order
+    other = 2 * modes.order + modes.feedthrough + 1 + starts * modes.order
     theirs = _left(found.system, records)[1]
     fewer = (lags - other) * float(np.log(samples))
     return float(coloured_criterion(left)[0] - coloured_criterion(theirs)[0] + fewer)

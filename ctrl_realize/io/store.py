@@ -22,7 +22,7 @@ from .models import MAX_MODEL_BYTES, model_from_text, model_to_text
 FORMAT = "ctrl_realize campaign row"
 SCHEMA = 3
 _INTERVALS = ("interval", "total_delay_interval")
-_NUMBERS = ("amplitude", "delay", "dead_time", "misfit", "gain", "gain_std", "total_delay")
+_NUMBERS = ("amplitude", "delay", "dead_time", "residual", "gain", "gain_std", "total_delay")
 
 MOST_TRIES = 2
 """Times that a process may die over a record."""

@@ -85,11 +85,11 @@ def delay_check_plot(
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time, or bound ◂ [ms]'
     """
-    size = (8.0, 1.6 + 0.5 * len(check.views))
-    factor, unit = time_unit(max(view.high for view in check.views))
+    size = (8.0, 1.6 + 0.5 * len(check.estimates))
+    factor, unit = time_unit(max(view.high for view in check.estimates))
     with style.canvas(ax, title=title, size=size) as (axes,):
         lines: list[Line2D] = []
-        for place, view in enumerate(reversed(check.views)):
+        for place, view in enumerate(reversed(check.estimates)):
             bound = view.kind == "upper bound"
             looks = {"color": style.NOISE if bound else style.MODEL, "linewidth": 3.0, **kwargs}
             if view.doubt:  # it does not count
@@ -103,7 +103,7 @@ def delay_check_plot(
             axes.axvspan(low, high, color=style.BAND, alpha=0.3, label="all agree", linewidth=0)
         names = [
             f"{view.method}\n({view.source}{', in doubt' if view.doubt else ''})"
-            for view in reversed(check.views)
+            for view in reversed(check.estimates)
         ]
         axes.set_yticks(range(len(names)), names)
         axes.set_ylim(-0.6, len(names) - 0.4)

@@ -214,11 +214,11 @@ def _evidence_rows(
     """List who sees which dead time, with which interval: structures not ruled out, then views."""
     rows: list[tuple[str, float, tuple[float, float] | None, str]] = []
     for line in result.structures:
-        if line.interval is not None and line.excess <= _RULED_OUT:
+        if line.interval is not None and line.delta_bic <= _RULED_OUT:
             name = f"order {line.order}, degree {line.relative_degree}"
             rows.append((name, line.dead_time, line.interval, style.MODEL))
     rows = rows[:_MOST_STRUCTURES]
-    rows += [(name, seen, None, style.MEASURED) for name, seen in result.views.items()]
+    rows += [(name, seen, None, style.MEASURED) for name, seen in result.delay_estimates.items()]
     return rows or [("estimate", result.dead_time, result.interval, style.MODEL)]
 
 

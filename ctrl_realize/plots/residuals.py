@@ -147,7 +147,7 @@ def prediction_plot(
     ['measured', '10 ahead, fit 86.6 %']
     """
     row = whole(output, "output", 0, prediction.fit_percent.size - 1)
-    label = f"{prediction.steps} ahead, fit {prediction.fit_percent[row]:.1f} %"
+    label = f"{prediction.horizon} ahead, fit {prediction.fit_percent[row]:.1f} %"
     values = np.atleast_2d(prediction.output)[row]
     with style.canvas(ax, title=title) as (axes,):
         lines = _signals(axes, prediction.record, values, row, label, kwargs)

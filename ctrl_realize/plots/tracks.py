@@ -39,12 +39,12 @@ def track_plot(
     >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
     >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
     >>> record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
-    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
-    >>> cplt = plots.track_plot(tracker.run(record))
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, forgetting_time=3.0)
+    >>> cplt = plots.track_plot(tracker.track(record))
     >>> cplt.figure.axes[0].get_ylabel()
     'dead time [ms]'
     """
-    told = np.asarray(track.tells, dtype=bool)
+    told = np.asarray(track.resolved, dtype=bool)
     with style.canvas(ax, 2, title=title, size=(8.0, 5.2), heights=(2.0, 1.0)) as axes:
         factor, unit = axis_time_unit(float(np.max(np.abs(track.time))), axes[1])
         time = factor * track.time

@@ -95,7 +95,7 @@ def _extent(record: Record | None) -> tuple[str, str, str]:
 
 
 def campaign_table(campaign: Campaign) -> Table:
-    """List the records of a campaign: delay, interval, misfit, or what went wrong."""
+    """List the records of a campaign: delay, interval, residual, or what went wrong."""
     waits = [row.dead_time for row in campaign.good]
     scale, unit = time_unit(float(np.median(waits)))
     columns = (
@@ -105,7 +105,7 @@ def campaign_table(campaign: Campaign) -> Table:
         Column(f"dead time [{unit}]", "number"),
         Column(f"interval [{unit}]", "number"),
         Column("order", "number"),
-        Column("misfit", "number"),
+        Column("residual", "number"),
         Column("remarks"),
     )
     best = campaign.best.name
@@ -124,7 +124,7 @@ def campaign_table(campaign: Campaign) -> Table:
             wait,
             f"{low} to {high}",
             str(row.order),
-            f"{row.misfit:.3g}",
+            f"{row.residual:.3g}",
             ", ".join([*remarks, *row.warnings]),
         )
         rows.append(Row(cells, "best" if row.name == best else ""))

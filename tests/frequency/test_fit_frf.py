@@ -53,7 +53,7 @@ def test_exact_data_give_the_exact_model_without_a_guess(tau, gain, slow, pair, 
     # Rounding (1e-16) over curvature: three superfluous digits are lost at low damping.
     assert fit.dead_time == pytest.approx(tau, abs=1e-7)
     assert fit.gain == pytest.approx(gain, rel=1e-6)
-    assert fit.misfit < 1e-7
+    assert fit.weighted_rms < 1e-7
 
 
 def test_model_is_the_continuous_fit_behind_a_hold_with_its_fractional_delay():
@@ -78,7 +78,7 @@ def test_dead_times_scatter_as_the_stated_deviation_and_are_covered():
     assert abs(error.mean()) < 3 * std.mean() / np.sqrt(50)
     inside = np.mean([fit.interval[0] <= 0.04 <= fit.interval[1] for fit in fits])
     assert 0.88 <= inside <= 1.0  # 95 +- 3.1 %, two of them
-    assert np.mean([fit.misfit for fit in fits]) == pytest.approx(1.0, abs=0.03)
+    assert np.mean([fit.weighted_rms for fit in fits]) == pytest.approx(1.0, abs=0.03)
 
 
 def bound_of(level):
@@ -197,7 +197,7 @@ def test_units_of_output_and_time_change_nothing_else(size, rate):
         plain.dead_time, abs=1e-3 * plain.std_given_structure
     )
     assert other.gain == pytest.approx(plain.gain * size, rel=1e-5)
-    assert other.misfit == pytest.approx(plain.misfit, rel=1e-6)
+    assert other.weighted_rms == pytest.approx(plain.weighted_rms, rel=1e-6)
     assert_allclose(np.array(other.interval) * rate, plain.interval, rtol=1e-3)
 
 
@@ -275,12 +275,12 @@ def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
     ).fit
     assert back.flags == ()
     assert back.dead_time == pytest.approx(12.7e-9, abs=0.5e-9)
-    assert back.misfit < 0.6 * fit.misfit
-    assert back.misfit < 0.07
+    assert back.weighted_rms < 0.6 * fit.weighted_rms
+    assert back.weighted_rms < 0.07
     # Ten poles take it to 100 MHz with 5 %; beyond, neighbouring lines differ by 18 % and from
     # 150 MHz on by 75 % of their size: noise, and nothing to fit.
     wide = cr.MeasuredFRF(later, frf.frequency_hz).between_hz(1e6, 100e6)
-    assert cr.fit_frf(wide, 10, relative_degree=1).fit.misfit < 0.055
+    assert cr.fit_frf(wide, 10, relative_degree=1).fit.weighted_rms < 0.055
 
 
 def test_leading_phase_is_told_and_a_missing_delay_is_not_taken_for_it():
@@ -308,7 +308,7 @@ def test_resonances_over_three_decades_are_found_in_noise():
     scatter = 0.03 * (rng.standard_normal(300) + 1j * rng.standard_normal(300)) / np.sqrt(2)
     measured = response * np.exp(-s * 2e-4) * (1 + scatter)
     fit = cr.fit_frf(cr.MeasuredFRF(measured, f), 12, relative_degree=2).fit
-    assert fit.misfit == pytest.approx(0.03, rel=0.15)
+    assert fit.weighted_rms == pytest.approx(0.03, rel=0.15)
     for w in centres:
         k = int(np.argmin(np.abs(fit.poles - w * complex(-0.01, 1))))
         assert abs(fit.poles[k] - w * complex(-0.01, 1)) < 4 * fit.pole_std[k] < 0.02 * w

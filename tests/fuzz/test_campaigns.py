@@ -275,7 +275,7 @@ def test_what_a_campaign_says_follows_from_its_rows(rng, method):
     )
     for summary in statistics:
         assert campaign.delays.min() <= summary.mean <= campaign.delays.max()
-        assert campaign.best.misfit == min(row.misfit for row in campaign.good)
+        assert campaign.best.residual == min(row.residual for row in campaign.good)
     if method == "output_error" and rng.randrange(6):
         # the model of all records is one more fit, ten times as long as the rest
         return

@@ -284,7 +284,7 @@ CORE = ct.ss([[0.9, 0.2], [-0.2, 0.9]], [[0], [1]], [[0.3, 0]], 0.1, 0.1)
 @pytest.mark.parametrize("value", [1e71, -1.7e308])
 def test_a_sample_near_the_end_of_the_doubles_is_refused_and_changes_nothing(value):
     # squares overflowed in the tracker's sums
-    tracker = cr.DelayTracker(CORE, max_delay=5, memory=3.0)
+    tracker = cr.DelayTracker(CORE, max_delay=5, forgetting_time=3.0)
     for pair in ((0.0, value), (value, 0.0)):
         with pytest.raises(DataError, match="there is no measurement"):
             tracker.update(*pair)
@@ -292,17 +292,17 @@ def test_a_sample_near_the_end_of_the_doubles_is_refused_and_changes_nothing(val
 
 
 def test_an_output_of_zero_beside_a_moving_input_is_told_without_overflow():
-    tracker = cr.DelayTracker(ct.ss(0.8, 1, 0.2, 0, 0.1), max_delay=10, memory=10.0)
+    tracker = cr.DelayTracker(ct.ss(0.8, 1, 0.2, 0, 0.1), max_delay=10, forgetting_time=10.0)
     with good_end():
         for u in 1e12 * np.repeat([0.0, 1.0, -1.0, 1.0], 30):
             tracker.update(u, 0.0)
         told = tracker.estimate()
-    assert not told.tells
+    assert not told.resolved
 
 
 def test_a_memory_of_more_samples_than_can_be_counted_is_refused():
     with pytest.raises(OptionError, match="needed are at most"):
-        cr.DelayTracker(CORE, max_delay=5, memory=1e308)
+        cr.DelayTracker(CORE, max_delay=5, forgetting_time=1e308)
 
 
 def test_a_pole_that_is_moved_to_where_it_cannot_move_from_gives_no_core():
@@ -360,7 +360,7 @@ def test_one_point_that_weighs_more_than_all_others_gives_a_finite_pulse_respons
 
 
 def test_an_output_1e200_times_as_large_as_the_input_is_followed_without_overflow():
-    tracker = cr.DelayTracker(PLANT, max_delay=10, memory=10.0)
+    tracker = cr.DelayTracker(PLANT, max_delay=10, forgetting_time=10.0)
     with good_end() as told:
         for k in range(40):
             tracker.update(2e-144 if k == 5 else 0.0, 1e58 * np.sin(k))
@@ -391,7 +391,7 @@ def test_a_first_move_at_the_last_sample_behind_a_wild_one_is_fitted_or_refused(
 @pytest.mark.parametrize("moved", [1e-155, 1e-158, 1e-100])
 def test_an_input_whose_squares_underflow_is_followed_or_refused_without_overflow(moved):
     # the inverse of sums of squares around 1e-310 was infinite
-    tracker = cr.DelayTracker(PLANT, max_delay=10, memory=10.0)
+    tracker = cr.DelayTracker(PLANT, max_delay=10, forgetting_time=10.0)
     with good_end() as models:
         for k in range(60):
             tracker.update(moved if k % 7 == 5 else 0.0, np.sin(k))

@@ -47,7 +47,7 @@ def test_any_stream_is_followed_or_refused_sample_by_sample(rng):
     bad = {rng.randrange(u.size): any_float(rng) for _ in range(rng.choice([0, 0, 1, 3]))}
     options = {
         "max_delay": rng.choice([5, 10, 12]),
-        "memory": rng.choice([3.0, 10.0, 1e6]),
+        "forgetting_time": rng.choice([3.0, 10.0, 1e6]),
         "min_delay": rng.choice([0, 0, 2]),
         "dynamics": rng.random() < 0.7,
     }
@@ -69,7 +69,7 @@ def test_any_stream_is_followed_or_refused_sample_by_sample(rng):
     assert options["min_delay"] <= told.delay <= options["max_delay"]
     assert told.report()
     assert repr(tracker)
-    if told.tells:
+    if told.resolved:
         ends["tells"] += 1
         low, high = told.delay_interval
         assert low <= told.delay <= high
@@ -88,7 +88,7 @@ def test_any_start_of_a_tracker_is_taken_or_refused(rng):
         cr.DelayTracker(
             rng.choice([*CORES, -CORES[0], ct.tf(1, [1, 1]), ct.ss(2.0, 1, 1, 0, DT), None]),
             max_delay=rng.choice([5, 0, -1, 2.5, None]),
-            memory=rng.choice([3.0, any_float(rng), None]),
+            forgetting_time=rng.choice([3.0, any_float(rng), None]),
             min_delay=rng.choice([0, 0, 7, -1]),
             dynamics=rng.choice([True, False]),
         )
@@ -107,12 +107,12 @@ def test_a_clean_stream_is_followed_to_its_delay(rng):
     if at_rest:
         u[0] = 0.0
     y = cr.DelayedStateSpace(core, delay).simulate(u)
-    tracker = cr.DelayTracker(core, max_delay=delay + rng.randint(2, 6), memory=20.0)
+    tracker = cr.DelayTracker(core, max_delay=delay + rng.randint(2, 6), forgetting_time=20.0)
     with good_end():
         for sample in zip(u, y, strict=True):
             tracker.update(*sample)
     told = tracker.estimate()
-    if told.tells:
+    if told.resolved:
         ends["tells"] += 1
         assert told.delay_interval[0] <= delay <= told.delay_interval[1]
         assert abs(told.delay - delay) <= (0 if at_rest else 1)

@@ -104,7 +104,7 @@ def test_where_no_model_leaves_noise_the_delay_is_the_median_of_five_views():
     slew += 0.03 * np.random.default_rng(0).standard_normal(slew.size)
     fit = cr.fit_output_error(cr.Record(record.time, record.input, slew)).fit
     assert "structured_misfit" in codes(fit)
-    views = list(fit.views.values())
+    views = list(fit.delay_estimates.values())
     assert len(views) == 6
     assert fit.dead_time == pytest.approx(np.median(views[:5]), rel=1e-9)
     # the earliest is left out of the interval, which one wrong view would open to nothing
@@ -112,7 +112,7 @@ def test_where_no_model_leaves_noise_the_delay_is_the_median_of_five_views():
     believed = cr.fit_output_error(
         cr.Record(record.time, record.input, slew), structures=[(2, 2)]
     ).fit
-    assert not believed.views
+    assert not believed.delay_estimates
 
 
 def test_wild_samples_move_least_squares_more_than_the_usual_loss():

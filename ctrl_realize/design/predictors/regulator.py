@@ -198,7 +198,7 @@ def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     weight = weight_matrix(Q, core.nstates, "Q", "core state(s)")
     price = weight_matrix(R, core.ninputs, "R", "input(s)")
     _check_coupling(price, delays)
-    _check_memory(core.nstates + sum(delays), delays)
+    _check_forgetting_time(core.nstates + sum(delays), delays)
     gain, cost, poles = riccati(ct.dlqr, A, B, weight, price, "Q and R")
     shared = len(set(delays)) == 1
     with np.errstate(over="ignore", invalid="ignore"):
@@ -240,7 +240,7 @@ def _state_loop(
     return DelayedStateSpace(seen, d, fit=plant.fit), controller
 
 
-def _check_memory(states: int, delays: tuple[int, ...]) -> None:
+def _check_forgetting_time(states: int, delays: tuple[int, ...]) -> None:
     steps = max(delays) - min(delays)
     size = 8 * steps * states * len(delays)
     if size > MOST_MEMORY:

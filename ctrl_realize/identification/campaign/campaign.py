@@ -34,7 +34,7 @@ class Campaign(Result):
     """Models of many records, and what they say together.
 
     ``statistics(trim)`` is over ``[row.delay for row in rows if row.system]``; `best` is the row
-    of least misfit; `system` is the final model.
+    of least residual; `system` is the final model.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class Campaign(Result):
     def best(self) -> CampaignRow:
         """The row whose model fits best; the records are scaled to a unit step first."""
         _ = self.dt
-        return min(self.good, key=lambda row: row.misfit)
+        return min(self.good, key=lambda row: row.residual)
 
     @cached_property
     def system(self) -> DelayedStateSpace:
@@ -169,7 +169,7 @@ class Campaign(Result):
         -------
         pandas.DataFrame
             Index ``record``; columns ``amplitude``, ``delay`` [samples], ``dead_time``, ``low``,
-            ``high`` [s], ``gain``, ``gain_std``, ``order``, ``misfit``, ``flags`` and ``error``.
+            ``high`` [s], ``gain``, ``gain_std``, ``order``, ``residual``, ``flags`` and ``error``.
         """
         import pandas as pd
 
@@ -184,7 +184,7 @@ class Campaign(Result):
                 "gain": row.gain,
                 "gain_std": row.gain_std,
                 "order": np.nan if row.order is None else row.order,
-                "misfit": row.misfit,
+                "residual": row.residual,
                 "flags": ", ".join(flag.code for flag in row.flags),
                 "error": row.error or "",
             }
@@ -257,7 +257,7 @@ class Campaign(Result):
                 f"({summary.dropped} of {len(self.good)} removed)",
             ),
             *spread,
-            ("best record", f"{best.name} (misfit {best.misfit:.3g})"),
+            ("best record", f"{best.name} (residual {best.residual:.3g})"),
         ]
 
     def __repr__(self) -> str:

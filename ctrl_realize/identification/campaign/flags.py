@@ -108,7 +108,7 @@ def _same_records(rows: Rows) -> Flag | None:
     """Find records whose results agree in every digit, which noise never lets happen."""
     alike: dict[tuple[float, ...], list[str]] = {}
     for row in rows:
-        results = (row.delay, row.misfit, row.gain, row.amplitude, *row.interval)
+        results = (row.delay, row.residual, row.gain, row.amplitude, *row.interval)
         alike.setdefault(results, []).append(row.name)
     twice = [names for names in alike.values() if len(names) > 1]
     if not twice:

@@ -49,7 +49,7 @@ class CampaignRow:
         ``delay * dt`` in s.
     interval : tuple of float
         Interval of the dead time in s.
-    misfit : float
+    residual : float
         Misfit of the model for a unit step, so that records can be compared.
     gain, gain_std : float
         Gain of the model at zero frequency, and its standard error if its structure is the
@@ -83,7 +83,7 @@ class CampaignRow:
     delay: float = float("nan")
     dead_time: float = float("nan")
     interval: tuple[float, float] = (float("nan"), float("nan"))
-    misfit: float = float("nan")
+    residual: float = float("nan")
     gain: float = float("nan")
     gain_std: float = float("nan")
     total_delay: float = float("nan")
@@ -153,7 +153,7 @@ def identify_row(
         warnings.simplefilter("always")
         try:
             record = read_source(source)
-            if not record.issiso:
+            if not record.issiso():
                 raise DataError(
                     f"{record!r}: a campaign compares the delays of one input and one output; for "
                     "several channels see fit_state_space, which takes several records too"
@@ -231,7 +231,7 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
         delay=float(fit.delay),
         dead_time=float(fit.dead_time),
         interval=(float(low), float(high)),
-        misfit=_scaled_misfit(fit, row.amplitude),
+        residual=_unit_residual(fit, row.amplitude),
         gain=_gain(system),
         gain_std=float(getattr(fit, "gain_std_given_structure", np.nan)),
         total_delay=float(_or_nan(getattr(fit, "total_delay", None))),
@@ -241,10 +241,10 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
     )
 
 
-def _scaled_misfit(fit: OutputErrorFit | DelayScan, amplitude: float) -> float:
+def _unit_residual(fit: OutputErrorFit | DelayScan, amplitude: float) -> float:
     """Misfit for a unit step: a scan works on one, a fit on the raw record."""
     if isinstance(fit, DelayScan):
-        return fit.misfit
+        return fit.least_iae
     return fit.residual / (abs(amplitude) if np.isfinite(amplitude) else 1.0)
 
 

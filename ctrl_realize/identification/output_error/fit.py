@@ -245,7 +245,7 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
                 f"the output of {named('record', record.name)} does not leave its rest level: it "
                 f"moves by {moves:.3g} in all"
             )
-        if not record.issiso:
+        if not record.issiso():
             raise DataError(
                 f"{named('record', record.name)} has {record.ninputs} inputs and "
                 f"{record.noutputs} outputs; choose one of each when it is made"

@@ -105,27 +105,27 @@ def _misfit(fit: OutputErrorEstimate) -> Flag | None:
     return Flag(
         "structured_misfit",
         "no model fits down to the noise level (the residual, averaged over bins, is "
-        f"{fit.misfit:.2g} times the noise): the plant is nonlinear or has unmodelled "
+        f"{fit.normalized_rms:.2g} times the noise): the plant is nonlinear or has unmodelled "
         "dynamics; "
         + (
             "the dead time is the median of five delay estimates and the interval is their range"
-            if fit.views
+            if fit.delay_estimates
             else "the interval is valid only if a given structure is that of the plant"
         ),
     )
 
 
 def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None:
-    if fit.views:
+    if fit.delay_estimates:
         width = fit.high - fit.low
         if width <= 0.3 * max(fit.delay, dt):
             return None
         apart = [
             f"{ESTIMATE_WORDS[key]} {in_time(delay)}"
-            for key, delay in fit.views
+            for key, delay in fit.delay_estimates
             if not _near(fit, delay)
         ]
-        return Flag("views_disagree", "delay estimates far from their median: " + ", ".join(apart))
+        return Flag("estimates_disagree", "delay estimates far from their median: " + ", ".join(apart))
     low, high = profile_limits(*fit.profile)
     wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
     if fit.open_start or not wide or fit.high - fit.low <= 2 * (high - low):
@@ -168,8 +168,8 @@ def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
 
 def _dispersed(fit: OutputErrorEstimate) -> Flag | None:
     """Say so where a flow explains the response better than lags."""
-    flow = min(fit.flows, key=lambda flow: flow.excess, default=None)
-    if flow is None or (flow.excess >= 0 and not fit.follows_flow):
+    flow = min(fit.flows, key=lambda flow: flow.delta_bic, default=None)
+    if flow is None or (flow.delta_bic >= 0 and not fit.follows_flow):
         return None
     behind = f" and a lag of {in_time(flow.lag)}" if flow.lag else ""
     kind = (

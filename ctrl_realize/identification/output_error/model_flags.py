@@ -46,11 +46,11 @@ def slow_modes(fit: OutputErrorEstimate, length: float) -> Flag | None:
 
 def open_gain(fit: OutputErrorEstimate) -> Flag | None:
     """Tell whether structures that are not ruled out differ in gain or total delay."""
-    kept = [line for line in fit.structures if line.excess <= _AS_GOOD]
+    kept = [line for line in fit.structures if line.delta_bic <= _AS_GOOD]
     gain, total = _gain_and_total(fit)
     gains = np.array([gain, *(line.gain for line in kept)])
     totals = np.array([total, *(line.total_delay for line in kept)])
-    if fit.views or not (_apart(gains) or _apart(totals)):
+    if fit.delay_estimates or not (_apart(gains) or _apart(totals)):
         return None
     return Flag(
         "gain_open",

@@ -43,7 +43,7 @@ _TOTAL_IN_DOUBT = frozenset(
 class StructureRow:
     """One structure that was fitted: `order` poles, ``order - relative_degree`` zeros.
 
-    `excess` is its information criterion above that of the best structure; up to 10 the data do
+    `delta_bic` is its information criterion above that of the best structure; up to 10 the data do
     not rule it out, and `interval` (s) is the 95 % profile-likelihood interval of its dead time
     (None where the structure is ruled out).
     """
@@ -52,7 +52,7 @@ class StructureRow:
     relative_degree: int
     dead_time: float
     total_delay: float
-    excess: float
+    delta_bic: float
     interval: tuple[float, float] | None
 
 
@@ -101,18 +101,18 @@ class OutputErrorFit(Result):
         shorter than the slowest time constant and does not resolve the gain.
     at_noise_level : bool
         The residual is as small as the noise before the step.
-    misfit : float
+    normalized_rms : float
         Residual over noise, in means over bins of samples.
     noise, residual : float
         Standard deviations in the unit of the output.
     correlation : float
         Samples of the residual that one independent sample is worth.
-    views : dict of str to float
+    delay_estimates : dict of str to float
         Dead time in s as seen in six ways, of which the last serves the interval only; empty
         where one model explains everything.
     structures : tuple of StructureRow
         Everything that was fitted, best first.
-    profile_delay, profile_excess : ndarray
+    profile_delay, profile_deviance : ndarray
         Profile of the chosen structure: delay in s, chi-square above the minimum.
     time, measured, fitted : ndarray, shape (N,)
         The record that was fitted (the mean, for several) and the model's response to it.
@@ -123,7 +123,7 @@ class OutputErrorFit(Result):
     dt : float
         Sample time in s.
     better : StructureRow or None
-        Where structures were asked for, and are ruled out: the structure that does it, `excess`
+        Where structures were asked for, and are ruled out: the structure that does it, `delta_bic`
         below them. The dead time is then an apparent one, with the lags that the model lacks in it.
     choices : tuple of str
         What was chosen, and why.
@@ -154,14 +154,14 @@ class OutputErrorFit(Result):
     zeros: ComplexArray
     gain: float
     at_noise_level: bool
-    misfit: float
+    normalized_rms: float
     noise: float
     residual: float
     correlation: float
-    views: dict[str, float]
+    delay_estimates: dict[str, float]
     structures: tuple[StructureRow, ...]
     profile_delay: FloatArray
-    profile_excess: FloatArray
+    profile_deviance: FloatArray
     time: FloatArray
     measured: FloatArray
     fitted: FloatArray
@@ -204,7 +204,7 @@ class OutputErrorFit(Result):
 
     def __repr__(self) -> str:
         low, high = self.interval
-        level = "noise" if self.at_noise_level else f"{self.misfit:.2g} x noise"
+        level = "noise" if self.at_noise_level else f"{self.normalized_rms:.2g} x noise"
         return (
             f"<OutputErrorFit {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, "
             f"order {self.order}, "
@@ -244,11 +244,11 @@ class OutputErrorFit(Result):
             ("gain", gain_in_words(self.gain, self.gain_interval)),
             (
                 "residual",
-                (f"{self.residual:.3g}, noise {self.noise:.3g} (normalised rms {self.misfit:.3g})"),
+                (f"{self.residual:.3g}, noise {self.noise:.3g} (normalised rms {self.normalized_rms:.3g})"),
             ),
         ]
         rows += [
-            (f"delay estimate: {name}", in_time(value, 4)) for name, value in self.views.items()
+            (f"delay estimate: {name}", in_time(value, 4)) for name, value in self.delay_estimates.items()
         ]
         if self.repeatability is not None:
             rows += self.repeatability.rows()

@@ -45,24 +45,24 @@ def summarise(
         zeros=locked(np.sort_complex(zeros)),
         gain=float(fit.numerator[0] / np.prod(-poles[poles != 0]).real),
         at_noise_level=fit.adequate,
-        misfit=fit.misfit,
+        normalized_rms=fit.normalized_rms,
         noise=data.sigma,
         residual=fit.residual,
         correlation=fit.correlation,
-        views={ESTIMATE_WORDS[key]: delay for key, delay in fit.views},
+        delay_estimates={ESTIMATE_WORDS[key]: delay for key, delay in fit.delay_estimates},
         structures=tuple(
             StructureRow(
                 line.structure.order,
                 line.structure.relative_degree,
                 line.delay,
                 line.total_delay,
-                line.excess,
+                line.delta_bic,
                 None if np.isnan(line.low) else (line.low, line.high),
             )
             for line in fit.structures
         ),
         profile_delay=locked(fit.profile[0]),
-        profile_excess=locked(fit.profile[1]),
+        profile_deviance=locked(fit.profile[1]),
         time=locked(time),
         measured=locked(data.output),
         fitted=locked(fit.fitted),
@@ -80,7 +80,7 @@ def summarise(
 def _row_of(better: Better) -> StructureRow:
     n, r = better.structure.order, better.structure.relative_degree
     ends = better.low, better.high
-    return StructureRow(n, r, better.delay, better.total, -better.excess, ends)
+    return StructureRow(n, r, better.delay, better.total, -better.delta_bic, ends)
 
 
 def with_repeats(result: OutputErrorFit, repeats: Repeatability) -> OutputErrorFit:
@@ -110,7 +110,7 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
 
 def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     s = fit.structure
-    simple = " with up to three poles" if fit.views else ""
+    simple = " with up to three poles" if fit.delay_estimates else ""
     kind = (
         model_words(fit.chain)
         if fit.chain
@@ -127,7 +127,7 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             f"{kind}: lowest information criterion of {len(fit.structures)} "
             f"structures{simple}, with a penalty on zeros and on a fourth pole"
         ]
-    if fit.views:
+    if fit.delay_estimates:
         reasons.append(
             "dead time: median of five delay estimates, since no model fits down to the noise level"
         )

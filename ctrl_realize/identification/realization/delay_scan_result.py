@@ -136,7 +136,7 @@ class DelayScan(Result):
         return self.interval
 
     @property
-    def misfit(self) -> float:
+    def least_iae(self) -> float:
         """Least integrated absolute error, in the unit of the output per input."""
         return float(self.iae[self.delay])
 

@@ -32,13 +32,14 @@ ALIKE, EXACT = 1.5, 1e-9
 class MimoRealization(Result):
     """How a model of several channels was put together.
 
-    ``delays[i, j] == output_delays[i] + input_delays[j] + rest[i, j]``, where `rest` is inside
-    the core; entries without response have the delay -1. `misfit` is the sum of absolute errors
-    of each entry over the sum of its absolute Markov parameters.
+    ``delays[i, j] == output_delays[i] + input_delays[j] + residual_delays[i, j]``, where
+    `residual_delays` are inside the core; entries without response have the delay -1.
+    `relative_iae` is the sum of absolute errors of each entry over the sum of its absolute Markov
+    parameters.
 
     Attributes
     ----------
-    delays, rest : ndarray of int, shape (p, m)
+    delays, residual_delays : ndarray of int, shape (p, m)
     output_delays, input_delays : tuple of int
     structure : str
         ``"common"``: one A for all channels. ``"rows"``: one model for each output behind tapped
@@ -47,7 +48,7 @@ class MimoRealization(Result):
         Of the models that the core is made of.
     states : int
         Of the whole model, delays included.
-    misfit : ndarray, shape (p, m)
+    relative_iae : ndarray, shape (p, m)
     impulse : ImpulseResponse
     flags : tuple of Flag
 
@@ -63,13 +64,13 @@ class MimoRealization(Result):
     """
 
     delays: IntArray
-    rest: IntArray
+    residual_delays: IntArray
     output_delays: tuple[int, ...]
     input_delays: tuple[int, ...]
     structure: str
     orders: tuple[int, ...]
     states: int
-    misfit: FloatArray
+    relative_iae: FloatArray
     impulse: ImpulseResponse
     flags: tuple[Flag, ...] = ()
 
@@ -84,7 +85,7 @@ class MimoRealization(Result):
             ("of the outputs", " ".join(map(str, self.output_delays))),
             ("structure", f"{self.structure}, order {' + '.join(map(str, self.orders))}"),
             ("states in total", str(self.states)),
-            ("largest relative error", f"{100 * float(self.misfit.max()):.3g} %"),
+            ("largest relative error", f"{100 * float(self.relative_iae.max()):.3g} %"),
         ]
 
     def __repr__(self) -> str:
@@ -261,13 +262,13 @@ def realize_mimo(
         data.dt,
         MimoRealization(
             delays=_locked(found),
-            rest=_locked(np.where(known, found - np.add.outer(behind, before), 0)),
+            residual_delays=_locked(np.where(known, found - np.add.outer(behind, before), 0)),
             output_delays=pieces.outputs,
             input_delays=pieces.inputs,
             structure=way,
             orders=pieces.orders,
             states=pieces.states,
-            misfit=read_only(misfits[way]),
+            relative_iae=read_only(misfits[way]),
             impulse=data,
             flags=pieces.flags,
         ),

@@ -131,7 +131,7 @@ def realize(
         hankel=hankel,
         feedthrough=direct,
         singular_values=read_only(model.singular_values),
-        following=model.following,
+        next_singular_value=model.following,
         error_bound=model.rest_bound if padded else None,
         iae=_iae(markov[:, :, : delay + samples + 1], model, D, delay),
         impulse=data,

@@ -37,7 +37,7 @@ class Realization(Result):
         Leading singular values of the Hankel matrix: all of them where it is
         small, else the `order` ones that the model is made of.
         `leading_singular_values` computes more.
-    following : float
+    next_singular_value : float
         Singular value ``order + 1``, the first that was left out; beyond a
         Hankel matrix of 200 rows an estimate from below.
     error_bound : float or None
@@ -60,8 +60,10 @@ class Realization(Result):
     >>> import ctrl_realize as cr
     >>> pulse = np.r_[0.0, 0.9 ** np.arange(99) + 0.01 * (-0.5) ** np.arange(99)]
     >>> found = cr.realize(pulse, 1, dt=0.1).fit
-    >>> print(found.singular_values[:1].round(2), round(found.following, 4), round(found.iae, 3))
-    [5.26] 0.0124 0.029
+    >>> print(found.singular_values[0].round(2), round(found.next_singular_value, 4))
+    5.26 0.0124
+    >>> print(round(found.iae, 3))
+    0.029
     """
 
     order: int
@@ -70,7 +72,7 @@ class Realization(Result):
     hankel: str
     feedthrough: bool
     singular_values: FloatArray
-    following: float
+    next_singular_value: float
     error_bound: float | None
     iae: float
     impulse: ImpulseResponse = field(repr=False)
@@ -108,7 +110,7 @@ class Realization(Result):
             ("dead time", f"{in_time(self.delay * self.dt, 5)} {in_samples}"),
             ("Hankel matrix", f"{self.hankel}, {self.samples} samples"),
             ("feedthrough D", f"G[{self.delay}]" if self.feedthrough else "0"),
-            ("singular values", f"{values} (next {self.following:.4g})"),
+            ("singular values", f"{values} (next {self.next_singular_value:.4g})"),
             ("sum of |error|", f"{self.iae:.4g}"),
         ]
         if self.error_bound is not None:

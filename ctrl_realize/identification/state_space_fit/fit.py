@@ -194,9 +194,9 @@ def _from_start(
     orders = search.orders(asked)
     found = delay_matrix(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
     shares = _split(found)
-    fits = search.by_order(orders, shares, direct=feedthrough is not False)
+    fits = search.by_order(orders, shares, feedthrough=feedthrough is not False)
     best = min(fits, key=lambda c: c.bic)
-    moved = search.improved(best, delays=delays is None, direct=feedthrough is None)
+    moved = search.improved(best, delays=delays is None, feedthrough=feedthrough is None)
     if asked is None or len(asked) > 1:
         moved = search.lowered(moved, orders, delays=delays is None)
     bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
@@ -217,7 +217,7 @@ def _silence(best: Candidate) -> tuple[Flag, ...]:
     """Flag the outputs of which the model explains no more than its parameters would of noise."""
     found = best.found
     # What belongs to one output: its C, the initial state, and its row of D.
-    count = 2 * best.order + best.found.model.D.shape[1] * best.direct
+    count = 2 * best.order + best.found.model.D.shape[1] * best.feedthrough
     gain = found.counts * np.log(found.spread / found.variance)
     return tuple(
         Flag("no_response", f"output {a} shows no response to the input above the noise")
@@ -290,14 +290,12 @@ def refine_state_space(
     core = model.delay_free
     if core.nstates == 0:
         raise UnsuitableSystemError("the system is a pure gain; it has no dynamics to refine")
-    direct = bool(np.any(core.D)) if feedthrough is None else bool(feedthrough)
+    given = bool(np.any(core.D)) if feedthrough is None else bool(feedthrough)
     shares = model.input_delays, model.output_delays
     found = fit_sections(
-        experiments(group, shares), in_sections(core.A, core.B, core.C, core.D), direct=direct
+        experiments(group, shares), in_sections(core.A, core.B, core.C, core.D), feedthrough=given
     )
-    return fitted_system(
-        Candidate(found, core.nstates, *shares, direct, np.nan), group, {}, (), cut
-    )
+    return fitted_system(Candidate(found, core.nstates, *shares, given, np.nan), group, {}, (), cut)
 
 
 def _orders(order: int | Iterable[int] | None) -> tuple[int, ...] | None:

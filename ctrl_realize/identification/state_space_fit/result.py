@@ -37,14 +37,14 @@ class StateSpaceFit(Result):
         States of the core.
     input_delays, output_delays : tuple of int
         In samples.
-    direct : bool
+    feedthrough : bool
         Whether the core has a direct term.
     bic : dict of int to float
         Bayesian information criterion of every order tried; of the last one, with its final
         delays. Smaller is better, 6 less is clear.
     noise_std : ndarray, shape (p,)
         Standard deviation of what the model leaves of every output.
-    steps : int
+    iterations : int
         Gauss-Newton steps of the last fit.
     fit_percent : ndarray, shape (p,)
         ``100 (1 - noise_std / std y)`` of every output, over all records.
@@ -85,11 +85,11 @@ class StateSpaceFit(Result):
     order: int
     input_delays: tuple[int, ...]
     output_delays: tuple[int, ...]
-    direct: bool
+    feedthrough: bool
     bic: dict[int, float]
     noise_std: FloatArray
     fit_percent: FloatArray
-    steps: int
+    iterations: int
     checks: tuple[ResidualAnalysis, ...]
     records: tuple[Record, ...]
     choices: tuple[str, ...] = ()
@@ -127,7 +127,7 @@ class StateSpaceFit(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         return [
-            ("order", f"{self.order}, {'with' if self.direct else 'without'} feedthrough"),
+            ("order", f"{self.order}, {'with' if self.feedthrough else 'without'} feedthrough"),
             ("input delays", " ".join(map(str, self.input_delays)) + " samples"),
             ("output delays", " ".join(map(str, self.output_delays)) + " samples"),
             ("residual std", ", ".join(f"{s:.3g}" for s in self.noise_std)),
@@ -179,7 +179,7 @@ def fitted_system(
         longest = max(r.n_samples for r in group)
         slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
         advice = "compare with a lower order on other data"
-        if slow and group[0].issiso:
+        if slow and group[0].issiso():
             advice = (
                 "the slowest time constant is longer than the record, as of an integrator: "
                 "use fit_output_error (or identify), which fits integrators for one input "
@@ -201,11 +201,11 @@ def fitted_system(
         order=core.nstates,
         input_delays=best.inputs,
         output_delays=best.outputs,
-        direct=best.direct,
+        feedthrough=best.feedthrough,
         bic=bic,
         noise_std=read_only(np.sqrt(best.found.variance)),
         fit_percent=read_only(100 * (1 - np.sqrt(best.found.variance / best.found.spread))),
-        steps=best.found.steps,
+        iterations=best.found.steps,
         checks=checks,
         records=group,
         choices=choices,

@@ -46,7 +46,7 @@ class Candidate:
     order: int
     inputs: tuple[int, ...]
     outputs: tuple[int, ...]
-    direct: bool
+    feedthrough: bool
     bic: float
 
 
@@ -132,28 +132,30 @@ class Search:
         return possible
 
     def fit(
-        self, order: int, shares: Shares, *, direct: bool, start: Candidate | None = None
+        self, order: int, shares: Shares, *, feedthrough: bool, start: Candidate | None = None
     ) -> Candidate:
         """Fit one structure; its start is another fit, or Kung's realization."""
         data = experiments(self._group, shares, self._enough)
         sections = start.found.model if start is not None else self._kung(order, shares)
         most = MOST_STEPS if start is None else NEARBY
-        found = fit_sections(data, sections, direct=direct, enough=ROUGHLY, most=most)
-        return self._judged(found, order, shares, direct)
+        found = fit_sections(data, sections, feedthrough=feedthrough, enough=ROUGHLY, most=most)
+        return self._judged(found, order, shares, feedthrough)
 
     def finish(self, best: Candidate) -> Candidate:
         """Fit once more, to all samples."""
         shares = best.inputs, best.outputs
         data = experiments(self._group, shares)
-        found = fit_sections(data, best.found.model, direct=best.direct)
+        found = fit_sections(data, best.found.model, feedthrough=best.feedthrough)
         return replace(best, found=found)
 
-    def by_order(self, orders: Sequence[int], shares: Shares, *, direct: bool) -> list[Candidate]:
+    def by_order(
+        self, orders: Sequence[int], shares: Shares, *, feedthrough: bool
+    ) -> list[Candidate]:
         """Fit rising orders until none is better any more."""
         fits: list[Candidate] = []
         for order in orders:
             try:
-                fits.append(self.fit(order, shares, direct=direct))
+                fits.append(self.fit(order, shares, feedthrough=feedthrough))
             except OrderError:
                 break
             best = min(range(len(fits)), key=lambda i: fits[i].bic)
@@ -165,18 +167,18 @@ class Search:
             )
         return fits
 
-    def improved(self, best: Candidate, *, delays: bool, direct: bool) -> Candidate:
+    def improved(self, best: Candidate, *, delays: bool, feedthrough: bool) -> Candidate:
         """Change one thing at a time while that is better.
 
-        A delay by a sample where `delays` are free, the direct term where `direct` is, and at the
-        end the order: with the right delays a smaller one may do.
+        A delay by a sample where `delays` are free, the direct term where `feedthrough` is, and at
+        the end the order: with the right delays a smaller one may do.
         """
         for _ in range(FARTHEST):
             shares = best.inputs, best.outputs
-            ways = [(moved, best.direct) for moved in _neighbours(*shares) if delays]
-            ways += [(shares, not best.direct)] if direct else []
+            ways = [(moved, best.feedthrough) for moved in _neighbours(*shares) if delays]
+            ways += [(shares, not best.feedthrough)] if feedthrough else []
             tried = [
-                self.fit(best.order, moved, direct=own, start=best)
+                self.fit(best.order, moved, feedthrough=own, start=best)
                 for moved, own in ways
                 if max(moved[0]) + max(moved[1]) < self._markov.shape[-1] // 2
             ]
@@ -194,11 +196,11 @@ class Search:
         """
         for order in (n for n in orders if n < best.order):
             try:
-                lower = self.fit(order, (best.inputs, best.outputs), direct=best.direct)
+                lower = self.fit(order, (best.inputs, best.outputs), feedthrough=best.feedthrough)
             except OrderError:
                 continue
             if delays and self._markov.shape[:2] == (1, 1):
-                lower = self.improved(lower, delays=True, direct=False)
+                lower = self.improved(lower, delays=True, feedthrough=False)
             best = min(best, lower, key=lambda c: c.bic)
         return best
 
@@ -210,14 +212,16 @@ class Search:
         response without direct term says that the dead time ended within the sample before it.
         """
         low, high = _within(best)
-        for direct in {best.direct, False}:
+        for feedthrough in {best.feedthrough, False}:
             for step in (-1, 1):
                 last, missed = best, 0
                 for _ in range(FARTHEST_PLAUSIBLE):
                     delay = last.inputs[0] + step
                     if not 0 <= delay < self._markov.shape[-1] // 2 or missed == 2:
                         break
-                    last = self.fit(best.order, ((delay,), last.outputs), direct=direct, start=last)
+                    last = self.fit(
+                        best.order, ((delay,), last.outputs), feedthrough=feedthrough, start=last
+                    )
                     missed += 1
                     if (last.bic - best.bic) / independent <= RULED_OUT:
                         first, end = _within(last)
@@ -250,20 +254,22 @@ class Search:
         B, C = whole.B[:order] / self._size_in, whole.C[:, :order] * self._size_out[:, None]
         return in_sections(whole.A[:order, :order], B, C, direct)
 
-    def _judged(self, found: SectionFit, order: int, shares: Shares, direct: bool) -> Candidate:
+    def _judged(
+        self, found: SectionFit, order: int, shares: Shares, feedthrough: bool
+    ) -> Candidate:
         p, m, _ = self._markov.shape
         values = found.counts.sum() / p
         used = min(self._samples, self._enough)
-        count = order * (p + m) + (p * m if direct else 0)
+        count = order * (p + m) + (p * m if feedthrough else 0)
         # As if all delays left the same number of samples.
         bic = 2 * found.loss * used / values + count * np.log(used)
-        return Candidate(found, order, *shares, direct, float(bic))
+        return Candidate(found, order, *shares, feedthrough, float(bic))
 
 
 def _within(found: Candidate) -> tuple[float, float]:
     """Bounds of the dead time, in samples, of a sampled model of one input and output."""
     delay = found.inputs[0] + found.outputs[0]
-    return (max(delay - 1.0, 0.0), float(delay)) if found.direct else (delay, delay + 1.0)
+    return (max(delay - 1.0, 0.0), float(delay)) if found.feedthrough else (delay, delay + 1.0)
 
 
 def _neighbours(inputs: tuple[int, ...], outputs: tuple[int, ...]) -> list[Shares]:

@@ -52,7 +52,7 @@ def detect_step(
     >>> u = np.where(t < 1.0, 4.0, 20.0)
     >>> u[50] = 40.0  # a spike
     >>> edge = cr.detect_step(cr.Record(t, u, 0 * t))
-    >>> edge.index, edge.rest, edge.amplitude
+    >>> edge.index, edge.baseline, edge.amplitude
     (100, 4.0, 16.0)
     """
     return found_step(record, spike_samples, min_share)
@@ -164,11 +164,11 @@ def unit_step(
     return StepResponse(
         time=np.asarray(record.dt * index[before.size :]),
         output=scaled[before.size :],
-        input=(u[at.index : at.stop] - at.rest) / at.amplitude,
+        input=(u[at.index : at.stop] - at.baseline) / at.amplitude,
         pre=scaled[: before.size],
         dt=record.dt,
         amplitude=at.amplitude,
-        rest_output=level,
+        baseline=level,
         drift=slope / record.dt,
         edge=at,
         name=record.name,
@@ -199,7 +199,7 @@ def _to_step_edge(edge: Edge, record: Record) -> StepEdge:
         edge.index,
         float(record.time[edge.index]),
         edge.amplitude,
-        edge.rest,
+        edge.baseline,
         edge.samples,
         edge.start,
         edge.stop,

@@ -21,17 +21,18 @@ def check_candidates(min_delay: int, max_delay: int) -> tuple[int, int]:
     return low, high
 
 
-def check_memory(memory: float, dt: float, max_delay: int) -> float:
+def check_forgetting_time(forgetting_time: float, dt: float, max_delay: int) -> float:
     """Return the memory in samples; the largest candidate must lie well within it."""
-    span = positive(memory, "memory", "time in s") / dt
+    span = positive(forgetting_time, "forgetting_time", "time in s") / dt
     if span > LONGEST:
         raise OptionError(
-            f"memory={memory:g} s is {span:.4g} samples; needed are at most {LONGEST:g}"
+            f"forgetting_time={forgetting_time:g} s is {span:.4g} samples; needed are at most "
+            f"{LONGEST:g}"
         )
     if span <= max_delay:
         raise DelayRangeError(
-            f"memory={memory:g} s is {span:.4g} samples, and delays up to {max_delay} samples are "
-            "to be seen; needed is a longer memory"
+            f"forgetting_time={forgetting_time:g} s is {span:.4g} samples, and delays up to "
+            f"{max_delay} samples are to be seen; needed is a longer forgetting_time"
         )
     return span
 

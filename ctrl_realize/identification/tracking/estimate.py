@@ -56,7 +56,7 @@ class Solution:
     offset: float
     gain_std: float
     move_std: FloatArray
-    speed_ratios: tuple[float, ...]
+    pole_speed_ratios: tuple[float, ...]
     variance: float
     reply_std: float
     sees_reply: bool
@@ -87,33 +87,33 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
     bank, q = now.bank, now.n_parameters
     spread = np.array([1.0, *(SPEED_STD for _ in now.directions)])
     found = bank.solve(np.eye(1, q)[0], variance / spread**2)
-    best = int(np.argmin(found.misfit))
+    best = int(np.argmin(found.weighted_sse))
     theta, delay = found.theta[best], bank.low + best
     freedom = max(bank.weight**2 / bank.weight_squared - q - 1, 1.0)
-    variance = found.misfit[best] / bank.weight * (1 + (q + 1) / freedom)
+    variance = found.weighted_sse[best] / bank.weight * (1 + (q + 1) / freedom)
     # Never below what sums of squares can resolve in double precision.
     noise = max(variance * inflation, 1e-14 * found.power, 1e-300)
-    interval = _interval(found.misfit - found.misfit[best], noise, bank.low)
+    interval = _interval(found.weighted_sse - found.weighted_sse[best], noise, bank.low)
     # root by root: the product overflows for an output 1e200 times as large as the input
     std = np.sqrt(noise) * np.sqrt(np.diag(found.inverse[best]))
     gain, gain_std = float(theta[0]), float(std[0])
     moves = _relative(theta)
     speeds = [i for i, (what, _, _) in enumerate(now.directions) if what == "speed"]
-    unseen = _no_reply(float(found.power - found.misfit[best]) / noise, gain, gain_std)
+    unseen = _no_reply(float(found.power - found.weighted_sse[best]) / noise, gain, gain_std)
     open_still = _no_choice(delay, interval, (bank.low, bank.high))
     return Solution(
         delay=delay,
-        place=delay + _fraction(found.misfit, best),
+        place=delay + _fraction(found.weighted_sse, best),
         interval=interval,
         theta=theta,
         offset=float(found.offset[best]),
         gain_std=gain_std,
         move_std=std[1:] / abs(gain) if gain else np.full(q - 1, np.inf),
-        speed_ratios=tuple(
+        pole_speed_ratios=tuple(
             float(np.exp(now.moved[i] + np.clip(moves[i], -SHOWN_MOVE, SHOWN_MOVE))) for i in speeds
         ),
         variance=variance,
-        reply_std=float(np.sqrt(max(found.power - found.misfit[best], 0.0) / bank.weight)),
+        reply_std=float(np.sqrt(max(found.power - found.weighted_sse[best], 0.0) / bank.weight)),
         sees_reply=not unseen,
         reason=unseen or open_still or _too_far(moves[speeds]),
     )

@@ -17,7 +17,7 @@ class TrackPoint(Result):
     """What the samples of the forgetting window say at one moment.
 
     ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
-    ``interval`` to half a sample where `tells` is true. Where it is false, `reason` says what is
+    ``interval`` to half a sample where `resolved` is true. Where it is false, `reason` says what is
     missing and the numbers are the best guess without any claim.
 
     Attributes
@@ -39,11 +39,11 @@ class TrackPoint(Result):
         `DelayTracker.reset` starts anew.
     gain_ratio, gain_std : float
         Gain relative to the starting model, and its standard deviation.
-    speed_ratios : tuple of float
+    pole_speed_ratios : tuple of float
         How much faster each real pole and pole pair has become; 1 is unchanged.
     noise_std : float
         Standard deviation of the residual.
-    tells : bool
+    resolved : bool
     reason : str
 
     Examples
@@ -53,7 +53,7 @@ class TrackPoint(Result):
     >>> import ctrl_realize as cr
     >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
     >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
-    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, forgetting_time=3.0)
     >>> for sample in zip(u, cr.DelayedStateSpace(core, 7).simulate(u)):
     ...     tracker.update(*sample)
     >>> now = tracker.estimate()
@@ -67,9 +67,9 @@ class TrackPoint(Result):
     delay_interval: tuple[int, int]
     gain_ratio: float
     gain_std: float
-    speed_ratios: tuple[float, ...]
+    pole_speed_ratios: tuple[float, ...]
     noise_std: float
-    tells: bool
+    resolved: bool
     dt: float
     reason: str = ""
     lost: bool = False
@@ -82,7 +82,7 @@ class TrackPoint(Result):
     @property
     def dead_time_interval(self) -> tuple[float, float] | None:
         """The same as `interval`; None where nothing is claimed."""
-        return self.interval if self.tells else None
+        return self.interval if self.resolved else None
 
     def _title(self) -> str:
         return f"Tracked delay at {self.time:.6g} s"
@@ -98,13 +98,13 @@ class TrackPoint(Result):
                     "model"
                 ),
             ),
-            ("pole speed ratios", ", ".join(f"{s:.3g}" for s in self.speed_ratios) or "kept"),
+            ("pole speed ratios", ", ".join(f"{s:.3g}" for s in self.pole_speed_ratios) or "kept"),
             ("residual std", f"{self.noise_std:.3g}"),
-            ("resolved", "yes" if self.tells else f"no: {self.reason}"),
+            ("resolved", "yes" if self.resolved else f"no: {self.reason}"),
         ]
 
     def __repr__(self) -> str:
-        told = "" if self.tells else f", not resolved: {self.reason}"
+        told = "" if self.resolved else f", not resolved: {self.reason}"
         return f"<TrackPoint {self.delay} {self.delay_interval} at {self.time:.6g} s{told}>"
 
 
@@ -112,7 +112,7 @@ class TrackPoint(Result):
 class TrackHistory(Result):
     """Course of a tracked delay: all arrays have one entry for each moment in `time`.
 
-    Where ``tells`` is false, nothing is claimed; `low` and `high` then only show what is left
+    Where ``resolved`` is false, nothing is claimed; `low` and `high` then only show what is left
     open.
 
     Attributes
@@ -125,7 +125,7 @@ class TrackHistory(Result):
         Ends of the 95 % interval in s; `delay_low` and `delay_high` are the same in samples.
     gain_ratio : ndarray, shape (K,)
         Gain over that of the starting model.
-    tells : ndarray of bool, shape (K,)
+    resolved : ndarray of bool, shape (K,)
         Whether the samples within the memory tell a delay.
     lost : ndarray of bool, shape (K,)
         Where the residual was much louder than the model's, see `TrackPoint`.
@@ -140,9 +140,9 @@ class TrackHistory(Result):
     >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
     >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
     >>> record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
-    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
-    >>> track = tracker.run(record)
-    >>> print(track.time[[0, 20, -1]], track.tells[[0, 20, -1]], track.delay[[0, 20, -1]])
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, forgetting_time=3.0)
+    >>> track = tracker.track(record)
+    >>> print(track.time[[0, 20, -1]], track.resolved[[0, 20, -1]], track.delay[[0, 20, -1]])
     [0.05 1.25 9.95] [False False  True] [0.         7.8695741  6.97755342]
     """
 
@@ -151,7 +151,7 @@ class TrackHistory(Result):
     low: FloatArray
     high: FloatArray
     gain_ratio: FloatArray
-    tells: BoolArray
+    resolved: BoolArray
     lost: BoolArray
     dt: float
 
@@ -174,7 +174,7 @@ class TrackHistory(Result):
         return "Tracked delay"
 
     def _rows(self) -> list[tuple[str, str]]:
-        told = np.flatnonzero(self.tells)
+        told = np.flatnonzero(self.resolved)
         share = f"{told.size} of {self.time.size} points"
         if self.lost.any():
             share += f", track lost at {int(self.lost.sum())}"
@@ -189,7 +189,7 @@ class TrackHistory(Result):
         ]
 
     def __repr__(self) -> str:
-        return f"<TrackHistory: {self.time.size} points, resolved at {int(self.tells.sum())}>"
+        return f"<TrackHistory: {self.time.size} points, resolved at {int(self.resolved.sum())}>"
 
 
 def track_of(course: Sequence[TrackPoint], dt: float) -> TrackHistory:
@@ -204,7 +204,7 @@ def track_of(course: Sequence[TrackPoint], dt: float) -> TrackHistory:
         low=along(moment.interval[0] for moment in course),
         high=along(moment.interval[1] for moment in course),
         gain_ratio=along(moment.gain_ratio for moment in course),
-        tells=locked(np.array([moment.tells for moment in course])),
+        resolved=locked(np.array([moment.resolved for moment in course])),
         lost=locked(np.array([moment.lost for moment in course])),
         dt=dt,
     )

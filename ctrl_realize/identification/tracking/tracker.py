@@ -24,7 +24,7 @@ from ...numerics.state_space.pole_sensitivity import (
     pole_directions,
     sensitivity_system,
 )
-from .checks import check_candidates, check_memory, check_start, model_noise
+from .checks import check_candidates, check_forgetting_time, check_start, model_noise
 from .estimate import LinearisedBank, Solution, solve
 from .results import TrackHistory, TrackPoint, track_of
 
@@ -71,7 +71,7 @@ class DelayTracker:
         not matter.
     max_delay, min_delay : int
         Candidates, in samples.
-    memory : float
+    forgetting_time : float
         Time in s after which a sample counts for 1/e. Ten settling times or more see several
         moves of the input; the estimate trails a change by about as much.
     dynamics : bool, default True
@@ -126,10 +126,10 @@ class DelayTracker:
     >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
     >>> worn = cr.DelayedStateSpace(core, 7)
     >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
-    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, memory=3.0)
+    >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, forgetting_time=3.0)
     >>> for sample in zip(u, worn.simulate(u)):
     ...     tracker.update(*sample)
-    >>> tracker.estimate().delay, tracker.estimate().tells
+    >>> tracker.estimate().delay, tracker.estimate().resolved
     (7, True)
     """
 
@@ -138,7 +138,7 @@ class DelayTracker:
         model: ct.StateSpace,
         *,
         max_delay: int,
-        memory: float,
+        forgetting_time: float,
         min_delay: int = 0,
         dynamics: bool = True,
         noise_std: float | None = None,
@@ -148,7 +148,7 @@ class DelayTracker:
         check_start(core)
         self._low, self._high = check_candidates(min_delay, max_delay)
         self.dt = float(core.dt)
-        self._span = check_memory(memory, self.dt, self._high)
+        self._span = check_forgetting_time(forgetting_time, self.dt, self._high)
         self._forgetting = float(np.exp(-1.0 / self._span))
         self._stride = max(1, round(self._span / MOMENTS))
         self._noise_std = model_noise(model, noise_std)
@@ -285,7 +285,7 @@ class DelayTracker:
         )
 
     @single_threaded
-    def run(self, record: Record) -> TrackHistory:
+    def track(self, record: Record) -> TrackHistory:
         """Take in a whole record, and return the course of the estimate.
 
         Raises
@@ -294,7 +294,7 @@ class DelayTracker:
             A record with several channels, missing samples, or another sample time.
         """
         check_complete(record, "DelayTracker.run")
-        if not record.issiso:
+        if not record.issiso():
             raise DataError(f"{record!r} has several channels; needed is one input and one output")
         if not np.isclose(record.dt, self.dt, rtol=1e-3, atol=0):
             raise DataError(
@@ -344,9 +344,9 @@ class DelayTracker:
         """Go on from what was found, and start a bank about moved poles where they have moved."""
         self._told = self._tell(found)
         full = self._count >= self._span
-        if found is not None and full and self._told.tells and not np.any(self._now.moved):
+        if found is not None and full and self._told.resolved and not np.any(self._now.moved):
             self._least = min(self._least, float(np.sqrt(found.variance)))
-        self._places.append(self._told.dead_time / self.dt if self._told.tells else np.nan)
+        self._places.append(self._told.dead_time / self.dt if self._told.resolved else np.nan)
         if found is None:
             return
         self._solution, self._variance = found, found.variance
@@ -378,9 +378,9 @@ class DelayTracker:
             dt=self.dt,
             gain_ratio=1.0,
             gain_std=np.inf,
-            speed_ratios=(),
+            pole_speed_ratios=(),
             noise_std=np.inf,
-            tells=False,
+            resolved=False,
             reason=f"only {self._count} samples yet" if self._count else "no samples yet",
         )
 
@@ -396,9 +396,9 @@ class DelayTracker:
             dt=self.dt,
             gain_ratio=found.gain,
             gain_std=found.gain_std,
-            speed_ratios=found.speed_ratios,
+            pole_speed_ratios=found.pole_speed_ratios,
             noise_std=float(np.sqrt(found.variance)),
-            tells=not (found.reason or loud or pending),
+            resolved=not (found.reason or loud or pending),
             reason=found.reason or loud or pending,
             lost=bool(loud),
         )

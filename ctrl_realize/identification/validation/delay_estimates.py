@@ -96,7 +96,7 @@ def compare_delay_estimates(
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 100), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(1500)
     >>> check = cr.validation.compare_delay_estimates(cr.Record(0.01 * np.arange(1500), u, y))
-    >>> check.agree, [view.method for view in check.views]
+    >>> check.agree, [view.method for view in check.estimates]
     (True, ['output error', 'scan', 'cross-correlation'])
     """
     if record is None and frf is None:
@@ -115,7 +115,7 @@ def compare_delay_estimates(
         raise DataError("no method found a delay: " + "; ".join(map(str, flags)))
     common, conflicts = common_dead_time(views)
     return DelayComparison(
-        views=tuple(views),
+        estimates=tuple(views),
         agree=common is not None,
         common=common,
         conflicts=conflicts,
@@ -132,7 +132,7 @@ def _from_record(
     flags: list[Flag],
 ) -> None:
     check_complete(record, "compare_delay_estimates")
-    if not record.issiso:
+    if not record.issiso():
         raise DataError(f"{record!r} has several channels; needed is one input and one output")
     dt = record.dt
     total, model_order, stepped = 0.1 * record.n_samples * dt, 2, False

@@ -65,7 +65,7 @@ class DelayComparison(Result):
 
     Attributes
     ----------
-    views : tuple of DelayEstimate
+    estimates : tuple of DelayEstimate
     agree : bool
     common : tuple of float or None
         In s.
@@ -93,7 +93,7 @@ class DelayComparison(Result):
     0.113 to 0.126 s, take that of the output error
     """
 
-    views: tuple[DelayEstimate, ...]
+    estimates: tuple[DelayEstimate, ...]
     agree: bool
     common: tuple[float, float] | None
     conflicts: tuple[tuple[str, str], ...]
@@ -103,7 +103,7 @@ class DelayComparison(Result):
     @property
     def rely_on(self) -> str | None:
         """Method whose interval of the dead time is the narrowest of those that count."""
-        times = [view for view in counted(self.views) if view.kind == "dead time"]
+        times = [view for view in counted(self.estimates) if view.kind == "dead time"]
         if not self.agree or not times:
             return None
         return min(times, key=lambda view: view.high - view.low).method
@@ -112,7 +112,7 @@ class DelayComparison(Result):
         """Tabulate the views, one row each, in s and in samples."""
         import pandas as pd
 
-        rows = pd.DataFrame([vars(view) for view in self.views]).set_index("method")
+        rows = pd.DataFrame([vars(view) for view in self.estimates]).set_index("method")
         if self.dt is not None:
             rows["samples"] = rows["value"] / self.dt
         return rows
@@ -121,7 +121,7 @@ class DelayComparison(Result):
         return "Comparison of delay estimates"
 
     def _rows(self) -> list[tuple[str, str]]:
-        rows = [(f"{view.method} ({view.source})", self._words(view)) for view in self.views]
+        rows = [(f"{view.method} ({view.source})", self._words(view)) for view in self.estimates]
         if self.common is not None:
             agreed = f"yes, on {interval_in_time(*self.common)}"
         elif self.conflicts:
@@ -133,7 +133,7 @@ class DelayComparison(Result):
             rows.append(
                 ("rely on", f"{self.rely_on}: the narrowest interval among the reliable estimates")
             )
-        rows += [(f"{view.method} in doubt", view.doubt) for view in self.views if view.doubt]
+        rows += [(f"{view.method} in doubt", view.doubt) for view in self.estimates if view.doubt]
         return rows
 
     def _words(self, view: DelayEstimate) -> str:
@@ -145,7 +145,7 @@ class DelayComparison(Result):
 
     def __repr__(self) -> str:
         verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"
-        return f"<DelayComparison: {len(self.views)} estimates that {verdict}>"
+        return f"<DelayComparison: {len(self.estimates)} estimates that {verdict}>"
 
 
 def counted(views: Sequence[DelayEstimate]) -> list[DelayEstimate]:

@@ -22,18 +22,18 @@ NOISE_ORDER = 20
 
 @dataclass(frozen=True, eq=False)
 class Prediction(Result):
-    """Output predicted `steps` samples ahead.
+    """Output predicted `horizon` samples ahead.
 
-    ``output[k]`` uses the input up to k and the measured output up to ``k - steps``; `fit_percent`
-    compares it with the record. The model is the system plus an autoregression of its residual
-    of the order `noise_order`, per output.
+    ``output[k]`` uses the input up to k and the measured output up to ``k - horizon``;
+    `fit_percent` compares it with the record. The model is the system plus an autoregression of its
+    residual of the order `noise_order`, per output.
 
     Attributes
     ----------
     output : ndarray, shape (N,) or (p, N)
     fit_percent : ndarray, shape (p,)
         ``100 (1 - |y - output| / |y - mean y|)`` of every output.
-    steps : int
+    horizon : int
         Samples from the last measured output that was used to the one that is predicted.
     noise_order : tuple of int
         Of every output; 0 where the residual is white.
@@ -49,20 +49,20 @@ class Prediction(Result):
     >>> slow = cr.DelayedStateSpace(ct.ss([[0.95]], [[1.0]], [[1.0]], [[1.0]], 0.1), 0)
     >>> y = plant.simulate(u) + slow.simulate(0.05 * e)
     >>> record = cr.Record(0.1 * np.arange(500), u, y)
-    >>> for steps in (1, 10):
-    ...     print(steps, cr.validation.predict(plant, record, steps).fit_percent.round(0))
+    >>> for horizon in (1, 10):
+    ...     print(horizon, cr.validation.predict(plant, record, horizon).fit_percent.round(0))
     1 [87.]
     10 [65.]
     """
 
     output: FloatArray
     fit_percent: FloatArray
-    steps: int
+    horizon: int
     noise_order: tuple[int, ...]
     record: Record
 
     def _title(self) -> str:
-        return f"Prediction {self.steps} samples ahead"
+        return f"Prediction {self.horizon} samples ahead"
 
     def _rows(self) -> list[tuple[str, str]]:
         return [
@@ -72,20 +72,20 @@ class Prediction(Result):
 
     def __repr__(self) -> str:
         fit = ", ".join(f"{f:.1f}" for f in self.fit_percent)
-        return f"<Prediction {self.steps} ahead: fit {fit} %>"
+        return f"<Prediction {self.horizon} ahead: fit {fit} %>"
 
 
 @single_threaded
 def predict(
-    system: ct.StateSpace, record: Record, steps: int, *, start: Start = "estimate"
+    system: ct.StateSpace, record: Record, horizon: int, *, start: Start = "estimate"
 ) -> Prediction:
-    """Predict the output of a record `steps` samples ahead.
+    """Predict the output of a record `horizon` samples ahead.
 
     Parameters
     ----------
     system, record, start
         As for `analyse_residuals`.
-    steps : int
+    horizon : int
         Samples ahead, at least 1.
 
     Returns
@@ -95,13 +95,13 @@ def predict(
     Raises
     ------
     DataError, UnsuitableSystemError, OptionError
-        As for `analyse_residuals`; steps that are no whole number from 1 on.
+        As for `analyse_residuals`; a horizon that is no whole number from 1 on.
 
     Notes
     -----
     The autoregression of the residual is fitted to the same record (order 0...20 by BIC), so that
     `fit_percent` says how well this record is described, not how well the next one would be
-    predicted. Compare models at the same `steps`.
+    predicted. Compare models at the same `horizon`.
 
     The predictor is that of [1]_ for the model ``y = G u + v``, v the autoregression.
 
@@ -126,7 +126,7 @@ def predict(
     1 [87.]
     10 [65.]
     """
-    ahead = whole(steps, "steps", 1)
+    ahead = whole(horizon, "horizon", 1)
     simulated = simulate_record(system, record, start)
     y = np.atleast_2d(record.output)
     most = min(NOISE_ORDER, record.n_samples // 10)
@@ -137,7 +137,7 @@ def predict(
     return Prediction(
         output=read_only(output.reshape(record.output.shape)),
         fit_percent=read_only(fit_percent(y, output)),
-        steps=ahead,
+        horizon=ahead,
         noise_order=tuple(c.size for c in models),
         record=record,
     )

@@ -158,7 +158,7 @@ def fit_sampled(
         left = correlation_time(whole.window.output - fit.fitted)
         fit = replace(fit, correlation=left, adequate=left <= WHITE)
     # The noise is not known from a rest; correlation is what shows in means over bins.
-    fit = replace(fit, misfit=float(np.sqrt(fit.correlation)))
+    fit = replace(fit, normalized_rms=float(np.sqrt(fit.correlation)))
     parts = np.split(fit.fitted, data.edges[1:-1])
     return SampledFit(
         fit,

@@ -157,7 +157,7 @@ def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:
     """Tell whether the model is a chain so long that it may be a flow, none being ruled out."""
     if choice.chain is None or choice.model.structure.order < _LIKE_A_FLOW:
         return False
-    return not flows or min(flow.excess for flow in flows) <= _OUT_OF_QUESTION
+    return not flows or min(flow.delta_bic for flow in flows) <= _OUT_OF_QUESTION
 
 
 def _opened(

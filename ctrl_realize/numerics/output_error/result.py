@@ -52,7 +52,7 @@ class OtherModel(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StructureFit:
-    """One line of the table of structures; delays in s, `excess` of the criterion to the best.
+    """One line of the table of structures; delays in s, `delta_bic` of the criterion to the best.
 
     `low` and `high` are the profile-likelihood interval, NaN where it was not needed.
     """
@@ -60,7 +60,7 @@ class StructureFit:
     structure: Structure
     delay: float
     total_delay: float
-    excess: float
+    delta_bic: float
     low: float
     high: float
     poles: ComplexArray
@@ -71,7 +71,7 @@ class StructureFit:
 class Better:
     """A structure that rules out the one that was asked for: its delay and 95 % interval in s.
 
-    `excess` is by how much its information criterion is smaller.
+    `delta_bic` is by how much its information criterion is smaller.
     """
 
     structure: Structure
@@ -79,7 +79,7 @@ class Better:
     total: float
     low: float
     high: float
-    excess: float
+    delta_bic: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +109,11 @@ class OutputErrorEstimate:
     poles: ComplexArray
     numerator: FloatArray
     adequate: bool
-    misfit: float
+    normalized_rms: float
     residual: float
     correlation: float
     structures: tuple[StructureFit, ...]
-    views: tuple[tuple[RobustKey, float], ...]
+    delay_estimates: tuple[tuple[RobustKey, float], ...]
     fitted: FloatArray
     profile: tuple[FloatArray, FloatArray]
     latest: float
@@ -189,14 +189,14 @@ def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[Struct
         lines.append(
             StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles, gain)
         )
-    return tuple(sorted(lines, key=lambda line: line.excess))
+    return tuple(sorted(lines, key=lambda line: line.delta_bic))
 
 
 def assembled(
     whole: WindowFit,
     chosen: Candidate,
     adequate: bool,
-    views: tuple[tuple[RobustKey, float], ...],
+    delay_estimates: tuple[tuple[RobustKey, float], ...],
     profiles: dict[Structure, Profile],
     interval: tuple[float, float, float],
     profile: Profile,
@@ -225,11 +225,11 @@ def assembled(
         poles=chosen.poles,
         numerator=numerator,
         adequate=adequate,
-        misfit=whole.misfit,
+        normalized_rms=whole.normalized_rms,
         residual=whole.sigma,
         correlation=whole.correlation,
         structures=_table(whole, profiles),
-        views=views,
+        delay_estimates=delay_estimates,
         fitted=whole.window.predict(whole.problem, chosen),
         profile=profile,
         latest=whole.scales.latest,

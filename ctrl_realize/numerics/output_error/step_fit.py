@@ -152,9 +152,9 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
 
 def _is_noise(data: StepData, whole: WindowFit) -> bool:
     """Tell whether the model leaves what was there before the step, or what goes on long after."""
-    if whole.misfit <= ADEQUATE * data.colour:
+    if whole.normalized_rms <= ADEQUATE * data.colour:
         return True
-    if whole.misfit > ADEQUATE * data.colour * _LOUDER:
+    if whole.normalized_rms > ADEQUATE * data.colour * _LOUDER:
         return False
     state = evaluate(whole.problem, whole.best.structure, whole.best.parameters[None])
     assert whole.window.bins is not None

@@ -90,7 +90,7 @@ class BankSolution:
     """
 
     theta: FloatArray
-    misfit: FloatArray
+    weighted_sse: FloatArray
     offset: FloatArray
     inverse: FloatArray
     power: float

@@ -96,7 +96,7 @@ class DispersedFlow:
 
     `mean` is that of the residence time, `spread` its standard deviation over the mean, `lag` the
     time constant behind it, 0 if there is none. `criterion` includes what a flow must be worth,
-    `excess` is it above that of the best lags.
+    `delta_bic` is it above that of the best lags.
     """
 
     delay: float
@@ -105,7 +105,7 @@ class DispersedFlow:
     lag: float
     cost: float
     criterion: float
-    excess: float
+    delta_bic: float
 
     @property
     def parameters(self) -> int:
@@ -158,7 +158,7 @@ def fit_flows(
     lagging = _FlowFit(problem, problem.drive, scales, True)
     flows = _followed(lagging, target, variance, penalty, level)
     # Without the lag there are no fewer squares: a parameter is all that can be won.
-    if flows and flows[0].excess - penalty <= PLAUSIBLE:
+    if flows and flows[0].delta_bic - penalty <= PLAUSIBLE:
         plain = _FlowFit(problem, problem.drive, scales, False)
         flows += _followed(plain, target, variance, penalty, level)
     return [flow for flow in flows if flow.spread * flow.mean >= _MINOR * flow.lag]
@@ -180,9 +180,9 @@ def _followed(
         if best is None or cost < best.cost:
             criterion = cost / variance + fit.count * penalty + _CHARGE
             best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
-        if again or best.excess > _HOPELESS:
+        if again or best.delta_bic > _HOPELESS:
             break
-    if best is not None and best.excess <= _REACH:
+    if best is not None and best.delta_bic <= _REACH:
         # What may be compared with a limit has converged.
         x = fit.improved(fit.parameters(best), converged=True)
         cost = fit.cost(x)

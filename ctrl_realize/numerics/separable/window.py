@@ -110,7 +110,7 @@ class WindowFit:
     scales: Scales
     sigma: float
     correlation: float
-    misfit: float
+    normalized_rms: float
     rounding: float = 0.0
     colour: float | None = None
 

@@ -79,7 +79,7 @@ def fit_sections(
     data: Sequence[Experiment],
     start: Sections,
     *,
-    direct: bool,
+    feedthrough: bool,
     enough: float = ENOUGH,
     most: int = MOST_STEPS,
 ) -> SectionFit:
@@ -90,7 +90,7 @@ def fit_sections(
     data : sequence of Experiment
     start : Sections
         Its B and D are found anew, its poles are drawn inside the unit circle.
-    direct : bool
+    feedthrough : bool
         Whether D is free, else it is zero.
     enough : float
         Gain of log likelihood below which a step is the last one.
@@ -110,7 +110,7 @@ def fit_sections(
         / counts
     )
     floor = _EXACT**2 * spread
-    model = _inside(start, direct)
+    model = _inside(start, feedthrough)
 
     def at(candidate: Sections, weights: FloatArray) -> _Point:
         moved = tuple(motion(candidate, one.v) for one in data)
@@ -123,10 +123,10 @@ def fit_sections(
         return _Point(candidate, moved, left, variance, float(counts @ np.log(variance)) / 2)
 
     here = at(model, 1 / spread)
-    mask = model.free(direct=direct, poles=False)
+    mask = model.free(feedthrough=feedthrough, poles=False)
     gram, slope = _normal(here, data, known, 1 / spread, mask)
     here = at(_stepped(model, mask, _damped(gram, slope, 1e-12)), 1 / spread)
-    mask, damping, done = model.free(direct=direct), _DAMPING, 0
+    mask, damping, done = model.free(feedthrough=feedthrough), _DAMPING, 0
     while done < most:
         weights = 1 / here.variance
         gram, slope = _normal(here, data, known, weights, mask)
@@ -148,14 +148,14 @@ def fit_sections(
     return SectionFit(here.model, here.variance, spread, counts, here.loss, done)
 
 
-def _inside(start: Sections, direct: bool) -> Sections:
+def _inside(start: Sections, feedthrough: bool) -> Sections:
     """Draw unstable poles radially into the unit circle."""
     a = start.a.copy()
     for row in a:
         largest = float(np.abs(np.roots([1.0, *row])).max())
         if largest > 0.999:
             row *= np.array([1.0, 0.999 / largest]) * 0.999 / largest
-    D = start.D if direct else np.zeros_like(start.D)
+    D = start.D if feedthrough else np.zeros_like(start.D)
     return Sections(a, start.B, start.C, D, start.single)
 
 

@@ -75,14 +75,14 @@ class Sections:
         )
         return Sections(a, B, C, D, self.single)
 
-    def free(self, *, direct: bool, poles: bool = True) -> NDArray[np.bool_]:
+    def free(self, *, feedthrough: bool, poles: bool = True) -> NDArray[np.bool_]:
         """Mark the parameters that may move: a, B, C, D; without `poles` B and D alone."""
         a, B, C = (np.ones(x.shape, dtype=np.bool_) for x in (self.a, self.B, self.C))
         if self.single:
             a[-1, 1], B[-1, 0], C[:, -1, 0] = False, False, False
         if not poles:
             a[:], C[:] = False, False
-        D = np.full(self.D.shape, direct)
+        D = np.full(self.D.shape, feedthrough)
         return np.concatenate([x.ravel() for x in (a, B, C, D)])
 
     def _states(self) -> NDArray[np.bool_]:

@@ -112,7 +112,7 @@ def test_missing_samples_take_out_the_equations_that_they_touch():
         cr.validation.compare_delay_estimates,
         lambda holes: cr.validation.analyse_residuals(TWO_STATES, holes),
         lambda holes: cr.validation.predict(TWO_STATES, holes, 1),
-        lambda holes: cr.DelayTracker(TWO_STATES, max_delay=20, memory=10.0).run(holes),
+        lambda holes: cr.DelayTracker(TWO_STATES, max_delay=20, forgetting_time=10.0).track(holes),
     ],
 )
 def test_what_needs_every_sample_says_that_some_are_missing(work):

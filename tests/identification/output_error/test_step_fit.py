@@ -43,7 +43,7 @@ def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(valve
     assert fit.std_given_structure / TS == pytest.approx(0.092, rel=0.15)
     assert covers(fit, 36.4)
     assert fit.at_noise_level
-    assert not fit.views
+    assert not fit.delay_estimates
     # Delay and lags together: 165.2 samples for 37, less 0.6; known to 0.02.
     assert abs(fit.total_delay / TS - 164.6) < 0.1
     assert fit.onset > fit.dead_time
@@ -54,8 +54,8 @@ def test_the_table_lists_all_structures_best_first(valve):
     assert {(row.order, row.relative_degree) for row in rows} == {
         (n, r) for n in range(1, 6) for r in range(1, n + 1)
     }
-    assert [row.excess for row in rows] == sorted(row.excess for row in rows)
-    assert all(row.interval for row in rows if row.excess <= 10)
+    assert [row.delta_bic for row in rows] == sorted(row.delta_bic for row in rows)
+    assert all(row.interval for row in rows if row.delta_bic <= 10)
     low = min(row.interval[0] for row in rows if row.interval)
     high = max(row.interval[1] for row in rows if row.interval)
     assert valve.fit.interval == (low, high)

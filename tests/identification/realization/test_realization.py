@@ -153,7 +153,7 @@ def test_a_padded_matrix_bounds_the_error():
     z = np.exp(1j * np.linspace(0.0, np.pi, 50))
     off = np.abs(np.polyval(two[::-1], 1 / z) - model(z)).max()
     assert 0 < off <= fit.error_bound < 0.1
-    assert fit.following < fit.singular_values[0]
+    assert fit.next_singular_value < fit.singular_values[0]
     for hankel in ("round", None):
         with pytest.raises(OptionError, match="hankel="):
             cr.realize(LAG, 1, dt=DT, hankel=hankel)

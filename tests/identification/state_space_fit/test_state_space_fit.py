@@ -34,7 +34,7 @@ def model():
 
 def test_order_delays_and_direct_term_are_found(model):
     fit = model.fit
-    assert (fit.order, fit.input_delays, fit.output_delays, fit.direct) == (
+    assert (fit.order, fit.input_delays, fit.output_delays, fit.feedthrough) == (
         3,
         (2, 5),
         (0, 7),
@@ -63,12 +63,12 @@ def test_several_records_and_missing_outputs_are_used():
 
 def test_a_direct_term_is_found_or_asked_for():
     core = ct.ss(CORE.A, CORE.B, CORE.C, [[2.0, 0.0], [0.0, 0.0]], DT)
-    assert cr.fit_state_space(record(plant=cr.DelayedStateSpace(core, 0)), 3).fit.direct
+    assert cr.fit_state_space(record(plant=cr.DelayedStateSpace(core, 0)), 3).fit.feedthrough
     with_term = cr.fit_state_space(record(), 3, feedthrough=True)
     without = cr.fit_state_space(record(), 3, feedthrough=False)
-    assert with_term.fit.direct
+    assert with_term.fit.feedthrough
     assert np.any(with_term.delay_free.D)
-    assert not without.fit.direct
+    assert not without.fit.feedthrough
     assert not np.any(without.delay_free.D)
 
 

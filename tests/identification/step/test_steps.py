@@ -33,7 +33,7 @@ def test_a_clean_step_is_found_to_the_sample(at, low, jump, up):
     edge = cr.detect_step(record_of(step_input(400, at, low, high)))
     assert edge.index == at
     assert edge.samples == 1
-    assert_allclose([edge.rest, edge.amplitude], [low, high - low], rtol=1e-9, atol=1e-9)
+    assert_allclose([edge.baseline, edge.amplitude], [low, high - low], rtol=1e-9, atol=1e-9)
 
 
 @given(positions=st.lists(st.integers(0, 399), min_size=1, max_size=4), seed=st.integers(0, 99))
@@ -45,7 +45,7 @@ def test_spikes_shorter_than_the_window_change_nothing(positions, seed):
         if all(abs(k - other) > 8 for other in positions if other != k) and abs(k - 100) > 8:
             u[k : k + 3] += rng.choice([-30.0, 50.0])
     edge = cr.detect_step(record_of(u))
-    assert (edge.index, edge.amplitude, edge.rest) == (100, 16.0, 4.0)
+    assert (edge.index, edge.amplitude, edge.baseline) == (100, 16.0, 4.0)
 
 
 @pytest.mark.parametrize("length", [2, 5, 12, 40])
@@ -56,7 +56,7 @@ def test_a_ramp_is_found_from_its_first_sample_to_its_last(length):
     slack = int(np.ceil(0.02 * length))  # the level counts as left, and reached, within 2 %
     assert abs(edge.index - 300) <= slack
     assert abs(edge.samples - length) <= 2 * slack
-    assert_allclose([edge.rest, edge.amplitude], [4.0, 16.0], atol=1e-9)
+    assert_allclose([edge.baseline, edge.amplitude], [4.0, 16.0], atol=1e-9)
 
 
 def test_all_edges_are_listed_and_the_first_large_one_is_taken():
@@ -75,7 +75,7 @@ def test_a_record_that_starts_at_its_step_is_understood():
     u = np.full(500, 25.0)
     u[0] = 0.0
     edge = cr.detect_step(record_of(u))
-    assert (edge.index, edge.rest, edge.amplitude) == (1, 0.0, 25.0)
+    assert (edge.index, edge.baseline, edge.amplitude) == (1, 0.0, 25.0)
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def both():
 
 
 def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(both):
-    assert [(v.method, v.source) for v in both.views] == [
+    assert [(v.method, v.source) for v in both.estimates] == [
         ("output error", "record"),
         ("scan", "record"),
         ("cross-correlation", "record"),
@@ -71,19 +71,19 @@ def test_a_step_is_seen_in_three_ways():
 
 def test_frequency_response_of_another_plant_does_not_agree(both):
     other = cr.validation.compare_delay_estimates(frf=frequency_response(dead_time=0.4))
-    views = (*both.views[:3], *other.views)
+    views = (*both.estimates[:3], *other.estimates)
     common, conflicts = common_dead_time(list(views))
     assert common is None
     assert ("output error", "FRF fit") in conflicts
-    check = replace(both, views=views, agree=False, common=None, conflicts=conflicts)
+    check = replace(both, estimates=views, agree=False, common=None, conflicts=conflicts)
     assert "no: " in check.report()
     assert "do not agree" in repr(check)
 
 
 def test_a_frequency_response_alone_is_enough():
     check = cr.validation.compare_delay_estimates(frf=frequency_response())
-    assert [v.method for v in check.views] == ["FRF fit", "phase slope"]
-    fit, slope = check.views
+    assert [v.method for v in check.estimates] == ["FRF fit", "phase slope"]
+    fit, slope = check.estimates
     assert fit.low <= 0.124 <= fit.high
     # R2's lags are steep even at the top of the band: the bound is above the dead time
     assert slope.high > 0.124

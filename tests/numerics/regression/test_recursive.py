@@ -72,7 +72,7 @@ def test_the_bank_solves_the_weighted_least_squares_of_every_delay(low, restart)
         # regressors of 1e-3 give the normal matrix a condition number of 1e6
         assert_allclose(found.theta[i], answer[:-1], rtol=1e-6, atol=1e-6)
         assert_allclose(found.offset[i], answer[-1], rtol=0, atol=1e-8)
-        assert_allclose(found.misfit[i], misfit[0], rtol=1e-8)
+        assert_allclose(found.weighted_sse[i], misfit[0], rtol=1e-8)
         assert_allclose(
             bank.predict(d, found.theta[i]), answer[:-1] @ late[:, -1], rtol=1e-5, atol=1e-9
         )
