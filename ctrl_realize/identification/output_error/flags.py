@@ -125,7 +125,8 @@ def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None
             for key, delay in fit.delay_estimates
             if not _near(fit, delay)
         ]
-        return Flag("estimates_disagree", "delay estimates far from their median: " + ", ".join(apart))
+        words = ", ".join(apart)
+        return Flag("estimates_disagree", f"delay estimates far from their median: {words}")
     low, high = profile_limits(*fit.profile)
     wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
     if fit.open_start or not wide or fit.high - fit.low <= 2 * (high - low):

@@ -244,11 +244,13 @@ class OutputErrorFit(Result):
             ("gain", gain_in_words(self.gain, self.gain_interval)),
             (
                 "residual",
-                (f"{self.residual:.3g}, noise {self.noise:.3g} (normalised rms {self.normalized_rms:.3g})"),
+                f"{self.residual:.3g}, noise {self.noise:.3g} "
+                f"(normalised rms {self.normalized_rms:.3g})",
             ),
         ]
         rows += [
-            (f"delay estimate: {name}", in_time(value, 4)) for name, value in self.delay_estimates.items()
+            (f"delay estimate: {name}", in_time(value, 4))
+            for name, value in self.delay_estimates.items()
         ]
         if self.repeatability is not None:
             rows += self.repeatability.rows()

@@ -199,7 +199,7 @@ def _to_step_edge(edge: Edge, record: Record) -> StepEdge:
         edge.index,
         float(record.time[edge.index]),
         edge.amplitude,
-        edge.baseline,
+        edge.rest,
         edge.samples,
         edge.start,
         edge.stop,

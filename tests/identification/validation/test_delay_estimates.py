@@ -60,8 +60,8 @@ def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(bo
 
 def test_a_step_is_seen_in_three_ways():
     check = cr.validation.compare_delay_estimates(step_record(R1, noise=0.002))
-    assert [v.method for v in check.views] == ["output error", "onset", "scan"]
-    fit, onset, scan = check.views
+    assert [v.method for v in check.estimates] == ["output error", "onset", "scan"]
+    fit, onset, scan = check.estimates
     assert "not a confidence interval" in scan.doubt  # its set holds the truth in 4 of 10 records
     assert check.rely_on == "output error"
     assert fit.low <= 37 * 7.8125e-4 <= fit.high

@@ -152,7 +152,7 @@ def test_slopes_are_differences_of_outputs(order):
     sections = in_sections(*some_model(3, order))
     mine = motion(sections, v)
     slopes = np.stack([mine.slopes(sections, v, a, slice(0, SAMPLES)) for a in range(2)])
-    for k in np.flatnonzero(sections.free(direct=True)):
+    for k in np.flatnonzero(sections.free(feedthrough=True)):
         step = np.zeros(slopes.shape[1])
         step[k] = 1e-6
         ahead, behind = sections.moved(step), sections.moved(-step)
@@ -196,7 +196,7 @@ def near():
 
 def test_exact_data_give_the_plant_back_whatever_level_and_state_they_start_from():
     data = [experiment(k, 200, 0 * NOISE, level=k) for k in (0, 5)]
-    found = fit_sections(data, near(), direct=False).model
+    found = fit_sections(data, near(), feedthrough=False).model
     # the squares of what is left end at rounding, 1e-12 of the output
     assert_allclose(markov(*found.matrices(), 40), markov(*PLANT, 40), rtol=0, atol=1e-8)
 
@@ -207,7 +207,7 @@ def test_errors_are_those_that_the_cramer_rao_bound_allows():
     ratios = []
     for seed in range(24):
         data = experiment(seed, 300)
-        found = fit_sections([data], near(), direct=False)
+        found = fit_sections([data], near(), feedthrough=False)
         own = motion(truth, data.v)
         wrong = motion(found.model, data.v).output(found.model, data.v) - own.output(truth, data.v)
         linear = own.starts(truth)
@@ -226,8 +226,8 @@ def test_samples_that_are_missing_are_left_out():
     y[0, 50:90], y[1, 7] = np.nan, np.nan
     spoiled = data.y.copy()
     spoiled[0, 50:90] = 1e3
-    gaps = fit_sections([Experiment(data.v, y)], near(), direct=False)
+    gaps = fit_sections([Experiment(data.v, y)], near(), feedthrough=False)
     assert gaps.counts.tolist() == [460.0, 499.0]
     assert_allclose(markov(*gaps.model.matrices(), 30), markov(*PLANT, 30), atol=0.2)
-    wrong = fit_sections([Experiment(data.v, spoiled)], near(), direct=False)
+    wrong = fit_sections([Experiment(data.v, spoiled)], near(), feedthrough=False)
     assert np.abs(markov(*wrong.model.matrices(), 30) - markov(*PLANT, 30)).max() > 0.2
