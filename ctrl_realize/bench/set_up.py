@@ -90,6 +90,11 @@ def valve(
     OptionError
         An argument that makes no sense.
 
+    References
+    ----------
+    .. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of
+       valve dynamics with time delay, Proc. 16th IFAC World Congress, 2005, sections 2.2 and 3.1.
+
     Examples
     --------
     >>> import ctrl_realize as cr

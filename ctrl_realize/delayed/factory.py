@@ -58,6 +58,15 @@ def delayed_ss(
     DelayRangeError
         A negative delay, or one that is no multiple of a discrete core's sample time.
 
+    Notes
+    -----
+    Sampling behind a hold, with a dead time of any length, as in [1]_.
+
+    References
+    ----------
+    .. [1] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+       section 2.3.
+
     Examples
     --------
     >>> import control as ct

@@ -101,6 +101,14 @@ def identify(
     that leave more than twice as much.
     Given `order`, `structures` or `known`, nothing else is tried.
 
+    ``"paper"`` and ``"scan"`` are the method of [1]_; what `fit_output_error` rests on stands
+    there.
+
+    References
+    ----------
+    .. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of
+       valve dynamics with time delay, Proc. 16th IFAC World Congress, 2005, sections 2.1 and 3.2.
+
     Examples
     --------
     >>> import control as ct

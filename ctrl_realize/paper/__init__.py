@@ -115,6 +115,12 @@ def table_1_statistics(*, ddof: int = 1) -> TrimmedStatistics:
         Mean 36.68, which rounds to `DELAY`; variance 2.10 (2.04 with `ddof` 0), which rounds to
         `DELAY_VARIANCE`.
 
+    References
+    ----------
+    .. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of
+       valve dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 3.2 and Table
+       1.
+
     Examples
     --------
     >>> from ctrl_realize import paper

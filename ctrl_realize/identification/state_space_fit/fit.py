@@ -271,6 +271,11 @@ def refine_state_space(
     DataError, UnsuitableSystemError
         Records and a system that do not fit each other.
 
+    References
+    ----------
+    .. [1] M. Verhaegen and V. Verdult, Filtering and System Identification, Cambridge University
+       Press 2007, chapter 7 (output error), doi:10.1017/CBO9780511618888.
+
     Examples
     --------
     >>> import control as ct

@@ -44,6 +44,17 @@ def detect_step(
     NoStepError
         The input is constant, only noise, or its step comes with the last sample.
 
+    Notes
+    -----
+    Medians on both sides of every sample are compared, so that spikes shorter than half a window
+    move nothing; how long windows are and where an edge ends are our own rules. The paper has its
+    step after a known time [1]_.
+
+    References
+    ----------
+    .. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of
+       valve dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 3.1.
+
     Examples
     --------
     >>> import numpy as np
@@ -128,6 +139,11 @@ def unit_step(
         See `detect_step`.
     DataError
         Several channels, or fewer than five samples after the step.
+
+    References
+    ----------
+    .. [1] J. van Helvoirt, O. Bosgra, B. de Jager and M. Steinbuch, Approximate realization of
+       valve dynamics with time delay, Proc. 16th IFAC World Congress, 2005, section 3.2.
 
     Examples
     --------

@@ -208,6 +208,8 @@ def _step(
     scaled = columns / size[:, None]
     count = scaled.shape[2]
     walls = np.sqrt(damping)[:, None, None] * np.eye(count)
+    # min |J s - r|^2 + damping |D s|^2 as least squares (Nocedal and Wright, section 10.3).
+    # min |J s - r|^2 + damping |D s|^2 as least squares (Nocedal and Wright, section 10.3).
     q, r = np.linalg.qr(np.concatenate([scaled, walls], axis=1))
     rows = residual.shape[1]
     inside = np.einsum("bmk,bm->bk", q[:, :rows], residual)

@@ -174,6 +174,8 @@ def criteria(
     `variance` is that of the noise, colour included; `samples` how many independent ones there
     are.
     """
+    # Schwarz (1978) with known variance; delay, poles, numerator (zeros + 1) are the parameters.
+    # Schwarz (1978) with known variance; delay, poles, numerator (zeros + 1) are the parameters.
     penalty = parameter_charge(samples)
     return {s: c.cost / variance + (s.order + s.zeros + 2) * penalty for s, c in candidates.items()}
 

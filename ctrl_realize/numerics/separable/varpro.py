@@ -161,6 +161,8 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
         own = problem.own_terms(free)
         forced, whole = columns, data
         columns, data = own.without(columns), own.without(data[:, :, None])[:, :, 0]
+    # Variable projection: residual = (I - Q Q') data (Golub and Pereyra 1973).
+    # Variable projection: residual = (I - Q Q') data (Golub and Pereyra 1973).
     norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
     norm[norm == 0] = 1.0
     q, r = np.linalg.qr(columns / norm[:, None])
