@@ -143,6 +143,7 @@ def circle_quantile(level: float, repeats: float | None) -> float:
     1.732
     2.112
     """
+    # F with 2 and 2 (n - 1) degrees of freedom: P(F > f) = (1 + f / (n - 1))^-(n - 1).
     beyond = -np.log1p(-level)
     if repeats is None:
         return float(np.sqrt(beyond))

@@ -28,7 +28,7 @@ SAFE = ("amigo", "simc", "lambda")
 """Rules that are tried in place of one whose loop is unstable; then the optimal PI."""
 MOST_SENSITIVE = 2.0
 """Largest Ms of a loop to recommend: gain and phase margin are then at least 2 and 29 deg
-(Astrom and Hagglund, Advanced PID Control, 2006, section 4.6)."""
+(Astrom and Hagglund, Advanced PID Control, 2006, chapter 4)."""
 FINE = 1000
 """Samples within the total time of a process model, so many that sampling does not matter."""
 SETTLED = 10_000

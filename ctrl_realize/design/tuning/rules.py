@@ -76,7 +76,7 @@ def imc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Param
 
 
 def amigo(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Astrom and Hagglund, Advanced PID Control (2006), section 7.5: Ms near 1.4."""
+    """Astrom and Hagglund, Advanced PID Control (2006), chapter 7: Ms near 1.4."""
     L, K = _dead_time(model, "amigo"), model.gain
     if model.integrating:
         if kind == "PI":

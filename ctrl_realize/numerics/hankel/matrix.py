@@ -178,6 +178,7 @@ def hankel_norm_squared(h: FloatArray, rows: int, columns: int) -> float:
     """
     length = min(rows + columns - 1, h.shape[-1])
     k = np.arange(length)
+    # h[k] stands on antidiagonal k, which has this many entries.
     times = np.minimum(np.minimum(k + 1, rows + columns - 1 - k), min(rows, columns))
     energy = (h[..., :length] ** 2).reshape(-1, length).sum(axis=0)
     return float(times @ energy)

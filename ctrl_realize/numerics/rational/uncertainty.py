@@ -75,6 +75,7 @@ def error_root(data: FRFData, fit: RationalFit, scale: float, *, robust: bool) -
     freedom = max(residual.size - J.shape[1], 1)
     power = float(residual @ residual)
     excess = 0.5 * scale * freedom / power if power > 0 else 1.0
+    # White (1980): inv(J'J) J' diag(e^2) J inv(J'J) as a product R R'.
     part = root @ (root.T @ (J * residual[:, None]).T)
     return np.asarray(np.sqrt(excess * residual.size / freedom) * part)
 
@@ -128,6 +129,7 @@ def profile_interval(
     data: FRFData, fit: RationalFit, count: int, scale: float, std: float
 ) -> tuple[float, float]:
     """Find the dead times at which the misfit has grown by what 95 % confidence allows."""
+    # Rise of the misfit by chi-square times the variance (Venzon and Moolgavkar 1988).
     allowed = 0.5 * scale * _CHI2_95
     best = fit.theta[fit.order]
     ends = []

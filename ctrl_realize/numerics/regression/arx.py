@@ -157,6 +157,7 @@ def arx_state_space(fit: ArxFit) -> tuple[FloatArray, FloatArray, FloatArray, Fl
     a[: fit.a.shape[0]] = fit.a
     b = np.zeros((count + 1, p, m))
     b[fit.delay : fit.delay + nb] = fit.b
+    # Observer form: x1+ = -a1 x1 + x2 + (b1 - a1 b0) u, and so on; y = x1 + b0 u.
     A = np.eye(count * p, k=p)
     A[:, :p] -= a.reshape(count * p, p)
     B = (b[1:] - a @ b[0]).reshape(count * p, m)

@@ -92,6 +92,7 @@ def _posterior(problem: KernelProblem, x: FloatArray) -> KernelFit:
     factors = problem.factors(x)
     found = problem.likelihood(factors)
     variance = found.least / problem.freedom
+    # Mean F M^-1 F' b and covariance sigma^2 F M^-1 F' of the posterior (Chen et al. 2012).
     weights = solve_triangular(found.C.T, found.half, lower=False)
     wide = block_diag(*factors)
     spread = solve_triangular(found.C, wide.T, lower=True)

@@ -67,6 +67,7 @@ def prior_factors(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> 
         else:
             step = np.exp(row[1]) if kernel == "DC" else rate / 2
             L = np.where(apart < 0, 0.0, np.exp(-step * index)[np.abs(apart)])
+            # Cholesky factor of rho^|i-j|: rho^(i-j) sqrt(1 - rho^2), that of a Markov chain.
             L[:, 1:] *= np.sqrt(-np.expm1(-2 * step * group))
             decline = rate / 2
         exponent = decline * (index + (group + 1) / 2)

@@ -213,6 +213,7 @@ class DelayBank:
         floor = 1e-13 * peak if peak > EXTREME**-2 else 1.0
         precision = np.maximum(precision, floor)
         matrix = gram + np.diag(precision)
+        # Ljung, section 11.2: theta = R^-1 f, both sums weighted by powers of lambda.
         inverse = np.linalg.inv(matrix)
         right = cross + precision * prior
         theta = np.einsum("dij,dj->di", inverse, right)
