@@ -39,10 +39,10 @@ def fit_frf(
 ) -> DelayedStateSpace:
     r"""Fit a stable transfer function with free dead time to a frequency response.
 
-    Maximum likelihood, as Pintelon and Van Biesen (1990) proposed, for
-    :math:`e^{-s\tau} b(s) / a(s)` with noise of the measured standard deviation. No initial guess
-    is needed: for each dead time on a grid the poles come from a linear problem, and the best of
-    these starts are refined. Order and relative degree are chosen by BIC where not given.
+    Maximum likelihood [1]_, [5]_ for :math:`e^{-s\tau} b(s) / a(s)` with noise of the measured
+    standard deviation. No initial guess is needed: for each dead time on a grid the poles come from
+    a linear problem, and the best of these starts are refined. Order and relative degree are chosen
+    by BIC where not given.
 
     Parameters
     ----------

@@ -102,8 +102,8 @@ def pid(
     -----
     The rules are those of [1]_ (simc, sections 3 and 4), [2]_ and [3]_ (lambda, stable and
     integrating), [4]_ (imc, table II), [5]_ (amigo), [6]_ (both rules of Ziegler and Nichols) and
-    [7]_. The optimal rule solves the problem of [8]_ and [9]_, least absolute load error under a
-    limit on the sensitivity, on the exact frequency response.
+    [7]_. The optimal rule solves the problem of [9]_, least absolute load error under a limit on
+    the sensitivity (in [8]_: least integrated error), on the exact frequency response.
 
     References
     ----------

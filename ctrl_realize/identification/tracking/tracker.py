@@ -95,16 +95,16 @@ class DelayTracker:
 
     Notes
     -----
-    Multiple-model estimation of a delay on line after [1]_ and [2]_, with a bank of
-    candidates as in [3]_. The regressors are simulated, not measured, outputs, so noise does not
-    bias the dynamics. Pole moves enter to first order about a model that is renewed when a pole
-    has moved by 4 % or more: a second bank then runs beside the first for two memories and
-    more, and takes over. Until then the delay may be off by a tenth of the lag per tenth of a
-    pole's speed, and beyond 30 % nothing is claimed. A delay outside the candidates, poles that
-    have left at once and a drifting disturbance leave a residual much louder than the model's:
-    nothing is told then, and `TrackPoint.lost` is true. `reset` starts anew from
-    here. Probabilities of delays count exponential weights as whole samples, which is on the safe
-    side, and a residual that is slower than white as fewer of them.
+    A delay is followed on line as in [1]_ (which inputs tell of it: [2]_), here by a bank of
+    candidates [3]_, each with least squares and a forgetting factor [4]_. The regressors are
+    simulated, not measured, outputs, so noise does not bias the dynamics. Pole moves enter to first
+    order about a model that is renewed when a pole has moved by 4 % or more: a second bank then
+    runs beside the first for two memories and more, and takes over. Until then the delay may be off
+    by a tenth of the lag per tenth of a pole's speed, and beyond 30 % nothing is claimed. A delay
+    outside the candidates, poles that have left at once and a drifting disturbance leave a residual
+    much louder than the model's: nothing is told then, and `TrackPoint.lost` is true. `reset`
+    starts anew from here. Probabilities of delays count exponential weights as whole samples, which
+    is on the safe side, and a residual that is slower than white as fewer of them.
 
     References
     ----------
