@@ -20,6 +20,10 @@ from ..delayed import DelayedStateSpace
 from ..errors import DataError, NoStepError
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
+from ..identification.output_error.result import OutputErrorFit
+from ..identification.realization.delay_scan_result import DelayScan
+from ..identification.realization.result import Realization
+from ..identification.state_space_fit.result import StateSpaceFit
 from ..identification.step.steps import unit_step
 from ..io.atomic import replaced_when_complete
 from ..plots.fits import evidence_height
@@ -120,9 +124,8 @@ def identification_sketches(
 def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[Sketch]:
     """List the figures of how a model was found."""
     fit = system.fit
-    kind = type(fit).__name__
     sketches = []
-    if kind == "OutputErrorFit":
+    if isinstance(fit, OutputErrorFit):
         sketches.append(
             Sketch(
                 "fit",
@@ -142,10 +145,10 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
                 lambda figure: plots.step_plot(step, system, ax=figure),
             )
         )
-    if kind == "StateSpaceFit" and fit.checks:
+    if isinstance(fit, StateSpaceFit) and fit.checks:
         labels = fit.records[0].output_labels
         sketches += [_output_sketch(fit, i, label) for i, label in enumerate(labels)]
-    if kind == "DelayScan":
+    if isinstance(fit, DelayScan):
         sketches += [
             Sketch(
                 "delay",
@@ -161,7 +164,7 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
                 lambda figure: plots.impulse_plot(fit.impulse, system, ax=figure),
             ),
         ]
-    if kind in ("DelayScan", "Realization"):
+    if isinstance(fit, DelayScan | Realization):
         sketches.append(
             Sketch(
                 "singular_values",
