@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.report.verdict import campaign_verdict
 from tests.rigs import R1, step_record
 
 PLANT = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=0.001)
@@ -111,8 +110,3 @@ def test_no_card_shows_nan_or_inf(case):
     result = CASES[case]()
     words = re.sub(r"<[^>]*>", " ", result._repr_html_())
     assert not re.search(r"\b(nan|inf)\b", words, re.IGNORECASE), words
-
-
-def test_the_verdict_on_one_record_knows_no_scatter():
-    facts = dict(campaign_verdict(single()).facts)
-    assert facts["scatter (std)"] == "unknown: a single record has no scatter"

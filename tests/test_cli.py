@@ -156,28 +156,6 @@ def test_other_files_of_an_existing_folder_stay_and_old_results_are_replaced(fol
     assert not [one for one in tmp_path.parent.iterdir() if one.name.endswith(".tmp")]
 
 
-@pytest.mark.usefixtures("without_figures")
-def test_columns_can_be_named_or_numbered(valve, tmp_path):
-    record = valve.step_record(16.0, rng=0)
-    table = pd.DataFrame({"ms": 1e3 * record.time, "x": record.output, "i": record.input})
-    table.to_csv(tmp_path / "log.txt", sep=";", decimal=",", index=False)
-    out = tmp_path / "out"
-    words = ["--time", "0", "--time-unit", "ms", "--input", "i", "--response", "x", *FAST]
-    assert main(["identify", str(tmp_path / "log.txt"), "-o", str(out), *words]) == 0
-    assert cr.load_model(out / "model.json").dt == pytest.approx(record.dt, rel=1e-9)
-
-
-@pytest.mark.usefixtures("without_figures")
-def test_records_of_different_plants_are_kept_apart_on_request(folder, tmp_path, capsys):
-    slow = cr.bench.valve(dt=2e-3, rest=0.5, hold=1.0).step_record(16.0, rng=0)
-    other = save(slow, tmp_path / "slow.csv")
-    files = [str(folder / "step_0.csv"), str(other)]
-    assert main(["identify", *files, "-o", str(tmp_path / "one"), *FAST]) == 2
-    assert "--separate" in capsys.readouterr().err
-    assert main(["identify", *files, "-o", str(tmp_path / "out"), "--separate", *FAST]) == 0
-    assert {"step_0/model.json", "slow/model.json"} <= files_in(tmp_path / "out")
-
-
 def test_a_model_is_compared_with_a_measured_frf(folder, first, tmp_path, capsys):
     model, frf = str(first[0] / "model.json"), str(folder / "frf.csv")
     assert main(["compare", model, frf, "--band", "0.1", "5", "-o", str(tmp_path / "frf")]) == 0
@@ -192,23 +170,6 @@ def test_a_model_is_compared_with_a_measured_frf(folder, first, tmp_path, capsys
     assert "written" not in capsys.readouterr().out
 
 
-def test_units_of_an_frf_can_be_said(folder, first, tmp_path, capsys):
-    frf = cr.read_frf(folder / "frf.csv")
-    response = frf.frdata[0, 0]
-    columns = {
-        "f": 2 * np.pi * frf.frequency_hz,
-        "magnitude": 20 * np.log10(np.abs(response)),
-        "phase": np.unwrap(np.angle(response)),
-    }
-    pd.DataFrame(columns).to_csv(tmp_path / "frf.csv", index=False)
-    model, file = str(first[0] / "model.json"), str(tmp_path / "frf.csv")
-    units = ["--frequency-unit", "rad/s", "--magnitude-unit", "dB", "--phase-unit", "rad"]
-    assert main(["compare", model, file, *units]) == 0
-    assert main(["compare", model, str(folder / "frf.csv")]) == 0
-    one, two = capsys.readouterr().out.split("relative error")[1:]
-    assert one.split("\n")[0] == two.split("\n")[0]
-
-
 def test_the_same_call_gives_the_same_files(folder, first, tmp_path):
     out = tmp_path / "out"
     words = [str(folder / "step_0.csv"), "-o", str(out), "--frf", str(folder / "frf.csv"), *FAST]
@@ -217,34 +178,6 @@ def test_the_same_call_gives_the_same_files(folder, first, tmp_path):
     # the report tells the folder, the manifest the time
     for name in files_in(out) - {"report.html", "manifest.json"}:
         assert (out / name).read_bytes() == (first[0] / name).read_bytes(), name
-
-
-def test_hostile_names_of_files_reach_neither_terminal_nor_page(folder, tmp_path, capsys):
-    file = tmp_path / "\x07<b>$x^{.csv"
-    file.write_bytes((folder / "step_0.csv").read_bytes())
-    assert main(["identify", str(file), "-o", str(tmp_path / "out"), *FAST]) == 0
-    assert "\x07" not in capsys.readouterr().out
-    assert "<b>$x" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-
-
-def test_a_file_named_as_a_formula_is_a_name_in_the_table_too(folder, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names = ["=cmd|' calc'!A1.csv", "+1;=2.csv"]
-    for number, name in enumerate(names):
-        Path(name).write_bytes((folder / f"step_{number}.csv").read_bytes())
-    assert main(["identify", *names, "-o", "out", *FAST]) == 0
-    rows = pd.read_csv(tmp_path / "out" / "records.csv", index_col="record")
-    assert list(rows.index) == ["'=cmd|' calc'!A1", "'+1;'=2"]
-    assert rows["delay"].notna().all()
-
-
-@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["demo"]])
-def test_help_has_examples_and_exit_codes(command, capsys):
-    assert main([*command, "--help"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "Exit codes: 0 done; 1 done, but some records or the report failed; 2" in said
-    if command:
-        assert f"ctrl-realize {command[0]} " in said.split("Examples:")[1]
 
 
 def test_a_folder_appears_whole_or_not_at_all(tmp_path):
@@ -261,18 +194,6 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         fails(tmp_path / "there")
     assert (tmp_path / "there" / "half.txt").read_text(encoding="utf-8") == "whole"
-
-
-def test_an_interruption_is_told_and_leaves_nothing(folder, tmp_path, capsys, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("ctrl_realize.cli.identify_command.identify_record", interrupted)
-    assert main(["identify", str(folder / "step_0.csv"), "-o", str(tmp_path / "out")]) == 130
-    assert capsys.readouterr().err == (
-        "ctrl-realize: interrupted; unfinished results were not written\n"
-    )
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_package_runs_as_a_module():

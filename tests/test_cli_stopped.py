@@ -93,12 +93,6 @@ def test_a_stopped_campaign_goes_on_where_it_was_with_the_same_files(
     assert contents(out) == straight
 
 
-def test_an_interruption_before_the_first_record_leaves_nothing(files, tmp_path, monkeypatch):
-    stop_after(monkeypatch, (rows, "identify"), 0)
-    assert main(["identify", *files, "-o", str(tmp_path / "a" / "out"), *FAST]) == 130
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_disk_that_is_full_while_rows_are_kept_loses_no_result(files, tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -110,44 +104,6 @@ def test_a_disk_that_is_full_while_rows_are_kept_loses_no_result(files, tmp_path
     assert len(kept.good) == COUNT
     assert all("No space left" in row.warnings[-1] for row in kept.rows)
     assert len(store) == 0
-
-
-def test_records_kept_apart_stay_when_the_next_is_interrupted(files, tmp_path, monkeypatch):
-    from ctrl_realize.cli import identify_command
-
-    stop_after(monkeypatch, (identify_command, "identify_record"), 2)
-    out = tmp_path / "out"
-    assert main(["identify", *files, "-o", str(out), "--separate", *FAST]) == 130
-    assert {path.name for path in out.iterdir()} == {"step_0", "step_1"}
-    assert all((out / name / "report.html").exists() for name in ("step_0", "step_1"))
-
-
-def test_a_file_of_dots_alone_does_not_lead_out_of_the_folder(files, tmp_path):
-    dotted = tmp_path / "...csv"
-    dotted.write_bytes(Path(files[0]).read_bytes())
-    out = tmp_path / "a" / "out"
-    command = ["identify", str(dotted), files[1], "-o", str(out), "--separate", *FAST]
-    assert main(command) == 0
-    assert {path.name for path in tmp_path.iterdir()} == {"...csv", "a"}
-    assert [path.name for path in (tmp_path / "a").iterdir()] == ["out"]
-    assert {path.name for path in out.iterdir()} == {"record", "step_1"}
-
-
-def test_a_name_of_many_bytes_makes_no_file_name_that_is_too_long(files, tmp_path):
-    # 62 letters of four bytes: with number and ending more than the 255 bytes of a file name
-    long = tmp_path / f"{chr(0x20000) * 62}.csv"
-    long.write_bytes(Path(files[0]).read_bytes())
-    out = tmp_path / "out"
-    assert main(["identify", str(long), files[1], "-o", str(out), *FAST]) == 0
-    assert len(list((out / "models").iterdir())) == 2
-
-
-def test_results_for_a_folder_that_is_there_are_made_inside_it(tmp_path):
-    # it may be a disk of its own, onto which nothing can be moved in one step
-    with appearing(tmp_path) as staged:
-        assert staged.parent == tmp_path
-        (staged / "a.txt").write_text("done")
-    assert {path.name for path in tmp_path.iterdir()} == {"a.txt"}
 
 
 QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]
@@ -208,28 +164,6 @@ def test_a_record_whose_process_is_killed_is_a_row_with_the_reason_and_all_other
     assert "failed_records" in {flag.code for flag in campaign.flags}
 
 
-def test_a_record_over_which_the_process_died_twice_is_not_tried_for_ever(tmp_path):
-    store = cr.io.CampaignStore(tmp_path)
-    dying = (
-        "import os, signal, sys\n"
-        "import ctrl_realize as cr\n"
-        "with cr.io.CampaignStore(sys.argv[1]).attempt(sys.argv[2]):\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    for _ in range(2):
-        died = subprocess.run([sys.executable, "-c", dying, str(tmp_path), "key"], check=False)
-        assert died.returncode == -signal.SIGKILL
-    with pytest.raises(cr.errors.DataError, match="killed 2 times"), store.attempt("key"):
-        pass
-    with store.attempt("another"):
-        pass
-    assert [path.name for path in tmp_path.iterdir()] == ["tried-key.txt"]
-    store.forget_attempts()
-    with store.attempt("key"):  # a new start
-        assert len(store) == 0
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.slow
 def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(csv_files, tmp_path):
     out, temporary = tmp_path / "out", tmp_path / "tmp"
@@ -255,25 +189,6 @@ def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(csv_
     assert left_in_session(process) == []
 
 
-def test_a_reader_that_goes_away_costs_no_result(csv_files, tmp_path):
-    out = tmp_path / "out"
-    with started("identify", csv_files[0], "-o", str(out), *QUICK) as process:
-        process.stdout.close()  # "| head" has seen enough
-        assert process.stderr.read() == ""
-    assert process.returncode == 0
-    assert {"model.json", "report.html", "figures"} <= {path.name for path in out.iterdir()}
-
-
-def test_results_that_cannot_be_written_leave_the_rows(csv_files, tmp_path, capsys):
-    out = tmp_path / "out"
-    out.mkdir()
-    os.mkfifo(out / "model.json")  # is not replaced
-    assert main(["identify", *csv_files[:2], "-o", str(out), *QUICK]) == 2
-    assert "is not replaced" in capsys.readouterr().err
-    assert {path.name for path in out.iterdir()} == {"rows", "model.json"}
-    assert len(list((out / "rows").iterdir())) == 2
-
-
 def test_a_report_that_cannot_be_written_is_told_and_costs_no_model(csv_files, tmp_path, capsys):
     system = cr.identify(record(1), **OPTIONS)
     (tmp_path / "report.html").mkdir()  # in the way
@@ -295,13 +210,6 @@ def test_an_interruption_while_the_program_is_loaded_is_one_line(tmp_path):
     process.send_signal(signal.SIGINT)
     assert process.communicate(timeout=60) == ("", "ctrl-realize: interrupted\n")
     assert process.returncode == 130
-
-
-def test_signals_are_handled_as_before_after_a_command():
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = [signal.getsignal(number) for number in numbers]
-    assert main(["identify", str(Path("nowhere.csv")), "-o", "out"]) == 2
-    assert [signal.getsignal(number) for number in numbers] == before
 
 
 def files_in(folder):
@@ -328,14 +236,6 @@ def test_a_folder_with_results_of_another_run_is_refused_or_cleared_on_request(t
     assert (out / "model.json").read_text() == "one file"
 
 
-def test_the_same_command_replaces_all_of_its_own_results_and_nothing_else(tmp_path):
-    run = Run("command")
-    write(tmp_path, ["model.json", "models/1.json", "models/2.json"], run)
-    (tmp_path / "notes.txt").write_text("keep")
-    write(tmp_path, ["model.json", "models/1.json"], run)  # one record fewer
-    assert files_in(tmp_path) == {"manifest.json", "model.json", "models/1.json", "notes.txt"}
-
-
 def test_a_run_that_fails_leaves_the_results_of_the_last_one(tmp_path):
     run = Run("command")
     write(tmp_path, ["model.json"], run)
@@ -354,14 +254,6 @@ def test_a_manifest_of_others_removes_nothing_outside_its_folder(tmp_path, name)
     (out / "manifest.json").write_text(json.dumps({**content, "files": [name.format(tmp_path)]}))
     write(out, ["model.json"], Run("command"))
     assert (tmp_path / "mine.txt").read_text() == "keep"
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": "ctrl_realize results"}', "null"])
-def test_results_without_a_readable_manifest_are_those_of_another_run(tmp_path, text):
-    write(tmp_path, ["model.json"], Run("command"))
-    (tmp_path / "manifest.json").write_text(text)
-    with pytest.raises(OptionError, match=r"holds other results, such as model\.json"):
-        write(tmp_path, ["model.json"], Run("command"))
 
 
 def test_the_manifest_names_command_versions_inputs_and_files(tmp_path, capsys):

@@ -103,31 +103,6 @@ def test_the_deviation_of_two_independent_responses_is_that_of_a_simulation(oper
     assert_allclose(made.std, np.sqrt(np.mean(np.abs(scatter) ** 2, axis=0)), rtol=0.02)
 
 
-@pytest.mark.parametrize("operation", ["-H", "3 H", "H * discrete", "delayed * H", "H / system"])
-def test_an_exact_factor_leaves_coherence_repeats_and_sample_time(operation):
-    made = ALONE[operation][0](measured())
-    assert_array_equal(made.coherence, [0.99, 0.9, 0.8])
-    assert (made.repeats, made.sample_time) == (5, DT)
-
-
-@pytest.mark.parametrize("operation", ["H + 1", "H - system", "feedback"])
-def test_where_the_coherence_is_not_known_it_is_left_out_with_a_word(operation):
-    with pytest.warns(DataWarning, match="no coherence that is known"):
-        made = ALONE[operation][0](measured())
-    assert made.coherence is None
-    assert (made.repeats, made.sample_time) == (5, DT)
-
-
-def test_an_inverse_keeps_the_coherence_and_loses_the_hold_with_a_word():
-    with pytest.warns(DataWarning, match=r"not one hold of 0\.01 s"):
-        made = 1 / measured()
-    assert_array_equal(made.coherence, [0.99, 0.9, 0.8])
-    assert made.sample_time is None
-
-
-HELD = {"coherence": None}
-
-
 @pytest.mark.parametrize(
     ("operation", "second", "hold", "warned"),
     [
@@ -148,20 +123,6 @@ def test_the_hold_of_two_responses_is_told_or_warned_of(operation, second, hold,
     assert made.sample_time == hold
     assert [w.category for w in recwarn] == [DataWarning] * warned
     assert made.repeats == 5
-
-
-def test_a_deviation_that_one_side_lacks_is_left_out_with_a_word():
-    with pytest.warns(DataWarning, match="no standard deviation"):
-        made = bare() * cr.MeasuredFRF(SECOND, HZ)
-    assert made.std is None
-
-
-@pytest.mark.parametrize("operation", [*TWO, "plus number", "inverse"])
-def test_the_warning_stands_where_the_user_wrote_the_operation(operation):
-    frf = {"plus number": lambda a, b: 1 + a, "inverse": lambda a, b: 1 / a}
-    with pytest.warns(DataWarning) as caught:
-        TWO.get(operation, (frf.get(operation),))[0](measured(), measured(SECOND))
-    assert {warning.filename for warning in caught} == {__file__}
 
 
 def test_a_dead_time_is_found_the_same_after_scaling():
@@ -201,14 +162,6 @@ def test_channels_are_multiplied_as_matrices():
     assert_allclose(closed.std, np.sqrt(total), rtol=1e-4)
 
 
-def test_responses_beside_another_keep_their_deviations():
-    both = ct.append(bare(), bare(SECOND, 2 * STD))
-    assert_allclose(both.std[0, 0], STD)
-    assert_allclose(both.std[1, 1], 2 * STD)
-    assert not both.std[0, 1].any()
-    assert_allclose(both.frdata[1, 1], SECOND)
-
-
 @pytest.mark.parametrize(
     ("operation", "match"),
     [
@@ -224,27 +177,6 @@ def test_responses_beside_another_keep_their_deviations():
 def test_what_does_not_fit_is_refused(operation, match):
     with pytest.raises(DataError, match=match):
         operation(bare())
-
-
-def test_what_is_no_system_is_refused():
-    for operation in (lambda H: H * "a", lambda H: H - None, lambda H: {} + H):
-        with pytest.raises(TypeError):
-            operation(bare())
-
-
-@pytest.mark.parametrize("factor", [1 + 2.3e-16, 1 - 2.3e-16, 1 + 1e-12])
-def test_frequencies_may_differ_in_their_last_bits(factor):
-    hz = np.geomspace(0.1, 13, 50)
-    model = cr.delayed_ss(ct.tf([1], [0.08, 1]), 37, dt=7.8125e-4)
-    frf = cr.MeasuredFRF(model(np.exp(2j * np.pi * hz * model.dt)), hz)
-    asked = frf.omega * factor
-    assert np.any(asked != frf.omega)
-    assert_array_equal(frf.frequency_response(asked).complex, frf.complex)
-    assert_array_equal((frf * cr.MeasuredFRF(frf.complex, hz * factor)).complex, frf.complex**2)
-    lines = ct.bode_plot([model, frf], omega=asked).lines
-    assert lines.size == 2
-    with pytest.raises(ValueError, match="not all frequencies"):
-        frf.frequency_response(frf.omega * 1.001)
 
 
 UNSORTED_HZ = np.array([3.0, 1.0, 2.0])
@@ -278,39 +210,6 @@ def test_coherence_and_deviation_go_with_the_channels(frf, key, rows, columns):
         assert_array_equal(getattr(part, name), values[np.ix_(rows, columns, rising)])
     assert_array_equal(part.frequency_hz, [1.0, 2.0, 3.0])
     assert part.repeats == part.between_hz(1.0, 2.0).repeats == 7
-
-
-@pytest.mark.parametrize("key", [(0, 1), ("x", "b"), (slice(0, 1), 1)])
-def test_one_channel_is_as_from_one_record(frf, key):
-    one = frf[key]
-    rising = np.argsort(UNSORTED_HZ)
-    assert_array_equal(one.std, SPREADS[0, 1, rising])
-    assert_array_equal(one.coherence, COHERENCE[0, 1, rising])
-    assert_array_equal(one.complex, RESPONSE[0, 1, rising])
-    assert one.between_hz(1.5, 3).std.shape == (2,)
-    assert one[0, 0].std.shape == (3,)
-
-
-@pytest.mark.parametrize("key", [(0, 1), (slice(None), 0), (1, slice(1, 3)), ("y", ["a", "b"])])
-def test_channels_are_those_of_python_control(frf, key):
-    plain = ct.FrequencyResponseData(frf.frdata, frf.omega, smooth=False, name="rig", **LABELS)[key]
-    ours = frf[key]
-    assert_array_equal(ours.frdata, plain.frdata)
-    assert ours.input_labels == plain.input_labels
-    assert ours.output_labels == plain.output_labels
-    assert ours.name == plain.name
-
-
-def test_without_coherence_and_deviation_there_is_none_to_take():
-    part = cr.MeasuredFRF(RESPONSE, UNSORTED_HZ)[1, 0]
-    assert part.coherence is None
-    assert part.std is None
-    assert part.repeats is None
-
-
-def test_no_channel_is_refused(frf):
-    with pytest.raises(DataError, match="chooses no channel"):
-        frf[-1, -1]
 
 
 def test_one_channel_of_many_is_fitted_with_its_own_weights():

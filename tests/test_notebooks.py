@@ -55,7 +55,3 @@ def test_notebook_is_stored_as_it_should_be_read(path: Path):
     )
     assert pictures >= 1
     assert path.stat().st_size < 1_000_000
-
-
-def test_there_are_notebooks():
-    assert len(NOTEBOOKS) >= 8

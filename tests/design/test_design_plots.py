@@ -9,7 +9,6 @@ import pytest
 from matplotlib.text import Text
 
 import ctrl_realize as cr
-from ctrl_realize.errors import OptionError
 
 
 @pytest.fixture(scope="module")
@@ -47,24 +46,6 @@ def test_margins_are_marked_where_they_are(results):
     (mark,) = [line for line in phase.lines if line.get_label().startswith("phase margin")]
     assert mark.get_ydata()[0] == pytest.approx(-180, abs=0.1)  # read off the followed curve
     plt.close("all")
-
-
-def test_plots_go_into_given_axes(results):
-    figure, axes = plt.subplots(1, 3)
-    drawn = results["margins"].plot(ax=axes)
-    assert drawn.figure is figure
-    with pytest.raises(OptionError, match="needs 3"):
-        results["margins"].plot(ax=axes[0])
-    plt.close(figure)
-
-
-def test_closed_loops_are_drawn_as_they_respond(valve, pi_controller):
-    plant, pi = valve(37), pi_controller(0.5, 0.1)
-    drawn = cr.plots.closed_loop_plot(plant, {"PI": pi}, span=0.8)
-    line = np.ravel(drawn.lines)[0][0]
-    exact = ct.step_response(ct.feedback(ct.ss(plant) * pi, 1), timepts=np.arange(1025) * plant.dt)
-    np.testing.assert_allclose(line.get_ydata(), exact.outputs[: line.get_ydata().size], atol=1e-5)
-    plt.close(drawn.figure)
 
 
 def test_rules_that_ring_stand_at_the_edge_with_their_peak():

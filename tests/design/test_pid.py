@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import OptionError, UnsuitableSystemError
 from tests.oracles.dense import step_response
 
 DT = 7.8125e-4
@@ -103,18 +99,6 @@ def test_no_neighbour_of_the_optimal_pi_is_better(valve):
         assert load_error(cr.design.PIDController(low, share * best.ti, dt=plant.dt)) > lowest
 
 
-def test_the_optimal_rule_handles_integrating_plants_and_negative_gains(cores, valve):
-    plant = cr.delayed_ss(cores["integrating"], 37)
-    for sign in (1, -1):
-        found = cr.design.pid(sign * plant, "optimal", "PI", max_sensitivity=1.7)
-        checked = cr.design.margins(sign * plant, found)
-        assert checked.stable
-        assert checked.ms == pytest.approx(1.7, rel=2e-3)
-        assert np.sign(found.kp) == sign
-    minus = cr.design.pid(-valve(37), "optimal", "PID")
-    assert minus.kp == pytest.approx(-cr.design.pid(valve(37), "optimal", "PID").kp, rel=1e-6)
-
-
 @pytest.mark.parametrize("kind", ["PI", "PID"])
 def test_table_numbers_are_those_of_brute_force_simulation(valve, kind):
     plant = valve(37)
@@ -130,21 +114,6 @@ def test_table_numbers_are_those_of_brute_force_simulation(valve, kind):
         assert row.ms == pytest.approx(cr.design.margins(plant, controller).ms)
 
 
-def test_the_table_keeps_going_where_a_rule_has_no_answer(cores):
-    found = cr.design.compare_pid(cr.delayed_ss(cores["integrating"], 37), kinds=["PI"])
-    assert {rule for rule, _, _ in found.refused} == {"imc", "cohen_coon"}
-    assert len(found.controllers) == 6
-    assert "imc" in found.report()
-    with pytest.raises(OptionError, match="smallest is"):
-        found.best(max_sensitivity=1.02)
-
-
-def test_an_error_that_stays_is_infinite(valve):
-    found = cr.design.compare_pid(valve(37), ["simc"], ["P"])
-    assert found.performance[0].load_error == np.inf
-    assert found.performance[0].setpoint_error == np.inf
-
-
 @pytest.mark.parametrize("method", ["tustin", "forward", "backward"])
 def test_discrete_controller_tends_to_the_continuous_one(method):
     slow = cr.design.PIDController(2.0, 3.0, 0.5, 0.1, method=method)
@@ -154,80 +123,3 @@ def test_discrete_controller_tends_to_the_continuous_one(method):
     errors = [abs(slow.discretised(h)(np.exp(s * h)) - expected) for h in (0.02, 0.01)]
     assert errors[1] < 0.55 * errors[0]  # first order through the derivative
     assert slow.discretised(0.01).continuous(s) == pytest.approx(expected, rel=1e-12)
-
-
-def test_integral_rules_are_what_their_names_say():
-    z, h = np.exp(0.3j), 0.1
-    sums = {
-        "forward": h / (z - 1),
-        "backward": h * z / (z - 1),
-        "tustin": h / 2 * (z + 1) / (z - 1),
-    }
-    for method, integral in sums.items():
-        found = cr.design.PIDController(2.0, 3.0, dt=h, method=method)
-        assert found(z) == pytest.approx(2 * (1 + integral / 3), rel=1e-12)
-
-
-def test_controllers_pickle_copy_and_print():
-    found = cr.design.pid(FOPDT, "amigo", "PID", dt=0.1)
-    for again in (pickle.loads(pickle.dumps(found)), copy.deepcopy(found)):
-        assert (again.kp, again.ti, again.td, again.tf) == (found.kp, found.ti, found.td, found.tf)
-        assert again.model.lag == found.model.lag
-        assert repr(again) == repr(found)
-    assert isinstance(found, ct.StateSpace)
-
-
-def test_plants_are_not_changed(valve):
-    plant = valve(5)
-    before = [np.array(M) for M in (plant.A, plant.B, plant.C, plant.D)]
-    cr.design.compare_pid(plant, ["simc", "optimal"], ["PI"])
-    for a, b in zip(before, (plant.A, plant.B, plant.C, plant.D), strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "error", "match"),
-    [
-        ((FOPDT, "simk"), {}, OptionError, "rule='simk'"),
-        ((FOPDT, "simc", "PIDD"), {}, OptionError, "kind='PIDD'"),
-        ((FOPDT, "lambda", "PID"), {}, OptionError, "has no PID; it knows PI"),
-        ((FOPDT, "simc", "PID"), {}, OptionError, "second lag"),
-        ((FOPDT, "amigo"), {"closed_loop_time": 1.0}, OptionError, "closed_loop_time is for"),
-        ((FOPDT, "simc"), {"closed_loop_time": -1.0}, OptionError, "closed_loop_time=-1"),
-        ((FOPDT, "optimal"), {"max_sensitivity": 1.0}, OptionError, "max_sensitivity=1"),
-        ((FOPDT, "amigo", "PID"), {"derivative_filter": 0}, OptionError, "derivative_filter=0"),
-        ((FOPDT.system(0.1),), {"dt": 0.1}, OptionError, "takes its sample time"),
-        ((IPDT, "imc"), {}, UnsuitableSystemError, "not for integrating"),
-        ((cr.design.ProcessModel(1.0, 1.0, 0.0), "amigo"), {}, OptionError, "the model has none"),
-        ((ct.tf([1], [1, 1]),), {}, UnsuitableSystemError, "discrete system"),
-        ((ct.ss(1.2, 1, 1, 0, 0.1),), {}, UnsuitableSystemError, "unstable"),
-        ((ct.ss(1.2, 1, 1, 0, 0.1), "optimal"), {}, UnsuitableSystemError, "unstable"),
-    ],
-)  # fmt: skip
-def test_impossible_requests_are_refused(arguments, options, error, match):
-    with pytest.raises(error, match=match):
-        cr.design.pid(*arguments, **options)
-
-
-def test_impossible_controllers_are_refused():
-    with pytest.raises(OptionError, match="tf > 0"):
-        cr.design.PIDController(1.0, 1.0, 0.5)
-    with pytest.raises(OptionError, match="ti=0"):
-        cr.design.PIDController(1.0, 0.0)
-    with pytest.raises(OptionError, match="dt=-1"):
-        cr.design.PIDController(1.0, dt=-1.0)
-
-
-def test_a_controller_shows_its_parameters_with_units():
-    card = cr.design.pid(SOPDT.system(0.1), "simc", "PID", name="<b>")._repr_html_()
-    assert "&lt;b&gt;" in card
-    assert "<b>" not in card
-    assert "integral time ti" in card
-    assert "100 ms, tustin rule" in card
-    assert "none: continuous" in cr.design.PIDController(0.5, 0.2)._repr_html_()
-
-
-def test_a_controller_is_printed_with_its_parameters():
-    controller = cr.design.PIDController(0.5, 0.2, dt=0.01)
-    assert "kp = 0.5, ti = 0.2 s" in str(controller)
-    assert "A = " in str(controller)

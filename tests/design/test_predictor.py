@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
 
 
 @pytest.fixture(scope="module")
@@ -50,26 +47,6 @@ def test_gain_at_a_thousand_samples_is_the_prediction_law(balanced):
     for u in sent[::-1]:
         state = A @ state + B[:, 0] * u
     assert found.gain @ x == pytest.approx(found.core_gain @ state, rel=1e-9)
-
-
-@pytest.mark.parametrize("kind", ["integrating", "unstable", "resonant"])
-def test_gain_equals_dlqr_for_cores_that_are_not_stable(cores, kind):
-    plant = cr.delayed_ss(cores[kind], 12)
-    Q = np.eye(2)
-    K, *_ = ct.dlqr(plant.A, plant.B, enlarged(plant, Q), 1.0)
-    np.testing.assert_allclose(cr.design.predictor_lqr(plant, Q, 1.0).gain, K, rtol=1e-9)
-
-
-def test_several_inputs_share_one_delay():
-    rng = np.random.default_rng(0)
-    A = np.diag([0.9, 0.8, 0.99]) + 0.05 * rng.standard_normal((3, 3))
-    core = ct.ss(A, rng.standard_normal((3, 2)), rng.standard_normal((2, 3)), 0, 0.1)
-    plant = cr.delayed_ss(core, 5)
-    R = np.diag([1.0, 2.0])
-    K, *_ = ct.dlqr(plant.A, plant.B, enlarged(plant, np.eye(3)), R)
-    np.testing.assert_allclose(
-        cr.design.predictor_lqr(plant, np.eye(3), R).gain, K, rtol=1e-9, atol=1e-12
-    )
 
 
 def several_inputs(delays, seed=0, **settings):
@@ -228,43 +205,3 @@ def test_lqg_closes_the_loop_at_the_poles_of_regulator_and_estimator(cores, kind
     found = np.sort(np.abs(poles))[::-1][: expected.size]
     np.testing.assert_allclose(found, expected, rtol=1e-5)  # close pairs cost half the digits
     assert cr.design.margins(plant, controller).stable
-
-
-def test_lqg_response_from_structure_equals_its_matrices(balanced):
-    controller = cr.design.lqg(balanced(37), np.eye(3), 1.0, np.eye(3), 1.0)
-    plain = ct.ss(controller)
-    z = np.exp(0.1j)
-    direct = plain.C @ np.linalg.solve(z * np.eye(plain.nstates) - plain.A, plain.B) + plain.D
-    assert controller(z) == pytest.approx(direct[0, 0], rel=1e-9)
-
-
-def test_results_print_and_pickle(balanced):
-    regulator = cr.design.predictor_lqr(balanced(3), np.eye(3), 1.0)
-    estimator = cr.design.kalman_predictor(balanced(3), np.eye(3), 1.0)
-    for found in (regulator, estimator):
-        again = pickle.loads(pickle.dumps(found))
-        np.testing.assert_array_equal(again.gain, found.gain)
-        assert "pole" in found.report()
-        assert "\n" not in repr(found)
-        with pytest.raises(ValueError, match="read-only"):
-            found.gain[0, 0] = 1.0
-    controller = pickle.loads(pickle.dumps(cr.design.lqg(balanced(3), np.eye(3), 1, np.eye(3), 1)))
-    assert controller.regulator.delay == 3
-
-
-def test_wrong_weights_and_systems_are_refused(balanced, cores):
-    lqr = cr.design.predictor_lqr
-    with pytest.raises(DataError, match=r"Q has shape \(2, 2\); there are 3"):
-        lqr(balanced(3), np.eye(2), 1.0)
-    with pytest.raises(OptionError, match="not symmetric"):
-        lqr(balanced(3), np.triu(np.ones((3, 3))), 1.0)
-    with pytest.raises(DataError, match="non-finite"):
-        lqr(balanced(3), np.full((3, 3), np.nan), 1.0)
-    unreachable = ct.ss(np.diag([1.1, 0.5]), [[0.0], [1.0]], [[1.0, 1.0]], 0, 0.1)
-    with pytest.raises(UnsuitableSystemError, match="no stabilizing solution"):
-        lqr(cr.delayed_ss(unreachable, 3), np.eye(2), 1.0)
-    two = cr.delayed_ss(ct.ss(np.diag([0.5, 0.5]), np.eye(2), [[1.0, 1.0]], 0, 0.1), [1, 2])
-    with pytest.raises(OptionError, match="couples the inputs 0 and 1, which have the delays 1"):
-        lqr(two, np.eye(2), np.eye(2) + 0.1)
-    with pytest.raises(UnsuitableSystemError, match="discrete"):
-        lqr(ct.ss(-1, 1, 1, 0), 1.0, 1.0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from scipy.integrate import quad
 from scipy.linalg import solve_discrete_lyapunov
 
 import ctrl_realize as cr
-from ctrl_realize.errors import OptionError, OrderError, UnsuitableSystemError
 from ctrl_realize.numerics.state_space.process_models import half_rule, process_step
 
 ProcessModel = cr.design.ProcessModel
@@ -106,42 +103,6 @@ def test_the_error_is_the_distance_of_the_step_responses():
     assert found.error == pytest.approx(rms, rel=0.02)  # total time is itself an estimate
 
 
-def test_gain_and_time_unit_scale_the_model(valve):
-    one = cr.design.reduce_fopdt(valve(37))
-    two = cr.design.reduce_fopdt(-3 * valve(37))
-    assert two.gain == pytest.approx(-3 * one.gain)
-    assert two.lag == pytest.approx(one.lag, rel=1e-6)
-    assert two.error == pytest.approx(one.error, rel=1e-6)
-
-
-def test_models_print_pickle_and_check_themselves():
-    model = ProcessModel(1.0, 0.08, 0.029)
-    assert pickle.loads(pickle.dumps(model)).lag == 0.08
-    assert "exp(-0.029 s)" in model.report()
-    assert model.normalized_dead_time == pytest.approx(0.029 / 0.109)
-    for wrong in ((0.0, 1.0, 0.1), (1.0, -1.0, 0.1), (1.0, 1.0, -0.1), (1.0, 1.0, 0.1, 2.0)):
-        with pytest.raises(OptionError):
-            ProcessModel(*wrong)
-    with pytest.raises(OptionError, match="no tuning rule"):
-        ProcessModel(1.0, 0.0, 0.1)
-
-
-def test_unsuitable_systems_are_refused(cores):
-    reduce = cr.design.reduce_fopdt
-    with pytest.raises(UnsuitableSystemError, match="unstable"):
-        reduce(cr.delayed_ss(cores["unstable"], 3))
-    with pytest.raises(UnsuitableSystemError, match="more than one integrator"):
-        reduce(ct.tf([1], [1, 1, 0, 0]))
-    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
-        reduce(cr.delayed_ss(ct.ss(np.diag([0.5, 0.5]), np.eye(2), [[1.0, 1.0]], 0, 0.1), 1))
-    with pytest.raises(UnsuitableSystemError, match=r"z = -0\.5"):
-        reduce(cr.delayed_ss(ct.ss(-0.5, 1, 1, 0, 0.1), 1), method="half_rule")
-    with pytest.raises(UnsuitableSystemError, match="static gain is 0"):
-        reduce(cr.delayed_ss(ct.ss(ct.tf([1, -1], [1, -0.5], 0.1)), 1))
-    with pytest.raises(OptionError, match="method='area'"):
-        reduce(lags(1.0), method="area")
-
-
 def random_core(seed, n, inputs=1, outputs=1):
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((n, n))
@@ -183,31 +144,6 @@ def test_reduced_gramians_are_the_kept_singular_values():
     np.testing.assert_allclose(P, np.diag(np.diag(P)), atol=1e-8 * P[0, 0])
 
 
-def test_first_order_has_its_closed_form():
-    found = cr.design.hankel_singular_values(ct.ss(0.5, 1.0, 3.0, 0, 0.1))
-    np.testing.assert_allclose(found, [3 / (1 - 0.25)], rtol=1e-14)
-
-
-@given(scale=st.floats(0.1, 10.0))
-def test_scaling_the_system_scales_the_values(scale):
-    core = random_core(1, 4)
-    np.testing.assert_allclose(
-        cr.design.hankel_singular_values(scale * core),
-        scale * cr.design.hankel_singular_values(core),
-        rtol=1e-9,
-    )
-
-
-def test_the_smallest_order_within_a_tolerance_is_taken(valve):
-    plant = valve(37)
-    for tolerance in (1e-1, 1e-2, 1e-3, 1e-9):
-        small = cr.design.reduce(plant, tolerance=tolerance)
-        assert small.fit.error_bound <= tolerance
-        order = small.delay_free.nstates
-        if order:
-            assert cr.design.reduce(plant, order - 1).fit.error_bound > tolerance
-
-
 def test_integrators_and_unstable_poles_are_kept(cores):
     for kind, pole in (("integrating", 1.0), ("unstable", 1.0005)):
         small = cr.design.reduce(cr.delayed_ss(cores[kind], 9), 1)
@@ -217,14 +153,3 @@ def test_integrators_and_unstable_poles_are_kept(cores):
         z = np.exp(1j * np.array([0.1, 1.0]))
         error = np.abs(small.delay_free(z) - cores[kind](z)).max()
         assert error <= small.fit.error_bound * (1 + 1e-9)
-
-
-def test_wrong_orders_are_refused(cores, valve):
-    with pytest.raises(OrderError, match=r"1\.\.\.2"):
-        cr.design.reduce(cr.delayed_ss(cores["integrating"], 9), 0)
-    with pytest.raises(OrderError, match=r"order=4.*0\.\.\.3"):
-        cr.design.reduce(valve(1), 4)
-    with pytest.raises(OptionError, match="exactly one"):
-        cr.design.reduce(valve(1))
-    with pytest.raises(OptionError, match="exactly one"):
-        cr.design.reduce(valve(1), 2, tolerance=0.1)

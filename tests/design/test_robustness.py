@@ -5,22 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import control as ct
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.design import performance
-from ctrl_realize.design.tuning.table import UNSTABLE
-from ctrl_realize.errors import DataError, ModelWarning, OptionError, UnsuitableSystemError
 from ctrl_realize.numerics.rational.phase import dead_time_from_phase
 
 DT = 7.8125e-4
-
-
-@dataclass(frozen=True)
-class FitWithInterval:
-    dead_time_interval: tuple[float, float]
 
 
 def test_the_bound_holds_every_given_plant(valve):
@@ -40,13 +32,6 @@ def test_the_part_of_the_delay_is_the_supremum_over_the_interval(valve):
     expected = np.abs(np.exp(-1j * bound.omega[:, None] * shifts) - 1).max(axis=1)
     np.testing.assert_allclose(bound.delay_part, expected, rtol=1e-4, atol=1e-12)
     np.testing.assert_array_equal(bound.bound, bound.delay_part)
-
-
-def test_the_identified_interval_is_taken_by_default(valve):
-    plant = valve(37).replace(fit=FitWithInterval((0.028, 0.030)))
-    assert cr.design.uncertainty_bound([], plant).delay_part.max() > 0
-    with pytest.raises(OptionError, match="no interval"):
-        cr.design.uncertainty_bound([], valve(37))
 
 
 def test_a_robust_loop_is_stable_for_every_plant_within(valve, pi_controller):
@@ -78,27 +63,6 @@ def test_a_loop_that_some_plant_destabilizes_is_not_called_robust(valve, pi_cont
     assert not found.robust
     assert found.performance == np.inf
     assert "NOT guaranteed" in found.report()
-
-
-def test_the_bound_is_a_control_frd(valve):
-    bound = cr.design.uncertainty_bound([valve(36)], valve(37), np.array([1.0, 10.0, 100.0]))
-    assert isinstance(bound.frd, ct.FrequencyResponseData)
-    np.testing.assert_allclose(bound.frd.magnitude, bound.bound)
-    assert "%" in bound.report()
-
-
-def test_wrong_arguments_are_refused(valve):
-    make = cr.design.uncertainty_bound
-    with pytest.raises(OptionError, match="Campaign or a list"):
-        make(valve(3))
-    with pytest.raises(OptionError, match="no nominal"):
-        make([])
-    with pytest.raises(DataError, match="rise"):
-        make([valve(3)], valve(4), [2.0, 1.0])
-    with pytest.raises(DataError, match=r"dt=0\.1"):
-        make([ct.ss(0.5, 1, 1, 0, 0.1)], valve(4))
-    with pytest.raises(OptionError, match="low <= high"):
-        make([], valve(4), dead_time_interval=(2.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -146,58 +110,6 @@ def test_the_numbers_are_those_of_a_simulated_loop_without_a_guess(controller):
     assert found.settling_time == pytest.approx((outside[-1] + 1) * TS, abs=2 * TS)
 
 
-@pytest.mark.parametrize("controller", [pi(0.4, 0.8), 0.5])
-def test_a_guess_changes_nothing(controller):
-    free = performance(plant(), controller)
-    for guess in (0.1, 30.0):
-        told = performance(plant(), controller, guess)
-        # a response counts as settled where its last part moves by 1e-4
-        assert told.settling_time == pytest.approx(free.settling_time, abs=2 * TS)
-        assert told.overshoot == pytest.approx(free.overshoot, abs=1e-3)
-        assert told.setpoint_error == pytest.approx(free.setpoint_error, rel=2e-3)
-
-
-def test_a_loop_that_is_not_stable_is_refused():
-    with pytest.raises(UnsuitableSystemError, match=r"the loop is not stable.*margins"):
-        performance(plant(), 40.0)
-    with pytest.raises(UnsuitableSystemError, match="the loop with 'mad' is not stable"):
-        cr.plots.closed_loop_plot(plant(), {"good": pi(0.4, 0.8), "mad": 40.0})
-    with pytest.raises(OptionError, match="total_time"):
-        performance(plant(), 0.1, -1.0)
-
-
-def test_a_loop_that_outlasts_what_is_computed_says_so():
-    with pytest.warns(ModelWarning, match="not settled after 262144 samples"):
-        performance(plant(), pi(1e-6, 0.8))
-
-
-@pytest.mark.parametrize("scale", [1.0, 100.0])
-def test_a_plot_ends_when_the_slowest_of_its_loops_has_settled(scale):
-    system = cr.delayed_ss(ct.tf([2.0], [0.8 * scale, 1]), dead_time=0.3 * scale, dt=TS * scale)
-    loops = {
-        name: ct.ss(ct.tf([gain * (1 + TS / 0.8), -gain], [1, -1], TS * scale))
-        for name, gain in (("quick", 0.4), ("slow", 0.1))
-    }
-    drawn = cr.plots.closed_loop_plot(system, loops)
-    last = [np.max(line.get_xdata()) for line in np.ravel(drawn.lines)[0]]
-    slowest = max(performance(system, each).settling_time for each in loops.values())
-    assert slowest <= min(last)
-    assert max(last) <= 2 * slowest
-    response = np.ravel(drawn.lines)[0][1].get_ydata()
-    assert abs(response[-1] - 1) < 0.02
-    plt.close(drawn.figure)
-
-
-def test_performance_is_told_in_words():
-    assert repr(performance(plant(), pi(0.4, 0.8))) == (
-        "<Performance: set-point error 1 s, load error 2 s, overshoot 0 %, settled after 2.81 s>"
-    )
-    assert "set-point error stays" in repr(performance(plant(), 0.5))
-    assert repr(UNSTABLE) == (
-        "<Performance: set-point error stays, load error stays, overshoot unknown, does not settle>"
-    )
-
-
 @pytest.mark.parametrize("delay", [0, 37, 100, 300, 1000])
 def test_phase_is_that_of_a_fine_grid_on_any_grid(valve, delay):
     plant = valve(delay)
@@ -206,31 +118,6 @@ def test_phase_is_that_of_a_fine_grid_on_any_grid(valve, delay):
     some = np.array([17, 40_000, 200_000, 399_999])
     found = cr.design.unwrapped_phase(plant, fine[some])
     np.testing.assert_allclose(found, expected[some], rtol=1e-9, atol=1e-9)
-
-
-def test_order_of_frequencies_and_unit_do_not_matter(valve):
-    omega = np.array([300.0, 1.0, 20.0])
-    found = cr.design.unwrapped_phase(valve(300), omega)
-    np.testing.assert_array_equal(cr.design.unwrapped_phase(valve(300), omega[::-1]), found[::-1])
-    np.testing.assert_allclose(
-        cr.design.unwrapped_phase(valve(300), omega, deg=True), np.degrees(found)
-    )
-
-
-@pytest.mark.parametrize("integrators", [0, 1, 2, 3])
-def test_integrators_start_at_minus_90_degrees_each(integrators):
-    loop = ct.tf([1.0], [1.0, *[0.0] * integrators])
-    found = cr.design.unwrapped_phase(loop, [0.1, 10.0], dead_time=2.0, deg=True)
-    expected = -90 * integrators - np.degrees(2.0 * np.array([0.1, 10.0]))
-    np.testing.assert_allclose(found, expected, atol=1e-9)
-
-
-def test_a_negative_gain_starts_half_a_turn_lower(valve):
-    omega = np.array([1.0, 50.0])
-    found = cr.design.unwrapped_phase(-valve(37), omega) - cr.design.unwrapped_phase(
-        valve(37), omega
-    )
-    np.testing.assert_allclose(found, -np.pi, rtol=1e-12)
 
 
 @pytest.mark.parametrize("delay", [37, 300])
@@ -246,18 +133,6 @@ def test_sixty_measured_points_are_unwrapped_without_being_told_the_delay(valve,
     np.testing.assert_allclose(told, exact, atol=0.1)
     # What plain unwrapping makes of it: whole turns are missing.
     assert np.abs(np.unwrap(np.angle(response)) - exact).max() > 6 or delay == 37
-
-
-def test_wrong_uses_are_refused(valve):
-    data = cr.MeasuredFRF([1.0, 0.5, 0.2], [1, 2, 3])
-    with pytest.raises(OptionError, match="omega is missing"):
-        cr.design.unwrapped_phase(valve(3))
-    with pytest.raises(OptionError, match="leave it out"):
-        cr.design.unwrapped_phase(data, [1.0])
-    with pytest.raises(DataError, match="frequencies >= 0"):
-        cr.design.unwrapped_phase(valve(3), [-1.0])
-    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
-        cr.design.unwrapped_phase(cr.MeasuredFRF(np.ones((1, 2, 3)), [1, 2, 3]))
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])

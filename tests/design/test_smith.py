@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
 from dataclasses import dataclass
 
 import control as ct
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
+from ctrl_realize.errors import ModelWarning, UnsuitableSystemError
 from tests.oracles.dense import step_response
 
 DT = 7.8125e-4
@@ -58,37 +56,6 @@ def test_the_controller_equals_feedback_of_the_difference_of_two_models(
     np.testing.assert_allclose(predictor(z), expected, rtol=1e-9)
 
 
-def test_matrices_and_structured_response_agree(valve, pi_controller):
-    predictor = cr.design.smith_predictor(valve(37), pi_controller(1.5, 0.1), filter_time=0.02)
-    plain = ct.ss(predictor)
-    for z in np.exp(1j * np.array([0.01, 0.3, 2.5])):
-        direct = plain.C @ np.linalg.solve(z * np.eye(plain.nstates) - plain.A, plain.B) + plain.D
-        assert predictor(z) == pytest.approx(direct[0, 0], rel=1e-10)
-
-
-def test_it_has_as_many_states_as_core_delay_and_controller(valve, pi_controller):
-    predictor = cr.design.smith_predictor(valve(37), pi_controller(1.5, 0.1))
-    assert predictor.nstates == 3 + 37 + 1
-    by_hand = ct.feedback(pi_controller(1.5, 0.1), valve(0).delay_free - ct.ss(valve(37)))
-    assert by_hand.nstates == 1 + 3 + 3 + 37
-
-
-def test_no_state_is_hidden(valve, pi_controller):
-    predictor = ct.ss(cr.design.smith_predictor(valve(4), pi_controller(1.5, 0.1)))
-    # Ranks at each pole (Popov, Belevitch, Hautus): 1e-9 is far above rounding at order 8.
-    for pole in np.linalg.eigvals(predictor.A):
-        shifted = predictor.A - pole * np.eye(predictor.nstates)
-        assert np.linalg.svd(np.hstack([shifted, predictor.B]))[1][-1] > 1e-9
-        assert np.linalg.svd(np.vstack([shifted, predictor.C]))[1][-1] > 1e-9
-
-
-def test_without_delay_it_is_the_controller(valve, pi_controller):
-    controller = pi_controller(1.5, 0.1)
-    predictor = cr.design.smith_predictor(valve(0), controller)
-    assert predictor.nstates == 1
-    assert predictor(0.9 + 0.3j) == pytest.approx(controller(0.9 + 0.3j))
-
-
 def test_margins_see_the_same_closed_loop_as_its_eigenvalues(valve, pi_controller):
     counts = []
     for gain, delay in ((0.5, 30), (1.5, 60), (4.0, 40), (4.0, 120)):
@@ -109,18 +76,6 @@ def test_a_filtered_predictor_leaves_no_error_after_a_load(valve, pi_controller,
     )
     assert cr.design.margins(plant, predictor).stable
     assert abs(step_response(loaded(plant, predictor), 6000)[-1]) < 1e-6
-
-
-def test_removing_the_slow_pole_takes_it_out_of_the_load_response(cores):
-    slow = np.exp(-DT / 2.0)  # 2 s, against a dead time of 0.03 s
-    core = ct.ss([[slow]], [[1.0]], [[1 - slow]], [[0.0]], DT)
-    plant = cr.delayed_ss(core, 37)
-    controller = ct.ss([[1.0]], [[1.0]], [[20 * DT / 0.3]], [[20.0]], DT)
-    kept = cr.design.smith_predictor(plant, controller, filter_time=0.02)
-    taken = cr.design.smith_predictor(plant, controller, filter_time=0.02, remove_slow=True)
-    np.testing.assert_allclose(taken.removed_poles, [slow], rtol=1e-12)
-    areas = [np.abs(step_response(loaded(plant, c), 6000)).sum() for c in (kept, taken)]
-    assert areas[1] < 0.5 * areas[0]
 
 
 def test_an_integrating_core_needs_the_filter_and_then_rejects_loads(cores, pi_controller):
@@ -165,52 +120,3 @@ def test_the_identified_interval_is_checked(valve, pi_controller):
     with pytest.warns(ModelWarning, match="unstable for some dead time"):
         predictor = cr.design.smith_predictor(unsure, pi_controller(3.0, 0.08))
     assert not predictor.robustness.stable
-
-
-def test_it_pickles_and_copies(valve, pi_controller):
-    predictor = cr.design.smith_predictor(valve(5), pi_controller(1.5, 0.1), filter_time=0.02)
-    for again in (pickle.loads(pickle.dumps(predictor)), copy.deepcopy(predictor)):
-        assert again.name == "smith"
-        assert again.filter_time == 0.02
-        np.testing.assert_array_equal(again.A, predictor.A)
-
-
-def test_the_plant_is_not_changed(valve, pi_controller):
-    plant, controller = valve(5), pi_controller(1.5, 0.1)
-    before = [np.array(M) for s in (plant, controller) for M in (s.A, s.B, s.C, s.D)]
-    cr.design.smith_predictor(plant, controller, filter_time=0.02, remove_slow=True)
-    after = [M for s in (plant, controller) for M in (s.A, s.B, s.C, s.D)]
-    assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
-
-
-def test_unsuitable_systems_are_refused_with_the_reason(valve, cores, pi_controller):
-    pi = pi_controller(1.0, 0.1)
-    make = cr.design.smith_predictor
-    with pytest.raises(UnsuitableSystemError, match=r"unstable.*lqg"):
-        make(cr.delayed_ss(cores["unstable"], 5), pi)
-    double = ct.ss([[1.0, 1.0], [0, 1.0]], [[0.0], [1]], [[1.0, 0]], 0, DT)
-    with pytest.raises(UnsuitableSystemError, match="2 poles on the unit circle"):
-        make(cr.delayed_ss(double, 5), pi, filter_time=0.1)
-    with pytest.raises(UnsuitableSystemError, match="continuous"):
-        make(valve(5), ct.tf([1], [1, 1]))
-    with pytest.raises(UnsuitableSystemError, match="discrete system"):
-        make(ct.tf([1], [1, 1]), pi)
-    with pytest.raises(OptionError, match="needs filter_time"):
-        make(valve(5), pi, remove_slow=True)
-    with pytest.raises(OptionError, match="filter_time=-1"):
-        make(valve(5), pi, filter_time=-1.0)
-    with pytest.raises(OptionError, match="carries no interval"):
-        cr.design.delay_robustness(valve(5), pi)
-
-
-def test_a_predictor_of_a_long_line_shows_in_a_few_words():
-    plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), 300, dt=1e-3)
-    predictor = cr.design.smith_predictor(plant, cr.design.pid(plant))
-    assert (
-        str(predictor)
-        == repr(predictor)
-        == "<DelayLineController 'smith': order 2, line of 300 samples, dt = 0.001 s>"
-    )
-    card = predictor._repr_html_()
-    assert "300 samples = 300 ms" in card
-    assert len(card) < 2000

@@ -100,20 +100,6 @@ def test_known_delay_taken_out_removes_its_bias():
     assert np.median(aligned.coherence) > 0.99
 
 
-def test_a_stream_of_records_gives_what_one_long_record_gives():
-    record = noise_record(n=8 * 4096, noise=0.1)
-    pieces = (
-        cr.Record(
-            record.time[k : k + 4096], record.input[k : k + 4096], record.output[k : k + 4096]
-        )
-        for k in range(0, 8 * 4096, 4096)
-    )
-    streamed = cr.spectral_frf(pieces, segment=1024, overlap=0)
-    whole = cr.spectral_frf(record, segment=1024, overlap=0)
-    assert_allclose(streamed.complex, whole.complex, rtol=1e-9)
-    assert_allclose(streamed.std, whole.std, rtol=1e-7)
-
-
 def test_whole_periods_have_no_leakage():
     record, lines = multisine_record()
     frf = cr.spectral_frf(record, period=500, skip_periods=2)
@@ -121,12 +107,6 @@ def test_whole_periods_have_no_leakage():
     # The transient is exp(-4 s^-1 * 10 s) = 4e-18 after two periods.
     assert_allclose(frf.complex, exact(frf), rtol=1e-9)
     assert_allclose(frf.coherence, 1, atol=1e-12)
-
-
-def test_transient_in_the_first_period_would_show():
-    record, _ = multisine_record(periods=3)
-    frf = cr.spectral_frf(record, period=500, skip_periods=0)
-    assert np.abs(frf.complex / exact(frf) - 1).max() > 1e-3
 
 
 def test_deviation_of_periodic_estimates_is_that_of_their_scatter():
@@ -192,16 +172,6 @@ def test_inputs_that_move_together_are_refused():
         cr.spectral_frf(two_by_two(5000), period=500)
 
 
-def test_player_arm_has_two_inputs_and_two_coherent_outputs(shared_data):
-    table = np.genfromtxt(
-        shared_data / "cd_player_mimo" / "record.csv", delimiter=",", skip_header=1
-    )
-    record = cr.Record(table[:, 0], table[:, 1:3].T, table[:, 3:].T)
-    frf = cr.spectral_frf(record, segment=128)
-    assert frf.frdata.shape[:2] == (2, 2)
-    assert np.median(frf.coherence) > 0.5
-
-
 def test_random_record_of_the_simulated_valve_agrees_with_its_sampled_truth():
     valve = cr.bench.valve()
     bits = np.random.default_rng(0).integers(0, 2, 1600)
@@ -215,63 +185,6 @@ def test_random_record_of_the_simulated_valve_agrees_with_its_sampled_truth():
     assert held.rms_relative_error < 0.05
     divided = cr.compare_frf(valve.truth.sampled, frf, hold="zoh")
     assert np.mean(divided.phase_error_deg) > np.mean(held.phase_error_deg) + 0.3
-
-
-def test_two_mass_set_up_is_coherent_from_4_to_80_hz_with_its_resonance_at_58(shared_data):
-    data = np.load(shared_data / "tue_load_500k.npz")
-    dt = float(data["dt"])
-    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
-    frf = cr.spectral_frf(record).between_hz(4, 80)
-    assert np.mean(frf.coherence > 0.85) > 0.9
-    near = frf.between_hz(40, 80)
-    # Half a Hz from line to line.
-    assert near.frequency_hz[np.argmax(np.abs(near.complex))] == pytest.approx(58, abs=0.5)
-
-
-def test_motor_bench_resonates_at_77_hz_and_is_still_at_53(shared_data):
-    data = np.load(shared_data / "motor_bench_multisine.npz")
-    dt = float(data["dt"])
-    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
-    frf = cr.spectral_frf(record, period=int(data["period"]))
-    assert frf.frequency_hz.tolist() == pytest.approx(list(range(11, 251)))
-    near = frf.between_hz(30, 120)
-    assert near.frequency_hz[np.argmax(np.abs(near.complex))] == pytest.approx(77)
-    assert near.frequency_hz[np.argmin(np.abs(near.complex))] == pytest.approx(53)
-    assert np.all(frf.std < 0.02 * np.abs(frf.complex).max())
-
-
-@pytest.mark.parametrize(
-    ("options", "match"),
-    [
-        ({"method": "H3"}, "'H1'"),
-        ({"segment": 4}, "segment"),
-        ({"segment": 4096}, "two"),
-        ({"overlap": 1.0}, "overlap"),
-        ({"window": "no such"}, "window"),
-        ({"delay": -1}, "delay"),
-        ({"delay": 5000}, "nothing"),
-        ({"period": 300, "segment": 64}, "period alone"),
-        ({"period": 600}, "at least two"),
-        ({"period": 100, "skip_periods": -1}, "skip_periods"),
-    ],
-)
-def test_options_that_make_no_sense_are_refused(options, match):
-    with pytest.raises(cr.CtrlRealizeError, match=match):
-        cr.spectral_frf(noise_record(n=1000), **options)
-
-
-def test_records_without_excitation_or_of_two_rates_are_refused():
-    record = noise_record(n=1000)
-    with pytest.raises(ValueError, match="does not excite"):
-        cr.spectral_frf(cr.Record(record.time, np.ones(1000), record.output))
-    with pytest.raises(ValueError, match="does not excite"):
-        cr.spectral_frf(cr.Record(record.time, np.ones(1000), record.output), period=100)
-    with pytest.raises(ValueError, match="output is constant"):
-        cr.spectral_frf(cr.Record(record.time, record.input, np.ones(1000)))
-    with pytest.raises(ValueError, match="sample times"):
-        cr.spectral_frf([record, cr.Record(2 * record.time, record.input, record.output)])
-    with pytest.raises(ValueError, match="no records"):
-        cr.spectral_frf([])
 
 
 @pytest.mark.parametrize("dt", [0.02, 0.1])

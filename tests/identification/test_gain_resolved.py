@@ -46,13 +46,6 @@ def test_errors_of_gain_and_total_delay_are_those_of_the_noise():
     assert np.mean([low <= LAG + DELAY <= high for low, high in within]) >= 0.85
 
 
-def test_what_is_known_is_called_firm():
-    fit = cr.identify(step(120, seed=5)).fit
-    low, high = fit.total_delay_interval
-    assert low <= LAG + DELAY <= high < 1.1 * low
-    assert "firm" in dict(fit._rows())["total delay"]
-
-
 def test_a_gain_far_beyond_the_record_is_not_stated_as_known():
     system = cr.identify(step(100, lag=300.0, noise=0.1))
     fit = system.fit
@@ -100,11 +93,6 @@ def test_no_controller_is_designed_for_a_gain_of_unknown_sign(unknown, design):
         design(unknown)
 
 
-def test_an_analysis_of_such_a_model_warns(unknown):
-    with pytest.warns(UnresolvedWarning, match="the gain and its sign"):
-        cr.design.margins(unknown, 0.01)
-
-
 @pytest.mark.parametrize("seed", [3, 5, 22])
 def test_a_gain_is_told_beside_an_output_that_wanders(seed):
     fit = cr.identify(wandering(seed)).fit
@@ -131,10 +119,3 @@ def test_the_gas_furnace_has_the_gain_of_box_and_jenkins(shared_data):
     assert low <= -3.28 <= high < 0
     with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
         cr.design.pid(cr.identify(record, structures=[(2, 1)]))
-
-
-def test_a_saved_model_still_says_what_is_not_resolved(unknown, tmp_path):
-    cr.save_model(tmp_path / "model.json", unknown)
-    again = cr.load_model(tmp_path / "model.json")
-    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
-        cr.design.pid(again)

@@ -12,9 +12,8 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize import paper
-from ctrl_realize.errors import DelayRangeError, NoStepError, OptionError
 from ctrl_realize.identification import identify as identify_module
-from tests.rigs import R3, TS, step_record
+from tests.rigs import step_record
 
 
 def test_the_papers_settings_are_those_of_the_paper():
@@ -64,36 +63,6 @@ def test_a_scan_returns_the_model_with_names_choices_and_every_step(method):
     assert pickle.loads(pickle.dumps(sys)).fit.delay == sys.fit.delay
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "match"),
-    [
-        ({"method": "magic"}, OptionError, "'output_error', 'scan', 'paper'"),
-        ({"method": "scan", "known": R3}, OptionError, "known: not for method='scan'"),
-        ({"method": "output_error", "samples": 5}, OptionError, "samples: not for method"),
-        ({"method": "paper", "max_delay": 5000}, DelayRangeError, "need 6001 samples"),
-        ({"method": "scan", "order": 0}, OptionError, ">= 1"),
-        ({"order": 0}, OptionError, "order=0"),
-        ({"order": 9}, OptionError, "order=9"),
-        ({"order": 2, "structures": [(1, 1)]}, OptionError, "not both"),
-        ({"method": "scan", "max_delay": -1}, OptionError, ">= 0"),
-        ({"method": "scan", "max_delay": 10**6}, DelayRangeError, "needs more than"),
-    ],
-)
-def test_unusable_choices_are_refused(options, error, match):
-    with pytest.raises(error, match=match):
-        cr.identify(step_record(), **options)
-
-
-@pytest.mark.parametrize("method", ["output_error", "scan", "paper"])
-def test_a_step_at_the_last_sample_is_refused_by_every_method(method):
-    t = TS * np.arange(2000)
-    u = np.zeros(2000)
-    u[-1] = 5.0
-    noise = np.random.default_rng(0).standard_normal(2000)
-    with pytest.raises(NoStepError, match="nothing was recorded after it"):
-        cr.identify(cr.Record(t, u, noise), method=method)
-
-
 DT = 0.1
 TWO_MODES = ct.tf([25.0], [1, 0.8, 25.0]) + ct.tf([60.0], [1, 0.6, 144.0])
 LAG = ct.tf([2.0], [0.8, 1])
@@ -129,17 +98,6 @@ def test_modes_take_the_place_of_lags_that_leave_structure(chosen):
     assert "input_in_residual" not in codes(chosen)
 
 
-def test_modes_have_a_delay_with_its_interval(chosen):
-    fit = chosen.fit
-    assert (fit.delay, fit.dead_time) == (chosen.delay, chosen.delay * DT)
-    low, high = fit.delay_interval
-    assert low <= 3.0 + 1e-9 < high  # the plant's dead time is where the interval begins
-    assert high - low < 3
-    # static delay of both modes: damping terms over squared frequencies, weighted with the gains
-    total = 3 * DT + (0.8 / 25 + 60 / 144 * 0.6 / 144) / (1 + 60 / 144)
-    assert abs(fit.total_delay - total) < 0.3 * DT
-
-
 @pytest.mark.parametrize(("delay", "colour"), [(0.0, 0.0), (25.4, 0.9)])
 def test_the_interval_of_modes_holds_a_dead_time(delay, colour):
     found = cr.identify(record(TWO_MODES, delay, seed=2, colour=colour))
@@ -167,13 +125,6 @@ def test_a_structure_that_was_asked_for_is_only_judged():
     assert "fit_state_space" in str(flag)
 
 
-def test_modes_do_not_pass_a_largest_delay():
-    found = cr.identify(record(TWO_MODES, 9.0), max_delay=5)
-    assert isinstance(found.fit, cr.identification.OutputErrorFit)
-    (flag,) = (f for f in found.fit.flags if f.code == "input_in_residual")
-    assert "after max_delay" in str(flag)
-
-
 def test_lags_that_leave_little_more_widen_the_interval():
     rng = np.random.default_rng(6)
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 3)
@@ -185,11 +136,3 @@ def test_lags_that_leave_little_more_widen_the_interval():
     assert fit.lags.residual < 2 * fit.noise_std[0]
     assert fit.interval[0] <= min(fit.dead_time, fit.lags.interval[0])
     assert fit.interval[1] >= max(fit.dead_time, fit.lags.interval[1])
-
-
-def test_several_records_of_modes_go_together():
-    found = cr.identify([record(TWO_MODES, 3.0, seed, samples=300) for seed in (4, 5)])
-    assert isinstance(found.fit, cr.identification.StateSpaceFit)
-    assert len(found.fit.checks) == 2
-    assert found.fit.order == 4
-    assert found.fit.delay_interval[0] <= 3 + 1e-9 < found.fit.delay_interval[1]

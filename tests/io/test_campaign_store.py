@@ -19,9 +19,6 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.cli.staging import appearing
-from ctrl_realize.errors import OptionError
-from ctrl_realize.identification.campaign.rows import fingerprint
 from ctrl_realize.io.atomic import replaced_when_complete, write_text
 from ctrl_realize.io.text.csv_files import write_csv
 from tests.rigs import step_record
@@ -72,18 +69,6 @@ def test_other_settings_are_other_rows(records, tmp_path):
     assert len(store) == 3
 
 
-def test_failures_are_not_kept(records, tmp_path):
-    store = cr.io.CampaignStore(tmp_path)
-    missing = functools.partial(cr.read_record, tmp_path / "later.csv")
-    broken = cr.identify_campaign([missing, records[0]], method="paper", store=store)
-    assert (len(broken.failed), len(store)) == (1, 1)
-    rows = np.column_stack([records[1].time, records[1].input, records[1].output])
-    np.savetxt(
-        tmp_path / "later.csv", rows, delimiter=",", fmt="%.17g", header="t,u,y", comments=""
-    )
-    assert cr.identify_campaign([missing, records[0]], method="paper", store=store).failed == ()
-
-
 @pytest.mark.parametrize("damage", ["truncated", "edited", "empty", "binary", "renamed"])
 def test_a_damaged_row_is_made_anew(records, tmp_path, damage):
     store = cr.io.CampaignStore(tmp_path)
@@ -116,24 +101,6 @@ def test_workers_write_to_one_store(records, tmp_path):
     assert_same_results(parallel, cr.identify_campaign(records, method="paper"))
 
 
-def test_rows_of_a_store_hold_no_data(records, tmp_path):
-    kept = cr.identify_campaign(records[:1], method="paper", store=cr.io.CampaignStore(tmp_path))
-    assert not hasattr(kept.rows[0].system.fit, "impulse")
-    assert "misfit" in kept.rows[0].system.fit.report()
-
-
-def test_systems_that_look_alike_are_other_rows(records, monkeypatch):
-    # python-control shows eight digits of a system, or its name alone
-    monkeypatch.setitem(ct.config.defaults, "iosys.repr_format", "info")
-    sensors = [ct.tf([1], [1 / (2 * np.pi * hz), 1], name="sensor") for hz in (30.0, 10.0)]
-    sensors += [ct.ss(sensor, name="sensor") for sensor in sensors]
-    assert len({repr(sensor) for sensor in sensors}) < 4
-    keys = {fingerprint(records[0], "output_error", {"known": sensor}) for sensor in sensors}
-    assert len(keys) == 4
-    again = ct.tf([1], [1 / (2 * np.pi * 30.0), 1], name="another name")
-    assert fingerprint(records[0], "output_error", {"known": again}) in keys
-
-
 @pytest.mark.parametrize("package", ["ctrl-realize", "numpy", "scipy"])
 def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
     store = cr.io.CampaignStore(tmp_path)
@@ -164,12 +131,6 @@ def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records
     assert again.delays == first.delays
     assert "is not replaced" in again.rows[0].warnings[-1]
     assert path.is_fifo()
-
-
-def test_a_file_is_no_store(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OptionError, match="needs a folder"):
-        cr.io.CampaignStore(tmp_path / "file")
 
 
 SCRIPT = """
@@ -215,12 +176,6 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_the_text_is_written_and_nothing_else_is_left(tmp_path):
-    write_text(tmp_path / "a.txt", "one\ntwo\n")
-    assert (tmp_path / "a.txt").read_bytes() == b"one\ntwo\n"
-    assert names(tmp_path) == ["a.txt"]
-
-
 @pytest.mark.parametrize("reason", [RuntimeError, KeyboardInterrupt])
 def test_after_a_failure_the_old_file_is_whole_and_the_folder_clean(tmp_path, reason):
     file = tmp_path / "a.txt"
@@ -230,36 +185,6 @@ def test_after_a_failure_the_old_file_is_whole_and_the_folder_clean(tmp_path, re
         raise reason
     assert file.read_text() == "old"
     assert names(tmp_path) == ["a.txt"]
-
-
-def test_a_missing_folder_is_an_error_of_the_system(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        write_text(tmp_path / "nowhere" / "a.txt", "text")
-
-
-def test_a_folder_in_place_of_the_file_is_not_replaced(tmp_path):
-    (tmp_path / "a.txt").mkdir()
-    with pytest.raises(OSError, match=r"a\.txt"):
-        write_text(tmp_path / "a.txt", "text")
-    assert names(tmp_path) == ["a.txt"]
-
-
-def test_permissions_are_those_of_the_old_file_or_of_any_new_one(tmp_path):
-    plain = tmp_path / "plain.txt"
-    plain.write_text("made by the system")
-    write_text(tmp_path / "new.txt", "text")
-    assert stat.S_IMODE((tmp_path / "new.txt").stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
-    plain.chmod(0o640)
-    write_text(plain, "text")
-    assert stat.S_IMODE(plain.stat().st_mode) == 0o640
-
-
-def test_a_link_stays_a_link(tmp_path):
-    (tmp_path / "target.txt").write_text("old")
-    (tmp_path / "link.txt").symlink_to("target.txt")
-    write_text(tmp_path / "link.txt", "new")
-    assert (tmp_path / "link.txt").is_symlink()
-    assert (tmp_path / "target.txt").read_text() == "new"
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
@@ -281,14 +206,3 @@ def test_what_is_no_regular_file_is_not_replaced(tmp_path):
     assert link.is_symlink()
     assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
     assert names(tmp_path) == ["link", "pipe"]
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
-def test_results_replace_nothing_in_their_folder_that_is_no_regular_file(tmp_path):
-    os.mkfifo(tmp_path / "b.txt")
-    (tmp_path / "a.txt").write_text("old")
-    with pytest.raises(OSError, match="is not replaced"), appearing(tmp_path) as staged:  # noqa: PT012
-        for name in ("a.txt", "b.txt"):
-            (staged / name).write_text("new")
-    assert names(tmp_path) == ["a.txt", "b.txt"]
-    assert (tmp_path / "a.txt").read_text() == "old"  # all or nothing

@@ -2,10 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.io
 from numpy.testing import assert_allclose
 
-from ctrl_realize.errors import DataError, DataWarning, FileFormatError, OptionError
+from ctrl_realize.errors import DataError, FileFormatError, OptionError
 from ctrl_realize.io import read_frf
 
 F = np.array([0.5, 1.0, 2.0, 5.0, 10.0])
@@ -52,14 +51,6 @@ def test_the_same_response_is_read_however_it_is_written(tmp_path, text):
     check(read_frf(file))
 
 
-@pytest.mark.parametrize("name", ["G", "H", "frf", "response"])
-def test_complex_arrays_are_read(tmp_path, name):
-    np.savez(tmp_path / "a.npz", f=F, **{name: G})
-    scipy.io.savemat(tmp_path / "a.mat", {"meas": {"freq": F, name: G[:, None]}})
-    check(read_frf(tmp_path / "a.npz"))
-    check(read_frf(tmp_path / "a.mat"))
-
-
 def test_columns_and_units_are_chosen(tmp_path):
     file = tmp_path / "a.csv"
     file.write_text(written("a,b,c", OMEGA, 20 * np.log10(abs(G)), PHASE))
@@ -69,23 +60,6 @@ def test_columns_and_units_are_chosen(tmp_path):
     )  # fmt: skip
     check(frf)
     assert frf.name == "bench"
-
-
-def test_the_choice_of_a_form_counts_before_the_names(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text(written("f,re,im,gain,phase_rad", F, F, F, abs(G), PHASE))
-    check(read_frf(file, magnitude="gain"))
-
-
-def test_coherence_and_std_come_along(tmp_path):
-    file = tmp_path / "two.parts.csv"
-    coherence, std = np.linspace(1, 0.2, 5), np.linspace(0.01, 0.1, 5)
-    file.write_text(written("f,re,im,coherence,std", F[::-1], G.real, G.imag, coherence, std))
-    frf = read_frf(file)
-    assert_allclose(frf.coherence, coherence[::-1], rtol=0)
-    assert_allclose(frf.std, std[::-1], rtol=0)
-    assert frf.name == "two_parts"
-    assert frf.trusted(0.9).frequency_hz[0] == F[4]
 
 
 @pytest.mark.parametrize(
@@ -113,10 +87,3 @@ def test_what_is_not_clear_is_asked(tmp_path, text, kwargs, error, match):
     file.write_text(text)
     with pytest.raises(error, match=match):
         read_frf(file, **kwargs)
-
-
-def test_a_cut_last_line_is_left_out(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text(written("f,re,im", F, G.real, G.imag) + "20.0,0.")
-    with pytest.warns(DataWarning, match="has 2 of 3 cells"):
-        check(read_frf(file))

@@ -11,15 +11,10 @@ import control as ct
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 import ctrl_realize as cr
 from ctrl_realize import report
-from ctrl_realize.cli import main
-from ctrl_realize.cli.results import file_name
 from ctrl_realize.io.text.csv_files import write_csv
-from ctrl_realize.plots.names import plain, wrapped
-from ctrl_realize.report.svg import inline_svg, laid_out
 
 UNITS = [
     "Temp [°C]", "flow [µl/s]", "R [Ω]", "V [m³]", r"back\slash [\1]", r"\g<0> [\u00b0]",
@@ -89,32 +84,6 @@ def test_a_store_gives_a_name_of_every_printable_character_back(tmp_path):
         assert kept.name == name
 
 
-def test_figures_show_every_character_that_the_font_has():
-    shown = [plain(piece, 1000) for piece in PIECES[:25]]
-    texts = [text for text in shown if set(text) != {"?"}]
-
-    def draw(figure: Figure):
-        for k, text in enumerate(texts):
-            figure.text(0.0, k / len(texts), text)
-
-    svg = inline_svg(laid_out(draw, (8, 20)), "k", PRINTABLE)
-    for text in texts:
-        assert html.escape(text.replace(r"\$", "$"), quote=False) in svg
-
-
-@pytest.mark.parametrize("name", UNITS)
-def test_a_figure_shows_a_unit_as_it_is_written(name):
-    def draw(figure: Figure):
-        figure.subplots().set(ylabel=wrapped(name, 80), xlabel=plain(name))
-
-    svg = inline_svg(laid_out(draw, (4, 3)), "k", name)
-    assert svg.count(f">{html.escape(name, quote=False)}</text>") == 2
-
-
-def test_a_dollar_sign_at_the_end_of_a_line_is_no_formula():
-    assert wrapped("a" * 17 + "$ and $b", 18).split("\n")[0] == "a" * 17 + r"\$"
-
-
 def test_a_report_shows_names_and_units_as_they_are_written(tmp_path, fitted):
     name, unit = r"\1 {a} % $b$ x_{1}", r"$\g<0>$ [°CµΩ³]"
     record = cr.Record(*step_samples(), name=name, input_labels=[unit], output_labels=["." + unit])
@@ -125,19 +94,6 @@ def test_a_report_shows_names_and_units_as_they_are_written(tmp_path, fitted):
     assert text.count(name) >= 3  # heading, setting, call
     assert text.count(unit) >= 4  # setting, call, both axes of the record
     assert '"\\u00b0C\\u00b5\\u03a9\\u00b3"' in text  # for reading off values: JSON
-
-
-def test_the_command_line_takes_units_in_brackets_and_tags_with_dots(tmp_path):
-    t, u, y = step_samples()
-    path = tmp_path / r"Ofen \1 {2} % $3$ [°C].csv"
-    table = pd.DataFrame({"time [s]": t, "FIC101.OP [%]": u, r"TIC101.PV [°C] \u00b0": y})
-    table.to_csv(path, index=False)
-    words = ["identify", str(path), "--input", "1", "--response", "2", "-o", str(tmp_path / "out")]
-    assert main([*words, "--method", "scan", "--order", "1", "--max-delay", "40"]) == 0
-    assert (tmp_path / "out" / "report.html").stat().st_size > 10_000
-    model = cr.load_model(tmp_path / "out" / "model.json")
-    assert model.input_labels == ["FIC101_OP [%]"]
-    assert cr.read_record(path, input=1, output=2).input_labels == ("FIC101.OP [%]",)
 
 
 @pytest.mark.parametrize("method", ["output_error", "scan"])
@@ -152,17 +108,3 @@ def test_tags_with_dots_stay_with_the_record_and_are_allowed_in_the_model(method
     assert record.input_labels == ("FIC101.OP",)
     assert record.to_response().input_labels == ["FIC101.OP"]
     assert np.isfinite(ct.dcgain(system))
-
-
-def test_tags_that_differ_in_a_dot_alone_stay_apart_in_the_model():
-    core = ct.ss(0.5 * np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)), 0.1)
-    system = cr.delayed_ss(core, 1, inputs=["a.b", "a_b"], outputs=["y.1", "y.2"])
-    assert system.input_labels == ["a_b_2", "a_b"]
-    assert system["y_2", "a_b"].issiso()
-    frf = cr.MeasuredFRF(np.ones((2, 2, 3)), [1, 2, 3], name="run.1", inputs=["a.b", "a_b"])
-    assert (frf.name, frf.input_labels) == ("run_1", ["a_b_2", "a_b"])
-
-
-def test_any_name_makes_a_name_of_a_file(tmp_path):
-    for piece in PIECES[:300]:
-        (tmp_path / f"001_{file_name(piece)}.json").write_text("", encoding="utf-8")

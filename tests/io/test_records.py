@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import csv
-import errno
 import io
 import math
-import os
 import re
-import warnings
 
 import numpy as np
 import pandas as pd
@@ -22,13 +19,12 @@ from ctrl_realize.errors import (
     DataError,
     DataWarning,
     FileFormatError,
-    MissingFileError,
     OptionError,
     TimeAxisError,
 )
 from ctrl_realize.io import read_frf, read_record
 from ctrl_realize.io.text.csv_files import as_text, write_csv
-from ctrl_realize.io.units import is_units_line, split_unit, to_seconds
+from ctrl_realize.io.units import split_unit
 
 U = np.array([0.0, 0.0, 1.5, 1.5, -1.5])
 Y = np.array([10.25, 10.0, 9.75, 12.5, 12.0])
@@ -117,24 +113,6 @@ def test_the_encoding_does_not_matter(tmp_path, encoding):
     assert record.name == "größe"
 
 
-def test_the_encoding_can_be_said(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_bytes(table(header="t,u,y").encode("utf-32"))
-    check(read_record(file, encoding="utf-32"))
-    # Python has codecs that are no encodings of text
-    for encoding in ("klingon", "rot13", "zlib", "a\0b", 8):
-        with pytest.raises(OptionError, match=r"is not known|must be text"):
-            read_record(file, encoding=encoding)
-
-
-def test_names_of_columns_become_labels(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text(table(header="t,u.1,pressure [bar]"))
-    record = read_record(file, input=1)
-    assert record.input_labels == ("u.1",)
-    assert record.output_labels == ("pressure [bar]",)
-
-
 @pytest.mark.parametrize("choice", [{"input": "in", "output": "out"}, {"input": 2, "output": 1}])
 def test_columns_are_chosen_by_name_or_number(tmp_path, choice):
     file = tmp_path / "a.csv"
@@ -147,21 +125,6 @@ def test_a_file_without_time_takes_dt(tmp_path):
     file.write_text(table(columns=(U, Y)))
     check(read_record(file, dt=0.5))
     check(read_record(file, dt=0.5, input=0, output=1))
-
-
-def test_dt_takes_the_place_of_a_time_column(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text(table(header="t,u,y", columns=(np.round(T), U, Y)))
-    check(read_record(file, dt=0.5))
-
-
-def test_numbered_names_are_channels(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text(table(header="time_s,u1,u2,y[0],y[1]", columns=(T, U, -U, Y, 2 * Y)))
-    record = read_record(file)
-    check(record, input=[U, -U], output=[Y, 2 * Y])
-    assert record.input_labels == ("u1", "u2")
-    check(read_record(file, input="u2", output=["y[1]", "y[0]"]), input=-U, output=[2 * Y, Y])
 
 
 @pytest.mark.parametrize(
@@ -194,24 +157,6 @@ def test_dates_and_times_of_day_count_from_the_first_row(tmp_path, stamps):
     file.write_text("timestamp;u;y\n" + "".join(f"{stamp};1;2\n" for stamp in stamps))
     # nanoseconds are exact
     np.testing.assert_allclose(read_record(file).time, [0.0, 0.1, 0.2], rtol=0, atol=1e-15)
-
-
-def test_other_dates_need_their_format(tmp_path):
-    file = tmp_path / "a.csv"
-    rows = [f"03.02.2026 10:00:0{k},{k},{k}" for k in range(4)]
-    file.write_text("\n".join(["date time,u,y", *rows]) + "\n")
-    with pytest.raises(DataError, match=r"line 2: '03\.02\.2026 10:00:00'.*time_format="):
-        read_record(file)
-    with pytest.raises(OptionError, match="time_format='%' is no format"):
-        read_record(file, time_format="%")
-    assert_array_equal(read_record(file, time_format="%d.%m.%Y %H:%M:%S").time, np.arange(4.0))
-
-
-def test_nanoseconds_since_1970_keep_their_steps(tmp_path):
-    file = tmp_path / "a.csv"
-    start = 1_774_000_000_123_456_789
-    file.write_text("t_ns,u,y\n" + "".join(f"{start + 78_125 * k},{k},{k}\n" for k in range(50)))
-    np.testing.assert_allclose(read_record(file).time, 78_125e-9 * np.arange(50), rtol=3e-16)
 
 
 def test_jitter_is_refused_and_resampled_on_request(tmp_path):
@@ -248,30 +193,6 @@ def test_a_last_line_that_was_cut_is_left_out_with_a_warning(tmp_path, end):
     assert caught[0].filename == __file__
 
 
-@pytest.mark.parametrize("header", ["t,u,y\n", ""])
-def test_a_bad_first_row_is_no_header(tmp_path, header):
-    file = tmp_path / "a.csv"
-    file.write_text(header + "0,NaN,1\n" + "".join(f"{k},1,2\n" for k in range(1, 9)))
-    line = 2 if header else 1
-    with pytest.raises(DataError, match=f"line {line}: 'NaN': a value is missing"):
-        read_record(file)
-
-
-def test_a_short_last_number_is_kept_where_others_are_short_too(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text("t,u,y\n0,0,10.25\n0.5,0,10.0\n1,1.5,9.75\n1.5,1.5,12.5\n2,-1.5,12")
-    check(read_record(file))
-
-
-@pytest.mark.parametrize("last", ["2,-1.5,12.0000", "2,-1.5,12.0000\n", "2,-1.5,12.0000\n\n"])
-def test_a_whole_last_line_is_kept(tmp_path, last):
-    file = tmp_path / "a.csv"
-    file.write_text("t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n1.5,1.5,12.5000\n" + last)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check(read_record(file))
-
-
 BAD = {
     "text": ("1,1.5,high\n", DataError, r"column 'y', line 4: 'high': is not a number"),
     "NaN": ("1,1.5,NaN\n", DataError, r"column 'y', line 4: 'NaN': a value is missing"),
@@ -297,19 +218,6 @@ def test_a_bad_row_is_named(tmp_path, row, error, match):
     file.write_text("t,u,y\n0,0,1\n0.5,0,1\n" + row + "1.5,0,1\n2,0,1\n2.5,0,1\n3,0,1\n")
     with pytest.raises(error, match=match):
         read_record(file)
-
-
-def test_the_line_of_a_bad_cell_counts_comments_and_blank_lines(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text("# bench\n\nt,u,y\n0,0,1\n\n# restart\n1,0,bad\n2,0,1\n3,0,1\n4,0,1\n")
-    with pytest.raises(DataError, match="line 7: 'bad'"):
-        read_record(file)
-
-
-def test_a_bad_cell_in_a_column_that_is_not_used_does_no_harm(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text("t,u,y,z\n0,0,1,\n1,0,1,NaN\n2,0,1,x\n3,0,1,2\n")
-    assert read_record(file).n_samples == 4
 
 
 @pytest.mark.parametrize(
@@ -345,39 +253,6 @@ def test_what_is_not_clear_is_asked(tmp_path, text, kwargs, match):
     file.write_text(text + table(columns=(T, U, Y, Y)))
     with pytest.raises(OptionError, match=match):
         read_record(file, **kwargs)
-
-
-def test_a_header_that_does_not_fit_the_rows_is_named(tmp_path):
-    # decimal commas between commas: nobody can tell
-    file = tmp_path / "a.csv"
-    file.write_text("t,u,y\n0,0,1,5,2,5\n0,1,1,5,2,5\n0,2,1,5,2,5\n")
-    with pytest.raises(FileFormatError, match=r"line 1 .* has 3 cells, the lines below have 6"):
-        read_record(file)
-
-
-def test_a_mixture_of_decimal_signs_is_not_guessed(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text("t;u;y\n0.0;1,5;2\n0.1;1,5;2\n0.2;1,5;2\n")
-    with pytest.raises(DataError, match=r"line 2.*decimal="):
-        read_record(file)
-
-
-def test_rows_and_header_can_be_overruled(tmp_path):
-    file = tmp_path / "a.csv"
-    file.write_text("9,9,9\n1,2,3\n" + table())
-    check(read_record(file, skip_rows=2))
-    check(read_record(file, skip_rows=1, header=True, time=0, input=1, output=2))
-    with pytest.raises(TimeAxisError):
-        read_record(file)
-
-
-def test_a_missing_file_is_a_file_not_found_error(tmp_path):
-    # in the language of the user
-    said = re.escape(os.strerror(errno.ENOENT))
-    with pytest.raises(MissingFileError, match=rf"no\.csv' cannot be read: {said}"):
-        read_record(tmp_path / "no.csv")
-    with pytest.raises(FileNotFoundError):
-        read_record("no\0.csv")
 
 
 def test_missing_values_can_be_kept(tmp_path):
@@ -433,39 +308,6 @@ def test_a_clock_of_ticks_since_1970_is_not_taken_for_seconds(tmp_path, unit, ti
     assert read_record(file).dt == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("start", [46085.5, 739000.25], ids=["Excel", "datenum"])
-def test_dates_counted_in_days_are_not_taken_for_seconds(tmp_path, start):
-    file = tmp_path / "export.csv"
-    rows = [f"{start + k / 86400:.9f},0,{k}" for k in range(5)]
-    file.write_text("time,u,y\n" + "\n".join(rows) + "\n")
-    with pytest.raises(OptionError, match=r"looks like dates in days.*say time_unit='day'"):
-        read_record(file)
-    assert read_record(file, time_unit="day").dt == pytest.approx(1, rel=1e-4)  # nine decimals
-    file.write_text("time [days],u,y\n" + "\n".join(rows) + "\n")
-    assert read_record(file).dt == pytest.approx(1, rel=1e-4)
-
-
-def test_a_clock_of_seconds_may_show_what_a_day_count_shows(tmp_path):
-    file = tmp_path / "uptime.csv"
-    file.write_text("time,u,y\n" + "".join(f"{46085.5 + k / 1000:.3f},0,{k}\n" for k in range(50)))
-    assert read_record(file).dt == pytest.approx(1e-3)
-
-
-def test_a_clock_coarser_than_the_samples_is_told(tmp_path):
-    file = tmp_path / "logger.csv"
-    file.write_text("time,u,y\n" + "".join(f"{k // 10},0,{k}\n" for k in range(40)))
-    with pytest.raises(TimeAxisError, match="coarser than the samples, dt= takes its place"):
-        read_record(file)
-    assert read_record(file, dt=0.1).n_samples == 40
-
-
-def test_a_separator_of_thousands_is_told(tmp_path):
-    file = tmp_path / "big.csv"
-    file.write_text("Zeit;u;y\n" + "".join(f"{k},0;0,5;1.12{k},5\n" for k in range(5)))
-    with pytest.raises(DataError, match="without a separator of thousands"):
-        read_record(file)
-
-
 N = 12
 ENDS = ["\n", "\r\n", "\r", "\r\r\n"]
 
@@ -501,33 +343,6 @@ def test_no_sample_is_lost_whatever_the_line_ends_and_the_header(
     assert "".join(record.output_labels[0].split()) == "".join(header[2].split())
 
 
-def test_a_header_with_line_breaks_is_one_name(tmp_path):
-    path = tmp_path / "a.csv"
-    text = '"Time\n[s]","Valve\nposition\n[%]","Temp\r\n[°C]"\n'
-    path.write_text(text + "\n".join(",".join(row) for row in rows()), encoding="utf-8", newline="")
-    record = read_record(path, input="Valve position", output=2)
-    is_whole(record)
-    assert record.input_labels == ("Valve position [%]",)
-    assert record.output_labels == ("Temp [°C]",)
-
-
-def test_a_stray_quote_that_swallows_lines_is_told(tmp_path):
-    lines = [",".join([*row, "note"]) for row in rows()]
-    lines[4] = lines[4].replace("note", '"note')
-    path = tmp_path / "a.csv"
-    path.write_text("time_s,u,y,remark\n" + "\n".join(lines) + "\n")
-    with pytest.raises(FileFormatError, match=r"are its quotes|is not a table"):
-        read_record(path)
-
-
-@pytest.mark.parametrize("cell", ["00:05", "12:34.5"])
-def test_a_clock_of_two_numbers_is_asked_about(tmp_path, cell):
-    path = tmp_path / "a.csv"
-    path.write_text("time,u,y\n" + "".join(f"{cell},{k},{k}\n" for k in range(5)))
-    with pytest.raises(OptionError, match=r"line 2.*time_unit='h' or time_unit='min'"):
-        read_record(path)
-
-
 @pytest.mark.parametrize(
     ("header", "unit", "cells", "dt"),
     [
@@ -544,49 +359,6 @@ def test_a_clock_runs_in_the_unit_that_was_said(tmp_path, header, unit, cells, d
     path.write_text(f"{header},u,y\n" + "".join(f"{cell},{k},1\n" for k, cell in enumerate(cells)))
     record = read_record(path, time_unit=unit)
     assert record.dt == pytest.approx(dt, rel=1e-12)
-
-
-def test_a_clock_of_two_numbers_and_of_three_is_refused(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("time,u,y\n59:58,0,1\n59:59,0,1\n1:00:00,0,1\n1:00:01,0,1\n")
-    with pytest.raises(DataError, match="of two numbers and of three"):
-        read_record(path, time_unit="min")
-
-
-@pytest.mark.parametrize(
-    ("delimiter", "cells"),
-    [
-        (",", ["1,234", "2,345", "3,456"]),
-        (",", ["999", "1,001", "1,003"]),
-        (";", ["998", "999", "1,000"]),
-        ("\t", ["998", "999", "1,000"]),
-    ],
-)
-def test_commas_that_may_divide_thousands_are_asked_about(tmp_path, delimiter, cells):
-    path = tmp_path / "a.csv"
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file, delimiter=delimiter)
-        writer.writerows([["time_s", "u", "y"], *([k, k, c] for k, c in enumerate(cells))])
-    with pytest.raises(FileFormatError, match=r"may be \d\.\d{3} or \d{4}; say decimal"):
-        read_record(path)
-    assert read_record(path, decimal=",").output[2] == float(cells[2].replace(",", "."))
-
-
-@pytest.mark.parametrize("cells", [["1,234", "2,345", "0,456"], ["1,25", "2,345", "3,4"]])
-def test_commas_that_can_only_mark_decimals_do(tmp_path, cells):
-    path = tmp_path / "a.csv"
-    for delimiter in (";", ","):
-        with path.open("w", newline="") as file:
-            writer = csv.writer(file, delimiter=delimiter)
-            writer.writerows([["time_s", "u", "y"], *([k, k, c] for k, c in enumerate(cells))])
-        read = read_record(path).output
-        np.testing.assert_array_equal(read, [float(c.replace(",", ".")) for c in cells])
-
-
-def test_decimals_of_a_fixed_number_are_decimals(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("time_s;u;y\n" + "".join(f"{k};{k};{k + 1},125\n" for k in range(N)))
-    np.testing.assert_array_equal(read_record(path).output, np.arange(N) + 1.125)
 
 
 FORMULA_SIGNS = "=+-@\t\r\n\uff1d\uff0b\uff0d\uff20"
@@ -608,11 +380,6 @@ def test_no_cell_of_a_spreadsheet_begins_as_a_formula(name):
         assert cell[:1] not in tuple(FORMULA_SIGNS)
 
 
-@given(st.text(st.sampled_from([*FORMULA_SIGNS, "'", ";", '"', ",", "a", " "]), max_size=8))
-def test_a_name_is_got_back_by_leaving_out_one_apostrophe(name):
-    assert plain(as_text(name)) == name
-
-
 def test_names_and_numbers_are_read_as_they_were_written(tmp_path):
     values = np.resize([0.1, 1 / 3, -5e-324, 1e300, np.inf, np.nan], len(NAMES))
     table = pd.DataFrame({"delay": values}, index=pd.Index(NAMES, name="record"))
@@ -620,19 +387,6 @@ def test_names_and_numbers_are_read_as_they_were_written(tmp_path):
     again = pd.read_csv(tmp_path / "a.csv", keep_default_na=False, na_values={"delay": [""]})
     assert [plain(name) for name in again["record"]] == NAMES
     np.testing.assert_array_equal(again["delay"], values)
-
-
-def test_ordinary_tables_are_those_of_pandas(tmp_path):
-    table = pd.DataFrame(
-        {"gain": [1.5, -2.0, np.nan], "trusted": [True, False, True], "error": ["", "a, b", "c"]}
-    )
-    write_csv(tmp_path / "a.csv", table, index=False)
-    assert (tmp_path / "a.csv").read_bytes() == table.to_csv(index=False).encode()
-
-
-def test_names_of_columns_are_no_formulas_either(tmp_path):
-    write_csv(tmp_path / "a.csv", pd.DataFrame({"=1+1": [1]}), index=False)
-    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == "'=1+1\n1\n"
 
 
 @pytest.mark.parametrize(
@@ -657,33 +411,6 @@ def test_names_of_columns_are_no_formulas_either(tmp_path):
 )
 def test_a_name_splits_into_what_and_unit(name, parts):
     assert split_unit(name) == parts
-
-
-@pytest.mark.parametrize(
-    ("cells", "answer"),
-    [
-        (["s", "mA", "V"], True),
-        (["[s]", "[bar]", ""], True),
-        (["(sec)", "(1)", "(mm)"], True),
-        (["time", "u", "y"], False),
-        (["", "", ""], False),
-    ],
-)
-def test_a_line_of_units_is_known_by_a_unit_or_by_brackets(cells, answer):
-    assert is_units_line(cells) is answer
-
-
-@pytest.mark.parametrize(
-    ("unit", "seconds"),
-    [("s", 7.0), ("ms", 7e-3), ("µs", 7e-6), ("ns", 7e-9), ("min", 420.0), ("Hours", 25200.0)],
-)
-def test_scaled_time_is_the_double_nearest_to_the_decimal_number(unit, seconds):
-    assert to_seconds(np.array([7.0]), unit)[0] == seconds
-
-
-def test_an_unknown_unit_of_time_is_named_with_those_that_are_known():
-    with pytest.raises(OptionError, match=r"'ticks'.*ms.*min"):
-        to_seconds(np.arange(3.0), "ticks")
 
 
 def test_every_measured_record_in_text_is_read_to_the_last_bit(shared_data):
@@ -712,14 +439,3 @@ def test_every_measured_frequency_response_is_read(shared_data):
         turns = (np.angle(frf.frdata[0, 0], deg=True) - phase) / 360
         # angle() and exp() round, and 2160 degrees cost three digits
         np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("name", "dt", "samples"),
-    [("motor_bench_multisine.npz", 0.0004, 50_000), ("tue_load_500k.npz", 0.00025, 500_000)],
-)
-def test_long_records_in_npz_are_read(shared_data, name, dt, samples):
-    record = read_record(shared_data / name)
-    assert (record.dt, record.n_samples) == (dt, samples)
-    with np.load(shared_data / name) as arrays:
-        assert_array_equal(record.output, arrays["y"])

@@ -8,12 +8,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize import plots
-from ctrl_realize.errors import DataError, OptionError
-from ctrl_realize.identification.validation.delay_estimates_result import DelayEstimate
+from ctrl_realize.errors import OptionError
 from ctrl_realize.plots import style
 from tests import rigs
 
@@ -124,33 +123,6 @@ def test_plots_draw_into_what_they_are_given_and_make_no_figure_of_their_own(eve
     assert plt.get_fignums() == []
 
 
-def test_plots_leave_the_settings_of_matplotlib_as_they_were(every):
-    before = dict(mpl.rcParams)
-    for _, draw, _ in every:
-        draw(Figure())
-    assert dict(mpl.rcParams) == before
-
-
-def test_a_wrong_number_of_axes_is_refused(record):
-    with pytest.raises(OptionError, match="needs 2"):
-        plots.record_plot(record, ax=Figure().subplots())
-    with pytest.raises(OptionError, match="needs 2"):
-        plots.record_plot(record, ax=["upper", "lower"])
-
-
-def test_what_has_no_picture_is_named():
-    with pytest.raises(OptionError, match="no picture of a dict"):
-        plots.draw({})
-
-
-def test_the_delay_plot_shows_the_misfit_and_its_minimum(scanned):
-    drawn = plots.delay_plot(scanned, ax=Figure())
-    curve = drawn.lines[0, 0][0]
-    assert_array_equal(curve.get_ydata(), scanned.fit.iae)
-    point = drawn.axes[0, 0].get_lines()[1]
-    assert list(point.get_xdata()) == [scanned.fit.delay]
-
-
 def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
     # 30 points in three decades: the phase turns by many times between neighbours.
     model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.25, dt=7.8125e-4)
@@ -166,24 +138,6 @@ def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
         assert_allclose(phase, exact, atol=8.0)
 
 
-def test_noise_outside_the_coherent_band_does_not_choose_the_axis(measured):
-    wild = np.array(measured.frdata[0, 0])
-    wild[-5:] = 1e6
-    noisy = cr.MeasuredFRF(wild, measured.frequency_hz, coherence=measured.coherence)
-    top = plots.frf_plot(noisy, ax=Figure()).axes[0, 0].get_ylim()[1]
-    assert top < 0  # the valve's gain is -18 dB at most
-
-
-def test_measured_and_model_have_the_same_colours_everywhere(record, scanned, measured):
-    for drawn in (
-        plots.step_plot(record, scanned, ax=Figure()),
-        plots.impulse_plot(scanned.fit.impulse, scanned, ax=Figure()),
-        plots.frf_plot([measured, scanned], ax=Figure()),
-    ):
-        colours = [line.get_color() for line in drawn.lines[0, 0]]
-        assert colours == [style.MEASURED, style.MODEL]
-
-
 def test_records_of_any_input_are_drawn_one_after_the_other_and_steps_as_their_mean():
     rng = np.random.default_rng(0)
     plant = cr.delayed_ss(ct.ss(ct.tf([1], [0.2, 1])), dead_time=0.3, dt=0.05)
@@ -196,24 +150,6 @@ def test_records_of_any_input_are_drawn_one_after_the_other_and_steps_as_their_m
     for records, label in ((moving, "measured"), (steps, "mean of 2 records")):
         drawn = plots.fit_plot(cr.fit_output_error(records, structures=[(1, 1)]))
         assert drawn.lines[0, 0][0].get_label() == label
-
-
-def test_a_fitted_response_looks_like_a_model():
-    f = np.geomspace(0.1, 20, 40)
-    s = 2j * np.pi * f
-    fit = cr.fit_frf(cr.MeasuredFRF(2 * np.exp(-0.03 * s) / (0.08 * s + 1), f), 1).fit
-    measured, fitted = fit.plot().lines[0, 0]
-    assert (measured.get_color(), fitted.get_color()) == (plots.style.MEASURED, plots.style.MODEL)
-    assert fitted.get_linestyle() != "-"
-
-
-def test_what_a_plot_is_not_made_for_is_told_with_what_it_needs(record, scanned):
-    with pytest.raises(DataError, match="got a DelayedStateSpace; needed is a Record"):
-        plots.record_plot(scanned)
-    with pytest.raises(DataError, match="needed is an ImpulseResponse first"):
-        plots.impulse_plot(scanned)
-    with pytest.raises(DataError, match=r"such as design\.margins\(plant, controller\)"):
-        plots.margins_plot(scanned)
 
 
 @pytest.fixture(autouse=True)
@@ -240,43 +176,6 @@ def test_the_style_holds_inside_and_the_users_settings_are_back_behind():
     assert dict(mpl.rcParams) == before
 
 
-def test_the_users_settings_are_back_after_an_error():
-    before = dict(mpl.rcParams)
-    with pytest.raises(ZeroDivisionError), style.canvas(None, title="never"):
-        raise ZeroDivisionError
-    assert dict(mpl.rcParams) == before
-
-
-def test_a_figure_of_the_user_after_a_plot_looks_as_before_it(comparison):
-    mpl.rcParams.update({"lines.linewidth": 0.7, "axes.labelsize": 5.0})
-    comparison.plot()
-    axes = plt.figure().subplots()
-    (line,) = axes.plot([0, 1])
-    axes.set_xlabel("mine")
-    assert line.get_linewidth() == 0.7
-    assert axes.xaxis.label.get_size() == 5.0
-    assert axes.spines["top"].get_visible()
-
-
-def test_a_title_is_put_on_new_figures_only():
-    # The title of a figure that the user made is the user's.
-    for ax, title, shown in (
-        (None, None, "usual"),
-        (None, "mine", "mine"),
-        (None, "", ""),
-        (Figure(), "mine", ""),
-        (Figure().subplots(), "mine", ""),
-    ):
-        with style.canvas(ax, title=title, default_title="usual") as (axes,):
-            pass
-        assert axes.get_title(loc="left") == shown
-
-
-def test_any_plot_can_be_drawn_without_its_title(comparison):
-    assert comparison.plot().axes[0, 0].get_title(loc="left") == "Tuning rules on this plant"
-    assert comparison.plot(title="").axes[0, 0].get_title(loc="left") == ""
-
-
 PLANT = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
 
 
@@ -299,27 +198,3 @@ def test_residual_plot_shows_data_model_and_correlations(random_record):
     assert drawn.axes[0, 0].get_ylabel() == "level"
     with pytest.raises(OptionError, match="output"):
         plots.residual_plot(check, output=1)
-
-
-@pytest.mark.parametrize("agree", [True, False])
-def test_delay_check_plot_has_a_bar_for_each_view(agree):
-    views = (
-        DelayEstimate("output error", "record", "dead time", 0.02, 0.01, 0.03),
-        DelayEstimate("phase slope", "FRF", "upper bound", 0.05, 0.04, 0.06),
-    )
-    check = cr.validation.DelayComparison(views, agree, (0.01, 0.03) if agree else None, (), 0.001)
-    drawn = check.plot()
-    assert len(drawn.lines[0, 0]) == 2
-    names = [label.get_text() for label in drawn.axes[0, 0].get_yticklabels()]
-    assert names == ["phase slope\n(FRF)", "output error\n(record)"]
-    assert (drawn.axes[0, 0].get_legend() is not None) == agree
-
-
-def test_an_estimate_is_drawn_in_its_band(random_record):
-    estimate = cr.impulse_from_io(random_record, 40)
-    drawn = estimate.plot()
-    assert isinstance(drawn, ct.ControlPlot)
-    (band,) = drawn.axes[0, 0].collections
-    vertices = band.get_paths()[0].vertices
-    top = (estimate.density + 2 * estimate.std / estimate.dt).max()
-    assert_allclose(vertices[:, 1].max(), top)

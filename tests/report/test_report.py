@@ -7,7 +7,6 @@ import hashlib
 import re
 from html.parser import HTMLParser
 
-import control as ct
 import numpy as np
 import pytest
 
@@ -15,7 +14,6 @@ import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize._wording import interval_in_time
 from ctrl_realize.report.provenance import record_sha256
-from ctrl_realize.report.sketches import identification_sketches
 from ctrl_realize.report.verdict import comparison_verdict, verdict_of
 
 HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(2)>$\\frac{'
@@ -125,44 +123,6 @@ def test_the_verdict_comes_first_with_dead_time_and_interval(page, fitted):
     assert text.index("simulated data") < verdict
 
 
-def test_every_flag_of_the_fit_is_a_reason(tmp_path, record):
-    scan = cr.identify(record, method="scan", order=6, max_delay=60)
-    assert scan.fit.flags
-    path = report.write_identification(tmp_path / "r.html", scan, record)
-    text = parsed(path).text
-    for flag in scan.fit.flags:
-        assert flag.message[1:] in text
-
-
-def test_a_report_tells_data_checksum_settings_versions_and_call(page):
-    text = parsed(page).text
-    digest = hashlib.sha256(b"time,u,y\n").hexdigest()
-    for said in (digest, "data.csv", "output_error", "0.10.2", "sys = cr.identify(record)"):
-        assert said in text
-
-
-def test_figures_of_a_report_are_all_there_and_ids_are_unique(page):
-    tags = parsed(page)
-    figures = [attributes for tag, attributes in tags.seen if tag == "figure"]
-    pictures = [attributes for tag, attributes in tags.seen if tag == "svg"]
-    assert len(figures) == len(pictures) == 5
-    ids = [attributes["id"] for _, attributes in tags.seen if "id" in attributes]
-    assert len(ids) == len(set(ids))
-
-
-def test_a_report_of_several_channels_draws_every_output(tmp_path):
-    core = ct.ss([[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], np.zeros((2, 2)), 0.1)
-    u, noise = np.random.default_rng(0).standard_normal((2, 2, 300))
-    y = cr.DelayedStateSpace(core, (2, 5)).simulate(u) + 0.1 * noise
-    record = cr.Record(0.1 * np.arange(300), u, y, output_labels=["level", "heat"])
-    system = cr.fit_state_space(record, 2)
-    path = report.write_identification(tmp_path / "r.html", system, record)
-    text = path.read_text(encoding="utf-8")
-    assert "The output level" in text
-    assert "The output heat" in text
-    assert "state-space fit of all channels" in text
-
-
 def test_hostile_names_stay_text(tmp_path, record, fitted):
     hostile = cr.Record(
         record.time, record.input, record.output, name=HOSTILE, input_labels=[HOSTILE],
@@ -182,15 +142,6 @@ def test_hostile_names_stay_text(tmp_path, record, fitted):
     assert "<script>alert(1)</script>" in tags.text  # said, not done
 
 
-def test_names_in_a_report_steer_no_terminal_and_turn_no_line(tmp_path, record, fitted):
-    strange = "a\x1b[31mb\0c\x9b\u202egnp.exe"
-    named = cr.Record(record.time, record.input, record.output, name=strange)
-    path = report.write_identification(tmp_path / "r.html", fitted, named)
-    text = path.read_text(encoding="utf-8")
-    assert not set(text) & set("\x1b\0\x9b\u202e")
-    assert "a\ufffd[31mb\ufffdc\ufffd\ufffdgnp.exe" in text
-
-
 def test_a_report_that_fails_leaves_the_old_one(tmp_path, record, fitted, monkeypatch):
     path = tmp_path / "r.html"
     path.write_text("old", encoding="utf-8")
@@ -199,15 +150,6 @@ def test_a_report_that_fails_leaves_the_old_one(tmp_path, record, fitted, monkey
         report.write_identification(path, fitted, record)
     assert path.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_an_edge_among_many_is_not_shown_as_a_step(valve):
-    rng = np.random.default_rng(2)
-    switching = valve.record(4 + 8 * np.repeat(rng.integers(0, 2, 40), 90), rng=1, name="prbs")
-    system = cr.fit_output_error(switching, structures=[(3, 3)])
-    assert np.isnan(system.fit.onset)
-    names = [sketch.key for sketch in identification_sketches(system, switching)]
-    assert names == ["fit", "record", "frf"]
 
 
 def test_a_campaign_report_lists_every_record_and_names_the_failed(tmp_path, valve):
@@ -244,18 +186,3 @@ def test_the_level_of_trust_follows_the_flags(record):
     bad = verdict_of(system, [cr.results.Flag("delay_at_bound", "try a larger one")])
     assert bad.level == "poor"
     assert bad.reasons == ("Try a larger one.",)
-
-
-def test_a_scan_is_never_trusted_without_a_remark(record):
-    scanned = cr.identify(record, method="scan")
-    assert not scanned.fit.flags  # an easy record
-    verdict = verdict_of(scanned)
-    assert verdict.level == "caution"
-    assert verdict.reasons[0].startswith("The dead time is the delay with the smallest IAE")
-
-
-def test_the_checksum_of_a_record_is_that_of_its_samples(record):
-    other = cr.Record(record.time, record.input, record.output + 1e-12, name=record.name)
-    assert record_sha256(other) != record_sha256(record)
-    renamed = cr.Record(record.time, record.input, record.output, name="other")
-    assert record_sha256(renamed) == record_sha256(record)

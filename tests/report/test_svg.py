@@ -39,21 +39,6 @@ def test_a_drawn_figure_is_well_formed_and_has_its_own_ids():
     assert used <= ids[0]
 
 
-def test_colours_are_variables_of_the_page():
-    svg = drawn(line, "k", (4, 3), "d")
-    assert "var(--measured)" in svg
-    assert "var(--ink)" in svg
-    assert style.INK not in svg
-
-
-def test_text_in_figures_is_escaped_and_not_rounded():
-    svg = drawn(line, "k", (4, 3), 'a "b" <c>')
-    assert "<script" not in svg
-    assert "&lt;script&gt;" in svg
-    assert "0.123456789" in svg
-    assert 'aria-label="a &quot;b&quot; &lt;c&gt;"' in svg
-
-
 def test_a_figure_says_where_its_axes_are_and_what_they_show():
     def draw(figure):
         upper, lower = figure.subplots(2, 1, sharex=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import gc
 import os
 import pickle
 import signal
@@ -17,7 +16,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError
 from ctrl_realize.identification.campaign.packed_model import PackedModel
 from ctrl_realize.identification.campaign.rows import fingerprint
 from tests.rigs import TS, step_record
@@ -39,14 +37,6 @@ def records() -> list[cr.Record]:
 @pytest.fixture(scope="module")
 def campaign(records) -> cr.Campaign:
     return cr.identify_campaign(records, method="paper")
-
-
-def test_every_record_is_a_row_in_order(campaign, records):
-    table = campaign.table()
-    assert list(table.index) == [record.name for record in records]
-    assert_allclose(table["amplitude"], [4.0] * 4 + [16.0] * 4, rtol=0.01)
-    assert_array_equal(table["delay"], campaign.delays)
-    assert_allclose(table["dead_time"], campaign.delays * TS)
 
 
 def test_serial_and_parallel_give_the_same_bits(campaign, records):
@@ -74,21 +64,6 @@ def test_a_bad_record_is_a_row_with_its_error(records):
     assert "flat" in mixed.report()
 
 
-def test_a_file_that_cannot_be_read_is_a_row_with_its_name(records, tmp_path):
-    missing = functools.partial(cr.read_record, tmp_path / "gone.csv")
-    mixed = cr.identify_campaign([records[0], missing], method="paper", n_jobs=2)
-    assert "gone.csv" in mixed.rows[1].name
-    assert "MissingFileError" in mixed.rows[1].error
-
-
-def test_records_of_different_sample_times_have_no_common_delay(records):
-    slow = cr.Record(records[0].time * 2, records[0].input, records[0].output, name="slow")
-    mixed = cr.identify_campaign([records[0], slow], method="paper")
-    with pytest.raises(DataError, match="sample times from"):
-        mixed.statistics()
-    assert mixed.table()["dead_time"].notna().all()
-
-
 def test_a_delay_that_grows_with_the_step_raises_the_alarm():
     slow = [
         named(step_record(noise=1e-3, seed=s, amplitude=a, delay=37 + 2 * a), f"{a:g}_{s}")
@@ -98,21 +73,6 @@ def test_a_delay_that_grows_with_the_step_raises_the_alarm():
     flags = cr.identify_campaign(slow, method="scan", order=3, max_delay=120).flags
     assert [flag.code for flag in flags] == ["amplitude_trend"]
     assert "longer for larger steps" in str(flags[0])
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "match"),
-    [
-        (lambda: cr.identify_campaign([]), DataError, "no records"),
-        (lambda: cr.identify_campaign(["a.csv"]), DataError, "records.0. is a str"),
-        (lambda: cr.identify_campaign([step_record()], ordr=3), OptionError, "ordr"),
-        (lambda: cr.identify_campaign([step_record()], n_jobs=0), OptionError, "n_jobs=0"),
-        (lambda: cr.identify_campaign([step_record()], method="x"), OptionError, "choose one of"),
-    ],
-)
-def test_unusable_arguments_are_refused(make, error, match):
-    with pytest.raises(error, match=match):
-        make()
 
 
 def test_table_1_gives_the_papers_37_and_2():
@@ -144,27 +104,6 @@ TIME = DT * np.arange(200)
 def record(name="", step=-4.0, offset=0.0, **labels):
     moved = step * (np.arange(200) >= 60)
     return cr.Record(TIME, moved, offset + 2 * moved, name=name, **labels)
-
-
-def test_the_key_of_a_row_depends_on_samples_labels_method_and_options_alone():
-    one = record("a", offset=0.5)
-    assert fingerprint(record("b", offset=0.5), "scan", {}) == fingerprint(one, "scan", {})
-    later = cr.Record(TIME + 1, one.input, one.output)
-    other = cr.Record(TIME, one.input, one.output, output_labels=["level"])
-    keys = [
-        fingerprint(one, "scan", {}),
-        fingerprint(one, "paper", {}),
-        fingerprint(one, "scan", {"order": 2}),
-        fingerprint(one, "scan", {"order": 3}),
-        fingerprint(record(), "scan", {}),
-        fingerprint(record(step=-4 - 1e-15, offset=0.5), "scan", {}),
-        fingerprint(later, "scan", {}),
-        fingerprint(other, "scan", {}),
-        fingerprint(record(offset=0.5, input_labels=["valve"]), "scan", {}),
-    ]
-    assert len(set(keys)) == len(keys)
-    ways = [{"order": 2, "samples": 9}, {"samples": 9, "order": 2}]
-    assert len({fingerprint(one, "scan", way) for way in ways}) == 1
 
 
 @pytest.mark.parametrize(
@@ -228,15 +167,6 @@ def kept(tmp_path_factory):
     record = cr.Record(made.time, made.input, made.output, name="r")
     store = cr.io.CampaignStore(tmp_path_factory.mktemp("store"))
     return cr.identify_campaign([record], method="paper", store=store)
-
-
-def test_a_campaign_with_a_store_holds_no_augmented_matrix(kept):
-    gc.collect()
-    before = sum(type(thing) is cr.DelayedStateSpace for thing in gc.get_objects())
-    twin = pickle.loads(pickle.dumps(kept.rows))
-    after = sum(type(thing) is cr.DelayedStateSpace for thing in gc.get_objects())
-    assert after == before
-    assert twin[0].system.nstates > 30
 
 
 distributed = pytest.importorskip("distributed", reason="dask[distributed] is not installed")

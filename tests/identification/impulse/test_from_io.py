@@ -14,7 +14,6 @@ from ctrl_realize.errors import DataError
 from ctrl_realize.identification.impulse.regression import (
     OKID_ORDERS,
     through_arx,
-    with_prior,
     without_prior,
 )
 from tests.rigs import DT, TWO_STATES
@@ -62,32 +61,6 @@ def test_std_of_least_squares_is_the_cramer_rao_bound():
     assert_allclose(np.mean(scatter / bound), 1.0, rtol=0, atol=0.03)
 
 
-def test_a_prior_of_decay_beats_least_squares():
-    truth = TWO_STATES.markov(60)
-
-    def error(**options):
-        return np.mean(
-            [
-                np.sum(
-                    (cr.impulse_from_io(record(n=300, seed=s), 60, **options).markov - truth) ** 2
-                )
-                for s in range(10)
-            ]
-        )
-
-    free = error(method="least_squares")
-    assert error(kernel="TC") < free / 2
-    assert error(kernel="DC") < free / 2
-    assert error(kernel="SS") < free / 2
-
-
-@pytest.mark.parametrize("arx_order", [None, 12])
-def test_okid_of_exact_data_is_one_of_the_models_that_explain_them(arx_order):
-    g = cr.impulse_from_io(record(noise=0.0, n=800), 80, method="okid", arx_order=arx_order)
-    # a ridge of 1e-9 on sums over 800 samples
-    assert_allclose(g.markov, TWO_STATES.markov(80), rtol=0, atol=1e-5)
-
-
 def test_missing_samples_take_out_the_equations_that_they_touch():
     whole = record()
     y = whole.output.copy()
@@ -99,27 +72,6 @@ def test_missing_samples_take_out_the_equations_that_they_touch():
     # rows 39...599, less 3 outputs, less the 40 rows that see u[400]
     assert g.rows == 561 - 3 - 40
     assert np.all(np.abs(g.markov - TWO_STATES.markov(40)) < 4.5 * g.std)
-
-
-@pytest.mark.parametrize(
-    "work",
-    [
-        cr.detect_step,
-        cr.unit_step,
-        cr.fit_output_error,
-        cr.spectral_frf,
-        lambda holes: cr.stepped_sine_frf([holes]),
-        cr.validation.compare_delay_estimates,
-        lambda holes: cr.validation.analyse_residuals(TWO_STATES, holes),
-        lambda holes: cr.validation.predict(TWO_STATES, holes, 1),
-        lambda holes: cr.DelayTracker(TWO_STATES, max_delay=20, forgetting_time=10.0).track(holes),
-    ],
-)
-def test_what_needs_every_sample_says_that_some_are_missing(work):
-    y = record().output.copy()
-    y[7] = np.nan
-    with pytest.raises(DataError, match="1 of this record are missing"):
-        work(cr.Record(record().time, record().input, y, missing="keep"))
 
 
 @pytest.mark.parametrize("options", METHODS)
@@ -235,31 +187,6 @@ def test_without_a_prior_it_is_least_squares_with_a_free_level(m, p):
     assert (found.rows, found.method, found.flags) == (77, "least squares", ())
 
 
-def test_at_rest_the_past_is_the_first_sample():
-    one = series(n=40)
-    u, y = (np.concatenate([np.full((1, 3), z[0, 0]), z], axis=1) for z in (one.input, one.output))
-    longer = cr.Record(STEP * np.arange(43), u, y)
-    found, known = without_prior((one,), 4, "rest"), without_prior((longer,), 4, "unknown")
-    assert found.rows == 40
-    assert_allclose(found.markov, known.markov, rtol=0, atol=1e-12)
-    assert_allclose(found.std, known.std, rtol=1e-10)
-
-
-def test_records_join_with_a_level_each_and_short_ones_without_a_past_say_nothing():
-    one, other = series(seed=1), series(seed=2, level=-300.0)
-    short = series(n=3, seed=3)
-    found = without_prior((one, short, other), 4, "unknown")
-    (X, y), (Z, z) = tall(one, 3, 4), tall(other, 3, 4)
-    split = np.zeros((154, 6))
-    split[:77, [0, 2, 3, 4, 5]], split[77:, [1, 2, 3, 4, 5]] = X, Z
-    theta, std, _ = plain(split, np.concatenate([y, z], axis=1))
-    assert_allclose(found.markov[0, 0], theta[2:, 0], rtol=0, atol=1e-11)
-    assert_allclose(found.std[0, 0], std[2:, 0], rtol=1e-9)
-    # a record of four samples has one row, which its own level takes
-    four = series(n=4, seed=3)
-    assert without_prior((one, four, other), 4, "unknown").rows == found.rows + 1
-
-
 @pytest.mark.parametrize("follows", [0.0, 0.1])
 def test_silence_is_the_f_test_at_one_per_cent(follows):
     flagged, chances = [], []
@@ -274,31 +201,6 @@ def test_silence_is_the_f_test_at_one_per_cent(follows):
     assert flagged == [chance > 0.01 for chance in chances]
     assert sum(flagged) > 0
     assert (sum(flagged) < 55) == (follows > 0)
-
-
-def test_under_a_prior_every_output_is_estimated_by_itself():
-    one = series(n=120, m=2, p=2)
-    both = with_prior((one,), 8, "unknown", ("TC", "SS"))
-    alone = [
-        with_prior((cr.Record(one.time, one.input, one.output[[a]]),), 8, "unknown", (kernel,))
-        for a, kernel in enumerate(("TC", "SS"))
-    ]
-    for a in range(2):
-        assert_allclose(both.markov[a], alone[a].markov[0], rtol=0, atol=1e-12)
-        assert_allclose(both.std[a], alone[a].std[0], rtol=1e-9)
-        assert_allclose(both.noise_std[a], alone[a].noise_std[0], rtol=1e-9)
-    assert both.kernels == ("TC", "SS")
-    assert both.method.startswith("TC, SS kernel, ")
-    counts = [
-        float(count) for count in both.method.split("kernel, ")[1].split(" free")[0].split(",")
-    ]
-    assert len(counts) == 2
-    # no more than the data have to decide on, no fewer than the four that are not zero
-    assert all(3.5 <= count <= 16 for count in counts)
-    same = with_prior((one,), 8, "unknown", ("TC", "TC"))
-    assert same.method.startswith("TC kernel, ")
-    # noise of 0.3, known to 1 / sqrt(2 * 100) of it, 3 times
-    assert_allclose(both.noise_std, 0.3, rtol=0.25)
 
 
 @pytest.mark.parametrize(("m", "p"), [(1, 1), (2, 2)])

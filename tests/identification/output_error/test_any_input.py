@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.errors import DataError
 from tests.rigs import R1, R3, lag, pair
 
 DT = 0.01
@@ -37,27 +37,6 @@ def test_the_dead_time_is_found_from_operation_with_unknown_start(kind, plant):
     assert fit.std_given_structure / DT < 0.2
     assert fit.interval[0] <= DELAY * DT <= fit.interval[1]
     assert fit.structure == ((1, 1) if plant is R1 else (3, 3))
-
-
-def test_an_input_that_never_holds_is_no_step(shared_data):
-    # the first half of this record has moves that pass for one edge
-    table = np.loadtxt(shared_data / "exchanger" / "record.csv", delimiter=",", skiprows=1)
-    whole = cr.Record(*table.T)
-    first, second = whole.between(0, 2000), whole.between(2001, 4000)
-    model = cr.fit_output_error(first)
-    assert np.isnan(model.fit.onset)
-    assert model.fit.dead_time <= 1.0  # s, one sample: the delay is 0
-    assert cr.validation.analyse_residuals(model, second).fit_percent[0] > 35
-
-
-@pytest.mark.parametrize(("plant", "structure"), [(pair(1.5, 0.05), (2, 2)), (lag(0.05), (1, 1))])
-def test_what_was_before_the_record_may_ring_or_creep_through_all_of_it(plant, structure):
-    # decay times of 2.1 s and 3.2 s, in a record of 12 s that starts in the middle of motion
-    fit = cr.fit_output_error(cut_from_operation("prbs", plant, seed=2)).fit
-    assert fit.structure == structure
-    assert abs(fit.dead_time / DT - DELAY) < 4 * fit.std_given_structure / DT
-    assert fit.std_given_structure / DT < 0.06
-    assert fit.measured.shape == fit.fitted.shape == fit.time.shape
 
 
 def test_an_output_that_does_not_follow_the_input_gets_no_answer():
@@ -254,18 +233,6 @@ def test_error_and_standard_error_are_those_of_the_bound(values):
     assert np.sum((np.array(errors) / limits) ** 2) < 18.5
 
 
-def test_several_records_find_the_structure_that_made_them():
-    values = (DELAY, 2.5, 2.0, 5.0, 0.5)
-    records = [operation("prbs", seed, 400, values)[0] for seed in range(3)]
-    sys = cr.identify(records)
-    assert sys.fit.structure == (3, 3)
-    assert sys.fit.interval[0] <= DELAY * DT <= sys.fit.interval[1]
-    assert sys.fit.gain == pytest.approx(2.5, abs=0.02)
-    assert sys.fit.fitted.size == sys.fit.measured.size < 1200
-    assert np.all(np.diff(sys.fit.time) > 0)
-    assert "records" in sys.fit.report()
-
-
 def test_steps_and_random_inputs_go_together():
     values = (DELAY, 1.0, 2.0)
     random, _ = operation("prbs", 1, 400, values)
@@ -278,12 +245,3 @@ def test_steps_and_random_inputs_go_together():
     assert abs(fit.delay - DELAY) < 4 * fit.std_given_structure / DT
     assert fit.repeatability.p_value > 0.01
     assert fit.repeatability.amplitudes.tolist() == [2.0, 2.0]
-
-
-def test_records_that_do_not_go_together_are_refused():
-    one, _ = operation("prbs", 1, 300, (DELAY, 1.0, 2.0))
-    slow = cr.Record(2 * one.time, one.input, one.output)
-    with pytest.raises(DataError, match="one sample time"):
-        cr.fit_output_error([one, slow])
-    with pytest.raises(OptionError, match="takes one record"):
-        cr.identify([one, one], method="scan")

@@ -9,7 +9,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import pytest
 
 import ctrl_realize as cr
 
@@ -54,13 +53,6 @@ def in_band(folder, name):
     fit = fitted(folder / f"{name}.csv")
     low, high = band(name, fit.dt)
     return low <= fit.delay <= high
-
-
-@pytest.mark.parametrize(
-    "name", ["air_duct/45", "air_duct/90", "dc_motor_tacho/up", "rlc_zero_delay/up"]
-)
-def test_single_plants_are_in_their_bands(shared_data, name):
-    assert in_band(shared_data, name)
 
 
 def test_the_canal_is_in_its_bands_in_nine_of_twelve_records(shared_data):

@@ -20,7 +20,6 @@ from ctrl_realize.identification.output_error.averaging import (
     widened,
 )
 from ctrl_realize.identification.output_error.repeatability import Repeatability
-from ctrl_realize.report.verdict import campaign_verdict
 from tests import rigs
 
 TS = rigs.TS
@@ -69,15 +68,6 @@ def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
     assert fit.repeatability.trend / TS == pytest.approx(1 / 8, rel=0.3)
 
 
-@pytest.mark.parametrize("count", [4, 6])
-def test_a_trend_shows_in_few_records_too(count):
-    heights = [16.0] * (count // 2) + [8.0] * (count - count // 2)
-    alike = [record(k, delay=37, amplitude=a) for k, a in enumerate(heights)]
-    apart = [record(k, delay=37 + 2 * (a == 8), amplitude=a) for k, a in enumerate(heights)]
-    assert "amplitude_trend" not in codes(cr.fit_output_error(alike).fit)
-    assert "amplitude_trend" in codes(cr.fit_output_error(apart).fit)
-
-
 def moving(seed: int, *, drifts: bool) -> cr.Record:
     """Two lags behind 0.6 s: a drift of its own, or an earlier step 5 to 9 s before."""
     rng = np.random.default_rng(seed)
@@ -97,14 +87,6 @@ def test_records_that_were_not_at_rest_are_fitted_together(drifts):
     assert "records_differ" not in codes(fit)
     assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
     assert fit.total_delay == pytest.approx(6.6, rel=0.01)
-
-
-def test_a_record_that_came_twice_is_told():
-    records = [record(k) for k in range(3)]
-    apart, twice = (cr.fit_output_error([*records, more]).fit for more in (record(3), records[1]))
-    assert "same_records" not in codes(apart)
-    (told,) = (str(flag) for flag in twice.flags if flag.code == "same_records")
-    assert "1 of 4 records are duplicates (no. 4 is no. 2)" in told
 
 
 LEVEL = np.ones((1600, 1))
@@ -221,17 +203,6 @@ def step(height, seed, gain=1.0, lag=1.0, delay=0.5, noise=0.01):
     return cr.Record(T, u, y + noise * rng.standard_normal(T.size), name=f"step_{height:g}")
 
 
-def driven(seed, gain=1.0, lag=1.0, delay=0.5, noise=0.02):
-    rng = np.random.default_rng(seed)
-    u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)
-    plant = cr.delayed_ss(
-        cr.design.ProcessModel(gain=gain, lag=lag, dead_time=delay).system(0.05).delay_free,
-        round(delay / 0.05),
-    )
-    y = plant.simulate(u) + noise * rng.standard_normal(u.size)
-    return cr.Record(T, u, y, name=f"driven_{seed}")
-
-
 def told(records):
     return {flag.code for flag in cr.fit_output_error(records, structures=[(1, 1)]).fit.flags}
 
@@ -266,80 +237,3 @@ def test_records_of_one_plant_are_not_told_apart():
 def test_what_differs_is_named(name, values, code):
     records = [step(1.0 + i, i, **{name: value}) for i, value in enumerate(values)]
     assert code in told(records)
-
-
-def test_a_dead_time_that_differs_is_not_taken_for_lags_or_gains():
-    records = [step(1.0 + i, i, delay=0.5 + 0.05 * i) for i in range(3)]
-    assert not told(records) & {"gains_differ", "lags_differ"}
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "code"),
-    [("gain", 2.0, "no_common_gain"), ("lag", 1.5, "lags_differ")],
-)
-def test_records_of_other_inputs_are_compared_too(name, value, code):
-    same = [driven(seed) for seed in (1, 2)]
-    assert not told(same) & {"gains_differ", "lags_differ", "no_common_gain"}
-    assert code in told([*same[:1], driven(2, **{name: value})])
-
-
-def test_the_table_shows_every_record_beside_the_model():
-    fit = cr.fit_output_error(
-        [step(1.0, 0, lag=0.8), step(2.0, 1), step(4.0, 2, lag=1.3)], structures=[(1, 1)]
-    ).fit
-    table = fit.repeatability.table()
-    assert list(table.index) == ["step_1", "step_2", "step_4"]
-    # over each other: 0.8 to 1 to 1.3; the common model fits the mean
-    ratio = (table["lags"] / table["lags"]["step_2"]).to_numpy()
-    np.testing.assert_allclose(ratio, [0.8, 1.0, 1.3], rtol=0.03)
-    assert (table["fit_percent"] < 100).all()
-
-
-def test_the_gains_of_a_canal_differ_with_the_opening_of_its_gate(shared_data):
-    folder = shared_data / "wis_canal"
-    records = [
-        cr.read_record(folder / f"20210202_step_gate1_2_s{opening}.csv")
-        for opening in (25, 100, 255)
-    ]
-    system = cr.identify(records)
-    assert "gains_differ" in {flag.code for flag in system.fit.flags}
-    assert report.verdict_of(system).level == "poor"
-
-
-def test_the_picture_of_a_fit_has_every_record_beside_the_model():
-    records = [step(1.0, 0, 1.0), step(2.0, 1, 0.5), step(4.0, 2, 0.25)]
-    fit = cr.fit_output_error(records, structures=[(1, 1)]).fit
-    drawn = cr.plots.fit_plot(fit).figure.axes[0].get_lines()
-    ends = [float(np.mean(line.get_ydata()[-50:])) for line in drawn]
-    for gain in (1.0, 0.5, 0.25, fit.gain):
-        assert min(abs(end - gain) for end in ends) < 0.02
-
-
-@pytest.mark.parametrize("method", ["output_error", "scan"])
-def test_a_campaign_of_different_gains_is_flagged(method):
-    records = [step(1.0, 0, 1.0), step(2.0, 1, 0.5), step(4.0, 2, 0.25)]
-    options = {"structures": [(1, 1)]} if method == "output_error" else {}
-    campaign = cr.identify_campaign(records, method=method, **options)
-    found = {flag.code for flag in campaign.flags}
-    assert {"gains_differ", "no_common_gain"} <= found
-    assert campaign_verdict(campaign).level == "poor"
-    np.testing.assert_allclose(campaign.table()["gain"], [1.0, 0.5, 0.25], rtol=0.05)
-
-
-def test_a_campaign_of_one_plant_is_not_flagged():
-    campaign = cr.identify_campaign([step(h, 50 + h) for h in (1, 2, 4)], structures=[(1, 1)])
-    assert campaign.flags == ()
-
-
-def test_a_campaign_tells_dead_times_that_differ():
-    records = [step(2.0, i, delay=0.5 + 0.1 * i) for i in range(3)]
-    found = {flag.code for flag in cr.identify_campaign(records, structures=[(1, 1)]).flags}
-    assert "records_differ" in found
-    assert "gains_differ" not in found
-
-
-def test_a_campaign_tells_lags_that_differ():
-    records = [step(2.0, i, lag=1.0 + 0.3 * i) for i in range(3)]
-    assert "lags_differ" in {
-        flag.code for flag in cr.identify_campaign(records, structures=[(1, 1)]).flags
-    }

@@ -10,14 +10,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DelayRangeError, OptionError, OrderError
-from ctrl_realize.identification.realization.scan_curve import (
-    best_delay,
-    curve_flags,
-    flat_set,
-    local_minima,
-    noise_flags,
-)
 from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles import dense
 from tests.oracles.plants import modal, valve_pulse
@@ -111,67 +103,7 @@ def test_last_singular_value_is_compared_with_that_of_the_noise(noise, code):
     assert fit.noise_ratio == pytest.approx(fit.singular_values[fit.delay, 2] / fit.noise_floor)
 
 
-def test_curve_functions_read_a_curve_by_hand():
-    curve = np.array([9.0, 5.0, 2.0, 2.05, 4.0, 2.09, 2.2, 7.0])
-    assert best_delay(curve, 0.0) == 2
-    assert best_delay(curve - 2.0 + 1e-15 * np.arange(8), 1e-12) == 2
-    assert flat_set(curve, 2, 0.0) == (2, 5)
-    assert local_minima(curve, 2, 0.0) == 2
-    assert {flag.code for flag in curve_flags(curve, 2, 0.0)} == {"several_minima"}
-    assert {flag.code for flag in curve_flags(curve[:3], 2, 0.0)} == {"delay_at_bound"}
-    (near_the_end,) = curve_flags(curve[:4], 2, 0.0)
-    assert near_the_end.code == "delay_at_bound"
-    assert near_the_end.message.startswith("delays that fit equally well reach up to max_delay=3")
-    assert {flag.code for flag in curve_flags(np.array([2.2, 2.0, 3.0]), 1, 0.0)} == {
-        "no_delay_resolved"
-    }
-    assert noise_flags(1.0, None, 3) == noise_flags(1.0, 0.0, 3) == noise_flags(3.1, 1.0, 3) == ()
-    assert curve_flags(np.array([1.0, 0.0, 1.0]), 1, 0.0) == ()  # nothing is left: no division
-    (near,) = noise_flags(2.9, 1.0, 3)
-    assert near.code == "order_near_noise"
-    assert near.message.startswith("singular value 3 is 2.90 times the noise level: expect errors")
-    assert noise_flags(1.3, 1.0, 3)[0].code == "order_near_noise"
-    assert noise_flags(1.2, 1.0, 3)[0].code == "order_in_noise"
-
-
 # -- input that cannot be used ---------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("order", "kwargs", "error", "match"),
-    [
-        (3, {"max_delay": 5000}, DelayRangeError, "max_delay=5000 needs more than 5001 samples"),
-        (3, {"max_delay": 100, "samples": 1001}, DelayRangeError, "need 1102 samples.*1101"),
-        (3, {"max_delay": -1}, OptionError, "max_delay=-1"),
-        (3, {"max_delay": 2.5}, OptionError, "max_delay=2.5"),
-        (0, {"max_delay": 10}, OptionError, "order=0"),
-        (600, {"max_delay": 10}, OrderError, "order=600"),
-        (3, {"max_delay": 10, "samples": 4}, OrderError, "1 <= order <= 2"),
-        (3, {"max_delay": 10, "hankel": "x"}, OptionError, "hankel='x'"),
-    ],
-)
-def test_unusable_choices_are_refused(order, kwargs, error, match):
-    with pytest.raises(error, match=match):
-        cr.estimate_delay(valve_pulse("clean"), order, dt=TS, **kwargs)
-
-
-@pytest.mark.parametrize(
-    ("pulse", "order", "rank"),
-    [(np.zeros(300), 1, 0), (np.ones(300), 2, 1), (np.r_[1.0, np.zeros(299)], 1, 0)],
-)
-def test_degenerate_data_name_their_rank(pulse, order, rank):
-    with pytest.raises(OrderError, match=f"rank {rank}"):
-        cr.estimate_delay(pulse, order, max_delay=20, dt=1.0)
-
-
-def test_padded_candidates_are_the_padded_realizations():
-    pulse = valve_pulse("zero-phase", seed=1, noise=2e-3, n=161)
-    scan = cr.estimate_delay(pulse, 2, max_delay=5, samples=150, hankel="padded", dt=TS).fit
-    for d in (0, 5):
-        alone = cr.realize(pulse, 2, delay=d, samples=150, hankel="padded", dt=TS)
-        # the tolerance of the pairs of a scan (3e-10), times 300 for poles near the unit circle
-        assert_allclose(scan.candidates[d].markov(161), alone.markov(161), rtol=0,
-                        atol=1e-7 * np.abs(pulse).max())  # fmt: skip
 
 
 def test_a_causal_filter_is_named_with_its_delay():

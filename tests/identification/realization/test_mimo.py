@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, DelayRangeError, OptionError
 
 DT = 0.1
 CORE = ct.ss(
@@ -79,23 +78,6 @@ def test_other_units_change_no_delay_and_no_pole():
         assert np.array_equal(cr.identification.delay_matrix(unit * data, dt=DT), [[3, 4], [9, 10]])
 
 
-@pytest.mark.parametrize("structure", ["rows", "columns"])
-def test_lines_with_a_pure_gain_and_without_response_have_no_tap_too_many(structure):
-    delays = np.array([[0, 20], [5, 20], [20, -1]])
-    data = separate(delays)
-    data[2, 0] = np.eye(200)[20]  # nothing but a gain behind 20 samples
-    data[2, 1] = 0.0
-    if structure == "columns":
-        delays, data = delays.T, np.swapaxes(data, 0, 1)
-    sys = cr.identification.realize_mimo(data, 2, delays=delays, structure=structure, dt=DT)
-    assert_allclose(sys.markov(200), data, rtol=0, atol=1e-9)
-    fit = sys.fit
-    assert fit.orders == (2, 2, 0)
-    # one line of 0 to 20 samples, one of 20 that is not tapped before
-    assert (fit.input_delays, fit.output_delays)[structure == "columns"] == (0, 20)
-    assert fit.states == 4 + 20 + 20
-
-
 def test_noise_is_not_taken_for_a_response():
     plant = cr.DelayedStateSpace(CORE, (4, 7), output_delay=(0, 2, 0))
     rng = np.random.default_rng(0)
@@ -111,23 +93,6 @@ def test_noise_is_not_taken_for_a_response():
         sys, cr.Record(DT * np.arange(1000), fresh, plant.simulate(fresh))
     )
     assert np.all(check.fit_percent > 97)
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "match"),
-    [
-        ({"delays": [[1, 2, 3]]}, DelayRangeError, "shape"),
-        ({"delays": [[1.5, 2], [3, 4]]}, DelayRangeError, "whole numbers"),
-        ({"delays": [[1, 2], [3, 199]]}, DelayRangeError, "199"),
-        ({"delays": -np.ones((2, 2), dtype=int)}, DataError, "no channel"),
-        ({"structure": "best"}, OptionError, "'rows'"),
-        ({"level": 1.0}, OptionError, "level"),
-        ({"hankel": "round"}, OptionError, "hankel"),
-    ],
-)
-def test_unusable_choices_are_refused(options, error, match):
-    with pytest.raises(error, match=match):
-        cr.identification.realize_mimo(separate(np.array([[3, 4], [9, 10]])), 2, dt=DT, **options)
 
 
 class _Plain:

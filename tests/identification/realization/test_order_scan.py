@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import OptionError, OrderError
 from ctrl_realize.identification.realization.order import suggest_order
 from ctrl_realize.identification.realization.scan_surface import scan_surface
 from tests.oracles import dense
@@ -47,11 +46,6 @@ def test_suggested_order_is_what_stands_out_of_the_noise(noise, order, seed):
     assert scan.delay == scan.delays[order - 1]
 
 
-def test_without_known_noise_the_smallest_order_that_is_as_good_is_suggested():
-    assert cr.scan_orders(valve_pulse("clean"), 6, max_delay=60, dt=TS).order == 3
-    assert cr.scan_orders(valve_pulse("zero-phase"), 6, max_delay=60, dt=TS).order == 3
-
-
 @pytest.mark.parametrize("noise", [0.01, 0.1])
 @pytest.mark.parametrize(("poles", "delay"), [([0.9], 5), ([0.9 + 0.3j, 0.9 - 0.3j], 3)])
 def test_of_an_estimate_the_order_is_what_its_standard_deviations_ask_for(poles, delay, noise):
@@ -68,35 +62,6 @@ def test_of_an_estimate_the_order_is_what_its_standard_deviations_ask_for(poles,
     assert scan.order == len(poles)
     # first seen as many samples later as there are poles, where a direct term may take it up
     assert delay <= scan.delay <= delay + len(poles)
-
-
-def test_table_holds_one_row_for_each_order():
-    noise = 1e-3
-    impulse = cr.ImpulseResponse(valve_pulse("zero-phase", noise=noise), TS, noise=rest(noise))
-    scan = cr.scan_orders(impulse, 4, max_delay=80)
-    table = scan.table()
-    assert list(table.index) == [1, 2, 3, 4]
-    assert table.loc[scan.order, "suggested"]
-    assert table["suggested"].sum() == 1
-    assert table.loc[3, "delay"] == scan.delays[2]
-    assert table.loc[3, "dead_time"] == scan.delays[2] * TS
-    assert table.loc[3, "noise_ratio"] == scan.last_singular_value(3) / scan.noise_floor
-    assert table.loc[3, "iae"] == scan.iae[2].min()
-
-
-@pytest.mark.parametrize(
-    ("orders", "error", "match"),
-    [
-        ([], OptionError, "empty"),
-        (0, OptionError, "orders=0"),
-        ([1, 0], OptionError, "orders=0"),
-        ([1, 700], OrderError, "order=700"),
-        ("3", OptionError, "orders='3'"),
-    ],
-)
-def test_unusable_orders_are_refused(orders, error, match):
-    with pytest.raises(error, match=match):
-        cr.scan_orders(valve_pulse("clean"), orders, max_delay=50, dt=TS)
 
 
 def test_orders_whose_last_singular_value_is_within_the_noise_are_not_suggested():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, DelayRangeError, OptionError, OrderError
+from ctrl_realize.errors import OptionError
 from ctrl_realize.identification.realization.realize import uses_feedthrough
 from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles.plants import modal, valve_pulse
@@ -36,17 +36,6 @@ def test_exact_third_order_plant_behind_37_samples_is_found_exactly(valve, hanke
     time = np.arange(3000) * TS
     response = ct.step_response(sys, time).outputs
     assert_allclose(response, exact_step(R3, time - 37 * TS), rtol=0, atol=1e-9)
-
-
-def test_exact_proper_plant_needs_no_option():
-    A, B, C, D = modal(np.random.default_rng(3), 2)
-    pulse = np.r_[np.zeros(9), markov(A, B, C, D, 300)[0, 0]]
-    sys = cr.realize(pulse, 2, delay=9, dt=0.1)
-    assert sys.fit.feedthrough
-    assert_allclose(sys.markov(309), pulse, atol=1e-12 * np.abs(pulse).max())
-    proper = cr.realize(pulse, 2, delay=9, dt=0.1, feedthrough=False)
-    assert proper.delay_free.D == 0
-    assert_allclose(proper.markov(309)[10:], pulse[10:], atol=1e-12 * np.abs(pulse).max())
 
 
 @given(
@@ -97,39 +86,6 @@ def test_flags_tell_what_to_distrust():
     assert codes(lagging) == {"filter_delay"}
     assert "13.1 samples" in str(lagging.fit.flags[0])
     assert codes(cr.realize(valve_pulse("clean"), 3, delay=37, dt=TS)) == set()
-
-
-@pytest.mark.parametrize("n", [400, 1200])  # complete and truncated decomposition
-def test_order_above_the_numerical_rank_is_refused_by_name(n):
-    pulse = valve_pulse("clean", n=n)
-    with pytest.raises(OrderError, match=r"order=4.*rank 3"):
-        cr.realize(pulse, 4, delay=37, dt=TS)
-
-
-@pytest.mark.parametrize(
-    ("pulse", "order", "kwargs", "error", "match"),
-    [
-        (np.zeros(50), 1, {}, OrderError, "rank 0.*pure gain"),
-        (np.ones(50), 2, {}, OrderError, "rank 1"),
-        (np.eye(60)[5], 6, {}, OrderError, "rank 5"),
-        (np.ones(50), 0, {}, OptionError, "order=0"),
-        (np.ones(50), 1.5, {}, OptionError, "order=1.5"),
-        (np.ones(50), 26, {}, OrderError, "1 <= order <= 24"),
-        (np.ones(50), 1, {"delay": -1}, OptionError, "delay=-1"),
-        (np.ones(50), 1, {"delay": 60}, DelayRangeError, "delay=60 needs more than 61 samples"),
-        (np.ones(50), 1, {"delay": 5, "samples": 50}, DelayRangeError, "need 56 samples.*has 50"),
-        (np.ones(50), 1, {"hankel": "round"}, OptionError, "'square', 'padded'"),
-        (np.ones(50), 1, {"dt": None}, OptionError, "dt="),
-        (np.ones(50), 1, {"dt": -1.0}, OptionError, "dt=-1"),
-        (np.r_[np.ones(9), np.nan], 1, {}, DataError, "index 9"),
-        (np.ones((5, 5)), 1, {}, DataError, "shape"),
-        (["a", "b", "c"], 1, {}, DataError, "real numbers"),
-        (cr.ImpulseResponse(np.ones(50), 0.5), 1, {}, OptionError, "leave dt out"),
-    ],
-)
-def test_unusable_input_is_refused_with_what_is_needed(pulse, order, kwargs, error, match):
-    with pytest.raises(error, match=match):
-        cr.realize(pulse, order, **{"dt": 1.0, **kwargs})
 
 
 def test_another_time_unit_scales_the_dead_time_and_nothing_else():

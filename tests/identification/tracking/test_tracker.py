@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
+from ctrl_realize.errors import UnsuitableSystemError
 from tests.rigs import R3, TS, lag, pair
 
 
@@ -137,14 +137,6 @@ def test_a_delay_beyond_the_candidates_is_not_claimed():
     assert "max_delay=20" in fixed.estimate().reason
 
 
-def test_nothing_is_said_before_there_are_samples():
-    bank = tracker()
-    assert bank.estimate().reason == "no samples yet"
-    for _ in range(5):
-        bank.update(1.0, 2.0)
-    assert bank.estimate().reason == "only 5 samples yet"
-
-
 def test_offsets_and_units_do_not_matter():
     record, _ = worn_valve(seconds=10, last=37.0)
     moved = cr.Record(record.time, record.input + 1e4, 1e3 * record.output - 5e6)
@@ -170,53 +162,6 @@ def test_a_tracker_goes_on_after_pickling_as_if_nothing_had_happened():
     assert other.estimate().dead_time == one.estimate().dead_time
     assert repr(other) == repr(one)
     assert f"{record.n_samples} samples" in repr(one)
-
-
-@pytest.mark.parametrize("order", [2, 3])
-def test_the_exchanger_keeps_its_delay_of_zero(shared_data, order):
-    table = np.loadtxt(shared_data / "exchanger" / "record.csv", delimiter=",", skiprows=1)
-    record = cr.Record(*table.T)
-    first = cr.impulse_from_io(record.between(0, 1500), 200)
-    model = cr.realize(first, order, feedthrough=True)
-    track = cr.DelayTracker(model, max_delay=20, forgetting_time=300.0).track(record)
-    # the plant is not linear, and at times a pole of the third order moves too far
-    assert np.mean(track.resolved) > 0.6
-    assert np.all(track.dead_time[track.resolved] <= 1.0)  # s, one sample
-
-
-@pytest.mark.parametrize(
-    ("model", "options", "error", "match"),
-    [
-        (ct.ss([[1.1]], [[1.0]], [[1.0]], [[0.0]], TS), {}, UnsuitableSystemError, "unstable"),
-        (ct.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), {}, UnsuitableSystemError, "discrete"),
-        (ct.ss([[0.5]], [[1.0]], [[0.0]], [[0.0]], TS), {}, OptionError, "zero"),
-        (None, {"max_delay": 0}, DelayRangeError, "nothing to choose"),
-        (None, {"forgetting_time": 0.05}, DelayRangeError, "longer forgetting_time"),
-        (None, {"forgetting_time": -1.0}, OptionError, "forgetting_time"),
-        (None, {"min_delay": 1.5}, OptionError, "min_delay"),
-    ],
-)
-def test_unusable_choices_are_refused(model, options, error, match):
-    start = cr.delayed_ss(R3, delay=37, dt=TS) if model is None else model
-    with pytest.raises(error, match=match):
-        cr.DelayTracker(start, **{"max_delay": 90, "forgetting_time": 2.5, **options})
-
-
-def test_samples_that_are_no_numbers_and_records_that_do_not_fit_are_refused():
-    bank = tracker()
-    with pytest.raises(DataError, match="y=nan"):
-        bank.update(1.0, np.nan)
-    with pytest.raises(DataError, match="one number each"):
-        bank.update([1.0], [2.0])
-    for wrong in ("a", None, 1j):
-        with pytest.raises(DataError, match="one number each"):
-            bank.update(wrong, 1.0)
-    slow = cr.Record(np.arange(10.0), np.ones(10), np.ones(10))
-    with pytest.raises(DataError, match="sample time 1 s"):
-        bank.track(slow)
-    short = cr.Record(TS * np.arange(5), np.ones(5), np.ones(5))
-    with pytest.raises(DataError, match="5 samples"):
-        bank.track(short)
 
 
 def operated(plant, *, seconds, seed, noise=0.005, walk=0.0):
@@ -267,21 +212,6 @@ def test_a_track_that_is_lost_is_said_and_found_again_after_a_reset():
         bank.reset(cr.delayed_ss(R3, delay=0, dt=2 * TS))
 
 
-@pytest.mark.parametrize("known", [True, False])
-def test_a_residual_much_louder_than_the_models_stops_it_from_telling(known):
-    """From 8 s on the output takes in a wave that the input does not explain."""
-    record = operated(cr.delayed_ss(R3, delay=37, dt=TS), seconds=16, seed=0)
-    loud = tracker(dynamics=False, noise_std=0.08 if known else None)
-    wave = 5 * 0.08 * 2**0.5 * np.sin(2 * np.pi * 0.7 * record.time) * (record.time > 8)
-    track = loud.track(cr.Record(record.time, record.input, record.output + wave))
-    assert np.all(track.resolved[(track.time > 4) & (track.time < 8)])
-    last = loud.estimate()
-    assert (last.resolved, last.lost) == (False, True)
-    assert "the track is lost" in last.report()
-    with pytest.raises(OptionError, match="noise_std"):
-        tracker(noise_std=-1.0)
-
-
 def test_the_noise_of_a_fitted_model_is_known():
     plant = cr.delayed_ss(R3, delay=37, dt=TS)
     first = tracker(dynamics=False)
@@ -303,17 +233,3 @@ def test_a_dead_time_under_a_random_walk_is_followed_behind_a_high_pass(seed):
     assert np.mean(track.resolved[late]) > 0.9
     assert wrong(track, 45) <= 0.1 * np.sum(track.resolved)
     assert abs(passed.estimate().delay - 45) <= 3
-
-
-def test_intervals_are_in_seconds_and_in_samples():
-    record, _ = worn_valve(seconds=6, last=37.0)
-    bank = tracker(dynamics=False)
-    track = bank.track(record)
-    told = bank.estimate()
-    assert told.interval == tuple(TS * d for d in told.delay_interval)
-    assert told.dead_time_interval == told.interval
-    assert told.interval[0] - TS / 2 <= told.dead_time <= told.interval[1] + TS / 2
-    np.testing.assert_allclose(track.low, TS * track.delay_low)
-    np.testing.assert_allclose(track.high, TS * track.delay_high)
-    # A model that is used for a controller brings its interval along.
-    assert cr.design.pid(bank.model).check.stable_within_interval is not None

@@ -35,13 +35,6 @@ def test_the_scatter_is_that_of_the_likelihood(record, drawn):
     assert drawn.failed == 0
 
 
-def test_draws_depend_on_the_seed_alone(record, drawn):
-    again = bootstrap(record, R1_FIT, repeats=4, n_jobs=2)
-    assert np.array_equal(again.dead_times, bootstrap(record, R1_FIT, repeats=4).dead_times)
-    other = bootstrap(record, R1_FIT, repeats=4, seed=1)
-    assert not np.any(np.isin(other.dead_times, drawn.dead_times))
-
-
 def test_bands_hold_the_model_and_have_the_width_of_the_scatter(drawn):
     low, high = drawn.step_band(600)
     own = np.cumsum(drawn.system.markov(600))
@@ -95,27 +88,9 @@ def test_rounding_that_no_draw_sees_is_flagged(record):
     assert bootstrap(record, R1_FIT, repeats=3).flags == ()
 
 
-def test_five_records_are_drawn_as_records():
-    records = [
-        rigs.step_record(rigs.R1, noise=0.01, seed=k, before=100, after=500) for k in range(5)
-    ]
-    result = bootstrap(records, R1_FIT, repeats=5)
-    assert result.kind == "records"
-    assert result.block == 0
-
-
 def test_a_bootstrap_does_not_see_bias():
     # One lag too few: that of the sensor is read as delay, by every draw alike.
     record = rigs.step_record(rigs.R4, noise=0.002, before=200, after=900)
     result = bootstrap(record, partial(cr.fit_output_error, structures=[(3, 3)]), repeats=10)
     assert result.interval[0] > 39 * TS  # truth: 37; off by 5.4 for a long record
     assert "bias" in result.report()
-
-
-def test_unusable_choices_are_refused(record):
-    with pytest.raises(cr.errors.OptionError, match="repeats"):
-        bootstrap(record, repeats=1)
-    with pytest.raises(cr.errors.OptionError, match="function"):
-        bootstrap(record, "fit_output_error")
-    with pytest.raises(cr.errors.DataError, match="no records"):
-        bootstrap([])

@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.delayed.simulation import as_delayed, simulate_record
-from ctrl_realize.errors import DataError, UnsuitableSystemError
+from ctrl_realize.delayed.simulation import simulate_record
 from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
 MIMO = cr.DelayedStateSpace(TWO_INPUTS.delay_free, (2, 4), output_delay=(0, 3, 1))
@@ -124,15 +123,6 @@ def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
         assert np.abs(check.cross[0, 0]).argmax() == 25 + shift
 
 
-def test_what_rounding_leaves_says_nothing_about_the_model():
-    one = record(noise=0.0)
-    for size, whether in ((1e-9, True), (1e-7, False)):
-        y = one.output + size * np.ptp(one.output) * np.sin(np.arange(1000))
-        check = cr.validation.analyse_residuals(TWO_STATES, cr.Record(one.time, one.input, y))
-        assert check.white == whether
-        assert np.all(check.residual == 0) == whether
-
-
 def test_predictions_fall_from_the_noise_model_to_the_simulation():
     one = record(noise=0.1, colour=0.95, n=2000)
     simulated = cr.validation.analyse_residuals(TWO_STATES, one).fit_percent[0]
@@ -173,16 +163,6 @@ def measured(u, y, dt=TS):
     return cr.Record(dt * np.arange(np.shape(u)[-1]), u, y)
 
 
-def test_a_dead_time_longer_than_the_record_leaves_what_the_record_shows():
-    system = cr.DelayedStateSpace(core(), 50, output_delay=0)
-    rng = np.random.default_rng(0)
-    u = np.r_[np.repeat(rng.standard_normal(5), 10), rng.standard_normal(10)]
-    y = system.simulate(np.r_[u, np.zeros(10)])[50:60]
-    # ten samples of which each may have its own level inside the dead time
-    assert_allclose(simulate_record(system, measured(np.ones(10), y), "estimate")[0], y, atol=1e-9)
-    assert np.ptp(simulate_record(system, measured(np.ones(10), y), "rest")) == 0.0
-
-
 def test_each_output_has_its_own_offset_and_delay():
     system = cr.DelayedStateSpace(
         ct.ss([[0.8]], [[1.0]], [[1.0], [2.0]], np.zeros((2, 1)), TS), 0, output_delay=(0, 4)
@@ -191,36 +171,3 @@ def test_each_output_has_its_own_offset_and_delay():
     y = system.simulate(u) + np.array([[3.0], [-5.0]])
     one = measured(u[20:], y[:, 20:])
     assert_allclose(simulate_record(system, one, "estimate"), one.output, rtol=0, atol=1e-9)
-
-
-def test_units_of_the_outputs_do_not_matter():
-    units = np.array([[1e9], [1.0]])
-    plant = ct.ss([[0.8]], [[1.0]], [[1.0], [2.0]], np.zeros((2, 1)), TS)
-    other = ct.ss(plant.A, plant.B, units * plant.C, plant.D, TS)
-    rng = np.random.default_rng(0)
-    u = rng.standard_normal(60)
-    y = cr.DelayedStateSpace(plant, 3).simulate(u) + 0.1 * rng.standard_normal((2, 60))
-    found, scaled = (
-        simulate_record(cr.DelayedStateSpace(core, 3), measured(u[10:], of[:, 10:]), "estimate")
-        for core, of in ((plant, y), (other, units * y))
-    )
-    # 1e9 in 16 digits
-    assert_allclose(scaled / units, found, rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("system", "error", "match"),
-    [
-        ("plant", UnsuitableSystemError, "a str; needed is a discrete"),
-        (core(dt=None), UnsuitableSystemError, "not discrete"),
-        (core(dt=0), UnsuitableSystemError, "not discrete"),
-        (core(dt=True), UnsuitableSystemError, "not discrete with a sample time"),
-        (core(dt=1.0011 * TS), DataError, r"0\.1 s, the system 0\.10011 s"),
-        (ct.ss([[0.5]], [[1.0, 1.0]], [[1.0]], np.zeros((1, 2)), TS), DataError, "the system 2"),
-        (ct.ss([[0.5]], [[1.0]], np.ones((2, 1)), np.zeros((2, 1)), TS), DataError, "1 and 2"),
-        (core(1 + 1.1e-6), UnsuitableSystemError, "unstable"),
-    ],
-)
-def test_systems_that_do_not_fit_the_record_are_refused(system, error, match):
-    with pytest.raises(error, match=match):
-        as_delayed(system, measured(np.ones(9), np.ones(9)))

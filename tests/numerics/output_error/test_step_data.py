@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.output_error.condensed import MOST_LAGS, condensed
+from ctrl_realize.numerics.output_error.condensed import condensed
 from ctrl_realize.numerics.output_error.step_data import (
     StepData,
     fixed_regressors,
@@ -17,13 +15,10 @@ from ctrl_realize.numerics.output_error.step_data import (
     stop_at,
     window,
 )
-from ctrl_realize.numerics.regression.normal_equations import normal_equations
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.responses import SampledInput
 from ctrl_realize.numerics.separable.varpro import KnownFactor
 from ctrl_realize.numerics.signals.noise import hum_frequencies, rest_noise, winsorised_sigma
-from ctrl_realize.numerics.signals.onset import first_motion
-from tests import rigs
 
 EDGE, DELAY, LAG, DT = 200, 40, 60.0, 0.5
 
@@ -65,18 +60,6 @@ def test_means_weigh_what_they_hold_and_of_coarsely_rounded_samples_hardly_more(
     assert weight[np.argmax(width)] > 1.8
 
 
-def test_regressors_are_a_level_a_drift_that_may_end_and_the_hum():
-    made = replace(data(), drift=0.1)
-    level, slope = fixed_regressors(made).T
-    np.testing.assert_array_equal(level, 1.0)
-    np.testing.assert_allclose(np.diff(slope), 1 / 1400)
-    assert slope[EDGE] == 0
-    ended = fixed_regressors(replace(made, ending=True))[:, 1]
-    np.testing.assert_allclose(ended[EDGE + 2 * EDGE :], ended[-1])
-    np.testing.assert_array_equal(ended[: EDGE + 2 * EDGE], slope[: EDGE + 2 * EDGE])
-    assert fixed_regressors(replace(made, hum=[0.1])).shape == (1400, 4)
-
-
 def test_hum_is_found_at_rest_and_taken_off_before_the_noise_is_measured():
     k = np.arange(1400.0)
     line = 0.05 * np.sin(2 * np.pi * 0.063 * k + 1)
@@ -113,20 +96,6 @@ def test_a_record_that_begins_while_the_plant_moves_has_a_free_response_of_its_o
 
 def white(n, seed=0):
     return np.random.default_rng(seed).standard_normal(n)
-
-
-@pytest.mark.parametrize("pole", [0.0, 0.9, 0.97])
-def test_slow_noise_is_no_drift(pole):
-    rng = np.random.default_rng(5)
-    found = []
-    for _ in range(40):
-        slow = lfilter([1.0], [1.0, -pole], rng.standard_normal(1200))[200:]
-        found.append(rest_noise(slow[:500], slow, 0.0)[1])
-    # five standard errors: none of 40, where white ones make 10 and 24 of 40 a drift
-    assert not np.any(found)
-    assert rest_noise(slow[:500] + 0.5 * np.arange(500), slow, 0.0)[1] == pytest.approx(
-        0.5, abs=0.05
-    )
 
 
 def test_a_slope_before_the_step_has_three_explanations_and_a_brief_one_may_be_nothing():
@@ -180,16 +149,6 @@ def test_hum_is_found_to_a_small_part_of_a_period_over_the_record():
     assert abs(found[0] - frequency) < 4 * np.sqrt(24) / (2 * np.pi * 2 * 3840**1.5)
     for seed in range(20):
         assert hum_frequencies(white(1000, seed)) == []
-
-
-def test_first_motion_is_not_a_spike_and_not_a_glitch():
-    time = rigs.TS * np.arange(-400, 1200)
-    output = rigs.exact_step(rigs.R1, time - 60 * rigs.TS) + 0.002 * white(1600)
-    output[420:424] += 0.2  # 20 samples after the step, 4 samples long
-    found = first_motion(output, 400, 0.002, 0.0, 0.0)
-    assert 60 <= found.crossing <= 64
-    assert abs(found.onset - 60) < 1.5
-    assert found.sign == 1
 
 
 def test_profile_limits_are_where_a_parabola_crosses():
@@ -265,31 +224,3 @@ def test_outliers_count_for_little_with_hubers_loss():
         size[huber] = found.noise
     assert size[False] > 10 * 0.1
     assert size[True] < 1.2 * 0.1
-
-
-def test_levels_that_differ_from_record_to_record_do_not_matter():
-    y, u = record(5000)
-    one = condensed([y], [u], FINE, LAGS, huber=False)
-    other = condensed([y + 1e3], [u - 50.0], FINE, LAGS, huber=False)
-    g = 0.5 ** np.arange(LAGS)
-    costs = [np.sum((c.data - c.drive.factor @ g) ** 2) for c in (one, other)]
-    assert costs[1] == pytest.approx(costs[0], rel=1e-6)
-
-
-def test_directions_that_are_not_excited_have_no_row():
-    # two lines: four directions
-    k = np.arange(20_000)
-    u = np.sin(0.3 * k) + np.sin(0.8 * k)
-    y = lfilter(0.9 ** np.arange(LAGS), [1.0], u) + 0.1 * np.random.default_rng(0).standard_normal(
-        k.size
-    )
-    found = condensed([y], [u], FINE, LAGS, huber=False)
-    assert found.data.size == 4
-    sums = normal_equations(u[None], y[None], LAGS)
-    assert_allclose(found.drive.factor.T @ found.drive.factor, sums.gram, atol=1e-6 * sums.rows)
-
-
-@pytest.mark.parametrize(("samples", "lags"), [(500, LAGS), (30_000, MOST_LAGS + 1), (3000, 1)])
-def test_what_cannot_be_condensed_is_left(samples, lags):
-    y, u = record(samples)
-    assert condensed([y], [u], FINE, lags, huber=True) is None

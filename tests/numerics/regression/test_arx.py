@@ -114,16 +114,6 @@ def test_sums_by_fft_equal_those_of_the_regression_matrix(
     assert_allclose(equations.power, target.T @ target, rtol=0, atol=1e-11)
 
 
-def test_equations_of_two_records_add_up(rng):
-    z, y = rng.normal(size=(1, 50)), rng.normal(size=(1, 50))
-    total = normal_equations(z, y, 4) + normal_equations(2 * z, y + 7, 4)
-    first, second = by_rows(z, y, 4, True), by_rows(2 * z, y + 7, 4, True)
-    phi = np.concatenate([first[0], second[0]])
-    assert total.rows == 94
-    assert total.freedom == 92  # one offset each
-    assert_allclose(total.gram, phi.T @ phi, rtol=0, atol=1e-11)
-
-
 @pytest.fixture
 def rng():
     return np.random.default_rng(5)

@@ -12,11 +12,9 @@ from scipy.stats import invgauss
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.dispersion import fit_flows, flow_modes, flow_profile
 from ctrl_realize.numerics.separable.lag_chains import (
-    SHORTEST,
     LagChain,
     fit_chains,
     fit_diffusion,
-    still_improving,
 )
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
@@ -57,28 +55,6 @@ def test_the_chain_of_the_right_length_fits_best_and_has_the_delay(problem):
     rates = -best.candidate.poles.real
     # As far as the delay is off, the six lags make up for it: 1.5 samples in 72.
     assert np.mean(1 / rates) == pytest.approx(12.0, rel=0.02)
-
-
-def made(criteria: list[float]) -> list[LagChain]:
-    return [
-        LagChain(Candidate(Structure(n, n), np.zeros(n + 1), 0.0), value, 1.0)
-        for n, value in enumerate(criteria, SHORTEST)
-    ]
-
-
-@pytest.mark.parametrize(
-    ("criteria", "more"),
-    [
-        ([700, 500, 350, 250, 180], True),
-        ([2100, 1600, 1050, 520, 2], True),  # straight down: no end in sight
-        ([900, 300, 60, 20, 30], False),  # rises again
-        ([5000, 2500, 900, 200, 2], False),  # the bottom of a parabola
-        ([900, 300, 60], False),  # ended before the longest
-        ([], False),
-    ],
-)
-def test_chains_are_open_ended_while_they_improve_up_to_the_longest(criteria, more):
-    assert still_improving(made(criteria)) is more
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5])
@@ -176,9 +152,3 @@ def test_a_flow_is_found_behind_its_dead_time():
     low, high = profile_limits(*flow_profile(problem, flow, scales, 1e-6))
     assert low < 0.0373 < high
     assert high - low < 2e-3
-
-
-def test_a_lag_behind_a_flow_is_told_from_it():
-    problem, scales, like = flow_problem(lag=0.03)
-    flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
-    assert_allclose([flow.delay, flow.mean, flow.lag], [0.0373, 0.08, 0.03], rtol=0, atol=3e-3)

@@ -12,14 +12,10 @@ from ctrl_realize.numerics.output_error.step_data import step_data, step_scales,
 from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
 from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput, SeveralInputs
 from ctrl_realize.numerics.separable.structures import (
-    FASTEST,
     PLAUSIBLE,
-    SLOWER_WITH_ZEROS,
     Candidate,
-    Scales,
     choose,
     needless_parameters,
-    parameter_bounds,
     plausible,
     search,
 )
@@ -53,15 +49,6 @@ def test_poles_come_back_in_any_unit_of_time(poles, unit):
     assert_allclose(ordered(back / unit), ordered(poles / unit), rtol=1e-9)
 
 
-def test_parameters_are_logarithms_of_frequency_and_damping():
-    assert_allclose(parameters_from_poles(np.array([-3 + 4j, -3 - 4j])), np.log([5, 0.6]))
-    # two real poles: their geometric mean, and a damping above one
-    assert_allclose(parameters_from_poles(np.array([-4.0 + 0j, -1.0])), np.log([2, 1.25]))
-    # an odd one stands first; it is the slowest of the real ones
-    three = parameters_from_poles(np.array([-4.0 + 0j, -0.5, -1.0]))
-    assert_allclose(three, np.log([0.5, 2, 1.25]))
-
-
 @given(
     zeta=st.one_of(st.floats(0.01, 0.98), st.floats(1.02, 50)),
     omega=st.floats(1e-3, 1e3),
@@ -82,23 +69,6 @@ def test_derivatives_are_those_of_differences(zeta, omega, rate):
         assert_allclose(derivative[0, :, q], ((up - down) / (2 * h))[0], atol=1e-4 * size)
 
 
-@pytest.mark.parametrize("zeta", [1.0, 1 - 1e-9, 1 + 1e-9, 1 - 1e-5, 1 + 1e-5])
-def test_a_double_pole_is_given_apart(zeta):
-    poles = poles_from_parameters(np.log([[7.0, zeta]]))[0][0]
-    apart = (poles[0] - poles[1]) / 7
-    # 1 / (zeta + root) for zeta - root: their product is not quite one, by root^2
-    assert_allclose(abs(apart), GAP, rtol=GAP / 2)
-    # below a damping of one they stay a pair
-    assert bool(abs(apart.imag) > 0) == (zeta < 1)
-    assert_allclose(poles.mean(), -7, rtol=1e-4)
-
-
-@pytest.mark.parametrize("zeta", [1e-3, 0.3, 30.0, 1e6])
-def test_nothing_cancels_far_from_a_double_pole(zeta):
-    poles = poles_from_parameters(np.log([[7.0, zeta]]))[0][0]
-    assert_allclose(np.prod(poles), 49, rtol=1e-12)
-
-
 def real_poles(*rates):
     return poles_from_parameters(parameters_from_poles(-np.array(rates) + 0j)[np.newaxis])[0][
         0
@@ -114,26 +84,10 @@ def test_equal_poles_of_different_factors_are_moved_to_faster_ones():
     assert many[-1] < 3 * (1 + 6 * GAP)
 
 
-SCALES = Scales(onset=2.0, rise=0.5, length=10.0, dt=0.01, latest=3.0, earliest=0.25)
-
-
 def candidate(n: int, r: int, cost: float = 1.0, poles: object = None) -> Candidate:
     at = -np.arange(1.0, n + 1) if poles is None else np.asarray(poles)
     found = np.concatenate([[1.5], parameters_from_poles(at.astype(np.complex128))])
     return Candidate(Structure(n, r), found, cost)
-
-
-def test_bounds_reach_from_an_integrator_to_a_lag_shorter_than_a_sample():
-    low, high = (
-        getattr(parameter_bounds(Structure(1, 1), SCALES), side) for side in ("low", "high")
-    )
-    assert_allclose([low[0], high[0]], [0.25, 3.0])
-    assert_allclose(np.exp([low[1], high[1]]), [1e-5, FASTEST / 0.01])
-    beside_a_zero = parameter_bounds(Structure(3, 2), SCALES)
-    assert_allclose(
-        np.exp(beside_a_zero.low), np.exp([0.25, np.log(1e-5), np.log(1e-3), np.log(0.005)])
-    )
-    assert_allclose(np.exp(beside_a_zero.high[1:3]), SLOWER_WITH_ZEROS / 0.01)
 
 
 def test_zeros_and_a_fourth_pole_must_be_worth_it():
@@ -237,19 +191,6 @@ def test_means_over_bins_are_those_of_their_samples(poles, widest):
             means = (sums.T / width).T
             # a pole of 1e-9: a series to the second order, a ten-millionth of it
             np.testing.assert_allclose(one[row], means, rtol=1e-8, atol=1e-12)
-
-
-@pytest.mark.parametrize("count", [5, 100])
-@pytest.mark.parametrize("rate", [0.99e-4, 1.01e-4, 1e-6, 0.3])
-def test_the_mean_of_a_slow_mode_is_as_right_as_that_of_a_fast_one(rate, count):
-    pole = -rate / count / 0.1
-    _, mode, slope = train([1], [count], [0.0], [1.0]).modes(
-        np.array([0.0]), np.array([[pole + 0j]])
-    )
-    time = 0.1 * np.arange(1, 1 + count)
-    # the next term of the series is (1e-4)^2 / 6; above, rounding is divided by 1e-4
-    assert mode[0, 0, 0] == pytest.approx(np.exp(pole * time).mean(), rel=3e-9)
-    assert slope[0, 0, 0] == pytest.approx((time * np.exp(pole * time)).mean(), rel=1e-8)
 
 
 def test_several_records_stand_one_after_the_other_without_their_first_samples():

@@ -140,18 +140,6 @@ def test_a_minimum_in_a_kink_is_at_the_sample_and_both_of_its_sides_rise():
     assert 0 < kinks < 20
 
 
-def test_the_unit_of_time_changes_delay_and_lags_and_nothing_else():
-    structure, found = Structure(2, 2), []
-    for unit in (1.0, 1e-3, 60.0):
-        problem, scales = problem_of(unit=unit)
-        bounds = parameter_bounds(structure, scales)
-        first = start(18.0 * unit, 10.0 * unit, 40.0 * unit)
-        near = polish(problem, structure, first[None], bounds, scales.dt)[0][0]
-        x, cost = settle(problem, structure, near, bounds, scales.dt)
-        found.append([x[0] / unit, x[1] + np.log(unit), x[2], cost])
-    assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)
-
-
 @pytest.mark.parametrize(("order", "degree"), [(2, 2), (2, 1)])
 def test_a_level_is_met_by_the_least_cost_at_that_delay(order, degree):
     problem, scales = problem_of()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.separable.local_terms import Stretches
@@ -22,7 +20,6 @@ from ctrl_realize.numerics.separable.varpro import (
     partial_fractions,
     respond,
 )
-from ctrl_realize.numerics.signals.bins import response_bins
 from tests import rigs
 
 ONES = np.ones(300, dtype=np.int64)
@@ -84,43 +81,6 @@ def test_means_over_bins_are_means_of_samples_also_where_moves_arrive():
         expected = expected / width.reshape(1, -1, *[1] * (values.ndim - 2))
         # the slowest pole is at 1e-7: one minus its exponential keeps nine digits
         assert_allclose(mean, expected, rtol=1e-8, atol=1e-10)
-
-
-def test_a_few_moves_and_the_sampled_input_that_they_make_give_the_same_modes():
-    signal = np.zeros(300)
-    signal[5:], signal[100:] = 1.0, -0.5
-    train = MoveTrain(np.arange(300.0), ONES, 1.0, np.array([5.0, 100.0]), np.array([1.0, -1.5]))
-    poles, _ = poles_from_parameters(np.log([[0.03, 0.1, 0.2]]))
-    for a, b in zip(
-        train.modes(np.array([7.3]), poles),
-        SampledInput(signal, 1.0).modes(np.array([7.3]), poles),
-        strict=True,
-    ):
-        assert_allclose(a, b, atol=1e-11)
-
-
-@given(
-    st.lists(st.floats(-3, 2), min_size=1, max_size=5),
-    st.lists(st.floats(-4, 1.5), min_size=2, max_size=2),
-)
-def test_pole_parameters_and_poles_go_back_and_forth(speeds, dampings):
-    theta = np.array(speeds)
-    theta[theta.size % 2 + 1 :: 2] = dampings[: theta.size // 2]
-    poles, _ = poles_from_parameters(theta[None])
-    again, _ = poles_from_parameters(parameters_from_poles(poles[0])[None])
-    assert np.all(poles.real < 0)
-    # coinciding poles are moved apart by up to one per cent, once more on the way back
-    assert_allclose(np.prod(again), np.prod(poles), rtol=0.15 if theta.size > 2 else 0.02)
-
-
-def test_bins_cover_every_sample_once_and_are_single_samples_at_the_onset():
-    bins = response_bins(6440, [3840], 60)
-    assert bins.first[0] == 0
-    assert bins.first[-1] + bins.width[-1] == 6440
-    assert np.array_equal(bins.first[1:], (bins.first + bins.width)[:-1])
-    near = (bins.first >= 3880) & (bins.first < 3920)
-    assert np.all(bins.width[near] == 1)
-    assert bins.first.size < 300
 
 
 @pytest.mark.parametrize("zeta", [0.05, 0.7, 1.3])
@@ -260,22 +220,6 @@ def test_a_whitener_stands_in_for_the_weights():
     assert both[0] == pytest.approx(both[1], abs=1e-12)
 
 
-@pytest.mark.parametrize("structure", [ONE, JUMP, TWO, ZERO])
-def test_sensitivity_is_the_size_of_the_derivative_of_the_model(structure):
-    pair = [-np.log(LAG), np.log(1.2)][: structure.order]
-    x = np.concatenate([[3.37], pair])
-    weight = np.linspace(0.5, 2.0, SIZE)
-    made = problem(noisy(), root_weight=weight)
-    state = evaluate(made, structure, x[None])
-    b = state.numerator[0]
-    for q in range(x.size):
-        step = 1e-6 * (np.arange(x.size) == q)
-        change = respond(train(), NOTHING, b, x + step) - respond(train(), NOTHING, b, x - step)
-        size = np.linalg.norm(weight * change / 2e-6)
-        # no sample lies where the response breaks off; central differences of 1e-6
-        assert state.sensitivity[0, q] == pytest.approx(size, rel=1e-6)
-
-
 def test_own_terms_are_taken_out_of_data_and_model():
     # a free response of the plant and a level of its own in each of two stretches
     free = np.concatenate([4.0 * np.exp(-TIME[:40] / LAG), 1.0 - 2 * np.exp(-TIME[:50] / LAG)])
@@ -314,33 +258,3 @@ def test_a_delay_that_is_fixed_is_kept_wherever_it_is():
         trials = np.stack([np.full(3, delay), rates], axis=1)
         slower, at, faster = evaluate(problem(noisy()), ONE, trials).cost
         assert at <= min(slower, faster)
-
-
-def test_no_start_gets_worse_and_the_callers_are_kept():
-    starts = np.array([[1.0, -1.0], [6.0, 1.0], [3.0, -3.5]])
-    kept = starts.copy()
-    first = evaluate(problem(noisy()), ONE, starts).cost
-    last = first
-    for turns in (1, 2, 5):
-        x, cost = fit_batch(problem(noisy()), ONE, starts, BOX, most_iterations=turns)
-        assert np.all(cost <= last)
-        assert cost == pytest.approx(evaluate(problem(noisy()), ONE, x).cost)
-        last = cost
-    assert np.all(last < first)
-    assert np.array_equal(starts, kept)
-
-
-def test_steps_do_not_depend_on_the_unit_of_time():
-    # no start lies between two samples in one unit and on a sample in another
-    start = np.array([[5.1, 0.3], [1.1, -2.0]])
-    data = noisy()
-    for unit in (1e3, 1e-6):
-        shift = np.array([0.0, np.log(unit)])
-        scale = np.array([unit, 1.0])
-        box = Bounds(BOX.low * scale - shift, BOX.high * scale - shift)
-        ours, cost = fit_batch(problem(data), ONE, start, BOX, most_iterations=4)
-        other = problem(data, drive=train(unit))
-        theirs, same = fit_batch(other, ONE, start * scale - shift, box, most_iterations=4)
-        # four steps, each a solution of equations of condition 1e3
-        assert (theirs + shift) / scale == pytest.approx(ours, rel=1e-9)
-        assert same == pytest.approx(cost, rel=1e-9)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from ctrl_realize.numerics.signals.edges import Edge, despike, difference_noise, find_edges
-from ctrl_realize.numerics.signals.excitation import lively_start
 from ctrl_realize.numerics.signals.step_sequence import input_moves
 
 
@@ -45,26 +44,6 @@ def test_spikes_up_to_the_given_length_go_and_edges_stay():
 def test_one_clean_edge_is_described_in_full():
     assert find_edges(levels((2, 30), (5, 70)), 3, 0.5) == [Edge(30, 3.0, 2.0, 1, 0, 100)]
     assert find_edges(levels((2, 30), (-5, 70)), 0, 0.5) == [Edge(30, -7.0, 2.0, 1, 0, 100)]
-
-
-def test_neighbouring_edges_bound_each_other():
-    found = find_edges(levels((0, 50), (4, 60), (1, 70), (5, 80)), 3, 0.3)
-    assert [(e.index, e.amplitude, e.rest) for e in found] == [
-        (50, 4, 0),
-        (110, -3, 4),
-        (180, 4, 1),
-    ]
-    assert [(e.start, e.stop) for e in found] == [(0, 110), (50, 180), (110, 260)]
-
-
-@pytest.mark.parametrize(
-    "values",
-    [np.full(50, 4.0), np.zeros(50), white(500), 1e6 + 1e-5 * white(50), levels((4, 50))],
-    ids=["constant", "zero", "noise", "rounding", "level"],
-)
-@pytest.mark.parametrize("spike", [0, 3])
-def test_an_input_that_holds_still_has_no_edge(values, spike):
-    assert find_edges(values, spike, 0.5) == []
 
 
 @given(length=st.integers(1, 60), up=st.booleans(), spike=st.integers(0, 6))
@@ -115,49 +94,6 @@ def test_edges_are_found_anywhere_in_a_long_record():
     assert [edge.amplitude for edge in found] == [1.0, -1.0, 1.0, -1.0, 1.0]
 
 
-def test_no_more_edges_are_looked_for_than_are_wanted():
-    signal = np.repeat(np.random.default_rng(0).permutation(np.arange(300) % 2), 20).astype(float)
-    whole = find_edges(signal, 3, 0.1)
-    some = find_edges(signal, 3, 0.1, most=12)
-    assert len(whole) > 100
-    assert [edge.index for edge in some] == [edge.index for edge in whole[:13]]
-
-
-def moving(samples: int) -> np.ndarray:
-    return np.random.default_rng(1).choice([-1.0, 1.0], samples)
-
-
-@pytest.mark.parametrize("level", [0.0, 1e6])
-def test_an_input_that_moves_from_the_beginning_is_taken_from_there(level):
-    assert lively_start(level + moving(5000)[None], 400) == 0
-
-
-@pytest.mark.parametrize("rest", [450, 1000, 3999])
-@pytest.mark.parametrize("level", [0.0, 1e6])
-def test_a_rest_is_left_out(rest, level):
-    signal = level + np.concatenate([np.zeros(rest), moving(2000), np.zeros(3000)])
-    start = lively_start(signal[None], 400)
-    # half of the variance there is: the stretch begins up to half its length before
-    assert rest - 300 <= start <= rest + 100
-
-
-def test_of_two_inputs_both_move_in_it():
-    inputs = np.zeros((2, 4000))
-    inputs[0, :3000] = moving(3000)
-    inputs[1, 2000:] = moving(2000)
-    assert 1600 <= lively_start(inputs, 400) <= 2600
-
-
-def test_a_short_record_is_taken_from_its_start():
-    assert lively_start(np.concatenate([np.zeros(300), moving(100)])[None], 400) == 0
-
-
-def test_an_input_that_moves_at_the_very_end_gives_the_end():
-    signal = np.zeros(1000)
-    signal[-1] = 1.0
-    assert lively_start(signal[None], 300) == 700
-
-
 NOISE = 0.01
 N = 1000
 K = np.arange(N)
@@ -177,15 +113,6 @@ def test_a_clean_input_is_written_exactly_as_its_moves():
     index, size = input_moves(signal, [(10, 1), (40, 2)], 100)
     assert_array_equal(index, [10, 40, 41])
     assert_allclose(size, [2.0, -0.5, -0.5], rtol=0)
-
-
-def test_a_ramp_in_noise_keeps_its_samples():
-    ramp = NOISY + np.clip((K - 99) / 4, 0, 1) - (K >= 100)
-    index, size = input_moves(ramp, [(100, 4)], N)
-    assert_array_equal(index, [100, 101, 102, 103])
-    assert_allclose(written(index, size)[100:103], (ramp - np.median(ramp[:100]))[100:103])
-    # the last sample of the ramp is the first of the level that follows
-    assert written(index, size)[103] == pytest.approx(1, abs=5 * NOISE / np.sqrt(100))
 
 
 def test_a_drooping_input_is_followed_by_means_that_grow():

@@ -7,13 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter, sosfreqz
 
-from ctrl_realize.numerics.signals.bins import Bins, response_bins
+from ctrl_realize.numerics.signals.bins import response_bins
 from ctrl_realize.numerics.signals.correlation import (
     autoregression,
     correlation,
     cross_bound,
-    fit_percent,
-    predict_ahead,
     whiteness,
 )
 from ctrl_realize.numerics.signals.filters import butterworth, butterworth_group_delay, low_pass
@@ -30,15 +28,6 @@ def test_the_group_delay_is_the_slope_of_the_phase_at_zero(order):
     assert butterworth_group_delay(order, 50.0, DT) == pytest.approx(expected, rel=1e-6)
 
 
-def test_the_causal_filter_looks_only_back_and_starts_at_rest():
-    values = 3.0 + (np.arange(2000) >= 500)
-    filtered = low_pass(values, 5, 50.0, DT, zero_phase=False)
-    assert_allclose(filtered[:500], 3.0, atol=1e-12)
-    assert filtered[500] != 3.0
-    delay = np.sum(4.0 - filtered[500:])  # area above a unit step: its delay in samples
-    assert delay == pytest.approx(butterworth_group_delay(5, 50.0, DT), rel=1e-9)
-
-
 def test_forward_and_backward_is_symmetric_and_halves_the_power():
     pulse = np.zeros(4001)
     pulse[2000] = 1.0
@@ -48,14 +37,6 @@ def test_forward_and_backward_is_symmetric_and_halves_the_power():
     at_cutoff = np.sum(response * np.cos(2 * np.pi * 50.0 * DT * k))
     # twice through the filter: half the amplitude
     assert [response.sum(), at_cutoff] == pytest.approx([1, 0.5], abs=1e-9)
-
-
-def test_means_are_those_of_the_samples_of_each_bin():
-    bins = Bins(np.array([0, 1, 4]), np.array([1, 3, 2]))
-    values = np.array([5.0, 1.0, 2.0, 6.0, 7.0, 9.0, 100.0])  # the last is in no bin
-    assert bins.average(values).tolist() == [5.0, 3.0, 8.0]
-    both = np.stack([values, -2 * values], axis=1)
-    assert bins.average(both).tolist() == [[5.0, -10.0], [3.0, -6.0], [8.0, -16.0]]
 
 
 def test_bins_are_4_percent_of_the_distance_from_the_first_motion_wide():
@@ -72,15 +53,6 @@ def test_bins_are_4_percent_of_the_distance_from_the_first_motion_wide():
     assert width[:-1].max() <= 75
     assert len(set(width.tolist())) <= 20
     assert bins.width.sum() == 2000
-
-
-@pytest.mark.parametrize("edges", [[0], [1], [7, 9], [100, 101, 300]])
-def test_every_sample_is_in_one_bin(edges):
-    bins = response_bins(500, edges, 30)
-    inside = np.concatenate(
-        [np.arange(f, f + w) for f, w in zip(bins.first, bins.width, strict=True)]
-    )
-    assert inside.tolist() == list(range(500))
 
 
 def test_correlation_by_fft_is_the_sum_over_pairs():
@@ -113,12 +85,6 @@ def test_bound_of_cross_correlation_holds_for_coloured_signals():
     assert abs(np.mean(outside) - 0.05) < 0.025
 
 
-def test_fit_percent_is_100_for_the_data_and_0_for_their_mean():
-    y = np.random.default_rng(0).normal(size=(1, 50)) + 9
-    assert fit_percent(y, y)[0] == 100
-    assert_allclose(fit_percent(y, np.full((1, 50), y.mean())), 0, atol=1e-12)
-
-
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_order_and_coefficients_of_an_autoregression_are_found(seed):
     e = lfilter([1], [1, -1.5, 0.8], np.random.default_rng(seed).normal(size=4000))
@@ -126,10 +92,3 @@ def test_order_and_coefficients_of_an_autoregression_are_found(seed):
     assert 2 <= c.size <= 3  # BIC takes one more in about 1 % of cases
     assert_allclose(c[:2], [1.5, -0.8], rtol=0, atol=0.05)  # sqrt((1 - .8^2) / 4000) = 0.01
     assert autoregression(np.random.default_rng(seed).normal(size=4000), 10).size <= 1
-
-
-@pytest.mark.parametrize("steps", [1, 2, 7])
-def test_prediction_of_an_ar1_is_its_decay(steps):
-    e = np.random.default_rng(0).normal(size=30)
-    expected = np.concatenate([np.zeros(steps), 0.6**steps * e[:-steps]])
-    assert_allclose(predict_ahead(e, np.array([0.6]), steps), expected, rtol=0, atol=1e-14)

@@ -10,17 +10,12 @@ from scipy.signal import lfilter
 
 from ctrl_realize.numerics.signals.bins import response_bins
 from ctrl_realize.numerics.signals.noise import (
-    correlation_time,
     hum_frequencies,
-    mad_sigma,
     quantisation_step,
     rest_noise,
-    winsorised_sigma,
 )
 from ctrl_realize.numerics.signals.noise_model import (
-    coloured_criterion,
     noise_covariance,
-    noise_lags,
     whitener,
 )
 
@@ -44,18 +39,6 @@ def test_most_differences_have_to_be_multiples():
     assert quantisation_step(spoiled) == 0
     # a random signal has one smallest gap, and the others are no multiples of it
     assert quantisation_step(np.round(white(60), 9)) == 0
-
-
-def test_the_median_deviation_is_that_of_gaussian_noise():
-    assert mad_sigma(3 + 2 * white(100_000)) == pytest.approx(2, rel=0.02)
-    assert mad_sigma(np.array([1.0, 2.0, 4.0])) == pytest.approx(1.4826)
-
-
-def test_lost_degrees_of_freedom_are_counted_off():
-    values = white(12)
-    ratio = winsorised_sigma(values, 0.0, lost=4) / winsorised_sigma(values, 0.0)
-    assert ratio == pytest.approx(np.sqrt(12 / 8))
-    assert np.isfinite(winsorised_sigma(values[:2], 0.0, lost=2))
 
 
 def test_seven_samples_before_a_step_ask_the_record_and_eight_tell():
@@ -82,23 +65,6 @@ def test_a_dozen_samples_at_rest_are_helped_by_the_settled_half(seed):
     assert rest_noise(record[:50], record, 0.0)[0] < 0.3
 
 
-def line_in_noise(n, errors, seed):
-    """White noise without a line of its own, and a line of so many standard errors."""
-    k = np.arange(n) - float(n)
-    noise = white(n, seed)
-    noise -= np.polyval(np.polyfit(k, noise, 1), k)
-    sigma = winsorised_sigma(noise, 0.0, lost=2)
-    return noise + errors * sigma * np.sqrt(12 / n**3) * k, errors * sigma * np.sqrt(12 / n**3)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_five_standard_errors_make_a_drift(seed):
-    below, _ = line_in_noise(400, 4.98, seed)
-    above, slope = line_in_noise(400, 5.02, seed)
-    assert rest_noise(below, np.tile(below, 3), 0.0)[1] == 0
-    assert rest_noise(above, np.tile(above, 3), 0.0)[1] == pytest.approx(slope)
-
-
 def test_wild_samples_make_no_drift_and_hide_none():
     values = white(300)
     slope = 0.05
@@ -111,13 +77,6 @@ def test_wild_samples_make_no_drift_and_hide_none():
         assert drift == pytest.approx(slope, abs=3e-3)
 
 
-@pytest.mark.parametrize("pole", [0.4, 0.7, 0.95])
-def test_the_correlation_time_of_a_lag(pole):
-    found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))
-    # summed over some ten times its length: known to sqrt(20 time / 60 000), 12 % for the slowest
-    assert found == pytest.approx((1 + pole) / (1 - pole), rel=0.2)
-
-
 def test_lines_are_found_strongest_first_and_not_more_than_asked_for():
     index = np.arange(4000)
     frequencies = [0.0513, 0.1207, 0.2004, 0.3101]
@@ -128,48 +87,6 @@ def test_lines_are_found_strongest_first_and_not_more_than_asked_for():
     # resolution 1 / n, improved to a small part of it
     assert_allclose(found, frequencies[:3], atol=0.02 / 4000)
     assert_allclose(hum_frequencies(signal, most=1), frequencies[:1], atol=0.02 / 4000)
-
-
-def test_fewer_than_four_periods_and_fewer_than_sixtyfour_samples_are_no_line():
-    index = np.arange(1000)
-    for slow in (0.7, 1.5, 2.5, 3.2):
-        swing = np.cos(2 * np.pi * slow / 1000 * index) + 0.01 * white(1000)
-        assert hum_frequencies(swing) == []
-    assert hum_frequencies(np.cos(2 * np.pi * 8e-3 * index) + 0.01 * white(1000))
-    line = np.cos(2 * np.pi * 0.2 * index)
-    assert hum_frequencies(line[:63]) == []
-    assert hum_frequencies(line[:64] + 1e-3 * white(64))
-
-
-def test_clipped_noise_is_as_large_as_gaussian_noise_is():
-    # 200 000 samples tell a standard deviation to 0.16 %
-    values = 3.0 * np.random.default_rng(0).standard_normal(200_000)
-    assert winsorised_sigma(values, 0.0) == pytest.approx(3.0, rel=0.01)
-    spoilt = np.where(np.arange(values.size) % 100 == 0, 1e3, values)
-    assert winsorised_sigma(spoilt, 0.0) == pytest.approx(3.0, rel=0.03)
-
-
-def test_the_lags_of_autoregressive_noise_are_found():
-    white = np.random.default_rng(0).standard_normal(4000)
-    assert coloured_criterion([white])[1] == 0
-    criterion, lags = coloured_criterion([lfilter([1.0], [1, -1.2, 0.5], white)])
-    assert lags == 2
-    # the likelihood is that of what drives the noise: unit variance, to 4 x sqrt(2 / N)
-    n = white.size - noise_lags(white.size)
-    assert abs((criterion - 2 * np.log(n)) / n) < 4 * np.sqrt(2 / n)
-
-
-def test_stretches_of_one_noise_count_together_and_means_do_not():
-    white = np.random.default_rng(1).standard_normal(3000)
-    noise = lfilter([1.0], [1, -0.9], white)
-    parts = [noise[:1000], 5 + noise[1000:]]
-    assert coloured_criterion(parts)[1] == 1
-    assert abs(coloured_criterion(parts)[0] - coloured_criterion([noise])[0]) < 0.02 * 3000
-
-
-def test_a_residual_of_nothing_has_a_finite_criterion():
-    assert np.isfinite(coloured_criterion([np.zeros(100)])[0])
-    assert np.isfinite(coloured_criterion([np.sin(np.arange(400.0))])[0])
 
 
 RADIUS, ANGLE = 0.95, 2 * np.pi / 20
@@ -211,14 +128,3 @@ def test_means_over_bins_become_white_exactly():
     # the ridge is 1e-9 of the variance of a sample, the smallest eigenvalue of `among` 2e-4
     assert white @ among @ white.T == pytest.approx(np.eye(len(among)), abs=1e-4)
     assert np.all(np.triu(white, 1) == 0)
-
-
-def test_a_million_samples_need_no_covariance_of_a_million():
-    bins = response_bins(1_000_000, [1000], 1100)
-    covariance = exact_covariance(500)
-    white = whitener(bins, covariance)
-    # A wide bin is as good as alone: its mean has the variance of the noise at frequency 0.
-    growth = 2 * covariance.sum() - 1
-    width = float(bins.width[-1])
-    assert width > 10_000
-    assert white[-1, -1] ** -2 == pytest.approx(growth / width, rel=0.01)

@@ -1,4 +1,4 @@
-"""Table of what the long fuzz lane has run: ``python -m tests.fuzz.table LOG... --output FILE``.
+"""Table of what the long fuzz lane has run: ``python3 tools/fuzz_table.py LOG... --output FILE``.
 
 Reads what `FUZZ_LOG` was written to, in runs that may overlap: a case counts once.
 """
