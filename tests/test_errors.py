@@ -53,7 +53,7 @@ def fit_frf(frf=FRF, **options):
 
 
 def tracker(model=TWO_STATES, **options):
-    return cr.DelayTracker(model, **{"max_delay": 40, "memory": 20.0, **options})
+    return cr.DelayTracker(model, **{"max_delay": 40, "forgetting_time": 20.0, **options})
 
 
 ERRORS = {
@@ -72,7 +72,7 @@ ERRORS = {
         (lambda: realize(delay=5, samples=50), "need 56 samples.*has 50"),
         (lambda: cr.identify(STEP, method="paper", max_delay=5000), "need 6001 samples"),
         (lambda: tracker(max_delay=0), "nothing to choose"),
-        (lambda: tracker(memory=0.05), "longer memory"),
+        (lambda: tracker(forgetting_time=0.05), "forgetting_time"),
     ],
     NoStepError: [
         (lambda: cr.detect_step(QUIET), "no step"),
@@ -129,7 +129,7 @@ ERRORS = {
         (lambda: cr.identify_campaign([STEP], n_jobs=0), "n_jobs=0"),
         (lambda: cr.impulse_from_step(cr.unit_step(STEP), cutoff_hz=640.0), "half the sample rate"),
         (lambda: cr.impulse_from_step(cr.unit_step(STEP), filter_order=0), "1...10"),
-        (lambda: tracker(memory=-1.0), "memory"),
+        (lambda: tracker(forgetting_time=-1.0), "forgetting_time"),
         (lambda: tracker(min_delay=1.5), "min_delay"),
         (lambda: cr.design.margins(DISCRETE, dead_time=0.3), "discrete"),
         (lambda: cr.design.margins(LAG, dead_time=-1.0), ">= 0"),

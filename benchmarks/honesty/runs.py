@@ -47,7 +47,7 @@ class Study:
 STUDIES: dict[str, Study] = {
     "given": Study(step_intervals.given, 4),
     "scans": Study(step_intervals.scans, 4),
-    "views": Study(step_intervals.estimates),
+    "views": Study(step_intervals.views),
     "several": Study(step_intervals.several),
     "redrawn": Study(step_intervals.redrawn),
     "tracked": Study(step_intervals.tracked, 4),
