@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import inspect
 import re
@@ -164,3 +165,34 @@ def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
     for block in re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S):
         exec(block, scope)
     assert scope["sys"].fit.interval[0] < valve.truth.dead_time < scope["sys"].fit.interval[1]
+
+
+def test_every_source_that_the_code_names_is_on_the_page_of_references():
+    page = (DOCS / "references.md").read_text().replace("–", "-")
+    missing = []
+    for path in sorted(Path(cr.__file__).parent.rglob("*.py")):
+        documented = ast.AsyncFunctionDef, ast.FunctionDef, ast.ClassDef, ast.Module
+        nodes = [
+            node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, documented)
+        ]
+        words = "\n".join(ast.get_docstring(node) or "" for node in nodes)
+        for entry in re.findall(r"^\.\. \[\d+\] (.*(?:\n   \S.*)*)", words, re.M):
+            # Authors and title begin alike; section and digits may differ from place to place.
+            start = " ".join(entry.split())[:40]
+            dois = re.findall(r"doi:(\S+?)\.?$", entry)
+            if f"- {start}" not in page or any(f"[doi:{doi}]" not in page for doi in dois):
+                missing.append((path.name, start))
+    assert not missing
+    entries = re.findall(r"^- .*$", page, re.M)
+    assert len(entries) == len(set(entries)) > 50
+
+
+def test_every_module_of_the_numerical_floor_names_its_sources_or_says_that_it_is_our_own():
+    floor = Path(cr.__file__).parent / "numerics"
+    plumbing = {"__init__.py", "arrays.py", "blas_threads.py"}
+    silent = []
+    for path in sorted(floor.rglob("*.py")):
+        words = ast.get_docstring(ast.parse(path.read_text())) or ""
+        if path.name not in plumbing and not re.search(r"^References$|[Oo]ur own", words, re.M):
+            silent.append(str(path.relative_to(floor)))
+    assert not silent

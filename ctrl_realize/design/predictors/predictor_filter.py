@@ -36,8 +36,8 @@ def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating
 
     References
     ----------
-    .. [1] J.E. Normey-Rico and E.F. Camacho, Control of Dead-time Processes, Springer 2007,
-       chapter 7.
+    .. [1] J. E. Normey-Rico and E. F. Camacho, Control of Dead-time Processes, Springer 2007,
+       doi:10.1007/978-1-84628-829-6.
     """
     count = 1 + poles.size + int(integrating)
     basis = np.arange(count)

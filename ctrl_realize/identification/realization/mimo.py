@@ -212,7 +212,7 @@ def realize_mimo(
     .. [1] S. Y. Kung, A new identification and model reduction algorithm via singular value
        decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
     .. [2] B. De Schutter, Minimal state-space realization in linear system theory: an overview, J.
-       Comput. Appl. Math. 121 (2000) 331-354, section 4, doi:10.1016/S0377-0427(00)00341-1.
+       Comput. Appl. Math. 121 (2000) 331-354, doi:10.1016/S0377-0427(00)00341-1.
 
     Examples
     --------

@@ -9,7 +9,7 @@ is Kung's zero-padded version.
 References
 ----------
 .. [1] G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., Johns Hopkins 2013, section 4.8
-   (circulant matrices and the fast Fourier transform).
+   (Circulant and discrete Poisson systems).
 .. [2] S. Y. Kung, A new identification and model reduction algorithm via singular value
    decomposition, Proc. 12th Asilomar Conf. Circuits, Systems and Computers (1978) 705-714.
 """

@@ -9,7 +9,7 @@ References
 .. [1] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
    doi:10.1214/aos/1176344136.
 .. [2] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
-   16.4 (Model structure selection).
+   16.4 (Comparing model structures).
 """
 
 from __future__ import annotations

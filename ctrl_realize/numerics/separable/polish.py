@@ -275,8 +275,8 @@ def solve_level(
     the slopes of the others are zero there, and the cost is `goal`. None where they do not come
     to an end.
 
-    .. [1] Venzon and Moolgavkar, A method for computing profile-likelihood-based confidence
-       intervals, Applied Statistics 37 (1988) 87-94.
+    .. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based
+       confidence intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
     """
     x, unit = start.copy(), np.ones(start.size)
     unit[0] = dt

@@ -11,7 +11,7 @@ References
 .. [2] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
    doi:10.1080/01621459.1995.10476572.
 .. [3] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
-   16.4 (Model structure selection).
+   16.4 (Comparing model structures).
 """
 
 from __future__ import annotations

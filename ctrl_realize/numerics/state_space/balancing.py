@@ -115,8 +115,8 @@ def balanced_truncation(
 
     References
     ----------
-    .. [1] M.S. Tombs and I. Postlethwaite, Truncated balanced realization of a stable non-minimal
-       state-space system, Int. J. Control 46 (1987) 1319-1330.
+    .. [1] M. S. Tombs and I. Postlethwaite, Truncated balanced realization of a stable non-minimal
+       state-space system, Int. J. Control 46 (1987) 1319-1330, doi:10.1080/00207178708933971.
     """
     n = A.shape[0]
     if n == 0:

@@ -1,6 +1,7 @@
 """Frequency response of a line of past samples with weights of their own.
 
-The closed form is the geometric series ``sum_{i=1..d} A^(i-1) z^-i = (z I - A)^-1 (I - z^-d A^d)``.
+Our own: the closed form is the geometric series ``sum_{i=1..d} A^(i-1) z^-i = (z I - A)^-1 (I -
+z^-d A^d)``.
 """
 
 from __future__ import annotations

@@ -36,8 +36,9 @@ def principal_logarithm(A: FloatArray) -> FloatArray:
 
     References
     ----------
-    .. [1] A. H. Al-Mohy, N. J. Higham, SIAM J. Sci. Comput. 34 (2012), C153-C169, sections 2
-       and 5.
+    .. [1] A. H. Al-Mohy and N. J. Higham, Improved inverse scaling and squaring algorithms for the
+       matrix logarithm, SIAM J. Sci. Comput. 34 (2012) C153-C169, sections 2 and 5,
+       doi:10.1137/110852553.
     """
     n = A.shape[0]
     T, Z = schur(A, output="complex")

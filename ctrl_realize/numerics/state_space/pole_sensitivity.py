@@ -1,7 +1,7 @@
 """Small changes of a model: how its poles can move, what each move does, and the moved model.
 
-The derivatives are those of the logarithm of the factored transfer function, ``d log 1/(z - p) = dp
-/ (z - p)``, the gain at z = 1 being kept.
+Our own: the derivatives are those of the logarithm of the factored transfer function, ``d log 1/(z
+- p) = dp / (z - p)``, the gain at z = 1 being kept.
 """
 
 from __future__ import annotations
