@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import DataError, OptionError
+
+Choice = TypeVar("Choice")
 
 MOST = 10**12
 """No count of samples, lags or states is larger."""
@@ -118,12 +120,14 @@ def _unmasked(given: Any) -> Any:
     return given
 
 
-def one_of(value: Any, name: str, choices: tuple[str, ...]) -> str:
-    """Return `value` when it is one of the choices."""
+def one_of(value: Choice, name: str, choices: tuple[str, ...]) -> Choice:
+    """Return the choice that `value` is, written in any case."""
     # an array would compare one by one
-    if not isinstance(value, str) or value not in choices:
-        raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
-    return str(value)
+    if isinstance(value, str):
+        for choice in choices:
+            if value.casefold() == choice.casefold():
+                return cast(Choice, choice)
+    raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
 
 
 def spelled_out(text: str) -> str:

@@ -48,7 +48,23 @@ class Flag:
         return self.message
 
 
-class Result:
+class Drawable:
+    """What has a picture among `ctrl_realize.plots`."""
+
+    __slots__ = ()
+
+    def plot(self, **kwargs: Any) -> Any:
+        """Draw it; returns a `control.ControlPlot`.
+
+        Keyword arguments go to the function of `ctrl_realize.plots` that draws this kind of
+        object.
+        """
+        # The one way up in the layers: drawing is looked up when somebody asks for it, so that
+        # computing needs no matplotlib.
+        return import_module("ctrl_realize.plots").draw(self, **kwargs)
+
+
+class Result(Drawable):
     """Mixin of all results: `report`, `plot` and the card that a notebook shows.
 
     Examples
@@ -85,16 +101,6 @@ class Result:
 
     def _repr_html_(self) -> str:
         return html_card(self._title(), self._rows(), self._choices(), self._notes())
-
-    def plot(self, **kwargs: Any) -> Any:
-        """Draw the result; returns a `control.ControlPlot`.
-
-        Keyword arguments go to the function of `ctrl_realize.plots` that draws this kind of
-        result.
-        """
-        # The one way up in the layers: drawing is looked up when somebody asks for it, so that
-        # computing needs no matplotlib.
-        return import_module("ctrl_realize.plots").draw(self, **kwargs)
 
 
 def text_card(

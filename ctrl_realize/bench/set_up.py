@@ -126,7 +126,7 @@ def valve(
     if slew_limit is not None:
         positive(slew_limit, "slew_limit", "speed in strokes per second")
     if anti_aliasing is not None:
-        one_of(anti_aliasing, "anti_aliasing", ("linear-phase", "analog"))
+        anti_aliasing = one_of(anti_aliasing, "anti_aliasing", ("linear-phase", "analog"))
     before = [
         lag(paper.SETUP.converter_cutoff_hz),
         lag(positive(lag_hz, "lag_hz", "frequency in Hz")),

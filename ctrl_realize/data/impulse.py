@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import sosfreqz
 
-from .._checks import numbers, positive
-from ..errors import DataError, OptionError
+from .._checks import numbers, one_of, positive
+from ..errors import DataError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.signals.filters import butterworth, butterworth_group_delay
 from ..numerics.signals.time_axis import EXTREME
+from ..results import Drawable
 from .step import StepResponse
 
 Sampling = Literal["step-invariant", "impulse-invariant"]
@@ -68,7 +69,7 @@ class FilterSpec:
 
 
 @dataclass(frozen=True, eq=False)
-class ImpulseResponse:
+class ImpulseResponse(Drawable):
     """Response to a unit pulse: the Markov parameters G_0, G_1 and so on.
 
     The pulse has height 1 and lasts one sample, so a model's D, CB, CAB, ... are these numbers,
@@ -134,10 +135,7 @@ class ImpulseResponse:
         if np.abs(values).max() > EXTREME**2:
             raise DataError(f"markov goes up to {np.abs(values).max():g}, which is no measurement")
         seconds = positive(dt, "dt", "sample time in s")
-        if sampling not in ("step-invariant", "impulse-invariant"):
-            raise OptionError(
-                f"sampling={sampling!r}; choose 'step-invariant' or 'impulse-invariant'"
-            )
+        sampling = one_of(sampling, "sampling", ("step-invariant", "impulse-invariant"))
         fix = object.__setattr__
         fix(self, "markov", read_only(values))
         fix(self, "dt", seconds)

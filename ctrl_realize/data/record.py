@@ -13,13 +13,14 @@ from .._checks import numbers, one_of, spelled_out
 from ..errors import DataError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.signals.time_axis import axis_fault, sample_time
+from ..results import Drawable
 from .record_checks import axis_words, check_finite, check_shape, check_size, labelled
 from .resampling import MIN_SAMPLES, resampled
 
 MISSING = ("refuse", "keep")
 
 
-class Record:
+class Record(Drawable):
     """Input and output of a plant, measured together.
 
     Parameters
@@ -101,8 +102,9 @@ class Record:
         for what, values in signals.items():
             check_shape(values, what, stamps.size)
         check_finite(stamps, "time")
+        missing = one_of(missing, "missing", MISSING)
         for what, values in signals.items():
-            check_finite(values, what, allow_nan=one_of(missing, "missing", MISSING) == "keep")
+            check_finite(values, what, allow_nan=missing == "keep")
             check_size(values, what)
         fault = axis_fault(stamps)
         if fault is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..numerics.arrays import FloatArray, read_only
+from ..results import Drawable
 from .record import Record
 
 
@@ -55,7 +56,7 @@ class StepEdge:
 
 
 @dataclass(frozen=True, eq=False)
-class StepResponse:
+class StepResponse(Drawable):
     """Response to a unit step, cut out of a record.
 
     ``output[k] = (y[edge.index + k] - baseline - drift * k * dt) / amplitude``; `pre` is the

@@ -29,7 +29,7 @@ def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatA
     With ``start="estimate"`` so are the state of the core, and what was on its way through the
     dead times when the record began.
     """
-    one_of(start, "start", ("estimate", "rest"))
+    start = one_of(start, "start", ("estimate", "rest"))
     check_complete(record, "a simulation")
     model = as_delayed(system, record)
     u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)

@@ -18,6 +18,7 @@ import control as ct
 
 from .._checks import system_name
 from ..errors import DelayRangeError
+from ..results import Drawable
 from .algebra import DelayedAlgebra
 from .analysis import DelayedAnalysis
 from .cards import DelayedCards
@@ -29,7 +30,7 @@ MAX_DELAY = 10_000_000
 """Samples in all delays together; more are a sample time given in another unit."""
 
 
-class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, DelayedCards):
+class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, DelayedCards, Drawable):
     """Discrete state-space system with dead time: core(z) z^-d.
 
     It is a `control.StateSpace` with the states ``[core; u[k-1] ... u[k-d]]`` and goes into every

@@ -211,7 +211,7 @@ def _hold(system: Any, dt: float | None, hold: str | None) -> Literal["zoh"] | N
     """Decide whether the hold is divided out."""
     if hold is None:
         return None
-    one_of(hold, "hold", ("auto", "zoh"))
+    hold = one_of(hold, "hold", ("auto", "zoh"))
     if dt is None:
         if hold == "zoh":
             raise OptionError("hold='zoh' needs a discrete model; this one is continuous")

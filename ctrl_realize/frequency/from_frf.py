@@ -114,10 +114,10 @@ def impulse_from_frf(
     >>> print(f"{g.markov.sum():.3f}", np.abs(g.markov[:5]).max() < 0.002)
     1.000 True
     """
-    one_of(kernel, "kernel", ("TC", "DC", "SS"))
+    kernel = one_of(kernel, "kernel", ("TC", "DC", "SS"))
     step = positive(dt, "dt", "sample time in s")
     count = whole(length, "length", 8)
-    one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
+    weighting = one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
     points = frf_points(frf, weighting, band_hz, below_hz=0.5 / step)
     if weighting == "auto" and not points.noise_known:
         points = frf_points(frf, "uniform", band_hz, below_hz=0.5 / step)

@@ -52,7 +52,7 @@ def frf_points(
         Points from here on are left out.
     """
     points = measured_points(frf)
-    one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
+    weighting = one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
     frequency = points.frequency_hz
     usable = (frequency > _LEAST) & (np.abs(points.response) > _LEAST)
     usable &= np.isfinite(points.response) & (frequency < below_hz)
@@ -197,7 +197,7 @@ def held_every(frf: Any, hold: str | None, dt: float | None) -> float | None:
     """
     if hold is None:
         return None
-    one_of(hold, "hold", ("auto", "zoh"))
+    hold = one_of(hold, "hold", ("auto", "zoh"))
     known = sampled_every(frf)
     if known is None and hold == "zoh" and dt is None:
         raise OptionError("hold='zoh' needs dt, the sample time of the held input in s")

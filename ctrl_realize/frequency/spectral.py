@@ -123,7 +123,7 @@ def spectral_frf(
     >>> print(round(abs(frf.complex[10]), 3), frf.coherence.min() > 0.9999)
     2.0 True
     """
-    one_of(method, "method", ("H1", "H2", "Hv"))
+    method = one_of(method, "method", ("H1", "H2", "Hv"))
     whole(delay, "delay", 0)
     stream = _aligned(records, delay)
     if period is not None:

@@ -122,7 +122,7 @@ def identify(
     >>> isinstance(sys, ct.StateSpace), round(sys.fit.dead_time, 3)
     (True, 0.125)
     """
-    one_of(method, "method", METHODS)
+    method = one_of(method, "method", METHODS)
     scan_only = {"cutoff_hz": cutoff_hz != "auto", "samples": samples is not None}
     scan_only["feedthrough"] = feedthrough is not None
     fit_only = {"known": known is not None, "structures": structures is not None}

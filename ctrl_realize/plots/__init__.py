@@ -29,6 +29,7 @@ from .robustness import uncertainty_plot as uncertainty_plot
 from .scans import delay_plot as delay_plot
 from .scans import order_plot as order_plot
 from .scans import singular_value_plot as singular_value_plot
+from .systems import system_plot as system_plot
 from .tracks import track_plot as track_plot
 from .tuning import hankel_plot as hankel_plot
 from .tuning import pid_comparison_plot as pid_comparison_plot
@@ -63,6 +64,7 @@ __all__ = [
     "robustness_plot",
     "singular_value_plot",
     "step_plot",
+    "system_plot",
     "track_plot",
     "truth_plot",
     "uncertainty_plot",

@@ -118,7 +118,7 @@ def reduce_sopdt(
 
 
 def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> ProcessModel:
-    one_of(method, "method", METHODS)
+    method = one_of(method, "method", METHODS)
     if isinstance(system, ProcessModel):
         core = ct.ss(system.transfer_function())
         system = ContinuousModel(core, system.dead_time, _resolution(system))

@@ -191,7 +191,16 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
 
     def __str__(self) -> str:
         # python-control's shows matrices, in which nobody finds the parameters again.
-        return f"{self._line()}\n\n{super().__str__()}"
+        return f"{self._line()}\n{self._gains()}\n\n{super().__str__()}"
+
+    def _gains(self) -> str:
+        """The gains of the parallel form, ``kp + ki / s + kd s / (tf s + 1)``."""
+        gains = [f"kp = {self.kp:.4g}"]
+        if "I" in self.kind:
+            gains.append(f"ki = kp / ti = {self.kp / self.ti:.4g} 1/s")
+        if "D" in self.kind:
+            gains.append(f"kd = kp td = {self.kp * self.td:.4g} s")
+        return "gains: " + ", ".join(gains)
 
     def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]

@@ -167,9 +167,9 @@ def tuned(
     name: str | None = None,
 ) -> tuple[PIDController, DelayedStateSpace]:
     """Follow a rule, see `pid`, without a look at the loop; returns the plant it was for too."""
-    one_of(rule, "rule", RULES)
-    one_of(kind, "kind", KINDS)
-    one_of(method, "method", DISCRETIZATIONS)
+    rule = one_of(rule, "rule", RULES)
+    kind = one_of(kind, "kind", KINDS)
+    method = one_of(method, "method", DISCRETIZATIONS)
     known = kinds_of(rule)
     if kind not in known:
         raise OptionError(f"rule={rule!r} has no {kind}; it knows {', '.join(known)}")

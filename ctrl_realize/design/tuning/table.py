@@ -170,15 +170,13 @@ def compare_pid(
     >>> found.best(max_sensitivity=1.5).rule
     'optimal'
     """
-    for rule in rules or ():
-        one_of(rule, "rule", RULES)
-    for kind in kinds:
-        one_of(kind, "kind", KINDS)
+    tried = [one_of(rule, "rule", RULES) for rule in rules or RULES]
+    kinds = [one_of(kind, "kind", KINDS) for kind in kinds]
     plant, _ = reference_plant(system, options.get("dt"))
     total = _span(system, plant)
     made: list[tuple[PIDController, Margins, Performance]] = []
     refused: list[tuple[str, str, str]] = []
-    for rule in rules or RULES:
+    for rule in tried:
         for kind in kinds:
             if kind not in kinds_of(rule):
                 continue

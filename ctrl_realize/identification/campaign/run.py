@@ -69,7 +69,7 @@ def identify_campaign(
     >>> campaign.delays
     array([53., 55., 59.])
     """
-    one_of(method, "method", METHODS)
+    method = one_of(method, "method", METHODS)
     _check_options(options)
     if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or not 0 < abs(n_jobs) <= 10_000:
         raise OptionError(f"n_jobs={n_jobs!r}; needed is a number of processes, or -1 for all")

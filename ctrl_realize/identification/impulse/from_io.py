@@ -131,9 +131,9 @@ def impulse_from_io(
     >>> bool(np.abs(error).max() < 0.01)
     True
     """
-    one_of(method, "method", ("auto", "regularized", "least_squares", "okid"))
-    one_of(kernel, "kernel", ("auto", "TC", "DC", "SS"))
-    one_of(start, "start", ("unknown", "rest"))
+    method = one_of(method, "method", ("auto", "regularized", "least_squares", "okid"))
+    kernel = one_of(kernel, "kernel", ("auto", "TC", "DC", "SS"))
+    start = one_of(start, "start", ("unknown", "rest"))
     if arx_order is not None and method != "okid":
         raise OptionError(f"arx_order={arx_order!r} belongs to method='okid', not {method!r}")
     group = as_group(records)

@@ -152,8 +152,8 @@ def fit_output_error(
     >>> sys.fit.structure, round(sys.fit.dead_time, 3), round(sys.fit.gain, 2)
     ((1, 1), 0.125, 3.0)
     """
-    one_of(loss, "loss", ("huber", "least_squares"))
-    one_of(noise, "noise", ("auto", "white"))
+    loss = one_of(loss, "loss", ("huber", "least_squares"))
+    noise = one_of(noise, "noise", ("auto", "white"))
     tried = _structures(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)

@@ -232,7 +232,7 @@ def realize_mimo(
     data = as_impulse(impulse, dt)
     count = whole(order, "order", 1)
     choice = one_of(structure, "structure", ("auto", "common", "rows", "columns"))
-    one_of(hankel, "hankel", HANKEL)
+    hankel = one_of(hankel, "hankel", HANKEL)
     markov = channels(data)
     found = delay_matrix(data, level=level) if delays is None else given_delays(delays, markov)
     known = found >= 0

@@ -112,7 +112,8 @@ def realize(
     data = as_impulse(impulse, dt)
     order = whole(order, "order", 1)
     delay = whole(delay, "delay", 0)
-    padded = one_of(hankel, "hankel", HANKEL) == "padded"
+    hankel = one_of(hankel, "hankel", HANKEL)
+    padded = hankel == "padded"
     samples = check_samples(data, samples, order, delay, padded=padded, what="delay")
     markov = channels(data)
     model = realize_at(markov, delay, samples, order, padded=padded)

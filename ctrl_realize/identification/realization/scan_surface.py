@@ -67,7 +67,8 @@ def scan_surface(
     """Check the arguments, decompose behind every delay, take all misfits over one window."""
     data = as_impulse(impulse, dt)
     max_delay = whole(max_delay, "max_delay", 0)
-    padded = one_of(hankel, "hankel", HANKEL) == "padded"
+    hankel = one_of(hankel, "hankel", HANKEL)
+    padded = hankel == "padded"
     highest = max(orders)
     check_samples(data, samples, highest, max_delay, padded=padded, what="max_delay")
     if samples is None:

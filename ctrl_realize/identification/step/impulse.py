@@ -87,7 +87,7 @@ def impulse_from_step(
     if not isinstance(step, StepResponse):
         raise DataError(f"step is a {type(step).__name__}; needed is a StepResponse, see unit_step")
     order = whole(filter_order, "filter_order", 1, 10)
-    one_of(difference, "difference", ("backward", "central"))
+    difference = one_of(difference, "difference", ("backward", "central"))
     cutoff = _cutoff(step, cutoff_hz)
     # The samples before the step take part, so that differentiation and filter are settled when
     # the step comes. Where there are too few, rest is what was before: zeros.
@@ -118,7 +118,7 @@ def _cutoff(step: StepResponse, cutoff_hz: float | str | None) -> float | None:
         return None
     rate = 1 / step.dt
     if isinstance(cutoff_hz, str):
-        one_of(cutoff_hz, "cutoff_hz", ("auto",))
+        cutoff_hz = one_of(cutoff_hz, "cutoff_hz", ("auto",))
         rise = rise_time(step.output, step.dt)
         cutoff = CUTOFF_OVER_BANDWIDTH * BANDWIDTH_TIMES_RISE / rise
         return cutoff if cutoff < 0.45 * rate else None
