@@ -14,6 +14,7 @@ from ..data.impulse import ImpulseResponse
 from ..data.impulse_estimate import ImpulseEstimate
 from ..data.record import Record
 from ..data.step import StepResponse
+from ..delayed import DelayedStateSpace
 from ..design.loops.delay_robustness import DelayRobustness
 from ..design.loops.margin_result import Margins
 from ..design.loops.robustness import RobustnessCheck, UncertaintyBound
@@ -36,17 +37,17 @@ from ..identification.validation.prediction import Prediction
 from ..identification.validation.residuals_result import ResidualAnalysis
 from ..io.stored_fit import FitSummary
 from .campaigns import campaign_plot
-from .delays import bootstrap_plot, delay_check_plot
+from .delays import bootstrap_plot, delay_comparison_plot, track_plot
 from .fits import fit_plot
 from .frequencies import frf_fit_plot, frf_plot, truth_plot
 from .frf_comparison import comparison_plot
-from .impulses import channels_plot, impulse_estimate_plot, impulse_plot
+from .impulses import impulse_estimate_plot, impulse_plot, mimo_realization_plot
 from .loops import margins_plot
 from .records import record_plot, step_plot
-from .residuals import channel_fit_plot, prediction_plot, residual_plot
+from .residuals import prediction_plot, residual_plot, state_space_fit_plot
 from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
-from .tracks import track_plot
+from .systems import system_plot
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
 
 
@@ -98,10 +99,11 @@ def _no_curves(result: FitSummary, **kwargs: Any) -> ct.ControlPlot:
 draw.register(BalancedReduction, hankel_plot)
 draw.register(Bootstrap, bootstrap_plot)
 draw.register(Campaign, campaign_plot)
-draw.register(StateSpaceFit, channel_fit_plot)
-draw.register(MimoRealization, channels_plot)
-draw.register(DelayComparison, delay_check_plot)
+draw.register(StateSpaceFit, state_space_fit_plot)
+draw.register(MimoRealization, mimo_realization_plot)
+draw.register(DelayComparison, delay_comparison_plot)
 draw.register(OutputErrorFit, fit_plot)
+draw.register(DelayedStateSpace, system_plot)
 draw.register(DelayRobustness, delay_robustness_plot)
 draw.register(DelayScan, delay_plot)
 draw.register(TrackHistory, track_plot)

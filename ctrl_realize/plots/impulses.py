@@ -97,7 +97,7 @@ def impulse_plot(
         return style.finished(axes, lines, columns=columns)
 
 
-def channels_plot(
+def mimo_realization_plot(
     fit: MimoRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
     """Draw the responses of all channels, with a line where the delay of each ends.
@@ -122,7 +122,7 @@ def channels_plot(
     >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
     >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
     >>> system = cr.identification.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1)
-    >>> cplt = plots.channels_plot(system.fit)
+    >>> cplt = plots.mimo_realization_plot(system.fit)
     >>> [axes.get_title(loc="right") for axes in cplt.figure.axes]
     ['input 0 to output 0', 'input 0 to output 1']
     """

@@ -76,7 +76,7 @@ def residual_plot(
         return style.finished(axes, [above, own, cross], loc="above")
 
 
-def channel_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
+def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
     """Draw how a fitted model follows one of its records, and the correlations of what is left.
 
     Parameters
@@ -100,7 +100,7 @@ def channel_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) -> c
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
     >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.channel_fit_plot(cr.fit_state_space(record, 1).fit)
+    >>> cplt = plots.state_space_fit_plot(cr.fit_state_space(record, 1).fit)
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """

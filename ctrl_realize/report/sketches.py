@@ -182,7 +182,7 @@ def _output_sketch(fit: Any, output: int, label: str) -> Sketch:
         f"The output {label}",
         "Measured and simulated. Below: autocorrelation of the residual, and its "
         "cross-correlation with the input.",
-        lambda figure: plots.channel_fit_plot(fit, output=output, ax=figure),
+        lambda figure: plots.state_space_fit_plot(fit, output=output, ax=figure),
         (6.2, 5.4),
     )
 

@@ -84,6 +84,7 @@ def every(record, scanned, fitted, campaign, orders, measured, valve):
         ("frf_plot", lambda ax: plots.frf_plot([measured, fitted], ax=ax), 3),
         ("comparison_plot", lambda ax: plots.comparison_plot(comparison, ax=ax), 2),
         ("truth_plot", lambda ax: plots.truth_plot(valve.truth, ax=ax), 2),
+        ("system_plot", lambda ax: plots.system_plot(fitted, ax=ax), 1),
     ]
 
 
@@ -101,6 +102,7 @@ UNITS = {
     "frf_plot": "frequency [Hz]",
     "comparison_plot": "frequency [Hz]",
     "truth_plot": "frequency [Hz]",
+    "system_plot": "time after the step [s]",
 }
 
 
