@@ -160,6 +160,16 @@ def compare_pid(
     -------
     PIDComparison
 
+    Notes
+    -----
+    The sources of the rules are those of `pid`; the limit on the sensitivity by which the best is
+    chosen is the usual one of [1]_.
+
+    References
+    ----------
+    .. [1] K. J. Astrom and T. Hagglund, Advanced PID Control, ISA 2006, chapter 4 (Controller
+       design).
+
     Examples
     --------
     >>> import ctrl_realize as cr
