@@ -49,7 +49,15 @@ class Flag:
 
 
 class Drawable:
-    """What has a picture among `ctrl_realize.plots`."""
+    """What has a picture among `ctrl_realize.plots`.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize.results import Drawable
+    >>> issubclass(cr.Record, Drawable)
+    True
+    """
 
     __slots__ = ()
 
