@@ -7,17 +7,23 @@ things that one should know before trusting it.
 
 from __future__ import annotations
 
-import html
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
+from ._shown import html_card, text_card
 
-SHORT_LABEL = 16
-"""Letters of a label that is never broken."""
+IntervalKind = Literal["confidence", "conditional", "spanned", "flatness", "plausible", "tracked"]
+"""What the interval of a dead time is; see `ModelFit`."""
+INTERVAL_LABELS: dict[IntervalKind | None, str] = {
+    "confidence": "95 % interval",
+    "conditional": "95 % interval if the structure is right",
+    "spanned": "range of the delay estimates",
+    "flatness": "within 5 % of the smallest IAE",
+    "plausible": "dead times not ruled out",
+    "tracked": "95 % interval within the memory",
+    None: "95 % interval",
+}
 
 
 @dataclass(frozen=True)
@@ -111,135 +117,155 @@ class Result(Drawable):
         return html_card(self._title(), self._rows(), self._choices(), self._notes())
 
 
-def text_card(
-    title: str,
-    rows: Sequence[tuple[str, str]],
-    choices: Sequence[str] = (),
-    flags: Sequence[str] = (),
-) -> str:
-    """Lay out label-value rows as text, choices and flags below them.
+class ModelFit(Result):
+    """How a model was found: what the results of all estimators have in common.
 
-    Parameters
+    The `fit` of a `DelayedStateSpace` is one. Times are in s, delays in samples; None where the
+    method does not estimate a quantity. Where both are there, ``interval[0] <= dead_time <=
+    interval[1]`` and ``delay == dead_time / dt``, but for the whole samples that some methods
+    round to.
+
+    Attributes
     ----------
-    title : str
-    rows : sequence of (label, value)
-    choices, flags : sequence of str, optional
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> from ctrl_realize.results import text_card
-    >>> print(text_card("Delay", [("delay", "37 samples"), ("order", "3")], (), ["look twice"]))
-    Delay
-      delay  37 samples
-      order  3
-      ! look twice
+    dead_time : float or None
+    interval : tuple of float, or None
+        Of the dead time; `dead_time_interval` is the same where it may be relied on.
+    interval_kind : str or None
+        What `interval` is. ``"confidence"``: a 95 % interval. ``"conditional"``: one if the
+        structure that was asked for were right, which the data rule out. ``"spanned"``: by several
+        estimates, where no model leaves only noise. ``"flatness"``: delays within 5 % of the least
+        misfit. ``"plausible"``: dead times that are not ruled out, without a probability.
+        ``"tracked"``: of the samples within a tracker's memory.
+    interval_label : str
+        The same in words.
+    delay : float or None
+    delay_interval : tuple of float, or None
+    total_delay : float or None
+        Delay at zero frequency: dead time and lags.
+    total_delay_interval : tuple of float, or None
+        95 % interval.
+    onset : float or None
+        First motion of the output after a step of the input; NaN where the input is no step.
+    order : int or None
+        States of the core.
+    gain : float or None
+        At zero frequency.
+    gain_interval : tuple of float, or None
+        95 % interval.
+    gain_std_given_structure : float or None
+        Standard error, if the chosen structure is the plant's.
+    residual_std : float or None
+        Standard deviation of what the model leaves of its one output.
+    sampling : str or None
+        How the impulse response was sampled that the model was realized from.
+    records : tuple of Record
+        What was fitted; empty where it was no record.
+    choices : tuple of str
+    flags : tuple of Flag
     """
-    width = max((len(label) for label, _ in rows), default=0)
-    lines = [title]
-    lines += [f"  {label:<{width}}  {value}" for label, value in rows]
-    lines += [f"  - {choice}" for choice in choices]
-    lines += [f"  ! {flag}" for flag in flags]
-    return "\n".join(lines)
 
+    if TYPE_CHECKING:
+        # Every class defines these, mostly as fields of a dataclass, which could not take the
+        # place of properties that are there when the program runs.
+        @property
+        def dead_time(self) -> float | None:
+            """Dead time in s."""
+            ...
 
-def html_card(
-    title: str,
-    rows: Sequence[tuple[str, str]],
-    choices: Sequence[str] = (),
-    flags: Sequence[str] = (),
-) -> str:
-    """Lay out label-value rows as a small HTML table; everything is escaped.
+        @property
+        def interval(self) -> tuple[float, float] | None:
+            """Interval of the dead time in s."""
+            ...
 
-    Parameters
-    ----------
-    title, rows, choices, flags
-        As for `text_card`.
+        @property
+        def delay(self) -> float | None:
+            """Dead time in samples."""
+            ...
 
-    Returns
-    -------
-    str
+        @property
+        def delay_interval(self) -> tuple[float, float] | None:
+            """Interval of the dead time in samples."""
+            ...
 
-    Examples
-    --------
-    >>> from ctrl_realize.results import html_card
-    >>> card = html_card("Delay", [("delay", "37 samples")], flags=["look <twice>"])
-    >>> print(card[card.index("⚠"):])
-    ⚠ look &lt;twice&gt;</div></div>
-    """
-    cell = "text-align:left;vertical-align:top"
-    body = "".join(
-        f"<tr><th style='{cell};font-weight:500;padding:2px 16px 2px 0;"
-        # On a phone the values wrap first.
-        f"white-space:{'nowrap' if len(label) <= SHORT_LABEL else 'normal'}'>"
-        f"{html.escape(label)}</th>"
-        f"<td style='{cell};padding:2px 0'>{html.escape(value)}</td></tr>"
-        for label, value in rows
-    )
-    lines = "".join(f"<div style='margin-top:4px'>{html.escape(text)}</div>" for text in choices)
-    lines += "".join(f"<div style='margin-top:4px'>⚠ {html.escape(text)}</div>" for text in flags)
-    return (
-        "<div style='display:inline-block;border:1px solid #8886;border-radius:6px;"
-        "padding:8px 14px;max-width:46em'>"
-        f"<div style='font-weight:600;margin-bottom:4px'>{html.escape(title)}</div>"
-        f"<table style='border-collapse:collapse;margin:0'>{body}</table>{lines}</div>"
-    )
+        @property
+        def order(self) -> int | None:
+            """States of the core."""
+            ...
 
+        @property
+        def records(self) -> tuple[Any, ...]:
+            """What was fitted."""
+            ...
 
-def as_asked(system: Any) -> str:
-    """Write a system as its `repr_format`, or that of python-control's settings, asks for.
+        @property
+        def choices(self) -> tuple[str, ...]:
+            """What was chosen, and why."""
+            ...
 
-    What python-control takes where nothing was set, "eval", lists every number. Systems of this
-    toolbox show their one line there, and "eval" only where it was set on the system itself.
+        @property
+        def flags(self) -> tuple[Flag, ...]:
+            """What one should know before trusting it."""
+            ...
 
-    Parameters
-    ----------
-    system : control.InputOutputSystem
+    @property
+    def dead_time_interval(self) -> tuple[float, float] | None:
+        """Interval of the dead time in s, the same as `interval`."""
+        return self.interval
 
-    Returns
-    -------
-    str
+    @property
+    def interval_kind(self) -> IntervalKind | None:
+        """What `interval` is, as a key."""
+        return None
 
-    Examples
-    --------
-    >>> import control as ct
-    >>> import ctrl_realize as cr
-    >>> valve = cr.delayed_ss(ct.ss([], [], [], [[2.0]], 0.1), 3, name="valve")
-    >>> valve
-    <DelayedStateSpace 'valve': u -> y, order 0, z^-3 (0.3 s), dt = 0.1 s>
-    >>> valve.repr_format = "latex"
-    >>> repr(valve)[:4]
-    '<div'
-    """
-    asked = system.repr_format
-    if asked == "eval" and system._repr_format is not None:
-        return str(system._repr_eval_())
-    if asked not in ("eval", "info", "latex"):
-        raise ValueError(f"format {asked!r} unknown")
-    html_text = system._repr_html_() if asked == "latex" else None
-    return str(html_text or system._repr_info_())
+    @property
+    def interval_label(self) -> str:
+        """What `interval` is, in words."""
+        return INTERVAL_LABELS[self.interval_kind]
 
+    @property
+    def total_delay(self) -> float | None:
+        """Delay at zero frequency in s."""
+        return None
 
-def as_code(values: Any) -> str:
-    """Write an array, or a system of python-control, as code that has all its digits.
+    @property
+    def total_delay_interval(self) -> tuple[float, float] | None:
+        """95 % interval of the total delay in s."""
+        return None
 
-    Parameters
-    ----------
-    values : array_like or control.InputOutputSystem
+    @property
+    def onset(self) -> float | None:
+        """First motion of the output after a step of the input, in s."""
+        return None
 
-    Returns
-    -------
-    str
+    @property
+    def gain(self) -> float | None:
+        """Gain at zero frequency."""
+        return None
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from ctrl_realize.results import as_code
-    >>> print(as_code(np.array([1 / 3])))
-    array([0.3333333333333333])
-    """
-    with np.printoptions(precision=17, floatmode="unique", threshold=sys.maxsize):
-        return str(values._repr_eval_() if hasattr(values, "_repr_eval_") else repr(values))
+    @property
+    def gain_interval(self) -> tuple[float, float] | None:
+        """95 % interval of the gain."""
+        return None
+
+    @property
+    def gain_std_given_structure(self) -> float | None:
+        """Standard error of the gain if the chosen structure is the plant's."""
+        return None
+
+    @property
+    def residual_std(self) -> float | None:
+        """Standard deviation of what the model leaves of its one output."""
+        return None
+
+    @property
+    def sampling(self) -> str | None:
+        """How the impulse response was sampled that the model was realized from."""
+        return None
+
+    def _std(self) -> float | None:
+        """Standard error of the dead time in s, if the chosen structure is the plant's."""
+        return None
+
+    def _method(self) -> str:
+        """Say the method in words."""
+        return "model with dead time"

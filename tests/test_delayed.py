@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
+from ctrl_realize.io import FitSummary
 from tests.rigs import R3, TS, exact_step
 
 CONTROLLER = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.5]], TS)  # a PI controller
@@ -135,10 +136,15 @@ def test_what_cannot_keep_the_delay_is_plain_and_right(operation, delay):
 
 
 def test_a_fit_survives_copies_and_names_but_not_algebra():
-    S = valve(2).replace(fit={"found": "here"})
+    S = valve(2).replace(fit=FitSummary("Fit", "found here", ()))
     for kept in (S.copy("b"), pickle.loads(pickle.dumps(S)), S.replace(name="c")):
-        assert kept.fit == {"found": "here"}
+        assert kept.fit.report() == "found here"
     assert (2 * S).fit is None
+
+
+def test_a_fit_that_is_none_is_refused():
+    with pytest.raises(OptionError, match="fit is a dict; expected None or"):
+        valve(2).replace(fit={"found": "here"})
 
 
 def test_a_copy_computes_with_its_own_matrices():

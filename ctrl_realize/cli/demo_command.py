@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..delayed import fit_of
+from ..results import ModelFit
 from .demo_files import write_demo_files
 from .demo_run import run_demo
 from .demo_tables import outcome_table, table_1
@@ -49,7 +51,7 @@ def demo(
     say(outcome_table(result))
     say()
     say("Output-error fit of all records together")
-    say(result.fitted.fit.report())
+    say(fit_of(result.fitted, ModelFit).report())
     say()
     say(result.comparisons["fitted"].report())
     say(f"\n{result.seconds:.1f} s to simulate and identify")

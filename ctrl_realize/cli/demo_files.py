@@ -7,6 +7,9 @@ from pathlib import Path
 import pandas as pd
 
 from .. import paper, plots
+from ..delayed import fit_of
+from ..identification.output_error.result import OutputErrorFit
+from ..identification.realization.delay_scan_result import DelayScan
 from ..io import save_model
 from ..io.text.csv_files import write_csv
 from ..plots.fits import evidence_height
@@ -68,7 +71,7 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
     record = result.records[shown(result)]
     row = result.campaign.rows[shown(result)].system
     assert row is not None
-    scan = row.fit
+    scan = fit_of(row, DelayScan)
     truth = result.valve.truth.frf(result.frf.frequency_hz)
     final = [result.frf, result.fitted, result.printed]
     return [
@@ -78,7 +81,7 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
             "Mean of the records and the output-error fit. Below: the dead times that the "
             "data allow.",
             lambda figure: plots.fit_plot(result.fitted, ax=figure),
-            (6.2, 3.6 + evidence_height(result.fitted.fit)),
+            (6.2, 3.6 + evidence_height(fit_of(result.fitted, OutputErrorFit))),
         ),
         Sketch(
             "fig8_final_model",

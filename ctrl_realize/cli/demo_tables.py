@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .. import paper
+from ..delayed import fit_of
+from ..identification.output_error.result import OutputErrorFit
+from ..identification.realization.result import Realization
 from ..numerics.arrays import FloatArray
 from .demo_run import DemoResult
 from .terminal import table
@@ -41,8 +44,9 @@ def table_1(result: DemoResult) -> str:
 def outcome_rows(result: DemoResult) -> list[tuple[str, ...]]:
     """List what came out: printed, the paper's way, the better way, truth."""
     mine, theirs = result.campaign.statistics(paper.SETTINGS.trim), paper.table_1_statistics()
-    fit, truth = result.fitted.fit, result.valve.truth
-    lag = result.printed.fit.impulse.filter.group_delay
+    fit, truth = fit_of(result.fitted, OutputErrorFit), result.valve.truth
+    left = fit_of(result.printed, Realization).impulse.filter
+    lag = 0.0 if left is None else left.group_delay
     low, high = (bound / fit.dt for bound in fit.interval)
     errors = {
         name: f"{100 * one.rms_relative_error:.2g} %" for name, one in result.comparisons.items()

@@ -9,12 +9,14 @@ from typing import Annotated, Any
 import typer
 
 from ..data import MeasuredFRF
+from ..delayed import fit_of
 from ..errors import CtrlRealizeError, DataError, OptionError
 from ..frequency import compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
 from ..identification.methods import identify as identify_record
 from ..io import read_frf
+from ..results import ModelFit
 from .inputs import Reading, calls_again, check_files, reading, typed_call, words_again
 from .manifest import Run, refuse_other_results
 from .results import campaign_table, write_campaign_files, write_record_files
@@ -143,7 +145,7 @@ def _one(
         frf=frf, comparison=comparison, settings=settings, calls=calls,
     )  # fmt: skip
     say(printable(f"{file}: {record!r}"))
-    say(system.fit.report())
+    say(fit_of(system, ModelFit).report())
     if comparison is not None:
         say()
         say(comparison.report())
@@ -181,7 +183,7 @@ def _many(
     say(campaign.report())
     say()
     say("Final model")
-    say(campaign.system.fit.report())
+    say(fit_of(campaign.system, ModelFit).report())
     if comparison is not None:
         say()
         say(comparison.report())

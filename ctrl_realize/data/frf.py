@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._checks import complex_numbers, numbers, positive, real, system_name, system_names
+from .._shown import as_asked, as_code
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.statistics import circle_quantile
-from ..results import as_asked, as_code
 from .frf_algebra import FRFAlgebra
 from .frf_operands import SAME
 from .record_checks import check_size

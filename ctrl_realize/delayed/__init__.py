@@ -2,3 +2,4 @@
 
 from .factory import delayed_ss as delayed_ss
 from .system import DelayedStateSpace as DelayedStateSpace
+from .system import fit_of as fit_of

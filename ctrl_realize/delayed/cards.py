@@ -6,9 +6,9 @@ from html import escape
 
 import numpy as np
 
+from .._shown import as_asked, as_code, html_card
 from .._wording import in_time
 from ..numerics.arrays import ComplexArray
-from ..results import as_asked, as_code, html_card
 from .parts import CoreAndDelays
 
 _MOST_POLES = 8

@@ -12,6 +12,7 @@ import numpy as np
 from .._checks import positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
+from ..results import ModelFit
 from .parts import check_core
 from .system import MAX_DELAY, DelayedStateSpace
 
@@ -23,7 +24,7 @@ def delayed_ss(
     dead_time: float | None = None,
     dt: float | None = None,
     output_delay: int | Sequence[int] = 0,
-    fit: Any = None,
+    fit: ModelFit | None = None,
     name: str | None = None,
     inputs: str | Sequence[str] | None = None,
     outputs: str | Sequence[str] | None = None,

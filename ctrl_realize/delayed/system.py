@@ -12,19 +12,21 @@ transform its d poles at 0 drift out to |z| = eps^(1/d), 0.37 for d = 37.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import control as ct
 
 from .._checks import system_name
-from ..errors import DelayRangeError
-from ..results import Drawable
+from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ..results import Drawable, ModelFit
 from .algebra import DelayedAlgebra
 from .analysis import DelayedAnalysis
 from .cards import DelayedCards
 from .chains import parse_delays
 from .parts import check_core, named, signal_names
 from .responses import DelayedResponses
+
+AnyFit = TypeVar("AnyFit", bound=ModelFit)
 
 MAX_DELAY = 10_000_000
 """Samples in all delays together; more are a sample time given in another unit."""
@@ -48,8 +50,8 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
         Whole samples, the same for all inputs or one for each.
     output_delay : int or sequence of int, optional
         Whole samples behind the core, the same for all outputs or one for each.
-    fit : optional
-        How the model was found; any result of this toolbox.
+    fit : ModelFit, optional
+        How the model was found: the result of an estimator.
     name, inputs, outputs : optional
         Names, as for `control.ss`. Signals are named as those of `core`, or ``u`` and ``y``. A dot,
         which python-control keeps for ``system.signal``, becomes an underscore: ``FIC101.OP`` of a
@@ -64,12 +66,14 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
     delay_free : control.StateSpace
         The core.
     input_delays, output_delays : tuple of int
-    fit : object or None
+    fit : ModelFit or None
 
     Raises
     ------
     UnsuitableSystemError
         A core that is not a discrete state-space system with a sample time.
+    OptionError
+        A `fit` that is not one.
     DelayRangeError
         Delays that are negative, no whole numbers, not one for each signal, or more than ten
         million samples; and where matrices of more than 20 000 states are asked for.
@@ -109,7 +113,7 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
         delay: int | Sequence[int] = 0,
         *,
         output_delay: int | Sequence[int] = 0,
-        fit: Any = None,
+        fit: ModelFit | None = None,
         name: str | None = None,
         inputs: str | Sequence[str] | None = None,
         outputs: str | Sequence[str] | None = None,
@@ -127,6 +131,10 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             raise DelayRangeError(
                 f"the delays are {before + behind} samples; at most {MAX_DELAY} are allowed. Use a "
                 "longer sample time, or keep core and delay apart"
+            )
+        if fit is not None and not isinstance(fit, ModelFit):
+            raise OptionError(
+                f"fit is a {type(fit).__name__}; expected None or the fit of a model, a ModelFit"
             )
         input_names = signal_names(inputs, core.input_labels, "u")
         output_names = signal_names(outputs, core.output_labels, "y")
@@ -150,7 +158,7 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
         )
         self.input_delays = before
         self.output_delays = behind
-        self.fit = fit
+        self.fit: ModelFit | None = fit
         self._augmented = None
         self._schur = None
         self._locked = True
@@ -198,6 +206,21 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
         # Everything inside is read-only, so a copy may share it; the closures of python-control
         # must not be shared, and a new object has its own.
         return self.replace()
+
+
+def fit_of(system: DelayedStateSpace, kind: type[AnyFit]) -> AnyFit:
+    """Return the fit of a system where it is of a kind.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Another fit, or none.
+    """
+    if not isinstance(system.fit, kind):
+        raise UnsuitableSystemError(
+            f"the fit of {system.name!r} is {system.fit!r}; expected a {kind.__name__}"
+        )
+    return system.fit
 
 
 def _rebuild(

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._shown import as_asked, html_card, text_card
 from .._wording import in_time
 from ..delayed import DelayedStateSpace
 from ..delayed.deferred import DeferredMatrices
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.state_space.line_sums import CHUNK, LineSum
 from ..numerics.state_space.responses import frequency_response, schur_form
-from ..results import as_asked, html_card, text_card
 
 Pulses = tuple[FloatArray, FloatArray, FloatArray]
 """A (n, n), B (n, 1) and C (rows, n) of a pulse response."""

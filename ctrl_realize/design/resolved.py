@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..delayed import DelayedStateSpace
 from ..errors import UnresolvedWarning, UnsuitableSystemError, warn_caller
 from ..identification.output_error.result import is_firm
-from ..results import Flag
+from ..results import Flag, ModelFit
 
 SIGN_UNKNOWN = "gain_not_resolved"
 
@@ -51,14 +52,15 @@ def warn_unresolved(system: Any) -> None:
 
 
 def _flags(system: Any) -> tuple[Flag, ...]:
-    return tuple(getattr(getattr(system, "fit", None), "flags", ()))
+    fitted = isinstance(system, DelayedStateSpace) and system.fit is not None
+    return system.fit.flags if fitted else ()
 
 
 def _name(system: Any) -> str:
     return f"the model {system.name!r}"
 
 
-def _gain_is_known(fit: Any) -> bool:
+def _gain_is_known(fit: ModelFit) -> bool:
     """Whether the interval of a gain is narrow, though the record ends early."""
-    gain, interval = getattr(fit, "gain", None), getattr(fit, "gain_interval", None)
+    gain, interval = fit.gain, fit.gain_interval
     return gain is not None and interval is not None and is_firm(gain, interval)

@@ -90,7 +90,8 @@ def interval_of_dead_time(
     OptionError
         No interval of dead times.
     """
-    interval = getattr(system.fit, "dead_time_interval", None) if given is None else given
+    fitted = None if system.fit is None else system.fit.dead_time_interval
+    interval = fitted if given is None else given
     if interval is None:
         return None
     low, high = band(interval, "dead_time_interval", "dead times in s")
@@ -107,8 +108,8 @@ def held_fraction(system: DelayedStateSpace) -> float:
     A dead time of (d + f) samples is held as the delay d + 1 and a direct term; an interval of
     the dead time is around the former.
     """
-    identified = getattr(system.fit, "dead_time", None)
-    if not isinstance(identified, (int, float)):
+    identified = None if system.fit is None else system.fit.dead_time
+    if identified is None:
         return 0.0
     over = float(system.dead_time) - float(identified)
     return over if 0 < over < system.dt else 0.0

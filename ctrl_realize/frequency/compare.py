@@ -216,11 +216,9 @@ def _hold(system: Any, dt: float | None, hold: str | None) -> Literal["zoh"] | N
         if hold == "zoh":
             raise OptionError("hold='zoh' needs a discrete model; this one is continuous")
         return None
-    fit = getattr(system, "fit", None)
-    for holder in (fit, getattr(fit, "impulse", None)):
-        if getattr(holder, "sampling", None) == "impulse-invariant" and hold == "auto":
-            return None
-    return "zoh"
+    fit = system.fit if isinstance(system, DelayedStateSpace) else None
+    invariant = fit is not None and fit.sampling == "impulse-invariant"
+    return None if invariant and hold == "auto" else "zoh"
 
 
 def _evaluate(system: Any, omega: FloatArray, dt: float | None) -> ComplexArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import control as ct
@@ -11,7 +11,7 @@ import numpy as np
 from .._checks import numbers
 from .._wording import in_time, interval_in_time, time_within
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..results import Flag, Result
+from ..results import Flag, IntervalKind, ModelFit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +43,7 @@ class FRFStructure:
 
 
 @dataclass(frozen=True, eq=False)
-class FRFFit(Result):
+class FRFFit(ModelFit):
     r"""A transfer function with dead time, fitted to a frequency response.
 
     ``response(omega) == core(1j * omega) * exp(-1j * omega * dead_time)`` minimises
@@ -81,9 +81,12 @@ class FRFFit(Result):
         All that were tried, best first.
     name : str
         Name of the FRF.
+    dt : float
+        Sample time of the model, in s.
     hold_time : float or None
         Sample time in s of the hold that was divided out of `measured`; None where none was.
     flags : tuple of Flag
+    choices : tuple of str
 
     Examples
     --------
@@ -113,8 +116,26 @@ class FRFFit(Result):
     pole_std: FloatArray
     structures: tuple[FRFStructure, ...]
     name: str
+    dt: float
     hold_time: float | None = None
-    flags: tuple[Flag, ...] = field(default=())
+    flags: tuple[Flag, ...] = ()
+    choices: tuple[str, ...] = ()
+    records = ()
+
+    @property
+    def delay(self) -> float:
+        """Dead time in samples of the model, not rounded."""
+        return self.dead_time / self.dt
+
+    @property
+    def delay_interval(self) -> tuple[float, float]:
+        """Interval of the dead time in samples of the model."""
+        return self.interval[0] / self.dt, self.interval[1] / self.dt
+
+    @property
+    def interval_kind(self) -> IntervalKind:
+        """``"confidence"``: a 95 % interval."""
+        return "confidence"
 
     @property
     def core(self) -> ct.StateSpace:
@@ -151,6 +172,12 @@ class FRFFit(Result):
         import pandas as pd
 
         return pd.DataFrame([vars(structure) for structure in self.structures])
+
+    def _std(self) -> float:
+        return self.std_given_structure
+
+    def _method(self) -> str:
+        return "transfer function fitted to a frequency response"
 
     def _title(self) -> str:
         return f"Transfer function with dead time from the FRF {self.name!r}"

@@ -115,6 +115,7 @@ def chosen_model(
         pole_std=read_only(pole_std * unit),
         structures=tuple(rows),
         name=str(frf.name or "measured"),
+        dt=dt,
         hold_time=held,
         flags=tuple(flags),
     )

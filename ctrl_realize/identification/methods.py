@@ -12,13 +12,15 @@ import numpy as np
 from .._checks import one_of, whole
 from ..data import Record, StepResponse
 from ..data.given import as_records
-from ..delayed import DelayedStateSpace
+from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
 from .model_class import with_modes_judged
 from .output_error.fit import MOST_ORDER, fit_output_error
+from .output_error.result import OutputErrorFit
 from .realization.delay_scan import estimate_delay
+from .realization.delay_scan_result import DelayScan
 from .realization.order_scan import scan_orders
 from .state_space_fit.fit import fit_state_space
 from .step.impulse import impulse_from_step
@@ -157,7 +159,7 @@ def identify(
             structures=structures,
             include_known=include_known,
         )
-        stepped = np.isfinite(system.fit.onset)
+        stepped = np.isfinite(fit_of(system, OutputErrorFit).onset)
         if stepped or known is not None:
             return system
         asked = order is not None or structures is not None
@@ -264,9 +266,10 @@ def _paper(
         samples=behind,
         feedthrough=True if feedthrough is None else feedthrough,
     )
+    found = fit_of(system, DelayScan)
     choices = [
         "as in the paper: five-point central difference (half a sample early in a step "
-        f"response), {impulse.filter or 'no filter'}, order {system.fit.order}, {behind} "
+        f"response), {impulse.filter or 'no filter'}, order {found.order}, {behind} "
         f"samples, delays 0...{reach}"
     ]
     return _named(system, choices, step)
@@ -275,7 +278,7 @@ def _paper(
 def _named(
     system: DelayedStateSpace, choices: Sequence[str], step: StepResponse
 ) -> DelayedStateSpace:
-    names: dict[str, Any] = {"fit": replace(system.fit, choices=tuple(choices))}
+    names: dict[str, Any] = {"fit": replace(fit_of(system, DelayScan), choices=tuple(choices))}
     record = step.record
     if record is not None:
         names |= {"inputs": list(record.input_labels), "outputs": list(record.output_labels)}

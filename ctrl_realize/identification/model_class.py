@@ -15,7 +15,7 @@ import numpy as np
 
 from .._wording import in_time, interval_in_time
 from ..data import Record
-from ..delayed import DelayedStateSpace
+from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DataError, OrderError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.output_error.input_data import MOST_SAMPLES
@@ -26,7 +26,7 @@ from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
 from .output_error.result import OutputErrorFit
 from .state_space_fit.fit import Outcome, from_starts
-from .state_space_fit.result import StateSpaceFit
+from .state_space_fit.result import Timing
 from .validation.residuals import analyse_residuals
 
 LAGS = 25
@@ -62,7 +62,7 @@ def with_modes_judged(
 
     With `asked`, the structure is what the user wants: its residual is judged, nothing is tried.
     """
-    fit: OutputErrorFit = system.fit
+    fit = fit_of(system, OutputErrorFit)
     records, cut = lively_parts(fit.records)
     try:
         follows, left = _left(system, records)
@@ -87,9 +87,9 @@ def with_modes_judged(
             if gain > CLEAR and not late:
                 return _chosen(found, fit, sum(follows), gain, cut)
             why = (
-                f"a model of {found.system.fit.order} states starts after max_delay"
+                f"a model of {found.fit.order} states starts after max_delay"
                 if late
-                else f"a model of {found.system.fit.order} states (fit_state_space) is no better"
+                else f"a model of {found.fit.order} states (fit_state_space) is no better"
             )
         except (DataError, OrderError) as refused:
             why = f"no state-space model: {refused}"
@@ -124,7 +124,7 @@ def _gain(
     """How much smaller the criterion of the modes is than that of the lags."""
     if left is None:
         return float("inf")
-    modes = found.system.fit
+    modes = found.fit
     samples = sum(e.size for e in left)
     starts = len(records)
     # parameters, dead time, and the initial states
@@ -140,7 +140,7 @@ def _chosen(
 ) -> DelayedStateSpace:
     """Give the modes their dead time, its interval, and the reasons."""
     system = found.system
-    modes: StateSpaceFit = system.fit
+    modes = found.fit
     dt = lags.dt
     independent = max(correlation_time(np.ravel(c.residual)) for c in modes.checks)
     own = found.search.plausible(found.best, independent)
@@ -183,10 +183,7 @@ def _chosen(
     )
     fit = replace(
         modes,
-        dead_time=dead_time,
-        interval=(low, high),
-        total_delay=_total_delay(system),
-        lags=lags,
+        timing=Timing(dead_time, (low, high), _total_delay(system), lags),
         choices=(*reasons, *modes.choices),
         flags=tuple(flags),
     )

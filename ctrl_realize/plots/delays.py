@@ -20,16 +20,16 @@ from .style import axis_time_unit
 
 def estimate_of(system: DelayedStateSpace) -> float:
     """Return the dead time in s: that of the fit, which may be no whole number of samples."""
-    wait = getattr(system.fit, "dead_time", None)
-    return float(wait) if isinstance(wait, float) else float(np.max(system.dead_time))
+    fitted = None if system.fit is None else system.fit.dead_time
+    return float(np.max(system.dead_time)) if fitted is None else fitted
 
 
 def interval_of(system: DelayedStateSpace) -> tuple[float, float] | None:
     """Return the interval of a model's dead time in s, None where its fit knows none."""
-    interval = getattr(system.fit, "dead_time_interval", None)
+    interval = None if system.fit is None else system.fit.dead_time_interval
     if interval is None:
         return None
-    low, high = (float(bound) for bound in interval)
+    low, high = interval
     return (low, high) if np.isfinite(low) and np.isfinite(high) else None
 
 

@@ -15,10 +15,6 @@ from ..delayed import DelayedStateSpace
 from ..errors import UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
-from ..identification.output_error.result import OutputErrorFit
-from ..identification.realization.delay_scan_result import DelayScan
-from ..identification.realization.result import Realization
-from ..identification.state_space_fit.result import StateSpaceFit
 from .page import Page, Table, pairs, write_page
 from .provenance import own_version, versions
 from .sketches import (
@@ -313,10 +309,4 @@ def _write(
 
 
 def _kind(system: DelayedStateSpace) -> str:
-    names = {
-        OutputErrorFit: "output-error fit of the raw record",
-        StateSpaceFit: "state-space fit of all channels",
-        DelayScan: "delay scan by approximate realization",
-        Realization: "approximate realization",
-    }
-    return names.get(type(system.fit), "model with dead time")
+    return "model with dead time" if system.fit is None else system.fit._method()

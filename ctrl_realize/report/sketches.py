@@ -27,6 +27,7 @@ from ..identification.state_space_fit.result import StateSpaceFit
 from ..identification.step.steps import unit_step
 from ..io.atomic import replaced_when_complete
 from ..plots.fits import evidence_height
+from ..results import ModelFit
 from .page import PageFigure
 from .svg import inline_svg, laid_out, missing_glyphs_allowed
 
@@ -176,7 +177,7 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     return sketches
 
 
-def _output_sketch(fit: Any, output: int, label: str) -> Sketch:
+def _output_sketch(fit: StateSpaceFit, output: int, label: str) -> Sketch:
     return Sketch(
         f"output_{output}",
         f"The output {label}",
@@ -263,10 +264,9 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
     return sketches
 
 
-def _from_a_step(fit: Any) -> bool:
+def _from_a_step(fit: ModelFit | None) -> bool:
     """Tell whether there was rest before a step; an edge among many tells nothing by itself."""
-    onset = getattr(fit, "onset", None)
-    return not (isinstance(onset, float) and np.isnan(onset))
+    return fit is None or fit.onset is None or not np.isnan(fit.onset)
 
 
 def _step_of(record: Record) -> StepResponse | None:

@@ -15,18 +15,18 @@ from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.rows import CampaignRow
-from ..results import Result
+from ..results import ModelFit
 from .page import Column, Row, Table, pairs
 from .provenance import file_sha256, record_sha256
 
 Paths = Sequence[str | os.PathLike[str]]
 
 
-def fit_tables(fit: Any, title: str = "Details of the fit") -> list[Table]:
+def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[Table]:
     """Tell how a model was found, what was chosen and why."""
-    if not isinstance(fit, Result):
+    if fit is None:
         return []
-    choices = [("choice", str(choice)) for choice in getattr(fit, "choices", ())]
+    choices = [("choice", choice) for choice in fit.choices]
     return [pairs(title, [*fit._rows(), *choices])]
 
 

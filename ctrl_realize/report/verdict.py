@@ -16,7 +16,7 @@ from ..identification.campaign.campaign import Campaign
 from ..identification.output_error.result import gain_in_words
 from ..identification.realization.delay_scan_result import DelayScan
 from ..plots.delays import estimate_of, interval_of
-from ..results import Flag
+from ..results import INTERVAL_LABELS, Flag, ModelFit
 
 _CONTRADICTED = "frf_disagrees"
 
@@ -148,7 +148,8 @@ def headline_of(system: DelayedStateSpace) -> str:
     if interval is not None:
         said = time_within(wait, *interval)
         samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
-    kind = "Dead time" if getattr(system.fit, "better", None) is None else "Apparent dead time"
+    apparent = system.fit is not None and system.fit.interval_kind == "conditional"
+    kind = "Apparent dead time" if apparent else "Dead time"
     sentence = f"{kind} {said} ({samples} samples of {in_time(system.dt, 6)})"
     if interval is not None:
         sentence += f", {interval_name(system)} {interval_in_time(*interval)}"
@@ -162,10 +163,7 @@ def headline_of(system: DelayedStateSpace) -> str:
 
 def interval_name(system: DelayedStateSpace) -> str:
     """Name the interval for what it is."""
-    # A scan knows how flat its curve is, and no probability.
-    if hasattr(system.fit, "iae"):
-        return "within 5 % of the smallest IAE"
-    return str(getattr(system.fit, "interval_label", "95 % interval"))
+    return INTERVAL_LABELS[None] if system.fit is None else system.fit.interval_label
 
 
 def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
@@ -175,16 +173,8 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
     if interval is not None:
         name = interval_name(system)
         facts.append((name, interval_in_time(*interval)))
-    for attribute, label in (
-        ("std_given_structure", "standard error for this structure"),
-        ("onset", "visible onset"),
-        ("total_delay", "total delay at DC"),
-    ):
-        value = getattr(system.fit, attribute, None)
-        if attribute == "total_delay" and _gain(system) == INTEGRATING:
-            continue
-        if isinstance(value, float) and np.isfinite(value):
-            facts.append((label, _with_interval(system, attribute, value)))
+    if system.fit is not None:
+        facts += _times_of(system.fit, integrating=_gain(system) == INTEGRATING)
     facts.append(("order (without the delay)", str(system.delay_free.nstates)))
     facts.append(("gain", _gain_with_interval(system)))
     facts.append(("poles", poles_of(system)))
@@ -216,23 +206,36 @@ def _gain_is_resolved(system: DelayedStateSpace) -> bool:
 
 def _gain_with_interval(system: DelayedStateSpace) -> str:
     gain = _gain(system)
-    interval = getattr(system.fit, "gain_interval", None)
+    interval = None if system.fit is None else system.fit.gain_interval
     if interval is None or gain == INTEGRATING:
         return gain
     return gain_in_words(float(np.real(np.ravel(system.delay_free.dcgain())[0])), interval)
 
 
-def _with_interval(system: DelayedStateSpace, attribute: str, value: float) -> str:
-    low, high = getattr(system.fit, f"{attribute}_interval", (np.nan, np.nan))
-    if high == np.inf:
-        return "not determined by this record"
-    if np.isnan(high):
+def _times_of(fit: ModelFit, *, integrating: bool) -> list[tuple[str, str]]:
+    facts = []
+    for label, value in (
+        ("standard error for this structure", fit._std()),
+        ("visible onset", fit.onset),
+    ):
+        if value is not None and np.isfinite(value):
+            facts.append((label, in_time(value, 4)))
+    total = fit.total_delay
+    if total is not None and np.isfinite(total) and not integrating:
+        facts.append(("total delay at DC", _total(total, fit.total_delay_interval)))
+    return facts
+
+
+def _total(value: float, interval: tuple[float, float] | None) -> str:
+    if interval is None or np.isnan(interval[1]):
         return in_time(value, 4)
-    return f"{time_within(value, low, high)} ({interval_in_time(low, high)})"
+    if interval[1] == np.inf:
+        return "not determined by this record"
+    return f"{time_within(value, *interval)} ({interval_in_time(*interval)})"
 
 
 def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
-    flags: tuple[Flag, ...] = tuple(getattr(system.fit, "flags", ()))
+    flags = () if system.fit is None else system.fit.flags
     return (*flags, SCANNED) if isinstance(system.fit, DelayScan) else flags
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import control as ct
 import numpy as np
@@ -13,13 +12,11 @@ from hypothesis import strategies as st
 
 import ctrl_realize as cr
 from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
+from ctrl_realize.io import FitSummary
 
 
-@dataclass(frozen=True)
-class FitWithInterval:
-    """Stands for any result of an identification."""
-
-    dead_time_interval: tuple[float, float]
+def fit_with_interval(interval):
+    return FitSummary("Fit", "Fit", (), values=(("dead_time_interval", interval),))
 
 
 def furnace():
@@ -82,11 +79,11 @@ def test_a_process_model_is_checked_in_continuous_time():
 def test_a_dead_time_within_the_interval_that_makes_the_loop_unstable_is_said(gain):
     plant = quick() * gain
     limit = 0.029 + cr.design.pid(plant).check.margins.delay_margin
-    sure = plant.replace(fit=FitWithInterval((0.02, limit - 0.002)))
+    sure = plant.replace(fit=fit_with_interval((0.02, limit - 0.002)))
     made = cr.design.pid(sure)
     assert made.check.stable_within_interval
     assert "stable, dead time" in made.report()
-    unsure = plant.replace(fit=FitWithInterval((0.02, limit + 0.002)))
+    unsure = plant.replace(fit=fit_with_interval((0.02, limit + 0.002)))
     with pytest.warns(ModelWarning, match="unstable for some dead time") as warned:
         made = cr.design.pid(unsure)
     assert warned[0].filename == __file__
@@ -99,7 +96,7 @@ def test_a_dead_time_within_the_interval_that_makes_the_loop_unstable_is_said(ga
 
 def test_the_best_of_a_comparison_is_stable_over_the_interval():
     limit = 0.029 + cr.design.pid(quick()).check.margins.delay_margin
-    unsure = quick().replace(fit=FitWithInterval((0.02, limit + 0.002)))
+    unsure = quick().replace(fit=fit_with_interval((0.02, limit + 0.002)))
     found = cr.design.compare_pid(unsure, ["simc", "amigo"], ["PI"])
     assert found.best(max_sensitivity=5).rule == "amigo"
     assert "PI simc: the loop is unstable for some dead time" in found.report()
@@ -128,9 +125,9 @@ def test_every_design_function_says_what_the_interval_of_the_dead_time_does(desi
     assert made.check.robustness is None
     assert "on the design model" in made.report()
     limit = 0.029 + made.check.margins.delay_margin
-    sure = quick().replace(fit=FitWithInterval((0.0289, 0.0291)))
+    sure = quick().replace(fit=fit_with_interval((0.0289, 0.0291)))
     assert DESIGNS[design](sure).check.stable_within_interval
-    unsure = quick().replace(fit=FitWithInterval((0.0289, limit + 0.002)))
+    unsure = quick().replace(fit=fit_with_interval((0.0289, limit + 0.002)))
     with pytest.warns(ModelWarning, match="unstable for some dead time") as warned:
         made = DESIGNS[design](unsure)
     assert warned[0].filename == __file__

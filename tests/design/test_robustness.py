@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import control as ct
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.design import performance
+from ctrl_realize.io import FitSummary
 from ctrl_realize.numerics.rational.phase import dead_time_from_phase
 
 DT = 7.8125e-4
@@ -65,16 +64,12 @@ def test_a_loop_that_some_plant_destabilizes_is_not_called_robust(valve, pi_cont
     assert "NOT guaranteed" in found.report()
 
 
-@dataclass(frozen=True)
-class FitWithFraction:
-    dead_time: float
-    dead_time_interval: tuple[float, float]
-
-
 def test_an_interval_is_around_the_dead_time_and_not_around_the_delay_that_holds_it(valve):
     continuous = cr.design.to_continuous(valve(0)).core
     truth = 36.25 * DT  # held as z^-37 and a direct term
-    fit = FitWithFraction(truth, (truth - 2 * DT, truth + 2 * DT))
+    interval = truth - 2 * DT, truth + 2 * DT
+    values = (("dead_time", truth), ("dead_time_interval", interval))
+    fit = FitSummary("Fit", "Fit", (), values)
     plant = cr.delayed_ss(continuous, dead_time=truth, dt=DT, fit=fit)
     assert plant.delay == 37
     bound = cr.design.uncertainty_bound([], plant)

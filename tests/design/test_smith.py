@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import control as ct
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import ModelWarning, UnsuitableSystemError
+from ctrl_realize.io import FitSummary
 from tests.oracles.dense import step_response
 
 DT = 7.8125e-4
 
 
-@dataclass(frozen=True)
-class FitWithInterval:
-    """Stands for any result of an identification."""
-
-    dead_time_interval: tuple[float, float]
+def fit_with_interval(interval):
+    return FitSummary("Fit", "Fit", (), values=(("dead_time_interval", interval),))
 
 
 def closed(plant, controller):
@@ -113,10 +109,10 @@ def test_the_range_of_stable_dead_times_ends_where_it_says(valve, pi_controller)
 
 
 def test_the_identified_interval_is_checked(valve, pi_controller):
-    sure = valve(37).replace(fit=FitWithInterval((0.028, 0.030)))
+    sure = valve(37).replace(fit=fit_with_interval((0.028, 0.030)))
     predictor = cr.design.smith_predictor(sure, pi_controller(3.0, 0.08))
     assert predictor.robustness.stable
-    unsure = valve(37).replace(fit=FitWithInterval((0.01, 0.2)))
+    unsure = valve(37).replace(fit=fit_with_interval((0.01, 0.2)))
     with pytest.warns(ModelWarning, match="unstable for some dead time"):
         predictor = cr.design.smith_predictor(unsure, pi_controller(3.0, 0.08))
     assert not predictor.robustness.stable

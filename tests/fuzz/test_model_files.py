@@ -12,17 +12,22 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.io import load_model, save_model
-from ctrl_realize.results import Flag, Result
+from ctrl_realize.results import Flag, ModelFit
 from tests.fuzz.draws import any_float, any_text, some
 from tests.fuzz.lane import fuzz, good_end
 from tests.fuzz.test_binary_files import damaged
 
 
-class Fit(Result):
+class Fit(ModelFit):
     """Something to be summarised."""
 
     delay = 3
-    interval = (2.5, 3.5)
+    dead_time = 0.3
+    interval = (0.25, 0.35)
+    delay_interval = (2.5, 3.5)
+    order = 2
+    records = ()
+    choices = ("a choice",)
     flags = (Flag("a", "b"),)
 
     def _title(self):

@@ -17,7 +17,7 @@ from ctrl_realize.errors import (
     FileFormatError,
 )
 from ctrl_realize.io import FitSummary, load_model, save_model
-from ctrl_realize.results import Flag, Result
+from ctrl_realize.results import Flag, ModelFit
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False, width=64)
 # python-control keeps dots in names for itself
@@ -81,14 +81,19 @@ def file(tmp_path, model):
     return path
 
 
-class Fit(Result):
+class Fit(ModelFit):
     """A result with numbers of all kinds."""
 
     delay = np.int64(37)
     dead_time = 0.0289
-    std_given_structure = np.float64(1e-4)
-    interval = np.array([0.0287, np.inf])
-    method = "scan"
+    order = 3
+    interval = 0.0287, np.inf
+    delay_interval = None
+    interval_kind = "flatness"
+    sampling = "impulse-invariant"
+    gain = np.float64(-2.0)
+    records = ()
+    choices = ("order 3: chosen by hand",)
     flags = (Flag("delay_at_bound", "the best delay is max_delay=100; try a larger one"),)
 
     def _title(self):
@@ -105,11 +110,9 @@ def test_the_main_numbers_of_a_fit_its_report_and_its_flags_stay(tmp_path, model
     assert isinstance(summary, FitSummary)
     assert summary.report() == fit.report()
     assert summary.flags == fit.flags
-    assert (summary["delay"], summary["std_given_structure"], summary["method"]) == (
-        37,
-        1e-4,
-        "scan",
-    )
+    assert (summary["delay"], summary["gain"], summary["sampling"]) == (37, -2.0, fit.sampling)
+    assert (summary.gain, summary.order, summary.total_delay) == (-2.0, 3, None)
+    assert (summary.interval_label, summary.choices) == (fit.interval_label, fit.choices)
     # JSON has no infinity
     assert summary["interval"] == (0.0287, "inf")
     assert summary.interval == (0.0287, np.inf)

@@ -14,14 +14,14 @@ from ...errors import OptionError, OrderError
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.state_space.balancing import Part, balanced_truncation, split_modes
-from ...results import Result
+from ...results import Flag, ModelFit
 from ..siso import delayed_system
 
 STABLE = 1 - 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BalancedReduction(Result):
+class BalancedReduction(ModelFit):
     """How a core was reduced.
 
     ``error_bound = 2 * singular_values[kept:].sum()``, where ``kept = order - kept_unstable``; no
@@ -37,6 +37,8 @@ class BalancedReduction(Result):
     kept_unstable : int
         States on or outside the unit circle, which are never reduced.
     error_bound : float
+    choices : tuple of str
+    flags : tuple of Flag
 
     Examples
     --------
@@ -53,6 +55,16 @@ class BalancedReduction(Result):
     full_order: int
     kept_unstable: int
     error_bound: float
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = ()
+    dead_time = None
+    delay = None
+    interval = None
+    delay_interval = None
+    records = ()
+
+    def _method(self) -> str:
+        return "balanced truncation"
 
     def _title(self) -> str:
         return "Balanced truncation"

@@ -9,11 +9,11 @@ import control as ct
 import numpy as np
 
 from ..._checks import one_of, positive, real
+from ..._shown import as_asked, html_card, text_card
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.arrays import FloatArray
-from ...results import as_asked, html_card, text_card
 from ..loops.loop_check import LoopCheck
 from ..models.process_model import ProcessModel
 

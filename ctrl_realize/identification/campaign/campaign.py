@@ -15,12 +15,13 @@ import numpy as np
 
 from ..._checks import whole
 from ..._wording import in_time
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, fit_of
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ...results import Flag, Result
 from ..methods import Method, fit_records, identify
+from ..realization.delay_scan_result import DelayScan
 from ..realization.realize import realize
 from .flags import campaign_flags
 from .rows import CampaignRow, RecordSource, read_source
@@ -141,7 +142,7 @@ class Campaign(Result):
             good = [read_source(source) for row, source in pairs if row.model is not None]
             return fit_records(good, **self.options)
         chosen = self._identified(self.best)
-        scan = chosen.fit
+        scan = fit_of(chosen, DelayScan)
         final = realize(
             scan.impulse,
             scan.order,
@@ -157,7 +158,7 @@ class Campaign(Result):
     def _identified(self, row: CampaignRow) -> DelayedStateSpace:
         """The row's model with its whole fit, which a store keeps only in summary."""
         system = row.system
-        if system is not None and hasattr(system.fit, "impulse"):
+        if system is not None and isinstance(system.fit, DelayScan):
             return system
         source = self.sources[self.rows.index(row)]
         return identify(read_source(source), method=self.method, **self.options)

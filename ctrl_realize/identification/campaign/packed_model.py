@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import control as ct
 import numpy as np
 
 from ...delayed import DelayedStateSpace
 from ...numerics.arrays import FloatArray, read_only
+from ...results import ModelFit
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -30,7 +30,7 @@ class PackedModel:
     input_delays, output_delays : tuple of int
     name : str
     inputs, outputs : tuple of str
-    fit : object or None
+    fit : ModelFit or None
         How the model was found; the very object that the model had.
     """
 
@@ -42,7 +42,7 @@ class PackedModel:
     name: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    fit: Any
+    fit: ModelFit | None
 
     @classmethod
     def of(cls, system: DelayedStateSpace) -> PackedModel:

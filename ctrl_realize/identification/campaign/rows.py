@@ -17,11 +17,10 @@ import scipy
 
 from ..._checks import spelled_out
 from ...data import Record
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, fit_of
 from ...errors import CtrlRealizeError, DataError
-from ...results import Flag
+from ...results import Flag, ModelFit
 from ..methods import Method, identify
-from ..output_error.result import OutputErrorFit
 from ..realization.delay_scan_result import DelayScan
 from ..step.steps import detect_step
 from .packed_model import PackedModel
@@ -224,32 +223,32 @@ def _exact(value: Any) -> str:
 
 
 def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
-    fit = system.fit
-    low, high = fit.dead_time_interval
+    fit = fit_of(system, ModelFit)
+    low, high = fit.interval or (np.nan, np.nan)
     return replace(
         row,
-        delay=float(fit.delay),
-        dead_time=float(fit.dead_time),
+        delay=_or_nan(fit.delay),
+        dead_time=_or_nan(fit.dead_time),
         interval=(float(low), float(high)),
         residual=_unit_residual(fit, row.amplitude),
         gain=_gain(system),
-        gain_std=float(getattr(fit, "gain_std_given_structure", np.nan)),
-        total_delay=float(_or_nan(getattr(fit, "total_delay", None))),
-        total_delay_interval=getattr(fit, "total_delay_interval", (np.nan, np.nan)),
+        gain_std=_or_nan(fit.gain_std_given_structure),
+        total_delay=_or_nan(fit.total_delay),
+        total_delay_interval=fit.total_delay_interval or (np.nan, np.nan),
         model=PackedModel.of(system),
-        flags=tuple(fit.flags),
+        flags=fit.flags,
     )
 
 
-def _unit_residual(fit: OutputErrorFit | DelayScan, amplitude: float) -> float:
+def _unit_residual(fit: ModelFit, amplitude: float) -> float:
     """Misfit for a unit step: a scan works on one, a fit on the raw record."""
     if isinstance(fit, DelayScan):
         return fit.least_iae
-    return fit.residual / (abs(amplitude) if np.isfinite(amplitude) else 1.0)
+    return _or_nan(fit.residual_std) / (abs(amplitude) if np.isfinite(amplitude) else 1.0)
 
 
 def _or_nan(value: float | None) -> float:
-    return float("nan") if value is None else value
+    return float("nan") if value is None else float(value)
 
 
 def _gain(system: DelayedStateSpace) -> float:

@@ -23,7 +23,7 @@ from .flags import sampled_flags
 from .repeat_flags import repeat_flags
 from .repeatability import Repeatability
 from .result import OutputErrorFit
-from .summary import summarise, with_repeats
+from .summary import summarise
 
 FOLLOWS = 36.0
 """Least chi-square of the response to the input: six standard deviations. White noise that has
@@ -56,9 +56,7 @@ def fit_any_input(
             break
         used = tuple(i for i in used if i not in apart)
     fit = widened(found.fit, repeats, used)
-    flags = repeat_flags(repeats)
-    result = _summary(found, fit, records, used, limit, flags)
-    return with_repeats(result, repeats), fit
+    return _summary(found, fit, records, used, limit, repeat_flags(repeats), repeats), fit
 
 
 def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
@@ -126,6 +124,7 @@ def _summary(
     used: tuple[int, ...],
     limit: float | None,
     flags: tuple[Flag, ...],
+    repeats: Repeatability | None = None,
 ) -> OutputErrorFit:
     """Lay what was fitted out record after record, on one time axis."""
     data = found.data
@@ -140,16 +139,23 @@ def _summary(
     flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
     joined = bare_data(np.concatenate(measured), np.concatenate(signal), data.dt, fit.residual)
     fit = replace(fit, fitted=np.concatenate(found.fitted))
-    result = summarise(fit, joined, np.concatenate(times), records, flags)
-    if found.condensed is None:
-        return result
     sums = found.condensed
-    reason = (
-        f"all {sums.samples} samples, condensed to {sums.data.size} sums of products over "
-        f"{sums.drive.factor.shape[1]} lags (prewhitened with a noise model of "
-        f"{sums.noise_lags} lags); time, measured and fitted show a part of them"
+    reasons: tuple[str, ...] = ()
+    if sums is not None:
+        reasons = (
+            f"all {sums.samples} samples, condensed to {sums.data.size} sums of products over "
+            f"{sums.drive.factor.shape[1]} lags (prewhitened with a noise model of "
+            f"{sums.noise_lags} lags); time, measured and fitted show a part of them",
+        )
+    return summarise(
+        fit,
+        joined,
+        np.concatenate(times),
+        records,
+        flags,
+        repeatability=repeats,
+        choices=reasons,
     )
-    return replace(result, choices=(reason, *result.choices))
 
 
 def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:

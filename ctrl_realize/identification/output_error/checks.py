@@ -87,7 +87,8 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             if not stepped and all(flag.code != "not_linear" for flag in flags):
                 flags += nonlinear_flags(shown, fit.delay, fit.total_delay / fit.dt)
     known = [flag for flag in flags if flag.code not in codes]
-    return replace(fit, interval=(low, high), flags=(*fit.flags, *known))
+    estimate = replace(fit.estimate, low=low, high=high)
+    return replace(fit, estimate=estimate, flags=(*fit.flags, *known))
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ from .flags import fit_flags
 from .known import known_factor
 from .repeat_flags import repeat_flags, same_record_flags
 from .result import OutputErrorFit
-from .summary import fitted_core, summarise, with_repeats
+from .summary import fitted_core, summarise
 
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
@@ -226,8 +226,7 @@ def _fit_mean(
     fit = widened(fit, repeats, mean.used)
     flags = fit_flags(data, fit, limit) + repeat_flags(repeats)
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
-    result = summarise(fit, data, time, records, flags)
-    return with_repeats(result, repeats), fit
+    return summarise(fit, data, time, records, flags, repeatability=repeats), fit
 
 
 def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:

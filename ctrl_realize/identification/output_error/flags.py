@@ -76,15 +76,16 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
     if fit.better is None:
         return None
     other = fit.better
+    assert other.interval is not None
     return Flag(
         "apparent_dead_time",
         f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was "
         f"requested and is ruled out by the data: {time_within(fit.delay, fit.low, fit.high)} "
         "is an apparent dead time, which makes up for lags that the model lacks or has too "
         "many of, and its interval holds only if the structure is right; order "
-        f"{other.structure.order}, relative degree {other.structure.relative_degree} gives "
-        f"{time_within(other.delay, other.low, other.high)} "
-        f"({interval_in_time(other.low, other.high)})",
+        f"{other.order}, relative degree {other.relative_degree} gives "
+        f"{time_within(other.dead_time, *other.interval)} "
+        f"({interval_in_time(*other.interval)})",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,9 +15,15 @@ from ..._wording import (
     time_within,
 )
 from ...data import Record
-from ...numerics.arrays import ComplexArray, FloatArray
-from ...results import Flag, Result
+from ...numerics.arrays import ComplexArray, FloatArray, locked
+from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
+from ...numerics.output_error.step_data import StepData
+from ...numerics.separable.lag_chains import lag_sum
+from ...numerics.separable.static_gain import INTEGRATOR
+from ...results import Flag, IntervalKind, ModelFit
+from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
+from .words import ESTIMATE_WORDS
 
 _FIRM = 0.1  # part of a total delay up to which an interval on either side makes it firm
 
@@ -39,25 +45,8 @@ _TOTAL_IN_DOUBT = frozenset(
 """Flags after which not even the total delay is firm."""
 
 
-@dataclass(frozen=True)
-class StructureRow:
-    """One structure that was fitted: `order` poles, ``order - relative_degree`` zeros.
-
-    `delta_bic` is its information criterion above that of the best structure; up to 10 the data do
-    not rule it out, and `interval` (s) is the 95 % profile-likelihood interval of its dead time
-    (None where the structure is ruled out).
-    """
-
-    order: int
-    relative_degree: int
-    dead_time: float
-    total_delay: float
-    delta_bic: float
-    interval: tuple[float, float] | None
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class OutputErrorFit(Result):
+class OutputErrorFit(ModelFit):
     """Dead time and model from an output-error fit of raw records.
 
     ``interval[0] <= dead_time <= interval[1]`` and
@@ -70,61 +59,16 @@ class OutputErrorFit(Result):
 
     Attributes
     ----------
-    dead_time : float
-        Transport delay of the model, in s.
-    std_given_structure : float
-        Standard error of the dead time in s if the chosen structure is the plant's (that of the
-        spread of the views where the residual is not noise). It knows nothing of the doubt about
-        the structure, which is mostly the larger part: `interval` does.
-    interval : tuple of float
-        95 % interval of the dead time in s: of all structures that the data cannot rule out
-        where the residual is noise (and wider where a zero leaves the beginning open), of the
-        views where it is not.
-    onset : float
-        First motion of the output after the input has moved, in s (NaN when it is no step).
-    total_delay : float
-        Delay at zero frequency in s; integrators are left out.
-    total_delay_interval : tuple of float
-        95 % interval of the total delay in s, if the residual is noise; without end where the
-        record does not resolve it. Called firm where it reaches a tenth of it to either side.
-    order, relative_degree : int
-        Of the model that was chosen.
-    poles, zeros : ndarray of complex
-        Of the continuous model, in rad/s.
-    gain : float
-        Of the model at zero frequency; of one with an integrator, the slope per second.
-    gain_std_given_structure : float
-        Standard error of the gain if the chosen structure is the plant's.
-    gain_interval : tuple of float
-        95 % interval of the gain: of the structures that the data cannot rule out, if the residual
-        is noise; of the records too, where their gains differ. Without end where the record is
-        shorter than the slowest time constant and does not resolve the gain.
-    at_noise_level : bool
-        The residual is as small as the noise before the step.
-    normalized_rms : float
-        Residual over noise, in means over bins of samples.
-    noise, residual : float
-        Standard deviations in the unit of the output.
-    correlation : float
-        Samples of the residual that one independent sample is worth.
-    delay_estimates : dict of str to float
-        Dead time in s as seen in six ways, of which the last serves the interval only; empty
-        where one model explains everything.
-    structures : tuple of StructureRow
-        Everything that was fitted, best first.
-    profile_delay, profile_deviance : ndarray
-        Profile of the chosen structure: delay in s, chi-square above the minimum.
-    time, measured, fitted : ndarray, shape (N,)
-        The record that was fitted (the mean, for several) and the model's response to it.
+    estimate : OutputErrorEstimate
+        What the numerics have found; most other attributes are read from it.
+    data : StepData
+        What was fitted (the mean, for several records of steps), and its noise.
+    time : ndarray, shape (N,)
+        In s.
     records : tuple of Record
         What was given.
     repeatability : Repeatability or None
         Delay of every record by itself, where there are several.
-    dt : float
-        Sample time in s.
-    better : StructureRow or None
-        Where structures were asked for, and are ruled out: the structure that does it, `delta_bic`
-        below them. The dead time is then an apparent one, with the lags that the model lacks in it.
     choices : tuple of str
         What was chosen, and why.
     flags : tuple of Flag
@@ -143,37 +87,194 @@ class OutputErrorFit(Result):
     0.1250 s, within 0.1245 to 0.1254 s
     """
 
-    dead_time: float
-    std_given_structure: float
-    interval: tuple[float, float]
-    onset: float
-    total_delay: float
-    order: int
-    relative_degree: int
-    poles: ComplexArray
-    zeros: ComplexArray
-    gain: float
-    at_noise_level: bool
-    normalized_rms: float
-    noise: float
-    residual: float
-    correlation: float
-    delay_estimates: dict[str, float]
-    structures: tuple[StructureRow, ...]
-    profile_delay: FloatArray
-    profile_deviance: FloatArray
+    estimate: OutputErrorEstimate
+    data: StepData
     time: FloatArray
-    measured: FloatArray
-    fitted: FloatArray
-    dt: float
-    records: tuple[Record, ...] = ()
+    records: tuple[Record, ...]
     repeatability: Repeatability | None = None
     choices: tuple[str, ...] = ()
-    flags: tuple[Flag, ...] = field(default=())
-    gain_std_given_structure: float = float("nan")
-    gain_interval: tuple[float, float] = (float("nan"), float("nan"))
-    total_delay_interval: tuple[float, float] = (float("nan"), float("nan"))
-    better: StructureRow | None = None
+    flags: tuple[Flag, ...] = ()
+
+    def __post_init__(self) -> None:
+        profile = self.estimate.profile
+        for values in (self.time, self.data.output, self.estimate.fitted, *profile):
+            values.flags.writeable = False
+
+    @property
+    def dead_time(self) -> float:
+        """Transport delay of the model, in s."""
+        return self.estimate.delay
+
+    @property
+    def std_given_structure(self) -> float:
+        """Standard error of the dead time in s if the chosen structure is the plant's.
+
+        That of the spread of the delay estimates where the residual is not noise. It knows nothing
+        of the doubt about the structure, which is mostly the larger part: `interval` does.
+        """
+        return self.estimate.std
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the dead time in s.
+
+        Of all structures that the data cannot rule out where the residual is noise (and wider
+        where a zero leaves the beginning open), of the delay estimates where it is not.
+        """
+        return self.estimate.low, self.estimate.high
+
+    @property
+    def onset(self) -> float:
+        """First motion of the output after the input has moved, in s; NaN when it is no step."""
+        motion = self.data.motion
+        return float("nan") if motion is None else motion.onset * self.dt
+
+    @property
+    def total_delay(self) -> float:
+        """Delay at zero frequency in s; integrators are left out."""
+        return self.dead_time + lag_sum(self._moving_poles, self.estimate.numerator)
+
+    @property
+    def total_delay_interval(self) -> tuple[float, float]:
+        """95 % interval of the total delay in s, if the residual is noise.
+
+        Without end where the record does not resolve it. Called firm where it reaches a tenth of
+        it to either side.
+        """
+        return self.estimate.total_ends
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return self.estimate.structure.order
+
+    @property
+    def relative_degree(self) -> int:
+        """Poles minus zeros."""
+        return self.estimate.structure.relative_degree
+
+    @property
+    def _plain_poles(self) -> ComplexArray:
+        """Poles of the estimate, those of integrators at 0."""
+        length = (self.data.output.size - self.data.edge) * self.dt
+        poles = self.estimate.poles.copy()
+        poles[np.abs(poles) < INTEGRATOR / length] = 0.0
+        return poles
+
+    @property
+    def _moving_poles(self) -> ComplexArray:
+        poles = self._plain_poles
+        moving: ComplexArray = poles[poles != 0]
+        return moving
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles of the continuous model, in rad/s."""
+        return locked(np.sort_complex(self._plain_poles))
+
+    @property
+    def zeros(self) -> ComplexArray:
+        """Zeros of the continuous model, in rad/s."""
+        zeros = np.roots(self.estimate.numerator[::-1]).astype(np.complex128)
+        return locked(np.sort_complex(zeros))
+
+    @property
+    def gain(self) -> float:
+        """Gain at zero frequency; of a model with an integrator, the slope per second."""
+        return float(self.estimate.numerator[0] / np.prod(-self._moving_poles).real)
+
+    @property
+    def gain_std_given_structure(self) -> float:
+        """Standard error of the gain if the chosen structure is the plant's."""
+        static = self.estimate.static
+        return float("nan") if static is None else static.gain_std
+
+    @property
+    def gain_interval(self) -> tuple[float, float]:
+        """95 % interval of the gain: of the structures that the data cannot rule out.
+
+        Of the records too, where their gains differ. Without end where the record is shorter than
+        the slowest time constant and does not resolve the gain.
+        """
+        low, high = self.estimate.gain_ends
+        repeats = self.repeatability
+        if repeats is None or repeats.gain_test[1] >= BY_CHANCE:
+            return low, high
+        kept = [name not in repeats.outlying for name in repeats.names]
+        own = self.gain * repeats.gains[kept]
+        return float(min(low, *own)), float(max(high, *own))
+
+    @property
+    def at_noise_level(self) -> bool:
+        """The residual is as small as the noise before the step."""
+        return self.estimate.adequate
+
+    @property
+    def normalized_rms(self) -> float:
+        """Residual over noise, in means over bins of samples."""
+        return self.estimate.normalized_rms
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the output's noise."""
+        return self.data.sigma
+
+    @property
+    def residual(self) -> float:
+        """Standard deviation of what the model leaves."""
+        return self.estimate.residual
+
+    @property
+    def correlation(self) -> float:
+        """Samples of the residual that one independent sample is worth."""
+        return self.estimate.correlation
+
+    @property
+    def delay_estimates(self) -> dict[str, float]:
+        """Dead time in s as seen in six ways, of which the last serves the interval only.
+
+        Empty where one model explains everything.
+        """
+        return {ESTIMATE_WORDS[key]: delay for key, delay in self.estimate.delay_estimates}
+
+    @property
+    def structures(self) -> tuple[StructureFit, ...]:
+        """Everything that was fitted, best first."""
+        return self.estimate.structures
+
+    @property
+    def profile_delay(self) -> FloatArray:
+        """Delays of the profile of the chosen structure, in s."""
+        return self.estimate.profile[0]
+
+    @property
+    def profile_deviance(self) -> FloatArray:
+        """Chi-square above the minimum at each of them."""
+        return self.estimate.profile[1]
+
+    @property
+    def measured(self) -> FloatArray:
+        """Output that was fitted, shape (N,)."""
+        return self.data.output
+
+    @property
+    def fitted(self) -> FloatArray:
+        """Response of the model to the record, shape (N,)."""
+        return self.estimate.fitted
+
+    @property
+    def dt(self) -> float:
+        """Sample time in s."""
+        return self.data.dt
+
+    @property
+    def better(self) -> StructureFit | None:
+        """Where structures were asked for, and are ruled out: the structure that does it.
+
+        Its `delta_bic` is negative. The dead time is then an apparent one, with the lags that the
+        model lacks in it.
+        """
+        return self.estimate.better
 
     @property
     def delay(self) -> float:
@@ -186,16 +287,16 @@ class OutputErrorFit(Result):
         return self.interval[0] / self.dt, self.interval[1] / self.dt
 
     @property
-    def dead_time_interval(self) -> tuple[float, float]:
-        """Interval of the dead time in s, the same as `interval`."""
-        return self.interval
+    def interval_kind(self) -> IntervalKind:
+        """What `interval` is: of confidence only where one model leaves only noise."""
+        if self.better is not None:
+            return "conditional"
+        return "confidence" if self.at_noise_level else "spanned"
 
     @property
-    def interval_label(self) -> str:
-        """What `interval` is: a confidence interval only where one model leaves only noise."""
-        if self.better is not None:
-            return "95 % interval if the structure is right"
-        return "95 % interval" if self.at_noise_level else "range of the delay estimates"
+    def residual_std(self) -> float:
+        """Standard deviation of what the model leaves, the same as `residual`."""
+        return self.residual
 
     @property
     def structure(self) -> tuple[int, int]:
@@ -210,6 +311,12 @@ class OutputErrorFit(Result):
             f"order {self.order}, "
             f"relative degree {self.relative_degree}, residual {level}>"
         )
+
+    def _std(self) -> float:
+        return self.std_given_structure
+
+    def _method(self) -> str:
+        return "output-error fit of the raw record"
 
     def _kind(self) -> str:
         return "dead time" if self.better is None else "apparent dead time"

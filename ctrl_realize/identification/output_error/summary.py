@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import control as ct
 import numpy as np
 
 from ..._wording import interval_in_time
 from ...data import Record
-from ...numerics.arrays import ComplexArray, FloatArray, locked
-from ...numerics.output_error.result import Better, OutputErrorEstimate
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
-from ...numerics.separable.lag_chains import lag_sum
-from ...numerics.separable.static_gain import INTEGRATOR
 from ...results import Flag
-from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
-from .result import OutputErrorFit, StructureRow
-from .words import ESTIMATE_WORDS, model_words
+from .result import OutputErrorFit
+from .words import model_words
 
 
 def summarise(
@@ -27,70 +22,20 @@ def summarise(
     time: FloatArray,
     records: tuple[Record, ...],
     flags: tuple[Flag, ...],
+    *,
+    repeatability: Repeatability | None = None,
+    choices: tuple[str, ...] = (),
 ) -> OutputErrorFit:
-    """Collect a `OutputErrorFit`."""
-    length = (data.output.size - data.edge) * data.dt
-    poles = np.where(np.abs(fit.poles) < INTEGRATOR / length, 0.0, fit.poles)
-    onset = data.motion.onset * data.dt if data.motion is not None else float("nan")
-    zeros = np.roots(fit.numerator[::-1]).astype(np.complex128)
+    """Make the result of an estimate; `choices` come before those of the estimate."""
     return OutputErrorFit(
-        dead_time=fit.delay,
-        std_given_structure=fit.std,
-        interval=(fit.low, fit.high),
-        onset=onset,
-        total_delay=fit.delay + lag_sum(poles[poles != 0], fit.numerator),
-        order=fit.structure.order,
-        relative_degree=fit.structure.relative_degree,
-        poles=locked(np.sort_complex(poles)),
-        zeros=locked(np.sort_complex(zeros)),
-        gain=float(fit.numerator[0] / np.prod(-poles[poles != 0]).real),
-        at_noise_level=fit.adequate,
-        normalized_rms=fit.normalized_rms,
-        noise=data.sigma,
-        residual=fit.residual,
-        correlation=fit.correlation,
-        delay_estimates={ESTIMATE_WORDS[key]: delay for key, delay in fit.delay_estimates},
-        structures=tuple(
-            StructureRow(
-                line.structure.order,
-                line.structure.relative_degree,
-                line.delay,
-                line.total_delay,
-                line.delta_bic,
-                None if np.isnan(line.low) else (line.low, line.high),
-            )
-            for line in fit.structures
-        ),
-        profile_delay=locked(fit.profile[0]),
-        profile_deviance=locked(fit.profile[1]),
-        time=locked(time),
-        measured=locked(data.output),
-        fitted=locked(fit.fitted),
-        dt=data.dt,
+        estimate=fit,
+        data=data,
+        time=time,
         records=records,
-        choices=_choices(fit),
+        repeatability=repeatability,
+        choices=choices + _choices(fit),
         flags=flags,
-        gain_std_given_structure=np.nan if fit.static is None else fit.static.gain_std,
-        gain_interval=fit.gain_ends,
-        total_delay_interval=fit.total_ends,
-        better=None if fit.better is None else _row_of(fit.better),
     )
-
-
-def _row_of(better: Better) -> StructureRow:
-    n, r = better.structure.order, better.structure.relative_degree
-    ends = better.low, better.high
-    return StructureRow(n, r, better.delay, better.total, -better.delta_bic, ends)
-
-
-def with_repeats(result: OutputErrorFit, repeats: Repeatability) -> OutputErrorFit:
-    """Say how the records differ; the interval of the gain holds theirs where they do."""
-    low, high = result.gain_interval
-    kept = [name not in repeats.outlying for name in repeats.names]
-    if repeats.gain_test[1] < BY_CHANCE:
-        own = result.gain * repeats.gains[kept]
-        low, high = min(low, *own), max(high, *own)
-    return replace(result, repeatability=repeats, gain_interval=(float(low), float(high)))
 
 
 def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
@@ -154,7 +99,7 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
 
 def _interval_of(fit: OutputErrorEstimate) -> str:
     """Say what the interval is made of: structures of the table, and what reaches beyond them."""
-    ends = [(line.low, line.high) for line in fit.structures if line.low == line.low]
+    ends = [line.interval for line in fit.structures if line.interval is not None]
     parts = [f"{len(ends)} structure(s)"] if ends else []
     low = min((end[0] for end in ends), default=np.inf)
     high = max((end[1] for end in ends), default=-np.inf)

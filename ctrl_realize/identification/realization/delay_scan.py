@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..._checks import whole
 from ...data import ImpulseResponse
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, fit_of
 from ...errors import OrderError
 from ...numerics.arrays import read_only
 from ...numerics.blas_threads import single_threaded
@@ -131,7 +131,7 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
         feedthrough=surface.feedthrough,
         hankel=surface.hankel,
     )
-    realization: Realization = system.fit
+    realization = fit_of(system, Realization)
     last = surface.singular_value(order, delay)
     fit = DelayScan(
         iae=read_only(iae),

@@ -10,10 +10,10 @@ import control as ct
 import numpy as np
 
 from ..._wording import in_time
-from ...data import ImpulseResponse
+from ...data import ImpulseResponse, Record
 from ...delayed import DelayedStateSpace
 from ...numerics.arrays import FloatArray, read_only
-from ...results import Flag, Result
+from ...results import Flag, IntervalKind, ModelFit
 from .result import Realization
 
 
@@ -50,7 +50,7 @@ class Candidates(Sequence[DelayedStateSpace]):
 
 
 @dataclass(frozen=True, eq=False)
-class DelayScan(Result):
+class DelayScan(ModelFit):
     """Misfit of the best model behind every candidate delay.
 
     ``iae[d]`` is the sum of ``|impulse.markov[k] - candidates[d].markov(n)[k]|``
@@ -131,9 +131,19 @@ class DelayScan(Result):
         return (self.delay_interval[0] * self.dt, self.delay_interval[1] * self.dt)
 
     @property
-    def dead_time_interval(self) -> tuple[float, float]:
-        """Interval of the dead time in s, the same as `interval`."""
-        return self.interval
+    def interval_kind(self) -> IntervalKind:
+        """``"flatness"``: it tells how flat the curve is."""
+        return "flatness"
+
+    @property
+    def sampling(self) -> str:
+        """How the impulse response was sampled."""
+        return self.impulse.sampling
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """The record behind the impulse response, if it is known."""
+        return self.realization.records
 
     @property
     def least_iae(self) -> float:
@@ -158,6 +168,9 @@ class DelayScan(Result):
             return None
         last = float(self.singular_values[self.delay, -1])
         return last / self.noise_floor if self.noise_floor > 0 else np.inf
+
+    def _method(self) -> str:
+        return "delay scan by approximate realization"
 
     def _title(self) -> str:
         return f"Delay scan: {self.delay} samples ({in_time(self.delay * self.dt, 5)})"

@@ -16,7 +16,7 @@ from ...errors import DataError, DelayRangeError, OptionError
 from ...numerics.arrays import FloatArray, IntArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.state_space.delay_split import split_delays
-from ...results import Flag, Result
+from ...results import Flag, ModelFit
 from .impulses import as_impulse, channels
 from .mimo_cores import Assembly, aligned_core, cores_by_columns, cores_by_rows, misfit
 from .realize import HANKEL
@@ -29,7 +29,7 @@ ALIKE, EXACT = 1.5, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class MimoRealization(Result):
+class MimoRealization(ModelFit):
     """How a model of several channels was put together.
 
     ``delays[i, j] == output_delays[i] + input_delays[j] + residual_delays[i, j]``, where
@@ -51,6 +51,7 @@ class MimoRealization(Result):
     relative_iae : ndarray, shape (p, m)
     impulse : ImpulseResponse
     flags : tuple of Flag
+    choices : tuple of str
 
     Examples
     --------
@@ -73,6 +74,25 @@ class MimoRealization(Result):
     relative_iae: FloatArray
     impulse: ImpulseResponse
     flags: tuple[Flag, ...] = ()
+    choices: tuple[str, ...] = ()
+    dead_time = None
+    delay = None
+    interval = None
+    delay_interval = None
+    records = ()
+
+    @property
+    def order(self) -> int:
+        """Orders of all models that the core is made of, together."""
+        return sum(self.orders)
+
+    @property
+    def sampling(self) -> str:
+        """How the impulse response was sampled."""
+        return self.impulse.sampling
+
+    def _method(self) -> str:
+        return "approximate realization of several channels"
 
     def _title(self) -> str:
         p, m = self.delays.shape

@@ -9,12 +9,13 @@ import control as ct
 import numpy as np
 
 from ...data import ImpulseResponse
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, fit_of
 from ...errors import OrderError
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.hankel.delay_models import realize_at
 from ...numerics.state_space.delay_split import Matrices, joined_columns, joined_rows
 from ...results import Flag
+from ..realization.result import Realization
 from .impulses import channels, check_samples
 from .realize import realize
 
@@ -82,7 +83,7 @@ def _realized(
             return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), direct), ()
         system = realize(moved, rank, **options)
     core = system.delay_free
-    return (core.A, core.B, core.C, core.D), system.fit.flags
+    return (core.A, core.B, core.C, core.D), fit_of(system, Realization).flags
 
 
 def aligned_core(

@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 from ..._checks import whole
 from ..._wording import in_time
-from ...data import ImpulseResponse
+from ...data import ImpulseResponse, Record
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.hankel.delay_models import hankel_size, realize_at
-from ...results import Flag, Result
+from ...results import Flag, ModelFit
 from .impulses import channels
 
 
 @dataclass(frozen=True, eq=False)
-class Realization(Result):
+class Realization(ModelFit):
     """How a model was realized from an impulse response.
 
     ``iae`` is the sum of ``|impulse.markov[k] - sys.markov(n)[k]|`` over the
@@ -53,6 +53,8 @@ class Realization(Result):
     flags : tuple of Flag
         ``"unstable"``, ``"not_died_away"``, ``"negative_pole"``, ``"no_gap"``,
         ``"filter_delay"``.
+    choices : tuple of str
+        What was chosen, and why.
 
     Examples
     --------
@@ -77,11 +79,30 @@ class Realization(Result):
     iae: float
     impulse: ImpulseResponse = field(repr=False)
     flags: tuple[Flag, ...] = ()
+    choices: tuple[str, ...] = ()
+    interval = None
+    delay_interval = None
 
     @property
     def dt(self) -> float:
         """Sample time in s."""
         return self.impulse.dt
+
+    @property
+    def dead_time(self) -> float:
+        """`delay` in s."""
+        return self.delay * self.dt
+
+    @property
+    def sampling(self) -> str:
+        """How the impulse response was sampled."""
+        return self.impulse.sampling
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """The record behind the impulse response, if it is known."""
+        step = self.impulse.step
+        return () if step is None or step.record is None else (step.record,)
 
     def leading_singular_values(self, count: int = 30) -> FloatArray:
         """Compute the first singular values of the Hankel matrix, as in the paper's Fig. 5.
@@ -99,6 +120,9 @@ class Realization(Result):
         markov = channels(self.impulse)
         model = realize_at(markov, self.delay, self.samples, count, padded=padded)
         return read_only(model.singular_values[:count])
+
+    def _method(self) -> str:
+        return "approximate realization"
 
     def _title(self) -> str:
         return f"Realization of order {self.order} after a delay of {self.delay} samples"

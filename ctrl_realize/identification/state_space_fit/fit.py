@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..._checks import whole
 from ...data import Record
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.simulation import as_delayed
 from ...errors import DataError, DataWarning, OptionError, OrderError, UnsuitableSystemError
 from ...numerics.arrays import IntArray
@@ -24,6 +24,7 @@ from ...results import Flag
 from ..impulse.from_io import Method, Start, as_group, impulse_from_io
 from ..long_records import lively_parts
 from ..realization.mimo import delay_matrix, given_delays
+from ..state_space_fit.result import StateSpaceFit
 from .result import fitted_system
 from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, experiments
 
@@ -125,7 +126,8 @@ def fit_state_space(
     _check_signals(group, feedthrough)
     parts, cut = lively_parts(group)
     system = from_starts(parts, asked, delays, feedthrough).system
-    return system.replace(fit=replace(system.fit, flags=cut + system.fit.flags)) if cut else system
+    fit = fit_of(system, StateSpaceFit)
+    return system.replace(fit=replace(fit, flags=cut + fit.flags)) if cut else system
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +139,11 @@ class Outcome:
     seen: bool
     search: Search
     best: Candidate
+
+    @property
+    def fit(self) -> StateSpaceFit:
+        """How the model was fitted."""
+        return fit_of(self.system, StateSpaceFit)
 
 
 def from_starts(
@@ -163,7 +170,7 @@ def from_starts(
             best = found
         # An output that a start does not see gets a second one.
         clear = best.seen or tried > 1
-        if clear and all(check.independent for check in best.system.fit.checks):
+        if clear and all(check.independent for check in best.fit.checks):
             break
     if best is None:
         raise refused[0]

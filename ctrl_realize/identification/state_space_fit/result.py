@@ -12,7 +12,7 @@ from ...data import Record
 from ...delayed import DelayedStateSpace
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.state_space.balancing import balanced_truncation
-from ...results import Flag, Result
+from ...results import Flag, IntervalKind, ModelFit
 from ..output_error.result import OutputErrorFit
 from ..validation.residuals import analyse_residuals
 from ..validation.residuals_result import ResidualAnalysis
@@ -28,7 +28,30 @@ LAGS = 25
 
 
 @dataclass(frozen=True, eq=False)
-class StateSpaceFit(Result):
+class Timing:
+    """Dead time of a model of one input and output that takes the place of a fit of lags.
+
+    Attributes
+    ----------
+    dead_time : float
+        In s.
+    interval : tuple of float
+        In s: dead times that the data do not rule out, of this model and of `lags` unless they
+        leave twice as much.
+    total_delay : float or None
+        Delay at zero frequency in s; None for a plant without gain.
+    lags : OutputErrorFit
+        The fit of lags behind a dead time, which left too much.
+    """
+
+    dead_time: float
+    interval: tuple[float, float]
+    total_delay: float | None
+    lags: OutputErrorFit
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpaceFit(ModelFit):
     """How a model was fitted to records of one or several channels.
 
     Attributes
@@ -50,15 +73,9 @@ class StateSpaceFit(Result):
         ``100 (1 - noise_std / std y)`` of every output, over all records.
     checks : tuple of ResidualAnalysis
         Of every record without gaps.
-    dead_time : float, optional
-        In s, of one input and output that `identify` has fitted; None otherwise.
-    interval : tuple of float, optional
-        In s: dead times that the data do not rule out, of this model and of `lags` unless they
-        leave twice as much.
-    total_delay : float, optional
-        Delay at zero frequency in s.
-    lags : OutputErrorFit, optional
-        The fit of lags behind a dead time, which left too much, and whose place this one takes.
+    timing : Timing or None
+        Dead time, interval and total delay of one input and output that `identify` has fitted,
+        and the fit of lags whose place this one takes; None otherwise.
     records : tuple of Record
         What was fitted.
     choices : tuple of str
@@ -94,10 +111,27 @@ class StateSpaceFit(Result):
     records: tuple[Record, ...]
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
-    dead_time: float | None = None
-    interval: tuple[float, float] | None = None
-    total_delay: float | None = None
-    lags: OutputErrorFit | None = None
+    timing: Timing | None = None
+
+    @property
+    def dead_time(self) -> float | None:
+        """Dead time in s; None where `identify` has not asked for it."""
+        return None if self.timing is None else self.timing.dead_time
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Dead times in s that the data do not rule out; None where nobody has asked."""
+        return None if self.timing is None else self.timing.interval
+
+    @property
+    def total_delay(self) -> float | None:
+        """Delay at zero frequency in s; None where nobody has asked."""
+        return None if self.timing is None else self.timing.total_delay
+
+    @property
+    def lags(self) -> OutputErrorFit | None:
+        """Fit of lags behind a dead time whose place this one takes."""
+        return None if self.timing is None else self.timing.lags
 
     @property
     def delay(self) -> int | None:
@@ -111,14 +145,17 @@ class StateSpaceFit(Result):
         return None if self.interval is None else (self.interval[0] / dt, self.interval[1] / dt)
 
     @property
-    def dead_time_interval(self) -> tuple[float, float] | None:
-        """Interval of the dead time in s, the same as `interval`."""
-        return self.interval
+    def interval_kind(self) -> IntervalKind | None:
+        """``"plausible"``: what is not ruled out has no probability; None without an interval."""
+        return None if self.interval is None else "plausible"
 
     @property
-    def interval_label(self) -> str:
-        """What `interval` is: it has no probability."""
-        return "dead times not ruled out"
+    def residual_std(self) -> float | None:
+        """Standard deviation of what the model leaves of its one output; None for several."""
+        return float(self.noise_std[0]) if self.noise_std.size == 1 else None
+
+    def _method(self) -> str:
+        return "state-space fit of all channels"
 
     def _title(self) -> str:
         return (

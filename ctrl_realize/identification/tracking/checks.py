@@ -6,6 +6,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import positive, whole
+from ...delayed import DelayedStateSpace
 from ...delayed.parts import check_entries
 from ...errors import DelayRangeError, OptionError, UnsuitableSystemError
 
@@ -41,12 +42,10 @@ def model_noise(model: ct.StateSpace, given: float | None) -> float:
     """Return the noise that a model leaves: as given, as its `fit` has it, or 0 where unknown."""
     if given is not None:
         return positive(given, "noise_std", "standard deviation of the output's noise")
-    fit = getattr(model, "fit", None)
-    for name in ("residual", "noise_std"):
-        found = np.ravel(getattr(fit, name, np.nan))
-        if found.size == 1 and np.isreal(found[0]) and np.isfinite(found[0]):
-            return float(found[0])
-    return 0.0
+    if not isinstance(model, DelayedStateSpace) or model.fit is None:
+        return 0.0
+    found = model.fit.residual_std
+    return found if found is not None and np.isfinite(found) else 0.0
 
 
 def check_start(core: ct.StateSpace) -> None:

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..._wording import in_time
 from ...numerics.arrays import BoolArray, FloatArray, locked, read_only
-from ...results import Result
+from ...results import Flag, IntervalKind, ModelFit, Result
 
 
 @dataclass(frozen=True, eq=False)
-class TrackPoint(Result):
+class TrackPoint(ModelFit):
     """What the samples of the forgetting window say at one moment.
 
     ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
@@ -45,6 +45,8 @@ class TrackPoint(Result):
         Standard deviation of the residual.
     resolved : bool
     reason : str
+    choices : tuple of str
+    flags : tuple of Flag
 
     Examples
     --------
@@ -73,6 +75,23 @@ class TrackPoint(Result):
     dt: float
     reason: str = ""
     lost: bool = False
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = ()
+    order = None
+    records = ()
+
+    @property
+    def interval_kind(self) -> IntervalKind:
+        """``"tracked"``: of the samples within the memory."""
+        return "tracked"
+
+    @property
+    def residual_std(self) -> float:
+        """The same as `noise_std`."""
+        return self.noise_std
+
+    def _method(self) -> str:
+        return "tracked model"
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -96,9 +96,8 @@ class Bootstrap(Result):
         found = []
         if self.failed:
             found.append(Flag("failed_draws", f"the method gave an error for {self.failed} draws"))
-        if any(
-            flag.code == "coarse_quantisation" for flag in getattr(self.system.fit, "flags", ())
-        ):
+        fitted = () if self.system.fit is None else self.system.fit.flags
+        if any(flag.code == "coarse_quantisation" for flag in fitted):
             found.append(
                 Flag(
                     "coarse_quantisation",
@@ -291,8 +290,8 @@ def _identified(estimator: Estimator, draw: Any) -> tuple[DelayedStateSpace, flo
         system = estimator(draw)
     except CtrlRealizeError:
         return None
-    dead_time = getattr(system.fit, "dead_time", None)
-    wait = float(system.dead_time) if dead_time is None else float(dead_time)
+    dead_time = None if system.fit is None else system.fit.dead_time
+    wait = float(system.dead_time) if dead_time is None else dead_time
     return system.replace(fit=None), wait
 
 

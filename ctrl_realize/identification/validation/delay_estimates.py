@@ -7,6 +7,7 @@ import numpy as np
 from ..._checks import whole
 from ...data import MeasuredFRF, Record
 from ...data.given import check_complete
+from ...delayed import fit_of
 from ...errors import CtrlRealizeError, DataError
 from ...numerics.blas_threads import single_threaded
 from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
@@ -16,6 +17,7 @@ from ..impulse.from_io import impulse_from_io
 from ..output_error.fit import fit_output_error
 from ..output_error.result import OutputErrorFit
 from ..realization.delay_scan import estimate_delay
+from ..realization.delay_scan_result import DelayScan
 from ..step.impulse import impulse_from_step
 from ..step.steps import unit_step
 from .delay_estimates_result import DelayComparison, DelayEstimate, common_dead_time
@@ -137,7 +139,7 @@ def _from_record(
     dt = record.dt
     total, model_order, stepped = 0.1 * record.n_samples * dt, 2, False
     try:
-        fit: OutputErrorFit = fit_output_error(record).fit
+        fit = fit_of(fit_output_error(record), OutputErrorFit)
     except CtrlRealizeError as problem:
         flags.append(Flag("no_output_error", f"output error: {problem}"))
     else:
@@ -181,7 +183,8 @@ def _scan(record: Record, stepped: bool, most: int, order: int, total: float) ->
         tail = int(np.ceil(6 * total / record.dt)) + 20
         length = min(most + max(tail, 8 * order), record.n_samples // 4)
         impulse = impulse_from_io(record, length)
-    scan = estimate_delay(impulse, order, max_delay=min(most, impulse.n_samples // 2)).fit
+    system = estimate_delay(impulse, order, max_delay=min(most, impulse.n_samples // 2))
+    scan = fit_of(system, DelayScan)
     low, high = scan.delay_interval
     return DelayEstimate(
         "scan",
@@ -202,9 +205,10 @@ def _doubt(flags: tuple[Flag, ...]) -> str:
 def _from_frf(frf: MeasuredFRF, views: list[DelayEstimate], flags: list[Flag]) -> None:
     # Not at the top: most checks have no FRF, and its fit is a large part of the package.
     from ...frequency.fit_frf import fit_frf
+    from ...frequency.frf_fit import FRFFit
 
     try:
-        fit = fit_frf(frf).fit
+        fit = fit_of(fit_frf(frf), FRFFit)
     except CtrlRealizeError as problem:
         flags.append(Flag("no_frf_fit", f"FRF fit: {problem}"))
     else:

@@ -18,14 +18,14 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import ALL_STRUCTURES, PLAUSIBLE, Candidate, needless_parameters, search
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
-from .result import Better, profile_of
+from .result import StructureFit, profile_of
 
 _MOST_ORDER = ALL_STRUCTURES[-1].order
 
 
 def better_structure(
     whole: WindowFit, given: Candidate, refit: Callable[[], WindowFit]
-) -> Better | None:
+) -> StructureFit | None:
     """Find what rules a given structure out, None where nothing does.
 
     One pole more is tried first, from the given optimum on, which costs little; only where it
@@ -53,9 +53,11 @@ def better_structure(
     # Too many poles are no reason: they leave as little.
     if excess <= PLAUSIBLE or cost <= best.cost + PLAUSIBLE * free.variance:
         return None
-    low, high = profile_limits(*profile_of(free, best))
-    total = free.static(best).total
-    return Better(best.structure, best.delay, total, low, high, float(excess))
+    static = free.static(best)
+    interval = profile_limits(*profile_of(free, best))
+    return StructureFit(
+        best.structure, best.delay, static.total, -float(excess), interval, best.poles, static.gain
+    )
 
 
 def _lacks_a_pole(whole: WindowFit, given: Candidate) -> bool:

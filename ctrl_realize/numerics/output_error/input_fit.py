@@ -147,11 +147,13 @@ def fit_sampled(
     if structures is None and whole.best.structure.order == ORDERS[-1].order:
         whole = extended(whole, MORE_LAGS)
     chains = chains_of(whole) if structures is None else []
-    fit = likelihood_fit(whole, adequate=whole.correlation <= WHITE, chains=chains)
+    better = None
     if structures is not None:
         # On the stretch also where all samples were fitted: what is ruled out there is so at all.
         every = partial(_fit, data, factor, ORDERS, scales, huber)
-        fit = replace(fit, better=better_structure(stretch, stretch.best, every))
+        better = better_structure(stretch, stretch.best, every)
+    white = whole.correlation <= WHITE
+    fit = likelihood_fit(whole, adequate=white, chains=chains, better=better)
     if sums is not None:
         fit = replace(fit, fitted=_on_stretch(data, fit, factor))
     elif fit.chain:

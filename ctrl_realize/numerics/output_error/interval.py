@@ -37,7 +37,15 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, plausible
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
-from .result import OtherModel, OutputErrorEstimate, Profile, assembled, profiles_of
+from .result import (
+    DelayInterval,
+    OtherModel,
+    OutputErrorEstimate,
+    Profile,
+    StructureFit,
+    assembled,
+    profiles_of,
+)
 from .selection import Choice, choose_model
 
 _UNSEEN = 3.0
@@ -67,10 +75,13 @@ def likelihood_fit(
     chains: Sequence[LagChain] = (),
     flows: Sequence[DispersedFlow] = (),
     onset: float | None = None,
+    relaxing: bool = False,
+    better: StructureFit | None = None,
 ) -> OutputErrorEstimate:
     """Take delay and interval from the likelihood.
 
-    `onset` is the time of the first motion; without it the structures are believed.
+    `onset` is the time of the first motion; without it the structures are believed. `relaxing`
+    and `better` are those of the result.
     """
     tanks = [chain for chain in chains if not chain.hidden]
     choice = choose_model(whole, tanks, flows)
@@ -93,8 +104,18 @@ def likelihood_fit(
     if onset is not None and open_start:
         low, high = _opened(low, high, chosen.delay, onset, scales)
     first, last = profile_limits(*own)
-    interval = low, high, (last - first) / 3.92
-    found = assembled(whole, chosen, adequate, (), kept.profiles, interval, own)
+    interval = DelayInterval(low, high, (last - first) / 3.92)
+    found = assembled(
+        whole,
+        chosen,
+        adequate,
+        (),
+        kept.profiles,
+        interval,
+        own,
+        relaxing=relaxing,
+        better=better,
+    )
     return replace(
         found,
         chain=choice.chain,

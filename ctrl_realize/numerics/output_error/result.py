@@ -52,34 +52,39 @@ class OtherModel(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StructureFit:
-    """One line of the table of structures; delays in s, `delta_bic` of the criterion to the best.
+    """One structure that was fitted: `order` poles, ``order - relative_degree`` zeros.
 
-    `low` and `high` are the profile-likelihood interval, NaN where it was not needed.
+    `delta_bic` is its information criterion above that of the best structure; up to 10 the data do
+    not rule it out, and `interval` (s) is the 95 % profile-likelihood interval of its dead time
+    (None where the structure is ruled out). Times are in s, poles in rad/s; `gain` is that at
+    zero frequency.
     """
 
     structure: Structure
-    delay: float
+    dead_time: float
     total_delay: float
     delta_bic: float
-    low: float
-    high: float
+    interval: tuple[float, float] | None
     poles: ComplexArray
-    gain: float = float("nan")
+    gain: float
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return self.structure.order
+
+    @property
+    def relative_degree(self) -> int:
+        """Poles minus zeros."""
+        return self.structure.relative_degree
 
 
-@dataclass(frozen=True)
-class Better:
-    """A structure that rules out the one that was asked for: its delay and 95 % interval in s.
+class DelayInterval(NamedTuple):
+    """95 % interval of a delay, and its standard error if the structure is the plant's; in s."""
 
-    `delta_bic` is by how much its information criterion is smaller.
-    """
-
-    structure: Structure
-    delay: float
-    total: float
     low: float
     high: float
-    delta_bic: float
+    std: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +120,7 @@ class OutputErrorEstimate:
     structures: tuple[StructureFit, ...]
     delay_estimates: tuple[tuple[RobustKey, float], ...]
     fitted: FloatArray
-    profile: tuple[FloatArray, FloatArray]
+    profile: Profile
     latest: float
     chain: LagChain | None = None
     endless: bool = False
@@ -128,7 +133,7 @@ class OutputErrorEstimate:
     whitened: bool = False
     static: StaticGain | None = None
     alike: tuple[tuple[StaticGain, float], ...] = ()
-    better: Better | None = None
+    better: StructureFit | None = None
 
     @property
     def gain_ends(self) -> tuple[float, float]:
@@ -181,13 +186,13 @@ def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[Struct
     best = min(whole.criterion.values())
     lines = []
     for s, candidate in whole.candidates.items():
-        low, high = profile_limits(*profiles[s]) if s in profiles else (np.nan, np.nan)
+        interval = profile_limits(*profiles[s]) if s in profiles else None
         state = evaluate(whole.problem, s, candidate.parameters[None])
         total = candidate.delay + lag_sum(candidate.poles, state.numerator[0])
         excess = whole.criterion[s] - best
         gain = float(np.real(state.numerator[0, 0] / np.prod(-candidate.poles)))
         lines.append(
-            StructureFit(s, candidate.delay, total, excess, low, high, candidate.poles, gain)
+            StructureFit(s, candidate.delay, total, excess, interval, candidate.poles, gain)
         )
     return tuple(sorted(lines, key=lambda line: line.delta_bic))
 
@@ -198,16 +203,18 @@ def assembled(
     adequate: bool,
     delay_estimates: tuple[tuple[RobustKey, float], ...],
     profiles: dict[Structure, Profile],
-    interval: tuple[float, float, float],
+    interval: DelayInterval,
     profile: Profile,
+    *,
+    relaxing: bool = False,
+    better: StructureFit | None = None,
 ) -> OutputErrorEstimate:
-    """Put a result together; `interval` is its lower and upper end and the standard error, in s.
+    """Put a result together.
 
     `profiles` are those of the table of structures, `profile` that of the delay chosen.
     """
     state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
-    low, high, std = interval
     static = whole.static(chosen)
     charged = {s: whole.criterion[s] + needless_parameters(s) for s in profiles}
     least = charged.get(chosen.structure, np.inf)
@@ -218,9 +225,9 @@ def assembled(
     ]
     return OutputErrorEstimate(
         delay=chosen.delay,
-        low=low,
-        high=high,
-        std=std,
+        low=interval.low,
+        high=interval.high,
+        std=interval.std,
         structure=chosen.structure,
         poles=chosen.poles,
         numerator=numerator,
@@ -233,7 +240,9 @@ def assembled(
         fitted=whole.window.predict(whole.problem, chosen),
         profile=profile,
         latest=whole.scales.latest,
+        relaxing=relaxing,
         whitened=whole.colour is not None,
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
+        better=better,
     )

@@ -42,7 +42,6 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -53,7 +52,7 @@ from ..separable.window import WindowFit, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
 from .interval import likelihood_fit
-from .result import OutputErrorEstimate, RobustKey, assembled, profile_of
+from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled, profile_of
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
 
@@ -109,29 +108,28 @@ def fit_step_record(
     if adequate and whiten:
         whole = in_coloured_noise(whole, data)
     if structures is not None:
-        found = likelihood_fit(whole, adequate=adequate)
-        found = replace(
-            found,
-            better=better_structure(
-                plain,
-                plain.best,
-                lambda: _fit_until(
-                    data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber
-                ),
-            ),
+        better = better_structure(
+            plain,
+            plain.best,
+            lambda: _fit_until(data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber),
         )
-    elif adequate:
+        return likelihood_fit(whole, adequate=adequate, relaxing=data.relaxing, better=better)
+    if adequate:
         assert data.motion is not None
         onset = data.motion.onset * data.dt
         chains = chains_of(whole)
-        found = likelihood_fit(
-            whole, adequate=True, chains=chains, flows=flows_of(whole, chains), onset=onset
+        return likelihood_fit(
+            whole,
+            adequate=True,
+            chains=chains,
+            flows=flows_of(whole, chains),
+            onset=onset,
+            relaxing=data.relaxing,
         )
-    else:
-        simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
-        chosen = whole.best_of(simple)
-        found = _robust_fit(whole, chosen, _views(data, chosen, latest, factor, huber))
-    return replace(found, relaxing=data.relaxing)
+    simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
+    chosen = whole.best_of(simple)
+    views = _views(data, chosen, latest, factor, huber)
+    return _robust_fit(whole, chosen, views, relaxing=data.relaxing)
 
 
 def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
@@ -170,7 +168,11 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
 
 
 def _robust_fit(
-    whole: WindowFit, chosen: Candidate, views: tuple[tuple[RobustKey, float], ...]
+    whole: WindowFit,
+    chosen: Candidate,
+    views: tuple[tuple[RobustKey, float], ...],
+    *,
+    relaxing: bool,
 ) -> OutputErrorEstimate:
     """Take delay and interval from the views (points 3 and 4 of the rule)."""
     delay = float(np.median([at for _, at in views[:-1]]))
@@ -178,8 +180,9 @@ def _robust_fit(
     low, high = float(delays[1]), float(delays[-1])
     profiles = {chosen.structure: profile_of(whole, chosen)}
     fixed = at_delay(whole.problem, chosen, whole.scales, delay)
-    interval = low, high, (high - low) / 3.92
-    return assembled(whole, fixed, False, views, profiles, interval, profiles[chosen.structure])
+    interval = DelayInterval(low, high, (high - low) / 3.92)
+    own = profiles[chosen.structure]
+    return assembled(whole, fixed, False, views, profiles, interval, own, relaxing=relaxing)
 
 
 def _fit_until(

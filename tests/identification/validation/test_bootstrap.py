@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import control as ct
@@ -12,6 +11,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.identification.validation.bootstrap import bootstrap
+from ctrl_realize.io import FitSummary
 from tests import rigs
 
 TS = rigs.TS
@@ -48,18 +48,11 @@ def test_bands_hold_the_model_and_have_the_width_of_the_scatter(drawn):
     assert np.all(phase_high - phase_low < 0.5)
 
 
-@dataclass(frozen=True)
-class _Waits:
-    """Says that the dead time is what an estimator made of the record."""
-
-    dead_time: float
-
-
 def _mean_of_the_end(record):
     """A model whose dead time is the mean of the settled output."""
     wait = float(np.mean(np.ravel(record.output)[100:]))
     core = ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], 1.0)
-    return cr.DelayedStateSpace(core, 1, fit=_Waits(wait))
+    return cr.DelayedStateSpace(core, 1, fit=FitSummary("Fit", "Fit", (), (("dead_time", wait),)))
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.9])

@@ -1,0 +1,147 @@
+"""Results as cards, systems as the line that is asked for, arrays as code with all digits."""
+
+from __future__ import annotations
+
+import html
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+SHORT_LABEL = 16
+"""Letters of a label that is never broken."""
+
+
+def text_card(
+    title: str,
+    rows: Sequence[tuple[str, str]],
+    choices: Sequence[str] = (),
+    flags: Sequence[str] = (),
+) -> str:
+    """Lay out label-value rows as text, choices and flags below them.
+
+    Parameters
+    ----------
+    title : str
+    rows : sequence of (label, value)
+    choices, flags : sequence of str, optional
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> from ctrl_realize._shown import text_card
+    >>> print(text_card("Delay", [("delay", "37 samples"), ("order", "3")], (), ["look twice"]))
+    Delay
+      delay  37 samples
+      order  3
+      ! look twice
+    """
+    width = max((len(label) for label, _ in rows), default=0)
+    lines = [title]
+    lines += [f"  {label:<{width}}  {value}" for label, value in rows]
+    lines += [f"  - {choice}" for choice in choices]
+    lines += [f"  ! {flag}" for flag in flags]
+    return "\n".join(lines)
+
+
+def html_card(
+    title: str,
+    rows: Sequence[tuple[str, str]],
+    choices: Sequence[str] = (),
+    flags: Sequence[str] = (),
+) -> str:
+    """Lay out label-value rows as a small HTML table; everything is escaped.
+
+    Parameters
+    ----------
+    title, rows, choices, flags
+        As for `text_card`.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> from ctrl_realize._shown import html_card
+    >>> card = html_card("Delay", [("delay", "37 samples")], flags=["look <twice>"])
+    >>> print(card[card.index("⚠"):])
+    ⚠ look &lt;twice&gt;</div></div>
+    """
+    cell = "text-align:left;vertical-align:top"
+    body = "".join(
+        f"<tr><th style='{cell};font-weight:500;padding:2px 16px 2px 0;"
+        # On a phone the values wrap first.
+        f"white-space:{'nowrap' if len(label) <= SHORT_LABEL else 'normal'}'>"
+        f"{html.escape(label)}</th>"
+        f"<td style='{cell};padding:2px 0'>{html.escape(value)}</td></tr>"
+        for label, value in rows
+    )
+    lines = "".join(f"<div style='margin-top:4px'>{html.escape(text)}</div>" for text in choices)
+    lines += "".join(f"<div style='margin-top:4px'>⚠ {html.escape(text)}</div>" for text in flags)
+    return (
+        "<div style='display:inline-block;border:1px solid #8886;border-radius:6px;"
+        "padding:8px 14px;max-width:46em'>"
+        f"<div style='font-weight:600;margin-bottom:4px'>{html.escape(title)}</div>"
+        f"<table style='border-collapse:collapse;margin:0'>{body}</table>{lines}</div>"
+    )
+
+
+def as_asked(system: Any) -> str:
+    """Write a system as its `repr_format`, or that of python-control's settings, asks for.
+
+    What python-control takes where nothing was set, "eval", lists every number. Systems of this
+    toolbox show their one line there, and "eval" only where it was set on the system itself.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> valve = cr.delayed_ss(ct.ss([], [], [], [[2.0]], 0.1), 3, name="valve")
+    >>> valve
+    <DelayedStateSpace 'valve': u -> y, order 0, z^-3 (0.3 s), dt = 0.1 s>
+    >>> valve.repr_format = "latex"
+    >>> repr(valve)[:4]
+    '<div'
+    """
+    asked = system.repr_format
+    if asked == "eval" and system._repr_format is not None:
+        return str(system._repr_eval_())
+    if asked not in ("eval", "info", "latex"):
+        raise ValueError(f"format {asked!r} unknown")
+    html_text = system._repr_html_() if asked == "latex" else None
+    return str(html_text or system._repr_info_())
+
+
+def as_code(values: Any) -> str:
+    """Write an array, or a system of python-control, as code that has all its digits.
+
+    Parameters
+    ----------
+    values : array_like or control.InputOutputSystem
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize._shown import as_code
+    >>> print(as_code(np.array([1 / 3])))
+    array([0.3333333333333333])
+    """
+    with np.printoptions(precision=17, floatmode="unique", threshold=sys.maxsize):
+        return str(values._repr_eval_() if hasattr(values, "_repr_eval_") else repr(values))
