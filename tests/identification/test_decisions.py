@@ -218,6 +218,12 @@ def test_a_plant_with_a_resonance_and_zeros_gets_states_instead_of_lags():
     assert modes.fit.interval[0] - 1e-9 <= 0.4 <= modes.fit.interval[1] + 1e-9
     poles = np.log(modes.delay_free.poles().astype(complex)) / DT
     assert np.abs(poles - (-0.5 + 1j * np.sqrt(15.75))).min() < 0.1
+    row = cr.identify_campaign([record], progress=False).rows[0]
+    assert (row.error, row.dead_time, row.interval) == (
+        None,
+        modes.fit.dead_time,
+        modes.fit.interval,
+    )
     asked = cr.identify(record, order=1)
     assert "input_in_residual" in codes(asked.fit)
     near = cr.identify(record, max_delay=2)

@@ -13,7 +13,6 @@ from ctrl_realize.design import reduce
 from ctrl_realize.frequency import fit_frf
 from ctrl_realize.identification import (
     DelayTracker,
-    StateSpaceFit,
     fit_state_space,
     realize_mimo,
 )
@@ -147,15 +146,3 @@ def test_an_older_summary_is_read():
     assert (kept.interval_kind, kept.interval) == (None, (0.36, np.inf))
     assert kept.interval_label == INTERVAL_LABELS["flatness"]
     assert (kept.choices, kept.gain, kept.onset) == ((), None, None)
-
-
-def test_a_campaign_takes_a_model_with_modes():
-    # A resonance that lags cannot follow; `identify` gives a state-space fit.
-    plant = cr.delayed_ss(ct.tf([1.0], [0.01, 0.02, 1.0]), dead_time=0.1, dt=0.02)
-    rng = np.random.default_rng(3)
-    u = np.repeat(rng.choice([-1.0, 1.0], 60), 8)
-    y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    record = cr.Record(0.02 * np.arange(u.size), u, y)
-    row = cr.identify_campaign([record], progress=False).rows[0]
-    assert row.error is None
-    assert isinstance(row.system.fit, StateSpaceFit)

@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import ctrl_realize as cr
 from ctrl_realize.identification.campaign.packed_model import PackedModel
 from ctrl_realize.identification.campaign.rows import fingerprint
+from ctrl_realize.io import FitSummary
 from tests.rigs import TS, step_record
 
 
@@ -131,13 +132,14 @@ def test_the_key_knows_a_system_by_all_its_digits(known):
 RNG = np.random.default_rng(1)
 SISO = ct.ss([[0.9, 0.1], [0, 0.5]], [[0], [1]], [[1, 1 / 3]], 0.1, 7e-4)
 MIMO = ct.ss(*(RNG.standard_normal(shape) for shape in ((3, 3), (3, 2), (2, 3), (2, 2))), 0.1)
+FIT = FitSummary("Fit", "how", ())
 STATIC = ct.ss([], [], [], [[2.0]], 1.0)
 
 
 @pytest.mark.parametrize(
     "system",
     [
-        cr.DelayedStateSpace(SISO, 37, name="valve", inputs="i", outputs="x", fit="how"),
+        cr.DelayedStateSpace(SISO, 37, name="valve", inputs="i", outputs="x", fit=FIT),
         cr.DelayedStateSpace(SISO, 0),
         cr.DelayedStateSpace(MIMO, (2, 5), output_delay=(0, 3), name="plant"),
         cr.DelayedStateSpace(STATIC, 4),
@@ -155,7 +157,8 @@ def test_unpacking_gives_the_model_bit_by_bit(system):
             system.input_delays,
             system.output_delays,
         )
-        assert (twin.name, twin.dt, twin.fit) == (system.name, system.dt, system.fit)
+        assert (twin.name, twin.dt) == (system.name, system.dt)
+        assert (twin.fit and twin.fit.report()) == (system.fit and system.fit.report())
         assert twin.input_labels == system.input_labels
         assert twin.output_labels == system.output_labels
         assert twin.state_labels == system.state_labels
