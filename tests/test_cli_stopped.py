@@ -31,7 +31,7 @@ COUNT = 4
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    folder, valve = tmp_path_factory.mktemp("records"), cr.bench.valve(rest=0.5, hold=1.0)
+    folder, valve = tmp_path_factory.mktemp("records"), cr.bench.valve(pre_step_time=0.5, hold=1.0)
     for k in range(COUNT):
         made = valve.step_record(16.0, rng=k)
         columns = {"time_s": made.time, "input": made.input, "output": made.output}

@@ -150,7 +150,7 @@ def test_docstrings_of_everything_public_are_those_of_numpydoc(reference):
 
 
 def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
-    valve = cr.bench.valve(rest=0.5, hold=1.5)
+    valve = cr.bench.valve(pre_step_time=0.5, hold=1.5)
     step = valve.step_record(16.0, rng=5)
     table = np.stack([step.time, step.input, step.output], axis=1)
     header = "time_s,input,output"

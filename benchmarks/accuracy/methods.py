@@ -49,7 +49,7 @@ def paper(record: cr.Record, order: int) -> Estimate:
 def first_motion(record: cr.Record, order: int) -> Estimate:
     """Threshold: first sample beyond five standard deviations of the noise."""
     step = cr.unit_step(record)
-    level = 5 * float(np.std(step.pre)) if step.pre.size > 20 else 0.02
+    level = 5 * float(np.std(step.pre_step)) if step.pre_step.size > 20 else 0.02
     beyond = np.flatnonzero(np.abs(step.output) > level)
     return Estimate(float(beyond[0]) if beyond.size else float("nan"))
 

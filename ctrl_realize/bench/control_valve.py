@@ -58,7 +58,7 @@ class Valve:
 
     truth: ValveTruth = field(repr=False)
     dt: float
-    rest: float
+    pre_step_time: float
     hold: float
     noise: float
     input_noise: float
@@ -114,7 +114,7 @@ class Valve:
                 f"amplitude={amplitude!r}; the valve's range is {low:g}-{high:g} mA, so a step "
                 f"can have at most {high - low:g} mA"
             )
-        n_rest = round(self.rest / self.dt)
+        n_rest = round(self.pre_step_time / self.dt)
         current = np.full(n_rest + round(self.hold / self.dt), low)
         current[n_rest:] += amplitude
         return self.record(current, rng, name=name or f"valve_{amplitude:g}mA".replace(".", "p"))

@@ -31,7 +31,7 @@ def valve(
     hysteresis: float = 0.0,
     dead_time_scatter: float = 0.0,
     dt: float = paper.SETTINGS.sample_time,
-    rest: float = paper.SETUP.rest,
+    pre_step_time: float = paper.SETUP.pre_step_time,
     hold: float = 2.0,
 ) -> Valve:
     """Set up the simulated valve of the paper's sections 2.2 and 3.1.
@@ -78,7 +78,7 @@ def valve(
         a pneumatic drive may; `truth` holds the mean.
     dt : float
         Sample time in s, 1/1280 by default.
-    rest, hold : float
+    pre_step_time, hold : float
         Seconds before and after a step.
 
     Returns
@@ -119,7 +119,7 @@ def valve(
         if real(value, argument, "a fraction or a count") < 0:
             raise OptionError(f"{argument}={value!r}; needed is >= 0")
     real(drift, "drift", "fraction of the stroke per second")
-    positive(rest, "rest", "time in s")
+    positive(pre_step_time, "pre_step_time", "time in s")
     positive(hold, "hold", "time in s")
     if bits is not None:
         whole(bits, "bits", 2, 32)
@@ -148,7 +148,7 @@ def valve(
             matrices=chain(before + after, gain), dead_time=float(dead_time), dt=float(dt)
         ),
         dt=float(dt),
-        rest=float(rest),
+        pre_step_time=float(pre_step_time),
         hold=float(hold),
         noise=float(noise),
         input_noise=float(input_noise),

@@ -59,7 +59,7 @@ class StepEdge:
 class StepResponse(Drawable):
     """Response to a unit step, cut out of a record.
 
-    ``output[k] = (y[edge.index + k] - baseline - drift * k * dt) / amplitude``; `pre` is the
+    ``output[k] = (y[edge.index + k] - baseline - drift * k * dt) / amplitude``; `pre_step` is the
     same before the edge, so it holds the noise of the measurement in the same unit.
 
     Attributes
@@ -70,7 +70,7 @@ class StepResponse(Drawable):
         Unit step response S_0, S_1, ... (output unit per input unit).
     input : ndarray, shape (N,)
         Measured input, scaled to a step from 0 to 1.
-    pre : ndarray, shape (P,)
+    pre_step : ndarray, shape (P,)
         The samples before the edge, P = 0 where the record starts at the step.
     dt : float
         Sample time in s.
@@ -99,7 +99,7 @@ class StepResponse(Drawable):
     time: FloatArray
     output: FloatArray
     input: FloatArray
-    pre: FloatArray
+    pre_step: FloatArray
     dt: float
     amplitude: float
     baseline: float
@@ -109,7 +109,7 @@ class StepResponse(Drawable):
     record: Record | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        for what in ("time", "output", "input", "pre"):
+        for what in ("time", "output", "input", "pre_step"):
             object.__setattr__(self, what, read_only(getattr(self, what)))
 
     @property
@@ -121,5 +121,5 @@ class StepResponse(Drawable):
         name = f" {self.name!r}" if self.name else ""
         return (
             f"<StepResponse{name}: {self.n_samples} samples of {self.dt:g} s after a step of "
-            f"{self.amplitude:g}, {self.pre.size} before>"
+            f"{self.amplitude:g}, {self.pre_step.size} before>"
         )

@@ -74,7 +74,7 @@ class SetUp:
         The voltage-to-current converter is faster than this.
     bandwidth_hz : float
         Bandwidth of the valve, "around 2 Hz".
-    rest : float
+    pre_step_time : float
         The step comes just after this time in s.
     step_sizes_ma : tuple of float
         Step sizes, 100, 75, 50 and 25 % of the valve's range.
@@ -97,7 +97,7 @@ class SetUp:
     lvdt_cutoff_hz: float = 30.0
     converter_cutoff_hz: float = 10e3
     bandwidth_hz: float = 2.0
-    rest: float = 3.0
+    pre_step_time: float = 3.0
     step_sizes_ma: tuple[float, ...] = (16.0, 12.0, 8.0, 4.0)
     records_per_size: int = 10
     alias_free_hz: float = 500.0

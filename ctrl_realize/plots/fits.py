@@ -175,8 +175,8 @@ def _each_record(axes: Axes, result: OutputErrorFit, factor: float) -> list[Line
     every = max(1, -(-len(result.records) // _MOST_RECORDS))
     for record in result.records[::every]:
         step = unit_step(record, remove_drift=False)
-        time = factor * step.dt * np.arange(-step.pre.size, step.n_samples)
-        values = np.concatenate([step.pre, step.output])
+        time = factor * step.dt * np.arange(-step.pre_step.size, step.n_samples)
+        values = np.concatenate([step.pre_step, step.output])
         lines += axes.plot(
             time, values, color=style.MEASURED, linewidth=0.6, alpha=0.35, zorder=1,
             label=None if lines else f"{len(result.records)} records",

@@ -28,7 +28,7 @@ LOWEST_GAIN = -60.0
 
 
 def margins_plot(
-    found: Margins, *, ax: style.AxesLike = None, title: str | None = None
+    result: Margins, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
     """Draw gain, phase and Nyquist curve of a loop with its margins marked.
 
@@ -36,7 +36,7 @@ def margins_plot(
 
     Parameters
     ----------
-    found : Margins
+    result : Margins
     ax : sequence of three Axes or Figure, optional
     title : str, optional
 
@@ -53,12 +53,12 @@ def margins_plot(
     >>> [axes.get_title() or axes.get_ylabel() for axes in cplt.figure.axes]
     ['loop gain [dB]', 'loop phase [deg]', 'imaginary part']
     """
-    if not isinstance(found, Margins):
+    if not isinstance(result, Margins):
         raise DataError(
-            f"got a {type(found).__name__}; needed are the margins of a loop, such as "
+            f"got a {type(result).__name__}; needed are the margins of a loop, such as "
             "design.margins(plant, controller)"
         )
-    omega, values = found.response
+    omega, values = result.response
     frequency = omega / HERTZ
     gain = decibel(np.abs(values))
     phase = np.degrees(np.unwrap(np.angle(values)))
@@ -67,31 +67,31 @@ def margins_plot(
         drawn = [gain_ax.semilogx(frequency, gain, color=style.MODEL)]
         drawn.append(phase_ax.semilogx(frequency, phase, color=style.MODEL))
         gain_ax.axhline(0, color=style.INPUT, linewidth=1)
-        _mark_gain_margin(gain_ax, found)
-        _mark_phase_margin(phase_ax, found, frequency, phase)
-        drawn.append(_nyquist(nyquist, found, values))
+        _mark_gain_margin(gain_ax, result)
+        _mark_phase_margin(phase_ax, result, frequency, phase)
+        drawn.append(_nyquist(nyquist, result, values))
         gain_ax.set(xlabel="frequency [Hz]", ylabel="loop gain [dB]")
         phase_ax.set(xlabel="frequency [Hz]", ylabel="loop phase [deg]")
-        low, high = _shown_band(found)
+        low, high = _shown_band(result)
         for axes in (gain_ax, phase_ax):
             axes.set_xlim(low / HERTZ, high / HERTZ)
         gain_ax.set_ylim(bottom=max(LOWEST_GAIN, float(gain.min())))
         shown = phase[omega <= high]
         phase_ax.set_ylim(float(shown.min()) - 20, float(shown.max()) + 20)
-        verdict = "stable" if found.stable else "UNSTABLE"
+        verdict = "stable" if result.stable else "UNSTABLE"
         style.put_title(gain_ax, ax, title, f"Closed loop {verdict}")
         return style.finished(
             [gain_ax, phase_ax, nyquist], drawn, columns=3, legends=(0, 1, 2), loc="lower left"
         )
 
 
-def _shown_band(found: Margins) -> tuple[float, float]:
+def _shown_band(result: Margins) -> tuple[float, float]:
     """Choose the frequencies to show in rad/s.
 
     Far above the crossovers the delay turns on and on; the picture is about the rest.
     """
-    omega = found.response[0]
-    ends = np.array([found.gain_crossover, found.phase_crossover, found.modulus_crossover])
+    omega = result.response[0]
+    ends = np.array([result.gain_crossover, result.phase_crossover, result.modulus_crossover])
     ends = ends[np.isfinite(ends) & (ends > 0)]
     top = 4 * float(ends.max()) if ends.size else float(omega[-1])
     return max(float(omega[0]), top / 1e4), min(top, float(omega[-1]))
@@ -106,38 +106,38 @@ def _three(ax: style.AxesLike) -> list[Axes]:
     return [figure.add_subplot(place) for place in (grid[0, 0], grid[1, 0], grid[:, 1])]
 
 
-def _mark_gain_margin(axes: Any, found: Margins) -> None:
-    if np.isfinite(found.phase_crossover) and found.phase_crossover > 0:
-        at = found.phase_crossover / HERTZ
-        level = float(decibel(np.array([1 / found.gain_margin]))[0])
-        label = f"gain margin {found.gain_margin:.3g}"
+def _mark_gain_margin(axes: Any, result: Margins) -> None:
+    if np.isfinite(result.phase_crossover) and result.phase_crossover > 0:
+        at = result.phase_crossover / HERTZ
+        level = float(decibel(np.array([1 / result.gain_margin]))[0])
+        label = f"gain margin {result.gain_margin:.3g}"
         axes.plot([at, at], [0, level], color=style.TRUTH, marker="o", label=label)
 
 
-def _mark_phase_margin(axes: Any, found: Margins, frequency: Any, phase: Any) -> None:
-    if not np.isfinite(found.gain_crossover):
+def _mark_phase_margin(axes: Any, result: Margins, frequency: Any, phase: Any) -> None:
+    if not np.isfinite(result.gain_crossover):
         return
-    at = found.gain_crossover / HERTZ
+    at = result.gain_crossover / HERTZ
     here = float(np.interp(at, frequency, phase))
-    level = here - found.phase_margin
-    label = f"phase margin {found.phase_margin:.3g}°"
-    if np.isfinite(found.delay_margin):
-        label += f"\ndelay margin {in_time(found.delay_margin)}"
+    level = here - result.phase_margin
+    label = f"phase margin {result.phase_margin:.3g}°"
+    if np.isfinite(result.delay_margin):
+        label += f"\ndelay margin {in_time(result.delay_margin)}"
     axes.axhline(level, color=style.INPUT, linewidth=1)
     axes.plot([at, at], [level, here], color=style.TRUTH, marker="o", label=label)
 
 
-def _nyquist(axes: Any, found: Margins, values: Any) -> Any:
+def _nyquist(axes: Any, result: Margins, values: Any) -> Any:
     lines = axes.plot(values.real, values.imag, color=style.MODEL)
     axes.plot(values.real, -values.imag, color=style.MODEL, alpha=0.35, linewidth=1)
     axes.plot([-1], [0], marker="+", markersize=12, color=style.INK, linestyle="none")
     angle = np.linspace(0, 2 * np.pi, 200)
     axes.plot(
-        -1 + found.modulus_margin * np.cos(angle),
-        found.modulus_margin * np.sin(angle),
+        -1 + result.modulus_margin * np.cos(angle),
+        result.modulus_margin * np.sin(angle),
         color=style.TRUTH,
         linestyle=style.DASHES[1],
-        label=f"modulus margin {found.modulus_margin:.3g}",
+        label=f"modulus margin {result.modulus_margin:.3g}",
     )
     axes.set(
         xlim=(-NYQUIST_SPAN, NYQUIST_SPAN - 1),

@@ -222,9 +222,9 @@ def _measured_steps(
     looks.update(kwargs)
     lines: list[Line2D] = []
     for index, step in enumerate(steps):
-        early = min(step.pre.size, int(before / step.dt))
+        early = min(step.pre_step.size, int(before / step.dt))
         time = step.dt * np.arange(-early, step.n_samples)
-        values = np.concatenate([step.pre[step.pre.size - early :], step.output])
+        values = np.concatenate([step.pre_step[step.pre_step.size - early :], step.output])
         label = "measured" if len(steps) == 1 else f"measured, {len(steps)} records"
         lines += axes.plot(factor * time, values, label=label if index == 0 else None, **looks)
     return lines

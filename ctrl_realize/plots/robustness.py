@@ -17,13 +17,13 @@ from .style import HERTZ, axis_time_unit
 
 
 def delay_robustness_plot(
-    found: DelayRobustness, *, ax: style.AxesLike = None, title: str | None = None
+    result: DelayRobustness, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
     """Draw the modulus margin against the plant's dead time, with the interval shaded.
 
     Parameters
     ----------
-    found : DelayRobustness
+    result : DelayRobustness
     ax : Axes or Figure, optional
     title : str, optional
 
@@ -38,23 +38,29 @@ def delay_robustness_plot(
     >>> from ctrl_realize import plots
     >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
     >>> predictor = cr.design.smith_predictor(plant, ct.tf([2.0, -1.8], [1, -1], 0.01))
-    >>> found = cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
-    >>> cplt = plots.delay_robustness_plot(found)
+    >>> result = cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
+    >>> cplt = plots.delay_robustness_plot(result)
     >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
     ('dead time of the plant [ms]', 'modulus margin')
     """
     with style.canvas(ax, title=title, default_title="Robustness to the dead time") as (axes,):
-        times = found.dead_times
+        times = result.dead_times
         factor, unit = axis_time_unit(float(times.max()), axes)
-        low, high = found.dead_time_interval
+        low, high = result.dead_time_interval
         axes.axvspan(low * factor, high * factor, color=style.BAND, alpha=0.2, label="interval")
         axes.axvline(
-            (found.nominal * found.dt - found.held) * factor, color=style.INPUT, linewidth=1
+            (result.nominal * result.dt - result.fractional_time) * factor,
+            color=style.INPUT,
+            linewidth=1,
         )
         lines = axes.plot(
-            times * factor, found.modulus_margin, color=style.MODEL, marker="o", label="min |1 + L|"
+            times * factor,
+            result.modulus_margin,
+            color=style.MODEL,
+            marker="o",
+            label="min |1 + L|",
         )
-        bad = ~found.stable_at
+        bad = ~result.stable_at
         if bad.any():
             axes.plot(
                 times[bad] * factor, np.zeros(bad.sum()), "x", color=style.INK, label="unstable"
@@ -65,13 +71,13 @@ def delay_robustness_plot(
 
 
 def uncertainty_plot(
-    found: UncertaintyBound, *, ax: style.AxesLike = None, title: str | None = None
+    result: UncertaintyBound, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
     """Draw the multiplicative uncertainty and its two parts.
 
     Parameters
     ----------
-    found : UncertaintyBound
+    result : UncertaintyBound
     ax : Axes or Figure, optional
     title : str, optional
 
@@ -90,13 +96,13 @@ def uncertainty_plot(
     ['bound', 'spread of the systems', 'unsure dead time']
     """
     with style.canvas(ax, title=title, default_title="Multiplicative uncertainty") as (axes,):
-        hertz = found.omega / HERTZ
-        lines = _positive_loglog(axes, hertz, found.bound, color=style.MODEL, label="bound")
+        hertz = result.omega / HERTZ
+        lines = _positive_loglog(axes, hertz, result.bound, color=style.MODEL, label="bound")
         lines += _positive_loglog(
-            axes, hertz, found.spread, color=style.MEASURED, label="spread of the systems"
+            axes, hertz, result.spread, color=style.MEASURED, label="spread of the systems"
         )
         lines += _positive_loglog(
-            axes, hertz, found.delay_part, color=style.BAND, label="uncertain dead time"
+            axes, hertz, result.delay_part, color=style.BAND, label="uncertain dead time"
         )
         axes.axhline(1, color=style.INPUT, linewidth=1)
         axes.set(xlabel="frequency [Hz]", ylabel="relative error")
@@ -104,13 +110,13 @@ def uncertainty_plot(
 
 
 def robustness_plot(
-    found: RobustnessCheck, *, ax: style.AxesLike = None, title: str | None = None
+    result: RobustnessCheck, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
     """Draw ``|T|`` under the inverse of the uncertainty bound.
 
     Parameters
     ----------
-    found : RobustnessCheck
+    result : RobustnessCheck
     ax : Axes or Figure, optional
     title : str, optional
 
@@ -128,11 +134,11 @@ def robustness_plot(
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['|T|', '1 / uncertainty', 'margin 2.59']
     """
-    word = "Robustly stable" if found.robust else "Robust stability not guaranteed"
+    word = "Robustly stable" if result.robust else "Robust stability not guaranteed"
     with style.canvas(ax, title=title, default_title=word) as (axes,):
-        bound = found.uncertainty
+        bound = result.uncertainty
         hertz = bound.omega / HERTZ
-        lines = _positive_loglog(axes, hertz, found.complementary, color=style.MODEL, label="|T|")
+        lines = _positive_loglog(axes, hertz, result.complementary, color=style.MODEL, label="|T|")
         with np.errstate(divide="ignore"):
             ceiling = 1 / bound.bound
         keep = np.isfinite(ceiling)
@@ -144,10 +150,10 @@ def robustness_plot(
             linestyle=style.DASHES[0],
             label="1 / uncertainty",
         )
-        at = found.omega_critical / HERTZ
-        axes.axvline(at, color=style.INPUT, linewidth=1, label=f"margin {found.margin:.3g}")
+        at = result.omega_critical / HERTZ
+        axes.axvline(at, color=style.INPUT, linewidth=1, label=f"margin {result.margin:.3g}")
         axes.set(xlabel="frequency [Hz]", ylabel="magnitude")
-        axes.set_ylim(bottom=max(1e-4, float(found.complementary.min())))
+        axes.set_ylim(bottom=max(1e-4, float(result.complementary.min())))
         # Far below the critical frequency both curves are flat.
         axes.set_xlim(max(float(hertz[0]), at / 300), float(hertz[-1]))
         return style.finished([axes], [lines])

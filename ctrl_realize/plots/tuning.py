@@ -22,7 +22,7 @@ NAME_POINTS = 10
 
 
 def pid_comparison_plot(
-    found: PIDComparison, *, ax: style.AxesLike = None, title: str | None = None
+    result: PIDComparison, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
     """Draw load error against sensitivity peak, a point for each stable controller.
 
@@ -31,7 +31,7 @@ def pid_comparison_plot(
 
     Parameters
     ----------
-    found : PIDComparison
+    result : PIDComparison
     ax : Axes or Figure, optional
     title : str, optional
 
@@ -48,8 +48,8 @@ def pid_comparison_plot(
     >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
     ('sensitivity peak Ms', 'integrated absolute load error [s]')
     """
-    kinds = sorted({c.kind for c in found.controllers})
-    rows = zip(found.controllers, found.margins, found.performance, strict=True)
+    kinds = sorted({c.kind for c in result.controllers})
+    rows = zip(result.controllers, result.margins, result.performance, strict=True)
     points = [
         (c.kind, min(m.ms, RINGING), p.load_error, _rule_label(c.rule, m.ms))
         for c, m, p in rows
@@ -119,13 +119,13 @@ def _name_points(axes: Axes, points: list[tuple[float, float, str, str]]) -> Non
 
 
 def hankel_plot(
-    found: BalancedReduction, *, ax: style.AxesLike = None, title: str | None = None
+    result: BalancedReduction, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
     """Draw the Hankel singular values, those that were cut off pale.
 
     Parameters
     ----------
-    found : BalancedReduction
+    result : BalancedReduction
     ax : Axes or Figure, optional
     title : str, optional
 
@@ -145,11 +145,11 @@ def hankel_plot(
     'Hankel singular value'
     """
     with style.canvas(ax, title=title, default_title="Balanced truncation") as (axes,):
-        number = np.arange(1, found.singular_values.size + 1)
-        values = np.maximum(found.singular_values, 1e-300)
-        kept = found.order - found.kept_unstable
+        number = np.arange(1, result.singular_values.size + 1)
+        values = np.maximum(result.singular_values, 1e-300)
+        kept = result.order - result.kept_unstable
         lines = axes.semilogy(number[:kept], values[:kept], "o", color=style.MODEL, label="kept")
-        label = f"cut off, error ≤ {found.error_bound:.3g}"
+        label = f"cut off, error ≤ {result.error_bound:.3g}"
         lines += axes.semilogy(number[kept:], values[kept:], "o", color=style.NOISE, label=label)
         axes.set(xlabel="number", ylabel="Hankel singular value")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

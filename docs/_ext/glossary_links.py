@@ -9,7 +9,7 @@ from docutils import nodes
 
 GLOSSARY = "glossary"
 
-EVERYDAY = {"order", "core", "structure", "views"}
+EVERYDAY = {"order", "core", "structure"}
 """Terms that are common words as well; they are linked by hand where they are meant."""
 
 CLOSED = (nodes.literal, nodes.reference, nodes.title, nodes.math, nodes.caption, nodes.term)

@@ -30,7 +30,7 @@ def continuous_step(truth, times):
 
 @pytest.mark.parametrize("samples", [37.0, 0.0, 36.4, 0.25])
 def test_clean_step_is_the_continuous_step_at_the_samples(samples):
-    valve = bench.valve(dead_time=samples * DT, rest=0.05, hold=0.5, **CLEAN)
+    valve = bench.valve(dead_time=samples * DT, pre_step_time=0.05, hold=0.5, **CLEAN)
     record = valve.step_record(8)
     start = round(0.05 / DT)
     picked = np.arange(start, record.n_samples, 23)
@@ -88,7 +88,7 @@ def test_noise_is_limited_to_the_alias_free_band_and_has_the_stated_size():
 
 
 def test_campaign_is_the_papers():
-    records = bench.valve(rest=0.2, hold=0.3).step_campaign(rng=0)
+    records = bench.valve(pre_step_time=0.2, hold=0.3).step_campaign(rng=0)
     assert len(records) == 40
     assert records[0].name == "valve_16mA_01"
     assert records[39].name == "valve_4mA_10"

@@ -39,7 +39,7 @@ return {
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
-    valve = cr.bench.valve(rest=0.5, hold=1.0)
+    valve = cr.bench.valve(pre_step_time=0.5, hold=1.0)
     record = valve.step_record(16.0, rng=5, name="a name that is rather " + "long" * 40)
     system = cr.identify(record, method="scan", order=3, max_delay=80)
     one = report.write_identification(

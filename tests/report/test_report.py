@@ -55,7 +55,7 @@ def parsed(path):
 
 @pytest.fixture(scope="module")
 def valve():
-    return cr.bench.valve(rest=0.5, hold=1.0)
+    return cr.bench.valve(pre_step_time=0.5, hold=1.0)
 
 
 @pytest.fixture(scope="module")

@@ -48,9 +48,9 @@ class DelayRobustness(Result):
     dt : float
     stable_from, stable_to : float
         Dead times in s, in whole samples; beyond them the loop is unstable.
-    held : float
+    fractional_time : float
         Time in s by which the delay overstates the dead time, where the core holds a fraction of
-        a sample: ``dead_times = delays * dt - held``.
+        a sample: ``dead_times = delays * dt - fractional_time``.
 
     Examples
     --------
@@ -73,7 +73,7 @@ class DelayRobustness(Result):
     dt: float
     stable_from: float
     stable_to: float
-    held: float = 0.0
+    fractional_time: float = 0.0
 
     @property
     def stable(self) -> bool:
@@ -94,12 +94,12 @@ class DelayRobustness(Result):
     @property
     def dead_times(self) -> FloatArray:
         """Dead times in s that belong to `delays`."""
-        return np.asarray(self.delays * self.dt - self.held, dtype=np.float64)
+        return np.asarray(self.delays * self.dt - self.fractional_time, dtype=np.float64)
 
     def _inside(self) -> BoolArray:
         low, high = self.dead_time_interval
-        inside = (self.delays >= np.floor((low + self.held) / self.dt + 1e-9)) & (
-            self.delays <= np.ceil((high + self.held) / self.dt - 1e-9)
+        inside = (self.delays >= np.floor((low + self.fractional_time) / self.dt + 1e-9)) & (
+            self.delays <= np.ceil((high + self.fractional_time) / self.dt - 1e-9)
         )
         return np.asarray(inside | (self.delays == self.nominal), dtype=np.bool_)
 
@@ -124,7 +124,8 @@ class DelayRobustness(Result):
         return [
             (
                 "nominal",
-                f"{in_time(self.nominal * self.dt - self.held, 4)} ({self.nominal} samples)",
+                f"{in_time(self.nominal * self.dt - self.fractional_time, 4)} "
+                f"({self.nominal} samples)",
             ),
             ("interval", interval_in_time(low, high)),
             ("over the interval", "stable" if self.stable else "UNSTABLE somewhere"),
@@ -221,7 +222,7 @@ def over_interval(
         dt=dt,
         stable_from=float(np.maximum(0.0, dt * (nominal - earlier) - held)),
         stable_to=dt * (nominal + later) - held,
-        held=held,
+        fractional_time=held,
     )
 
 

@@ -79,10 +79,10 @@ def mean_step(steps: tuple[StepResponse, ...], skip: tuple[int, ...] = ()) -> Me
     skip : tuple of int
         Positions to leave out in any case; records far from the rest are left out as well.
     """
-    before = min(step.pre.size for step in steps)
+    before = min(step.pre_step.size for step in steps)
     after = min(step.n_samples for step in steps)
     outputs = np.array(
-        [np.concatenate([s.pre[s.pre.size - before :], s.output[:after]]) for s in steps]
+        [np.concatenate([s.pre_step[s.pre_step.size - before :], s.output[:after]]) for s in steps]
     )
     inputs = np.array([np.concatenate([np.zeros(before), s.input[:after]]) for s in steps])
     far = sorted({*skip, *_far_from_the_rest(outputs)})
@@ -126,7 +126,7 @@ def repeatability(
     found = []
     for step in steps:
         n = min(step.n_samples, mean.output.size - mean.edge)
-        output = np.concatenate([step.pre[step.pre.size - mean.edge :], step.output[:n]])
+        output = np.concatenate([step.pre_step[step.pre_step.size - mean.edge :], step.output[:n]])
         found.append(own_step_response(output, model, mean.edge + delay / mean.dt, own, mean.dt))
     return compared(
         tuple(step.name or f"record {i}" for i, step in enumerate(steps)),

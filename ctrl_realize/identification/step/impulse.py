@@ -92,11 +92,11 @@ def impulse_from_step(
     # The samples before the step take part, so that differentiation and filter are settled when
     # the step comes. Where there are too few, rest is what was before: zeros.
     lead = 4 if cutoff is None else settling_samples(cutoff, step.dt) + 4
-    zeros = np.zeros(max(lead - step.pre.size, 0))
-    joint = np.concatenate([zeros, step.pre, step.output])
-    edge = zeros.size + step.pre.size
+    zeros = np.zeros(max(lead - step.pre_step.size, 0))
+    joint = np.concatenate([zeros, step.pre_step, step.output])
+    edge = zeros.size + step.pre_step.size
     pulses = _differentiate(joint, difference)
-    noise = _differentiate(step.pre, difference) if step.pre.size >= 20 else None
+    noise = _differentiate(step.pre_step, difference) if step.pre_step.size >= 20 else None
     if cutoff is not None:
         pulses = low_pass(pulses, order, cutoff, step.dt, zero_phase=zero_phase)
         if noise is not None:
@@ -128,7 +128,7 @@ def _cutoff(step: StepResponse, cutoff_hz: float | str | None) -> float | None:
             f"cutoff_hz={cutoff:g} Hz; needed is below half the sample rate, {rate / 2:g} Hz "
             "(None filters nothing)"
         )
-    if settling_samples(cutoff, step.dt) > 10 * (step.output.size + step.pre.size):
+    if settling_samples(cutoff, step.dt) > 10 * (step.output.size + step.pre_step.size):
         raise OptionError(
             f"cutoff_hz={cutoff:g} Hz: this filter takes {5 / cutoff:.3g} s to settle, the step "
             f"response is {step.output.size * step.dt:.3g} s long"

@@ -131,7 +131,7 @@ def unit_step(
     Returns
     -------
     StepResponse
-        From the step up to the next edge or the end; the noise before it is kept in `.pre`.
+        From the step up to the next edge or the end; the noise before it is kept in `.pre_step`.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def unit_step(
     >>> u = np.where(t < 1.0, 4.0, 20.0)
     >>> y = 3.0 + 2.0 * (u - 4.0)
     >>> step = cr.unit_step(cr.Record(t, u, y))
-    >>> float(step.output[-1]), step.amplitude, step.pre.size
+    >>> float(step.output[-1]), step.amplitude, step.pre_step.size
     (2.0, 16.0, 100)
     """
     u = _single(as_record(record).input, "input", record)
@@ -181,7 +181,7 @@ def unit_step(
         time=np.asarray(record.dt * index[before.size :]),
         output=scaled[before.size :],
         input=(u[at.index : at.stop] - at.baseline) / at.amplitude,
-        pre=scaled[: before.size],
+        pre_step=scaled[: before.size],
         dt=record.dt,
         amplitude=at.amplitude,
         baseline=level,

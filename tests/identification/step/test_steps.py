@@ -150,9 +150,9 @@ def step(before=60, after=240, seed=0):
 def test_noise_is_the_rest_treated_as_the_response():
     one = step()
     plain = cr.impulse_from_step(one, cutoff_hz=None)
-    differences = np.r_[0.0, np.diff(one.pre)]  # the first has none before it
+    differences = np.r_[0.0, np.diff(one.pre_step)]  # the first has none before it
     assert_allclose(plain.noise, differences, rtol=0, atol=1e-15)
-    assert_allclose(plain.markov, np.diff(np.r_[one.pre[-1], one.output]), rtol=0, atol=1e-15)
+    assert_allclose(plain.markov, np.diff(np.r_[one.pre_step[-1], one.output]), rtol=0, atol=1e-15)
     smooth = cr.impulse_from_step(one, cutoff_hz=10.0, filter_order=3, zero_phase=False)
     expected = low_pass(differences, 3, 10.0, DT, zero_phase=False)
     assert_allclose(smooth.noise, expected, rtol=0, atol=1e-15)
