@@ -28,14 +28,14 @@ def positive(value: Any, name: str, what: str) -> float:
     """
     number = real(value, name, what)
     if number <= 0:
-        raise OptionError(f"{name}={value!r}; needed is a positive {what}")
+        raise OptionError(f"{name}={value!r}; expected a positive {what}")
     return number
 
 
 def real(value: Any, name: str, what: str) -> float:
     """Return `value` as a float when it is a finite real number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise OptionError(f"{name}={value!r}; needed is a finite number: {what}")
+        raise OptionError(f"{name}={value!r}; expected a finite number: {what}")
     return float(value)
 
 
@@ -43,7 +43,9 @@ def band(value: Any, name: str, what: str) -> tuple[float, float]:
     """Return the two ends of a band."""
     ends = tuple(value) if isinstance(value, Iterable) else ()
     if len(ends) != 2:
-        raise OptionError(f"{name}={value!r}; needed are two numbers, the ends: {what}")
+        raise OptionError(
+            f"{name}={value!r}; expected two numbers, the lower and the upper end: {what}"
+        )
     return real(ends[0], name, what), real(ends[1], name, what)
 
 
@@ -51,12 +53,12 @@ def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
     """Return `value` as an int when it is a whole number in low...high."""
     limits = f">= {low}" if high is None else f"in {low}...{high}"
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise OptionError(f"{name}={value!r}; needed is a whole number {limits}")
+        raise OptionError(f"{name}={value!r}; expected a whole number {limits}")
     number = int(value)
     if abs(number) > MOST:
-        raise OptionError(f"{name} is beyond {MOST:.0e}; needed is a whole number {limits}")
+        raise OptionError(f"{name} is larger than {MOST:.0e}; expected a whole number {limits}")
     if number < low or (high is not None and number > high):
-        raise OptionError(f"{name}={number}; needed is a whole number {limits}")
+        raise OptionError(f"{name}={number}; expected a whole number {limits}")
     return number
 
 
@@ -71,13 +73,13 @@ def numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
     array = _array(values, what)
     if array.dtype.kind in "mM":
         raise DataError(
-            f"{what} holds {array.dtype} values; needed are seconds, for instance "
-            "(stamps - stamps[0]) / np.timedelta64(1, 's')"
+            f"{what} holds {array.dtype} values; expected seconds, for instance (stamps - "
+            "stamps[0]) / np.timedelta64(1, 's')"
         )
     if array.dtype.kind not in "biuf":
         raise DataError(
-            f"{what} holds {array.dtype} values; needed are real numbers (a ragged list, text or "
-            "complex values cannot be used)"
+            f"{what} holds {array.dtype} values; expected real numbers (a ragged list, text "
+            "or complex values cannot be used)"
         )
     return np.asarray(array, dtype=np.float64)
 
@@ -86,7 +88,7 @@ def complex_numbers(values: ArrayLike, what: str) -> NDArray[np.complex128]:
     """Take real or complex numbers and nothing else; masked ones are missing, NaN."""
     array = _array(values, what)
     if array.dtype.kind not in "biufc":
-        raise DataError(f"{what} holds {array.dtype} values; needed are complex numbers")
+        raise DataError(f"{what} holds {array.dtype} values; expected complex numbers")
     return np.asarray(array, dtype=np.complex128)
 
 
@@ -103,7 +105,7 @@ def _array(values: Any, what: str) -> NDArray[Any]:
     try:
         return np.asarray(_unmasked(values))
     except ValueError as error:
-        raise DataError(f"{what} is no array: its rows have different lengths") from error
+        raise DataError(f"{what} is not an array: its rows have different lengths") from error
 
 
 def _unmasked(given: Any) -> Any:

@@ -228,7 +228,7 @@ def test_a_folder_with_results_of_another_run_is_refused_or_cleared_on_request(t
     write(out, ["model.json", "records.csv", "models/1.json", "models/2.json"], Run("three files"))
     (out / "models" / "mine.json").write_text("keep")
     before = {name: (out / name).read_bytes() for name in files_in(out)}
-    with pytest.raises(OptionError, match=r"made by: three files; .* or --overwrite"):
+    with pytest.raises(OptionError, match=r"made by: three files; .* or use --overwrite"):
         write(out, ["model.json"], Run("one file"))
     assert {name: (out / name).read_bytes() for name in files_in(out)} == before
     write(out, ["model.json", "figures/fit.png"], Run("one file", overwrite=True))

@@ -165,8 +165,8 @@ def test_channels_are_multiplied_as_matrices():
 @pytest.mark.parametrize(
     ("operation", "match"),
     [
-        (lambda H: H * cr.MeasuredFRF([1.0, 2.0], [1.0, 2.0]), "other frequencies"),
-        (lambda H: H + cr.MeasuredFRF(PLANT, HZ * 1.001), "other frequencies"),
+        (lambda H: H * cr.MeasuredFRF([1.0, 2.0], [1.0, 2.0]), "different frequencies"),
+        (lambda H: H + cr.MeasuredFRF(PLANT, HZ * 1.001), "different frequencies"),
         (lambda H: np.ones((2, 2)) * H * np.ones((3, 1)), "as many inputs"),
         (lambda H: H.feedback(np.ones((2, 2))), "feedback of shape"),
         (lambda H: H * ct.tf([1], [1, 0.5], True), "dt=True"),

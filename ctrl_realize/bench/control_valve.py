@@ -192,15 +192,15 @@ class Valve:
         held = np.asarray(current)
         if held.ndim != 1 or held.size < 3 or held.dtype.kind not in "biuf":
             raise DataError(
-                f"current has shape {held.shape} and type {held.dtype}; needed are N >= 3 real "
+                f"current has shape {held.shape} and type {held.dtype}; expected N >= 3 real "
                 "numbers"
             )
         held = held.astype(np.float64)
         bad = np.flatnonzero(~((held >= 0) & (held <= _MOST_MA)))
         if bad.size:
             raise DataError(
-                f"current is {held[bad[0]]:g} mA at sample {bad[0]}; needed is 0-{_MOST_MA:g} mA "
-                "everywhere"
+                f"current is {held[bad[0]]:g} mA at sample {bad[0]}; expected 0-{_MOST_MA:g} "
+                "mA everywhere"
             )
         time = self.dt * np.arange(held.size, dtype=np.float64)
         generator = np.random.default_rng(rng)
@@ -301,8 +301,8 @@ class Valve:
         dt = self.dt * max(1, int(np.ceil(span / (self.dt * _SINE_SAMPLES))))
         if frequency_hz > 0.4 / dt:
             raise OptionError(
-                f"{frequency_hz:.4g} Hz for {span:.4g} s does not fit into {_SINE_SAMPLES} samples "
-                f"of {dt:g} s; ask for fewer periods or a shorter settle"
+                f"{frequency_hz:.4g} Hz for {span:.4g} s does not fit into {_SINE_SAMPLES} "
+                f"samples of {dt:g} s; use fewer periods or a shorter settle"
             )
         return dt * np.arange(_SINE_SAMPLES, dtype=np.float64)
 

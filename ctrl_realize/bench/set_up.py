@@ -107,7 +107,7 @@ def valve(
     """
     positive(dt, "dt", "sample time in s")
     if real(dead_time, "dead_time", "dead time in s") < 0:
-        raise OptionError(f"dead_time={dead_time!r}; needed is >= 0 s")
+        raise OptionError(f"dead_time={dead_time!r}; expected a value >= 0 s")
     for value, argument in (
         (noise, "noise"),
         (input_noise, "input_noise"),
@@ -117,7 +117,7 @@ def valve(
         (dead_time_scatter, "dead_time_scatter"),
     ):
         if real(value, argument, "a fraction or a count") < 0:
-            raise OptionError(f"{argument}={value!r}; needed is >= 0")
+            raise OptionError(f"{argument}={value!r}; expected a value >= 0")
     real(drift, "drift", "fraction of the stroke per second")
     positive(pre_step_time, "pre_step_time", "time in s")
     positive(hold, "hold", "time in s")

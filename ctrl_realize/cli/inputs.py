@@ -73,7 +73,7 @@ def check_files(paths: Sequence[Path]) -> None:
         if not path.exists():
             raise MissingFileError(f"{path}: there is no such file")
         if path.is_dir():
-            raise OptionError(f"{path} is a folder; name the files in it")
+            raise OptionError(f"{path} is a folder; give the files in it")
 
 
 def typed_call(command: str, words: Sequence[str]) -> str:

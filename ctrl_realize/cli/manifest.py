@@ -54,8 +54,8 @@ def refuse_other_results(folder: Path, run: Run) -> None:
         return
     made = f"made by: {manifest['command']}" if manifest else f"such as {there[0].name}"
     raise OptionError(
-        f"{folder} holds other results, {made[:500]}; choose another folder, or --overwrite to "
-        "replace them"
+        f"{folder} holds other results, {made[:500]}; choose another folder, or use "
+        "--overwrite to replace them"
     )
 
 

@@ -100,18 +100,18 @@ class MeasuredFRF(FRFAlgebra):
         values = complex_numbers(response, "response")
         grid = numbers(frequency_hz, "frequency_hz")
         if grid.ndim != 1 or grid.size == 0:
-            raise DataError(f"frequency_hz has shape {grid.shape}; needed is (K,), K >= 1")
+            raise DataError(f"frequency_hz has shape {grid.shape}; expected (K,), K >= 1")
         if values.ndim not in (1, 3) or values.shape[-1] != grid.size:
             raise DataError(
                 f"response has shape {values.shape}, frequency_hz has {grid.size} points; "
-                "needed is (K,) or (outputs, inputs, K)"
+                "expected (K,) or (outputs, inputs, K)"
             )
         _check_finite(grid, "frequency_hz")
         _check_finite(values, "response")
         check_size(grid, "frequency_hz")
         check_size(_largest_part(values), "response")
         if np.any(grid < 0):
-            raise DataError(f"frequency_hz goes down to {grid.min():g} Hz; needed is >= 0")
+            raise DataError(f"frequency_hz goes down to {grid.min():g} Hz; expected a value >= 0")
         order = np.argsort(grid, kind="stable")
         grid = grid[order]
         values = values[..., order]
@@ -133,10 +133,10 @@ class MeasuredFRF(FRFAlgebra):
         ):
             raise DataError(
                 f"coherence runs from {self.coherence.min():g} to {self.coherence.max():g}; "
-                "needed are values in 0...1"
+                "expected values in 0...1"
             )
         if self.std is not None and self.std.min() < 0:
-            raise DataError(f"std goes down to {self.std.min():g}; needed is >= 0")
+            raise DataError(f"std goes down to {self.std.min():g}; expected a value >= 0")
         self.repeats = None if repeats is None else real(repeats, "repeats", "number above 1")
         if self.repeats is not None and self.repeats <= 1:
             raise OptionError(f"repeats={repeats!r}; a scatter needs more than one")
@@ -211,7 +211,7 @@ class MeasuredFRF(FRFAlgebra):
         chosen = places.real.astype(int)
         if chosen.size == 0:
             raise DataError(
-                f"[{key}] chooses no channel of {p} outputs and {m} inputs; count from 0"
+                f"[{key}] selects no channel of {p} outputs and {m} inputs (counted from 0)"
             )
         return MeasuredFRF(
             _channels(self.frdata, chosen),
@@ -253,9 +253,9 @@ class MeasuredFRF(FRFAlgebra):
         [0.211]
         """
         if self.std is None:
-            raise DataError("this FRF has no standard deviation, so nothing tells its error")
+            raise DataError("this FRF has no standard deviation, so its error is unknown")
         if not 0 < real(level, "level", "part between 0 and 1") < 1:
-            raise OptionError(f"level={level!r}; needed is above 0 and below 1")
+            raise OptionError(f"level={level!r}; expected a value above 0 and below 1")
         return np.asarray(self.std * circle_quantile(level, self.repeats))
 
     def between_hz(self, low: float, high: float) -> MeasuredFRF:
@@ -272,7 +272,7 @@ class MeasuredFRF(FRFAlgebra):
                 "this FRF has no coherence; choose a band with between_hz(low, high) instead"
             )
         if not 0 <= min_coherence <= 1:
-            raise OptionError(f"min_coherence={min_coherence!r}; needed is a value in 0...1")
+            raise OptionError(f"min_coherence={min_coherence!r}; expected a value in 0...1")
         good = self.coherence.reshape(-1, self.frequency_hz.size).min(axis=0) >= min_coherence
         return self._select(good, f"with a coherence of {min_coherence:g}")
 

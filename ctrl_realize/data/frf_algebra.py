@@ -83,9 +83,9 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         one, two = self.omega, np.asarray(other.omega)
         if one.size != two.size or not np.allclose(one, two, rtol=SAME, atol=0):
             raise DataError(
-                f"{self!r} and {other.name!r} have other frequencies ({two.size} points, "
-                f"{two[0] / (2 * np.pi):g}...{two[-1] / (2 * np.pi):g} Hz); measure or cut both "
-                "to the same"
+                f"{self!r} and {other.name!r} have different frequencies ({two.size} points, "
+                f"{two[0] / (2 * np.pi):g}...{two[-1] / (2 * np.pi):g} Hz); measure both at "
+                "the same frequencies, or select common points"
             )
 
     def _made(
@@ -107,8 +107,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
             lost.append("standard deviation")
         if lost:
             warn_caller(
-                f"{what} of measured responses has no {' and no '.join(lost)} that is known; left "
-                "out",
+                f"{what} of measured responses has no known {' and '.join(lost)}; dropped",
                 DataWarning,
             )
         values = np.asarray(values + np.zeros(self.omega.size))
@@ -201,7 +200,10 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         if two is None:
             return NotImplemented
         if not two.is_scalar:
-            raise DataError("a quotient needs one channel below; choose it with frf[output, input]")
+            raise DataError(
+                "the denominator of a quotient must have one channel; select it with "
+                "frf[output, input]"
+            )
         return self._quotient(one, two)
 
     def __rtruediv__(self, other: Any) -> Any:
@@ -209,7 +211,10 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         if two is None:
             return NotImplemented
         if not self.issiso():
-            raise DataError("a quotient needs one channel below; choose it with frf[output, input]")
+            raise DataError(
+                "the denominator of a quotient must have one channel; select it with "
+                "frf[output, input]"
+            )
         return self._quotient(two, self._operand())
 
     def _quotient(self, one: Operand, two: Operand) -> Any:
@@ -232,9 +237,9 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
     def __pow__(self, other: Any) -> Any:
         """Power of one channel, to a whole number."""
         if type(other) is not int:
-            raise ValueError(f"exponent {other!r}; needed is a whole number")
+            raise ValueError(f"exponent {other!r}; expected a whole number")
         if not self.issiso():
-            raise DataError("a power needs one channel; choose it with frf[output, input]")
+            raise DataError("a power needs one channel; select it with frf[output, input]")
         if other in (1, -1):
             return self * 1 if other == 1 else 1 / self
         one = self._operand()
@@ -265,7 +270,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         """
         one, two = self._operand(), self._other(other)
         if two is None:
-            raise TypeError(f"{type(other).__name__} is no system, number or matrix")
+            raise TypeError(f"{type(other).__name__} is not a system, number or matrix")
         H = np.moveaxis(one.values, 2, 0)
         p, m = self.noutputs, self.ninputs
         if two.is_scalar and p == m:
@@ -276,7 +281,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         if two.values.shape[:2] != (m, p):
             raise DataError(
                 f"feedback of shape {two.values.shape[:2]} around {p} outputs and {m} inputs; "
-                f"needed is {(m, p)}"
+                f"expected {(m, p)}"
             )
         K = sign * np.moveaxis(two.values, 2, 0)
         left, right = np.linalg.inv(np.eye(p) - H @ K), np.linalg.inv(np.eye(m) - K @ H)
@@ -291,7 +296,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         """Put another response beside this one; the paths between them are zero."""
         one, two = self._operand(), self._other(other)
         if two is None:
-            raise TypeError(f"{type(other).__name__} is no system, number or matrix")
+            raise TypeError(f"{type(other).__name__} is not a system, number or matrix")
         hold = one.hold if not two.measured else common_hold(one, two, "a response beside another")
         return self._made(
             "one beside another",

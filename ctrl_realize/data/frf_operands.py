@@ -45,8 +45,8 @@ def in_z(system: Any) -> bool:
     """Whether a system is sampled, with a sample time that is known."""
     if system.dt is True:
         raise DataError(
-            f"{system.name!r} is discrete with dt=True; give it its sample time in s, so that it "
-            "can be evaluated at frequencies"
+            f"{system.name!r} is discrete with dt=True; set its sample time in s, so that it "
+            "can be evaluated at these frequencies"
         )
     return bool(system.isdtime(strict=True))
 
@@ -93,8 +93,8 @@ def same_hold(one: float, two: float) -> bool:
 def warn_of_hold(what: str, hold: float) -> None:
     """Say that a result has none or two of the holds that its sample time would stand for."""
     warn_caller(
-        f"{what} of measured responses has not one hold of {hold:g} s in it any more, so its "
-        "sample_time is left out; give hold and dt where the result is fitted or compared",
+        f"{what} of measured responses does not contain exactly one hold of {hold:g} s, so "
+        "sample_time is dropped; give hold and dt where the result is fitted or compared",
         DataWarning,
     )
 

@@ -18,8 +18,8 @@ def as_record(given: Any) -> Record:
     """
     if not isinstance(given, Record):
         raise DataError(
-            f"got a {type(given).__name__}; needed is a Record, such as "
-            "Record(time, input, output) or read_record(path)"
+            "expected a Record, such as Record(time, input, output) or read_record(path), "
+            f"got a {type(given).__name__}"
         )
     return given
 
@@ -36,7 +36,7 @@ def as_records(given: Any) -> tuple[Record, ...]:
         return (given,)
     several = tuple(given) if isinstance(given, Iterable) else (given,)
     if not several:
-        raise DataError("no records; needed is at least one Record")
+        raise DataError("no records; expected at least one Record")
     if not isinstance(given, list | tuple) and not isinstance(several[0], Record):
         # Text, an array or a table is named as what it is, not as its letters, rows or columns.
         return (as_record(given),)
@@ -54,6 +54,6 @@ def check_complete(record: Record, task: str) -> None:
     as_record(record)
     if record.missing == "keep" and record.n_missing:
         raise DataError(
-            f"{task} needs every sample, and {record.n_missing} of this record are missing; cut "
-            "out a complete part with record.between(t0, t1), or interpolate"
+            f"{task} needs complete data, but {record.n_missing} samples of this record are "
+            "missing; select a complete part with record.between(t0, t1), or interpolate"
         )

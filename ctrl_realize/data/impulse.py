@@ -128,12 +128,14 @@ class ImpulseResponse(Drawable):
         values = _finite(markov, "markov")
         if values.ndim not in (1, 3) or values.shape[-1] < 2 or values.size == 0:
             raise DataError(
-                f"markov has shape {values.shape}; needed is (N,) or (outputs, inputs, N) "
-                "with N >= 2"
+                f"markov has shape {values.shape}; expected (N,) or (outputs, inputs, N) with "
+                "N >= 2"
             )
         # the quotient of a record's largest output and smallest step; its square is a double
         if np.abs(values).max() > EXTREME**2:
-            raise DataError(f"markov goes up to {np.abs(values).max():g}, which is no measurement")
+            raise DataError(
+                f"markov goes up to {np.abs(values).max():g}, which is not a plausible measurement"
+            )
         seconds = positive(dt, "dt", "sample time in s")
         sampling = one_of(sampling, "sampling", ("step-invariant", "impulse-invariant"))
         fix = object.__setattr__

@@ -109,8 +109,8 @@ class Record(Drawable):
         fault = axis_fault(stamps)
         if fault is not None:
             raise TimeAxisError(
-                f"{axis_words(fault)}; Record.resampled(...) or read_record(..., resample=True) "
-                "interpolates small jitter, Record needs a uniform axis"
+                f"{axis_words(fault)}; Record.resampled(...) or read_record(..., "
+                "resample=True) interpolates small jitter; Record needs a uniform time axis"
             )
         fix = object.__setattr__
         fix(self, "time", read_only(stamps))
@@ -123,7 +123,9 @@ class Record(Drawable):
         fix(self, "output_labels", labelled(output_labels, self.noutputs, "y", "output_labels"))
 
     def __setattr__(self, attribute: str, value: Any) -> None:
-        raise AttributeError(f"a Record does not change; make a new one with another {attribute}")
+        raise AttributeError(
+            f"a Record cannot be modified; make a new one with another {attribute}"
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (
@@ -182,9 +184,9 @@ class Record(Drawable):
         inside = (self.time >= start - slack) & (self.time <= stop + slack)
         if np.count_nonzero(inside) < MIN_SAMPLES:
             raise DataError(
-                f"between {start:g} s and {stop:g} s lie {np.count_nonzero(inside)} samples of "
-                f"the record, which runs from {self.time[0]:g} s to {self.time[-1]:g} s; "
-                f"at least {MIN_SAMPLES} are needed"
+                f"between {start:g} s and {stop:g} s there are {np.count_nonzero(inside)} "
+                f"samples of the record, which covers {self.time[0]:g} s to {self.time[-1]:g} "
+                f"s; at least {MIN_SAMPLES} are needed"
             )
         return Record(
             self.time[inside],
@@ -243,11 +245,11 @@ class Record(Drawable):
         0.1
         """
         if response.inputs is None:
-            raise DataError("the response holds no input; simulate with ct.forced_response")
+            raise DataError("the response has no input; simulate with ct.forced_response")
         many = {} if response.issiso else {"input": response.u, "output": response.y}
         for what, values in many.items():
             if np.ndim(values) > 2:
-                raise DataError(f"the response's {what} has several traces; pass one of them")
+                raise DataError(f"the {what} of the response has several traces; pass one of them")
         return cls(
             response.time,
             many.get("input", np.ravel(response.u)),

@@ -15,7 +15,7 @@ from ..numerics.signals.time_axis import EXTREME, UNIFORM_WITHIN, AxisFault
 def check_shape(values: FloatArray, what: str, samples: int) -> None:
     """Refuse a signal that is not (N,) or (signals, N) with the N of the time axis."""
     if values.ndim not in (1, 2) or values.size == 0:
-        raise DataError(f"{what} has shape {values.shape}; needed is ({samples},) or (signals, N)")
+        raise DataError(f"{what} has shape {values.shape}; expected ({samples},) or (signals, N)")
     if values.shape[-1] != samples:
         turned = values.ndim == 2 and values.shape[0] == samples
         hint = f"; it looks transposed, pass {what}.T" if turned else ""
@@ -41,7 +41,7 @@ def check_size(values: FloatArray, what: str) -> None:
     if large.any():
         first = int(np.flatnonzero(large.any(axis=0) if values.ndim == 2 else large)[0])
         raise DataError(
-            f"{what} is beyond {EXTREME:g} at index {first}; is the file damaged, or a unit wrong?"
+            f"{what} is larger than {EXTREME:g} at index {first}; check the file and the unit"
         )
 
 
@@ -52,11 +52,11 @@ def labelled(
     if given is None:
         return (letter,) if count == 1 else tuple(f"{letter}[{i}]" for i in range(count))
     if not isinstance(given, Sequence):
-        raise OptionError(f"{argument} is a {type(given).__name__}; needed are {count} names")
+        raise OptionError(f"{argument} is a {type(given).__name__}; expected {count} names")
     labels = (given,) if isinstance(given, str) else tuple(given)
     labels = tuple(spelled_out(str(label)) for label in labels)
     if len(labels) != count or len(set(labels)) != count:
-        raise OptionError(f"{argument}={labels!r}; needed are {count} different names")
+        raise OptionError(f"{argument}={labels!r}; expected {count} different names")
     return labels
 
 

@@ -20,16 +20,16 @@ def resampled(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Interpolate time, input and output; see `Record.resampled`."""
     if real(max_jitter, "max_jitter", "in sample steps, >= 0") < 0:
-        raise OptionError(f"max_jitter={max_jitter:g}; needed is >= 0, in sample steps")
+        raise OptionError(f"max_jitter={max_jitter:g}; expected a value >= 0, in sample steps")
     stamps = numbers(time, "time")
     if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
-        raise DataError(f"time has shape {stamps.shape}; needed is (N,), N >= {MIN_SAMPLES}")
+        raise DataError(f"time has shape {stamps.shape}; expected (N,), N >= {MIN_SAMPLES}")
     check_finite(stamps, "time")
     check_size(stamps, "time")
     steps = np.diff(stamps)
     fault = axis_fault(stamps) if np.any(steps <= 0) else None
     if fault is not None:
-        raise TimeAxisError(f"{axis_words(fault)}; resampling needs time that rises")
+        raise TimeAxisError(f"{axis_words(fault)}; resampling needs increasing time stamps")
     usual = float(np.median(steps))
     worst = int(np.argmax(steps))
     if steps[worst] > (1 + max_jitter) * usual:
@@ -41,8 +41,8 @@ def resampled(
     samples = (stamps[-1] - stamps[0]) / step
     if samples > MAX_DENSER * stamps.size:
         raise OptionError(
-            f"dt={step:g} s makes {samples:.4g} samples of {stamps.size}; at most "
-            f"{MAX_DENSER} times as many are made"
+            f"dt={step:g} s would give {samples:.4g} samples from {stamps.size}; the limit is "
+            f"{MAX_DENSER} times as many"
         )
     count = int(np.floor(samples * (1 + 1e-12))) + 1
     uniform = stamps[0] + step * np.arange(count)

@@ -43,8 +43,8 @@ class DelayedAlgebra(CoreAndDelays):
             empty = True
         if empty:
             raise OptionError(
-                f"{key!r} chooses no output or no input; there are {self.noutputs} outputs and "
-                f"{self.ninputs} inputs, counted from 0"
+                f"{key!r} selects no output or no input; there are {self.noutputs} outputs "
+                f"and {self.ninputs} inputs, counted from 0"
             )
         inputs = [self.input_index[name] for name in chosen.input_labels]
         outputs = [self.output_index[name] for name in chosen.output_labels]

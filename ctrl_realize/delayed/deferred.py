@@ -60,8 +60,8 @@ class DeferredMatrices(ct.StateSpace):  # type: ignore[misc]  # control is untyp
         if self._augmented is None:
             if self.nstates > MAX_STATES:
                 raise DelayRangeError(
-                    f"matrices of {self.nstates} states have {8 * self.nstates**2 // 10**9} GB; "
-                    f"they are made up to {MAX_STATES} states. {self._without_matrices()}"
+                    f"matrices of {self.nstates} states have {8 * self.nstates**2 // 10**9} "
+                    f"GB, the limit is {MAX_STATES} states. {self._without_matrices()}"
                 )
             made = self._make_matrices()
             for M in made:
@@ -102,7 +102,7 @@ class DeferredMatrices(ct.StateSpace):  # type: ignore[misc]  # control is untyp
         # `append` is known to do it.
         if attribute in ("A", "B", "C", "D", "dt") and self.__dict__.get("_locked", False):
             raise AttributeError(
-                f"{attribute} of a {type(self).__name__} is fixed; build a new one "
+                f"{attribute} of a {type(self).__name__} cannot be changed; build a new one "
                 "(delayed_ss, or the design function), or take a plain copy with ct.ss(sys)"
             )
         super().__setattr__(attribute, value)

@@ -80,10 +80,10 @@ def delayed_ss(
     """
     if not isinstance(core, (ct.StateSpace, ct.TransferFunction)):
         raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}; needed is a control.StateSpace or TransferFunction"
+            f"core is a {type(core).__name__}; expected a control.StateSpace or TransferFunction"
         )
     if delay is not None and dead_time is not None:
-        raise OptionError(f"delay={delay!r} and dead_time={dead_time!r}: give one of them")
+        raise OptionError(f"delay={delay!r} and dead_time={dead_time!r}: expected one of them")
     system = core if isinstance(core, ct.StateSpace) else ct.ss(core)
     settings: dict[str, Any] = {
         "output_delay": output_delay,
@@ -94,7 +94,7 @@ def delayed_ss(
     }
     wait = None if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
     if wait is not None and wait < 0:
-        raise DelayRangeError(f"dead_time={wait:g} s; needed is >= 0")
+        raise DelayRangeError(f"dead_time={wait:g} s; expected a value >= 0")
     if system.isctime(strict=True) or (dt is not None and system.dt is None):
         if dt is None:
             raise UnsuitableSystemError("the core is continuous; give dt, its sample time in s")
@@ -111,8 +111,8 @@ def delayed_ss(
         )
         if not all(np.isfinite(M).all() for M in sampled):
             raise UnsuitableSystemError(
-                f"sampled every {step:g} s the core has entries that are no numbers; its poles "
-                f"reach {np.abs(system.poles()).max(initial=0.0):.3g} rad/s: use a shorter dt"
+                f"sampled every {step:g} s the core has non-finite entries; its poles reach "
+                f"{np.abs(system.poles()).max(initial=0.0):.3g} rad/s: use a shorter dt"
             )
         discrete = ct.StateSpace(
             *sampled,
@@ -130,8 +130,9 @@ def delayed_ss(
         delay, rest = split_dead_time(wait, system.dt)
         if rest:
             raise DelayRangeError(
-                f"dead_time={wait:g} s is {wait / system.dt:.6g} samples of {system.dt:g} s; a "
-                "discrete core takes whole samples (a continuous core takes any)"
+                f"dead_time={wait:g} s is {wait / system.dt:.6g} samples of {system.dt:g} s; "
+                "a discrete core needs a whole number of samples (a continuous core takes "
+                "any dead time)"
             )
     return DelayedStateSpace(system, 0 if delay is None else delay, **settings)
 

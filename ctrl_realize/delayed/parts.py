@@ -118,13 +118,13 @@ def check_core(core: Any) -> None:
     """Refuse what is not a discrete state-space system with a sample time."""
     if not isinstance(core, ct.StateSpace):
         raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}; needed is a discrete control.StateSpace "
+            f"core is a {type(core).__name__}; expected a discrete control.StateSpace "
             "(delayed_ss also takes transfer functions)"
         )
     if core.dt is None or core.dt is True or not core.dt > 0:
         raise UnsuitableSystemError(
-            f"the core's dt is {core.dt!r}; needed is a sample time in s "
-            "(delayed_ss samples a continuous core)"
+            f"the core's dt is {core.dt!r}; expected a sample time in s (delayed_ss samples a "
+            "continuous core)"
         )
     check_entries(core)
 
@@ -148,9 +148,7 @@ def check_entries(system: Any) -> None:
         entries = [np.asarray(system)]
     if not all(np.all(np.isfinite(part)) for part in entries):
         name = f"the system {system.name!r}" if hasattr(system, "name") else f"the gain {system}"
-        raise UnsuitableSystemError(
-            f"{name} has entries that are not finite; needed are numbers other than NaN and inf"
-        )
+        raise UnsuitableSystemError(f"{name} has non-finite entries; expected finite numbers")
 
 
 def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter: str) -> list[str]:
@@ -158,9 +156,9 @@ def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter:
     if given is not None:
         names = [given] if isinstance(given, str) else given
         if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
-            raise OptionError(f"{given!r} is no list of names")
+            raise OptionError(f"{given!r} is not a list of names")
         if len(names) != len(core):
-            raise OptionError(f"names {list(names)} for {len(core)} signals; give one for each")
+            raise OptionError(f"names {list(names)} for {len(core)} signals; expected one for each")
         return system_names(names)
     generic = [f"{letter}[{i}]" for i in range(len(core))]
     return [letter] if list(core) == generic and len(generic) == 1 else list(core)

@@ -34,10 +34,10 @@ def warn_of_a_transfer_function(registers: int) -> None:
     if sys._getframe(2).f_code.co_name != ASKS:
         return
     warn_caller(
-        f"python-control makes polynomials of {registers} registers of dead time here; from some "
-        "50 on they are noise, and what follows from them is wrong. Instead of ct.margin(sys) and "
-        "ct.stability_margins(sys) use cr.design.margins(sys), instead of ct.tf(sys) use "
-        "sys.to_tf(), and with a transfer function sys * tf, sys + tf, ct.ss(tf) * sys and "
-        "ct.feedback(ct.ss(tf), sys)",
+        f"python-control forms polynomials with {registers} delay registers here; from about "
+        "50 on these are numerically meaningless, and so are the results. Instead of "
+        "ct.margin(sys) and ct.stability_margins(sys) use cr.design.margins(sys), instead of "
+        "ct.tf(sys) use sys.to_tf(), and with a transfer function sys * tf, sys + tf, "
+        "ct.ss(tf) * sys and ct.feedback(ct.ss(tf), sys)",
         ModelWarning,
     )

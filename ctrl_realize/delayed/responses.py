@@ -90,7 +90,7 @@ class DelayedResponses(CoreAndDelays):
         rows = np.atleast_2d(given)
         if rows.ndim != 2 or rows.shape[0] != self.ninputs:
             raise DataError(
-                f"inputs has shape {given.shape}; needed is ({self.ninputs}, N)"
+                f"inputs has shape {given.shape}; expected ({self.ninputs}, N)"
                 + (" or (N,)" if self.ninputs == 1 else "")
             )
         held = np.stack([later(u, d) for u, d in zip(rows, self.input_delays, strict=True)])

@@ -100,12 +100,13 @@ def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedSt
     """Check that a system fits a record, and give it delays (of zero) where it has none."""
     if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
         raise UnsuitableSystemError(
-            f"system is a {type(system).__name__}; needed is a discrete control.StateSpace"
+            f"system is a {type(system).__name__}; expected a discrete control.StateSpace"
         )
     model = system if isinstance(system, ct.StateSpace) else ct.ss(system)
     if not model.isdtime(strict=True) or model.dt is True:
         raise UnsuitableSystemError(
-            "the system is not discrete with a sample time; delayed_ss(system, dt=...) samples it"
+            "the system is not discrete with a sample time; sample it with "
+            "delayed_ss(system, dt=...)"
         )
     if not np.isclose(model.dt, record.dt, rtol=1e-3, atol=0):
         raise DataError(
@@ -120,7 +121,6 @@ def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedSt
     worst = np.abs(delayed.delay_free.poles()).max(initial=0.0)
     if stable and worst > 1 + 1e-6:
         raise UnsuitableSystemError(
-            f"the system is unstable (a pole at |z| = {worst:.6g}): its simulation runs away from "
-            "any record"
+            f"the system is unstable (a pole at |z| = {worst:.6g}): its simulation diverges"
         )
     return delayed

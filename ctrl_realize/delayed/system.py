@@ -129,8 +129,8 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             before, behind = (before[0] + behind[0],), (0,)
         if sum(before) + sum(behind) > MAX_DELAY:
             raise DelayRangeError(
-                f"the delays are {before + behind} samples; at most {MAX_DELAY} are allowed. Use a "
-                "longer sample time, or keep core and delay apart"
+                f"the delays are {before + behind} samples; at most {MAX_DELAY} are allowed. "
+                "Use a longer sample time, or keep core and delay separate"
             )
         if fit is not None and not isinstance(fit, ModelFit):
             raise OptionError(

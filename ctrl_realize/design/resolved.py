@@ -30,9 +30,9 @@ def check_sign(system: Any, purpose: str) -> None:
     for flag in _flags(system):
         if flag.code == SIGN_UNKNOWN:
             raise UnsuitableSystemError(
-                f"{purpose} needs the sign of the gain, and the record behind {_name(system)} does "
-                f"not tell it: {flag}. With a gain known from elsewhere, scale a model of known "
-                "dynamics (design.ProcessModel, delayed_ss)"
+                f"{purpose} needs the sign of the gain, which the record of {_name(system)} "
+                f"does not determine: {flag}. If the gain is known from elsewhere, scale a "
+                "model of known dynamics (design.ProcessModel, delayed_ss)"
             )
 
 
@@ -46,7 +46,7 @@ def warn_unresolved(system: Any) -> None:
         quantity = QUANTITIES.get(flag.code)
         if quantity is not None and not (flag.code == "not_settled" and _gain_is_known(system.fit)):
             warn_caller(
-                f"the record behind {_name(system)} does not resolve {quantity}: {flag}",
+                f"the record of {_name(system)} does not determine {quantity}: {flag}",
                 UnresolvedWarning,
             )
 

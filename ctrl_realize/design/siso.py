@@ -51,8 +51,8 @@ def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
             for num, den in zip(row_num, row_den, strict=True):
                 if np.trim_zeros(num, "f").size > np.trim_zeros(den, "f").size:
                     raise UnsuitableSystemError(
-                        f"{purpose} needs a proper system; {system.name!r} has more zeros than "
-                        "poles. Give its derivative a filter"
+                        f"{purpose} needs a proper system; {system.name!r} has more zeros "
+                        "than poles. Add a derivative filter"
                     )
         return ct.ss(system)
     raise UnsuitableSystemError(f"{purpose} needs a linear system; got a {type(system).__name__}")
@@ -74,8 +74,8 @@ def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
     if system.dt is True or not np.isclose(system.dt, dt, rtol=1e-6, atol=0.0):
         kind = "continuous" if system.dt == 0 else f"sampled with dt={system.dt!r}"
         raise UnsuitableSystemError(
-            f"the controller {system.name!r} is {kind}, the plant has dt={dt:g} s; "
-            "give a controller of the same sample time (a PID has .discretised(dt))"
+            f"the controller {system.name!r} is {kind}, the plant has dt={dt:g} s; expected "
+            "the same sample time (a PID has .discretised(dt))"
         )
     return system
 
@@ -96,9 +96,7 @@ def interval_of_dead_time(
         return None
     low, high = band(interval, "dead_time_interval", "dead times in s")
     if not 0 <= low <= high:
-        raise OptionError(
-            f"dead_time_interval=({low:g}, {high:g}); needed is 0 <= low <= high in s"
-        )
+        raise OptionError(f"dead_time_interval=({low:g}, {high:g}); expected 0 <= low <= high in s")
     return low, high
 
 

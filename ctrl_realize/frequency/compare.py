@@ -103,7 +103,7 @@ def compare_frf(
     """
     if not isinstance(system, ct.LTI):
         raise UnsuitableSystemError(
-            f"system is a {type(system).__name__}; needed is a system of python-control"
+            f"system is a {type(system).__name__}; expected a system of python-control"
         )
     check_single_channel(system, "system")
     dt = _sample_time(system)
@@ -122,8 +122,8 @@ def compare_frf(
     ratio = model / points.response
     if not np.all(np.isfinite(ratio)) or np.any(np.abs(ratio) == 0):
         raise UnsuitableSystemError(
-            "the model's response is zero or not finite at a measured frequency; is a pole or "
-            "zero of it on the grid?"
+            "the model's response is zero or not finite at a measured frequency; check "
+            "whether a pole or zero lies on the frequency grid"
         )
     delay = float(system.dead_time) if isinstance(system, DelayedStateSpace) else 0.0
     model_phase = unwrapped_phase(model, omega, delay)

@@ -169,13 +169,13 @@ def _searchable(max_dead_time: float, omega: FloatArray) -> float:
     most, least = longest_search(omega), 1e-15 / float(omega[-1])
     if max_dead_time > most:
         raise OptionError(
-            f"max_dead_time={max_dead_time:g} s is too long to search in at these frequencies; "
-            f"needed is at most {most:.3g} s"
+            f"max_dead_time={max_dead_time:g} s is too long for these frequencies; expected "
+            f"at most {most:.3g} s"
         )
     if max_dead_time < least:
         raise OptionError(
-            f"max_dead_time={max_dead_time:g} s is too short to search in at these frequencies; "
-            f"needed is at least {least:.3g} s, which is as good as none"
+            f"max_dead_time={max_dead_time:g} s is too short for these frequencies; expected "
+            f"at least {least:.3g} s, which is practically zero"
         )
     return max_dead_time
 
@@ -189,7 +189,7 @@ def _candidates(given: int | Sequence[int] | None, name: str, low: int) -> tuple
     except TypeError:
         values = (given,)  # type: ignore[assignment]
     if not values:
-        raise OrderError(f"{name}={given!r} is empty; needed is at least one number")
+        raise OrderError(f"{name}={given!r} is empty; expected at least one number")
     try:
         return tuple(sorted({whole(value, name, low, 30) for value in values}))
     except OptionError as error:
@@ -204,12 +204,12 @@ def _check_structures(
     pairs = [(n, r) for n in tried for r in (degrees or range(1, n + 1)) if r <= n]
     if not pairs:
         raise OrderError(
-            f"relative_degree={degrees} is above order={orders or tuple(tried)}; needed is at "
+            f"relative_degree={degrees} is above order={orders or tuple(tried)}; expected at "
             "most the order"
         )
     needed = max(2 * n + 2 - r for n, r in pairs)
     if n_points < needed:
         raise DataError(
-            f"{n_points} points are too few for order {max(tried)}; {needed} are needed, or a "
-            "lower order"
+            f"{n_points} points are too few for order {max(tried)}; expected at least "
+            f"{needed}, or a lower order"
         )

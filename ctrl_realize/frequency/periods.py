@@ -39,7 +39,7 @@ def _statistics(stream: Stream, period: int, skip: int) -> tuple[PeriodStatistic
         if (len(inputs_now), len(outputs_now)) != (1, 1):
             raise DataError(
                 f"the records have {len(inputs_now)} inputs and {len(outputs_now)} outputs; "
-                "period is for one of each"
+                "expected one of each with period"
             )
         u, y, dt = inputs_now[0], outputs_now[0], sample_time
         whole_periods = u.size // period
@@ -69,6 +69,6 @@ def _excited_lines(stats: PeriodStatistics, period: int) -> BoolArray:
     excited &= np.abs(stats.mean_y) > 0
     if not excited.any():
         raise DataError(
-            f"no line stands out of the input's noise; is its period really {period} samples?"
+            f"the input has no significant harmonics; check that its period is {period} samples"
         )
     return np.asarray(excited, dtype=np.bool_)

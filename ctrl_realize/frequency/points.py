@@ -62,14 +62,14 @@ def frf_points(
     if usable.sum() < 3:
         limit = f", below {below_hz:.4g} Hz" if np.isfinite(below_hz) else ""
         raise DataError(
-            f"{int(usable.sum())} usable points: above 0 Hz{limit}, not zero and inside the band; "
-            "at least 3 are needed"
+            f"{int(usable.sum())} usable points (above 0 Hz{limit}, non-zero and inside the "
+            "band); expected at least 3"
         )
     span = float(frequency[usable].max() / frequency[usable].min())
     if span > _WIDEST:
         raise DataError(
-            f"the frequencies span a ratio of {span:.3g}; needed is at most {_WIDEST:g} (a unit "
-            "wrong, or a value damaged?)"
+            f"the frequencies span a ratio of {span:.3g}; expected at most {_WIDEST:g} (check "
+            "the unit and the values)"
         )
     points = points.only(usable)
     sigma, known = _sigma(points.response, points.std, points.coherence, weighting)
@@ -83,9 +83,9 @@ def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
     power = float(np.mean(np.abs(response / sigma) ** 2))
     if power < 1 + _SIGNIFICANT / np.sqrt(response.size):
         raise DataError(
-            f"the response is {np.sqrt(power):.2g} times its standard deviation, as noise alone "
-            "would be: the input does not excite the output at these frequencies; choose another "
-            "band or measure longer"
+            f"the response is {np.sqrt(power):.2g} times its standard deviation, as for pure "
+            "noise: the input does not excite the output at these frequencies; choose "
+            "another band or measure longer"
         )
 
 
@@ -150,7 +150,7 @@ def measured_points(frf: Any) -> MeasuredPoints:
     """Take the points of an FRF of one channel, with coherence and std where it has some."""
     if not isinstance(frf, ct.FrequencyResponseData):
         raise UnsuitableSystemError(
-            f"frf is a {type(frf).__name__}; needed is a MeasuredFRF or a control FRD"
+            f"frf is a {type(frf).__name__}; expected a MeasuredFRF or a control FRD"
         )
     check_single_channel(frf, "frf")
     order = np.argsort(frf.omega, kind="stable")
@@ -171,8 +171,8 @@ def check_single_channel(system: Any, what: str) -> None:
     """Refuse several inputs or outputs."""
     if (system.noutputs, system.ninputs) != (1, 1):
         raise UnsuitableSystemError(
-            f"{what} has {system.ninputs} inputs and {system.noutputs} outputs; take one channel "
-            f"at a time, as {what}[i, j]"
+            f"{what} has {system.ninputs} inputs and {system.noutputs} outputs; expected one "
+            f"channel, such as {what}[i, j]"
         )
 
 

@@ -67,8 +67,8 @@ def fit_batch(
     if short.any():
         worst = int(np.flatnonzero(short)[0])
         raise DataError(
-            f"{records[worst]!r} keeps less than one period of {starts[worst] / 2 / np.pi:g} Hz; "
-            "record longer, or state a shorter settle"
+            f"{records[worst]!r} keeps less than one period of {starts[worst] / 2 / np.pi:g} "
+            "Hz; record for longer, or give a shorter settle"
         )
     return fit_sines(time, signals, starts, free_frequency=free_frequency, drift=drift, mask=mask)
 

@@ -130,11 +130,13 @@ def spectral_frf(
         whole(period, "period", 4)
         whole(skip_periods, "skip_periods", 0)
         if segment is not None:
-            raise OptionError("segment and period are given; periodic records take period alone")
+            raise OptionError(
+                "expected segment or period, got both; give only period for periodic records"
+            )
         found, dt = from_periods(stream, period, skip_periods)
     else:
         if not 0 <= real(overlap, "overlap", "part in 0...0.95") <= 0.95:
-            raise OptionError(f"overlap={overlap!r}; needed is a part in 0...0.95")
+            raise OptionError(f"overlap={overlap!r}; expected a part in 0...0.95")
         found, dt = from_segments(stream, method, segment, window, overlap)
     frequency = found.frequency_hz
     response = found.response * np.exp(-2j * np.pi * frequency * delay * dt)
@@ -158,7 +160,8 @@ def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:
             first_dt = record.dt
         elif abs(record.dt - first_dt) > 1e-6 * first_dt:
             raise TimeAxisError(
-                f"records have sample times of {first_dt:g} s and {record.dt:g} s; one is needed"
+                f"the records have sample times of {first_dt:g} s and {record.dt:g} s; "
+                "expected the same for all"
             )
         u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
         if channels is None:
@@ -169,7 +172,7 @@ def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:
                 f"{channels[0]} and {channels[1]}"
             )
         if delay >= u.shape[1]:
-            raise DataError(f"delay={delay} leaves nothing of {record!r}")
+            raise DataError(f"delay={delay} leaves no samples of {record!r}")
         yield u[:, : u.shape[1] - delay], y[:, delay:], record.dt
     if first_dt is None:
-        raise DataError("no records; needed is at least one")
+        raise DataError("no records; expected at least one")

@@ -107,7 +107,7 @@ def stepped_sine_frf(
     flat = [record for point in points for record in point]
     starts = _start_frequencies(points, flat, frequency_hz)
     if settle is not None and real(settle, "settle", "time in s") < 0:
-        raise OptionError(f"settle={settle!r}; needed is >= 0 s")
+        raise OptionError(f"settle={settle!r}; expected a value >= 0 s")
 
     omega = np.empty(len(flat))
     phasors = np.empty((len(flat), 2), dtype=np.complex128)
@@ -130,10 +130,10 @@ def stepped_sine_frf(
 def _as_points(records: Sweep) -> list[list[Record]]:
     """Check the records and give every point a list of repeats."""
     if not isinstance(records, Iterable):
-        raise DataError(f"got a {type(records).__name__}; needed are records")
+        raise DataError(f"expected records, got a {type(records).__name__}")
     points = [list(as_records(entry)) for entry in records]
     if not points:
-        raise DataError("no records; needed is at least one for each frequency")
+        raise DataError("no records; expected at least one for each frequency")
     for point in points:
         for record in point:
             check_complete(record, "stepped_sine_frf")
@@ -144,11 +144,10 @@ def _as_points(records: Sweep) -> list[list[Record]]:
                 )
             if record.n_samples < LEAST_SAMPLES:
                 raise DataError(
-                    f"{record!r} is too short for a sine; needed are at least {LEAST_SAMPLES} "
-                    "samples"
+                    f"{record!r} is too short for a sine; expected at least {LEAST_SAMPLES} samples"
                 )
             if np.ptp(record.input) == 0:
-                raise DataError(f"the input of {record!r} is constant; there is no sine in it")
+                raise DataError(f"the input of {record!r} is constant; it contains no sine")
     return points
 
 
@@ -161,8 +160,8 @@ def _start_frequencies(
     given = numbers(frequency_hz, "frequency_hz")
     if given.shape != (len(points),) or not np.all(np.isfinite(given)) or np.any(given <= 0):
         raise OptionError(
-            f"frequency_hz has shape {given.shape}; needed are {len(points)} frequencies above 0, "
-            "one for each point"
+            f"frequency_hz has shape {given.shape}; expected {len(points)} frequencies above "
+            "0, one for each point"
         )
     return 2 * np.pi * np.repeat(given, [len(point) for point in points])
 

@@ -28,7 +28,7 @@ def trusted_points(
     """Mark the points of the trusted band, and say what it was taken from."""
     if min_coherence is not None:
         if not 0 <= real(min_coherence, "min_coherence", "value in 0...1") <= 1:
-            raise OptionError(f"min_coherence={min_coherence!r}; needed is a value in 0...1")
+            raise OptionError(f"min_coherence={min_coherence!r}; expected a value in 0...1")
         if points.coherence is None:
             raise OptionError(
                 "min_coherence is given, but the FRF has no coherence; pass band_hz=(low, high)"
@@ -38,7 +38,7 @@ def trusted_points(
     if points.coherence is not None:
         limit = DEFAULT_MIN_COHERENCE if min_coherence is None else min_coherence
         good = running_median(points.coherence, _SMOOTHED_POINTS) >= limit
-        missing = f"a coherence of {limit:g} is reached nowhere; lower min_coherence"
+        missing = f"the coherence is below {limit:g} everywhere; lower min_coherence"
         return _widest(points, good, missing), "coherence"
     if points.std is not None:
         relative = running_median(points.std / np.abs(points.response), _SMOOTHED_POINTS)
@@ -53,7 +53,7 @@ def _inside(points: MeasuredPoints, band_hz: tuple[float, float]) -> BoolArray:
     inside = (frequency >= low) & (frequency <= high)
     if not inside.any():
         raise DataError(
-            f"band_hz={band_hz!r} holds no point; the FRF runs from {hertz(frequency[0])} to "
+            f"band_hz={band_hz!r} contains no point; the FRF covers {hertz(frequency[0])} to "
             f"{hertz(frequency[-1])}"
         )
     return inside

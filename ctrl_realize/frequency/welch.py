@@ -40,8 +40,8 @@ def from_segments(
             sums = part if sums is None else sums + part
     if sums is None or sums.count < 2:
         raise DataError(
-            f"records of up to {longest} samples hold {0 if sums is None else sums.count} segments "
-            f"of {taps.size}; at least two are needed: state a shorter segment"
+            f"records of up to {longest} samples hold {0 if sums is None else sums.count} "
+            f"segments of {taps.size}; expected at least two: give a shorter segment"
         )
     frequency = np.asarray(np.fft.rfftfreq(taps.size, dt), dtype=np.float64)
     # Zero was removed with the mean; the last line is the Nyquist frequency.
@@ -49,7 +49,9 @@ def from_segments(
     averages = independent_segments(taps, hop, sums.count)
     several = sums.yu.shape[:2] != (1, 1)
     if several and method != "H1":
-        raise OptionError(f"method={method!r} is for one input and one output; several take 'H1'")
+        raise OptionError(
+            f"method={method!r} is for one input and one output; use 'H1' for several"
+        )
     estimate = _many_channels if several else _one_channel
     return estimate(sums, frequency, lines, method, averages), dt
 
@@ -81,7 +83,7 @@ def _many_channels(
     m = uu.shape[1]
     if averages <= m:
         raise DataError(
-            f"{averages:.3g} independent segments are too few for {m} inputs; state a shorter "
+            f"{averages:.3g} independent segments are too few for {m} inputs; give a shorter "
             "segment"
         )
     power = np.einsum("fii->fi", uu).real
@@ -91,8 +93,8 @@ def _many_channels(
     excited &= np.linalg.eigvalsh(scaled)[:, 0] > _INDEPENDENT
     if not excited.any():
         raise DataError(
-            "the inputs do not excite the plant independently: at no frequency can their "
-            "shares be told apart"
+            "the inputs do not excite the plant independently: their contributions cannot be "
+            "separated at any frequency"
         )
     uu, yu, yy = uu[excited], yu[excited], yy[excited]
     inverse = np.linalg.inv(uu)
@@ -116,7 +118,7 @@ def _window(length: int, window: str | tuple[str, float]) -> FloatArray:
     try:
         return np.asarray(get_window(window, length), dtype=np.float64)
     except (ValueError, TypeError) as error:
-        raise OptionError(f"window={window!r} is none that scipy knows: {error}") from error
+        raise OptionError(f"window={window!r} is not a window known to scipy: {error}") from error
 
 
 def _default_segment(n_samples: int) -> int:

@@ -137,15 +137,16 @@ def identify(
     ]
     if strange:
         raise OptionError(
-            f"{', '.join(strange)}: not for method={method!r}; see the documentation of identify "
-            "for the arguments of each method"
+            f"{', '.join(strange)}: not an argument of method={method!r}; see the "
+            "documentation of identify"
         )
     if method == "output_error" and _of_several_channels(record):
         fit_only |= {"max_delay": max_delay is not None}
         strange = [name for name, given in fit_only.items() if given]
         if strange:
             raise OptionError(
-                f"{', '.join(strange)}: not for records of several channels; see fit_state_space"
+                f"{', '.join(strange)}: not an argument for records of several channels; see "
+                "fit_state_space"
             )
         return fit_state_space(record, order)
     if method == "output_error":
@@ -166,8 +167,8 @@ def identify(
         return with_modes_judged(system, max_delay, asked=asked)
     if not isinstance(record, Record):
         raise OptionError(
-            f"method={method!r} takes one record; several go together with method='output_error', "
-            "or one by one through identify_campaign"
+            f"method={method!r} takes one record; use method='output_error' for several "
+            "records together, or identify_campaign for each on its own"
         )
     step = unit_step(record)
     if method == "paper":
@@ -189,7 +190,7 @@ def fit_records(
     """Output-error fit with the arguments of `identify`; several records are fitted together."""
     if order is not None:
         if structures is not None:
-            raise OptionError("give order or structures, not both")
+            raise OptionError("expected order or structures, got both")
         order = whole(order, "order", 1, MOST_ORDER)
         structures = [(order, degree) for degree in range(1, order + 1)]
     return fit_output_error(records, structures=structures, **options)
@@ -249,9 +250,9 @@ def _paper(
     behind = PAPER_SAMPLES if samples is None else samples
     if reach + behind + 1 > step.n_samples:
         raise DelayRangeError(
-            f"the paper's settings need {reach + behind + 1} samples after the step (samples="
-            f"{behind}, max_delay={reach}), the record has {step.n_samples}; give samples= and "
-            "max_delay=, or use method='scan', which fits them to the record"
+            f"the settings of the paper need {reach + behind + 1} samples after the step "
+            f"(samples={behind}, max_delay={reach}), the record has {step.n_samples}; give "
+            "samples= and max_delay=, or use method='scan', which adapts them to the record"
         )
     impulse = impulse_from_step(
         step,

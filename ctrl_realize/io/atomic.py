@@ -83,10 +83,10 @@ def refuse_irregular(path: Path) -> None:
     except FileNotFoundError:
         return
     if stat.S_ISDIR(kind):
-        raise IsADirectoryError(errno.EISDIR, "is a folder; a file is to be written", str(path))
+        raise IsADirectoryError(errno.EISDIR, "is a folder; expected a file to write", str(path))
     if not stat.S_ISREG(kind):
         raise FileExistsError(
-            errno.EEXIST, "is a device, a pipe or a socket, and is not replaced", str(path)
+            errno.EEXIST, "is a device, a pipe or a socket and will not be replaced", str(path)
         )
 
 

@@ -57,8 +57,8 @@ def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str) -> None:
     if delimiter == "," or mixed:
         raise FileFormatError(
             f"{path}: {commas[0]!r} may be {commas[0].replace(',', '.')} or "
-            f"{commas[0].replace(',', '')}; say decimal=',' if the comma marks decimals, else "
-            "write the numbers without a separator of thousands"
+            f"{commas[0].replace(',', '')}; give decimal=',' if the comma is the decimal "
+            "mark; otherwise write the numbers without thousands separators"
         )
 
 

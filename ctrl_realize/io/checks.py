@@ -29,7 +29,9 @@ def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
     if not isinstance(max_bytes, Real) or not max_bytes > 0:
         raise OptionError(f"max_bytes={max_bytes!r} must be a positive number")
     if not isinstance(path, str | os.PathLike):
-        raise OptionError(f"a file is named by text or a Path, not by {type(path).__name__}")
+        raise OptionError(
+            f"expected the name of a file as text or Path, got a {type(path).__name__}"
+        )
     try:
         path = Path(path)
         status = path.stat()
@@ -38,11 +40,11 @@ def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
         reason = getattr(error, "strerror", None) or str(error)
         raise MissingFileError(f"{os.fspath(path)!r} cannot be read: {reason}") from error
     if stat.S_ISDIR(status.st_mode):
-        raise FileFormatError(f"{path} is a folder, a file is needed")
+        raise FileFormatError(f"{path} is a folder; expected a file")
     if not stat.S_ISREG(status.st_mode):
-        raise FileFormatError(f"{path} is a device or a pipe, a regular file is needed")
+        raise FileFormatError(f"{path} is a device or a pipe; expected a regular file")
     if not os.access(path, os.R_OK):
-        raise MissingFileError(f"{path} cannot be read: no permission")
+        raise MissingFileError(f"{path} cannot be read: permission denied")
     if status.st_size == 0:
         raise FileFormatError(f"{path} is empty")
     check_size(path, status.st_size, max_bytes)

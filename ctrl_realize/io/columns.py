@@ -53,7 +53,7 @@ def find_column(table: Table, wanted: str | int, argument: str) -> int:
     """Return the position of the one column that the caller asks for."""
     chosen = find_columns(table, wanted, argument)
     if len(chosen) != 1:
-        raise OptionError(f"{argument}={wanted!r} stands for {len(chosen)} columns, one is needed")
+        raise OptionError(f"{argument}={wanted!r} selects {len(chosen)} columns, expected one")
     return chosen[0]
 
 
@@ -78,8 +78,8 @@ def _one_choice(table: Table, wanted: object, argument: str) -> list[int]:
             return found
         if found:
             raise OptionError(
-                f"{argument}={wanted!r} fits {len(found)} columns of {table.path}; "
-                f"choose by number from {table.listing()}"
+                f"{argument}={wanted!r} matches {len(found)} columns of {table.path}; choose "
+                f"by number from {table.listing()}"
             )
     # the channels of a matrix
     found = [k for k, column in enumerate(columns) if column.name.startswith(wanted + "[")]

@@ -178,8 +178,8 @@ def _columns(table: Table, asked: dict[str, str | int | None]) -> dict[str, int]
         found = named(table, names, columns.values()) if part not in given else []
         if len(found) > 1:
             raise OptionError(
-                f"{table.path} has {len(found)} columns that could be {part}; say {part}=name or "
-                f"number; it has {table.listing()}"
+                f"{table.path} has {len(found)} columns that could be {part}; give "
+                f"{part}=name or number; it has {table.listing()}"
             )
         if found:
             columns[part] = found[0]
@@ -190,8 +190,8 @@ def _columns(table: Table, asked: dict[str, str | int | None]) -> dict[str, int]
     if "frequency" not in columns or not complete:
         missing = "the frequency" if "frequency" not in columns else "the response"
         raise OptionError(
-            f"{table.path}: cannot tell which column is {missing}; say frequency= and magnitude= "
-            f"with phase=, or real= with imag=; it has {table.listing()}"
+            f"{table.path}: cannot tell which column is {missing}; give frequency= and "
+            f"magnitude= with phase=, or real= with imag=; it has {table.listing()}"
         )
     kept = {"frequency", "coherence", "std", *complete[0]}
     return {part: index for part, index in columns.items() if part in kept}
@@ -204,8 +204,8 @@ def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
         unit = column.unit or ("rad/s" if named_omega else "hz")
     if unit not in _IN_HZ:
         raise OptionError(
-            f"{table.path}: {table.title(index)} is in {unit!r}; say frequency_unit='Hz', 'kHz', "
-            "'MHz' or 'rad/s'"
+            f"{table.path}: {table.title(index)} is in {unit!r}; give frequency_unit='Hz', "
+            "'kHz', 'MHz' or 'rad/s'"
         )
     return table.numbers(index) * _IN_HZ[unit]
 
@@ -229,7 +229,7 @@ def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
         return np.asarray(10 ** (values / 20), dtype=np.float64)
     if values.min() < 0:
         raise OptionError(
-            f"{table.path}: {table.title(index)} has negative values; is it in dB? say "
+            f"{table.path}: {table.title(index)} has negative values; is it in dB? give "
             "magnitude_unit='dB'"
         )
     return values
@@ -241,11 +241,11 @@ def _phase(table: Table, index: int, unit: str | None) -> FloatArray:
     unit = table.columns[index].unit if unit is None else unit
     if unit not in ("", "deg", "rad"):
         raise OptionError(
-            f"{table.path}: {table.title(index)} is in {unit!r}; say phase_unit='deg' or 'rad'"
+            f"{table.path}: {table.title(index)} is in {unit!r}; give phase_unit='deg' or 'rad'"
         )
     if not unit and values.any() and np.abs(values).max() <= 2 * np.pi:
         raise OptionError(
-            f"{table.path}: {table.title(index)} could be in degrees or in radians; say "
+            f"{table.path}: {table.title(index)} could be in degrees or in radians; give "
             "phase_unit='deg' or 'rad'"
         )
     return values if unit == "rad" else np.deg2rad(values)

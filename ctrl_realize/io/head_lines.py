@@ -45,8 +45,8 @@ def head_lines(path: Path, head: bytes, encoding: str, skip: int) -> list[Line]:
             lines.pop()  # cut off by us
         if not lines:
             raise FileFormatError(
-                f"the first line of {path} is longer than {HEAD_BYTES} bytes; "
-                "a table with one row per sample is needed"
+                f"the first line of {path} is longer than {HEAD_BYTES} bytes; expected a "
+                "table with one row per sample"
             )
     return _joined(lines[:MAX_HEAD_LINES], skip, text)
 

@@ -18,14 +18,14 @@ def field(content: Mapping[str, Any], key: str, kind: Any) -> Any:
     """Return ``content[key]`` if it is of the kind asked for."""
     value = content.get(key)
     if not isinstance(value, kind) or (isinstance(value, str) and not _is_text(value)):
-        raise FileFormatError(f"{key!r} is missing, or not of its kind")
+        raise FileFormatError(f"{key!r} is missing or has the wrong type")
     return value
 
 
 def boolean_free(content: Mapping[str, Any], key: str, kind: Any) -> Any:
     """Return a number; in Python true and false are numbers too, here they are not."""
     if isinstance(content.get(key), bool):
-        raise FileFormatError(f"{key!r} is true or false, a number is needed")
+        raise FileFormatError(f"{key!r} is true or false; expected a number")
     return field(content, key, kind)
 
 
@@ -33,9 +33,9 @@ def texts(content: Mapping[str, Any], key: str) -> list[str]:
     """Return a list of different texts."""
     values: list[str] = field(content, key, list)
     if not all(isinstance(value, str) and _is_text(value) for value in values):
-        raise FileFormatError(f"{key!r} holds something that is not text")
+        raise FileFormatError(f"{key!r} contains something that is not text")
     if len(set(values)) != len(values):
-        raise FileFormatError(f"{key!r} holds a name twice")
+        raise FileFormatError(f"{key!r} contains a name twice")
     return values
 
 
@@ -44,7 +44,7 @@ def whole_numbers(content: Mapping[str, Any], key: str, count: int) -> list[int]
     values: list[int] = field(content, key, list)
     whole = all(isinstance(value, int) and not isinstance(value, bool) for value in values)
     if not whole or len(values) != count or min(values, default=0) < 0:
-        raise FileFormatError(f"{key!r} must hold {count} whole numbers, none negative")
+        raise FileFormatError(f"{key!r} must contain {count} non-negative whole numbers")
     return values
 
 

@@ -126,7 +126,7 @@ def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -
     try:
         text = file.read_bytes().decode("utf-8")
     except ValueError as error:
-        raise FileFormatError(f"{file}: no model file: {error}") from error
+        raise FileFormatError(f"{file}: not a model file: {error}") from error
     try:
         return model_from_text(text, max_states=max_states)
     except FileFormatError as error:
@@ -171,7 +171,7 @@ def model_from_text(text: str, *, max_states: int | None = None) -> DelayedState
     try:
         content = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"no model file, or cut off: {error}") from error
+        raise FileFormatError(f"not a model file, or truncated: {error}") from error
     try:
         _check_origin(content)
         return _model_from(content, max_states=max_states)
@@ -221,14 +221,14 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> De
     n_states = order + sum(before) + sum(behind)
     if max_states is not None and n_states > max_states:
         raise FileFormatError(
-            f"the model has {n_states} states, delays included; max_states={max_states} allows "
-            f"fewer (the matrix takes {8e-6 * n_states**2:.0f} MB)"
+            f"the model has {n_states} states, delays included; the limit is "
+            f"max_states={max_states} (the matrix takes {8e-6 * n_states**2:.0f} MB)"
         )
     if not 0 < dt < float("inf"):
-        raise FileFormatError(f"dt={dt} is no sample time")
+        raise FileFormatError(f"dt={dt} is not a sample time")
     name = field(model, "name", str)
     if any("." in one for one in (name, *inputs, *outputs)):
-        raise FileFormatError("a name has a dot, which names of models have not")
+        raise FileFormatError("a name contains a dot, which is not allowed in names of models")
     return DelayedStateSpace(
         ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False),
         before,
@@ -243,7 +243,7 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> De
 def _check_origin(content: object) -> None:
     """Refuse foreign, later and edited files, and say which it is."""
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise FileFormatError(f"not a model file of ctrl_realize (its format is not {FORMAT!r})")
+        raise FileFormatError(f"not a model file of ctrl_realize (expected the format {FORMAT!r})")
     schema = content.get("schema")
     if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
         raise FileFormatError(f"schema {schema!r} is not known")
@@ -255,7 +255,7 @@ def _check_origin(content: object) -> None:
     stored = content.get("sha256")
     if stored != _checksum(content):
         raise FileFormatError(
-            "the checksum does not fit the content: the file was edited or damaged"
+            "the checksum does not match the content: the file was edited or damaged"
         )
 
 
@@ -279,11 +279,11 @@ def _versions() -> dict[str, str]:
 
 
 def _refuse_constant(text: str) -> float:
-    raise ValueError(f"{text} is no finite number")
+    raise ValueError(f"{text} is not a finite number")
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) != len(pairs):
-        raise ValueError("a key is there twice")
+        raise ValueError("a key occurs twice")
     return content

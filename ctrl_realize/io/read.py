@@ -16,7 +16,7 @@ _NOT_READABLE = {
     b"BZh": "compressed with bzip2: unpack it first",
     b"\xfd7zXZ": "compressed with xz: unpack it first",
     b"7z\xbc\xaf": "a 7z archive: unpack it first",
-    b"\x80\x04\x95": "a Python pickle: these run code when read, and are not read here",
+    b"\x80\x04\x95": "a Python pickle: these can run code when read and are refused",
     b"TDSm": "a LabVIEW TDMS file: export it as CSV",
     b"%PDF": "a PDF document",
 }

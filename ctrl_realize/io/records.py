@@ -147,7 +147,9 @@ def read_record(
         raise OptionError(f"dt={dt!r} must be a positive number of seconds")
     keep = one_of(missing, "missing", ("refuse", "keep")) == "keep"
     if keep and resample:
-        raise OptionError("missing='keep' and resample=True: over missing samples, which to keep?")
+        raise OptionError(
+            "missing='keep' and resample=True exclude each other: expected one of them"
+        )
     table = read_table(path, options, variable=variable, max_bytes=max_bytes)
     parts = _parts(table, time, input, output, dt)
     used = [*parts.inputs, *parts.outputs] + ([] if parts.time is None else [parts.time])
@@ -171,7 +173,7 @@ def read_record(
         place = f" ({table.place(int(row[1]))})" if row else ""
         # many stamps twice over: samples that came faster than their clock ticks
         coarse = np.mean(np.diff(stamps) == 0) > 0.2
-        advice = "; the clock is coarser than the samples, dt= takes its place" if coarse else ""
+        advice = "; the clock is coarser than the sample time, give dt= instead" if coarse else ""
         raise TimeAxisError(f"{table.path}{place}: {error}{advice}") from error
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from error
@@ -195,7 +197,7 @@ def _parts(
     dt: float | None,
 ) -> _Parts:
     if time is not None and dt is not None:
-        raise OptionError("time= and dt= are both given; one of them sets the time axis")
+        raise OptionError("expected time= or dt=, got both")
     inputs = [] if input is None else find_columns(table, input, "input")
     outputs = [] if output is None else find_columns(table, output, "output")
     clock = None if time is None else find_column(table, time, "time")
@@ -223,7 +225,7 @@ def _parts(
             )
     used = [*inputs, *outputs] + ([] if clock is None else [clock])
     if len(set(used)) != len(used):
-        raise OptionError("a column is asked for twice among time=, input= and output=")
+        raise OptionError("a column is selected twice among time=, input= and output=")
     return _Parts(clock, math.nan if step is None else step, inputs, outputs)
 
 
@@ -234,21 +236,21 @@ def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, floa
         return clocks[0], None
     if len(clocks) > 1:
         raise OptionError(
-            f"{table.path} has {len(clocks)} columns that could be time; say time=name or number; "
-            f"it has {table.listing()}"
+            f"{table.path} has {len(clocks)} columns that could be time; give time=name or "
+            f"number; it has {table.listing()}"
         )
     for key, value in table.constants.items():
         plain = key.rpartition(".")[2].replace("_", " ").lower()
         if plain in _DT_NAMES | _RATE_NAMES:
             step = value if plain in _DT_NAMES else 1 / value if value else math.inf
             if not (math.isfinite(step) and step > 0):
-                raise DataError(f"{table.path}: {key}={value} is no sample time; say dt=")
+                raise DataError(f"{table.path}: {key}={value} is not a sample time; give dt=")
             return None, step
     if 0 not in taken and not has_header(table) and len(table.columns) >= 3:
         return 0, None
     raise OptionError(
-        f"{table.path}: cannot tell which column is time; say time=name or number, or dt= in s; "
-        f"it has {table.listing()}"
+        f"{table.path}: cannot tell which column is time; give time=name or number, or dt= in "
+        f"s; it has {table.listing()}"
     )
 
 

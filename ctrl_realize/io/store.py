@@ -124,8 +124,8 @@ class CampaignStore:
         count = _count(path)
         if count >= MOST_TRIES:
             raise DataError(
-                f"the process was killed {count} times while it identified this record (most often "
-                f"the memory is exhausted); remove {path} to try again"
+                f"the process was killed {count} times while it identified this record "
+                f"(usually lack of memory); remove {path} to try again"
             )
         with suppress(OSError):  # a full disk costs the note, not the result
             write_text(path, f"{count + 1}\n")
@@ -155,9 +155,9 @@ def _row_from(content: Any, key: str) -> CampaignRow:
     if content.get("schema") != SCHEMA or content.get("key") != key:
         raise FileFormatError("a row of another format, or under another name")
     if content.get("versions") != versions():
-        raise FileFormatError("a row that other versions have made")
+        raise FileFormatError("a row made by another version")
     if content.get("sha256") != _checksum(content):
-        raise FileFormatError("the checksum does not fit the content")
+        raise FileFormatError("the checksum does not match the content")
     numbers: dict[str, Any] = {
         name: float(text)
         for name, text in field(content, "numbers", dict).items()

@@ -271,7 +271,7 @@ def summary_from_json(content: Any) -> FitSummary | None:
     if content is None:
         return None
     if not isinstance(content, Mapping):
-        raise FileFormatError("'fit' is not of its kind")
+        raise FileFormatError("'fit' has the wrong type")
     values = field(content, "values", dict)
     return FitSummary(
         kind=field(content, "kind", str),
@@ -290,7 +290,7 @@ def _pairs(content: Mapping[str, Any], key: str) -> tuple[tuple[str, str], ...]:
         for row in rows
     )
     if not good or any(len(text) > 10 * MAX_TEXT for row in rows for text in row):
-        raise FileFormatError(f"{key!r} must hold pairs of texts, at most {_MAX_ROWS}")
+        raise FileFormatError(f"{key!r} must contain pairs of texts, at most {_MAX_ROWS}")
     return tuple((row[0], row[1]) for row in rows)
 
 
@@ -320,6 +320,6 @@ def _tupled(value: Any) -> Plain:
     if isinstance(value, list):
         return tuple(_tupled(entry) for entry in value)
     if isinstance(value, dict):
-        raise FileFormatError("'values' of 'fit' holds more than numbers and text")
+        raise FileFormatError("'values' of 'fit' contains more than numbers and text")
     plain: Plain = value
     return plain

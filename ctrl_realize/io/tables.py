@@ -82,7 +82,7 @@ class Table:
         """
         values = self.values(index, keep_missing=keep_missing)
         if np.iscomplexobj(values):
-            raise DataError(f"{self.path}: {self.title(index)} is complex, real numbers are needed")
+            raise DataError(f"{self.path}: {self.title(index)} is complex; expected real numbers")
         return np.asarray(values, dtype=np.float64)
 
     def values(self, index: int, *, keep_missing: bool = False) -> np.ndarray[Any, np.dtype[Any]]:
@@ -94,8 +94,8 @@ class Table:
         if not finite.all():
             row = int(np.argmin(finite))
             raise DataError(
-                f"{self.path}: {self.title(index)}, {self.place(row)}: {cells[row]} is not finite"
-                " (or too large for a double)"
+                f"{self.path}: {self.title(index)}, {self.place(row)}: {cells[row]} is not "
+                "finite (or too large for double precision)"
             )
         return cells
 
@@ -110,11 +110,11 @@ class Table:
                 continue
             if not pattern.fullmatch(text):
                 what = "a value is missing" if missing else "is not a number"
-                advice = "; decimal=',' or '.' may help" if "," in text or "." in text else ""
+                advice = "; try decimal=',' or '.'" if "," in text or "." in text else ""
                 if "," in text and "." in text:
-                    advice = "; write it without a separator of thousands"
+                    advice = "; write it without thousands separators"
                 if missing:
-                    advice = "; missing='keep' keeps a gap in a record"
+                    advice = "; missing='keep' keeps gaps in a record"
                 raise DataError(
                     f"{self.path}: {self.title(index)}, {self.place(row)}: {text[:60]!r}"
                     f": {what}{advice}"

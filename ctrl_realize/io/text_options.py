@@ -35,7 +35,7 @@ class TextOptions:
             raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")
         for name in ("delimiter", "comment"):
             if str(getattr(self, name)) in _IN_NUMBERS[name]:
-                raise OptionError(f"{name}={getattr(self, name)!r} would cut numbers in two")
+                raise OptionError(f"{name}={getattr(self, name)!r} would split numbers")
         if self.header not in (True, False, "auto"):
             raise OptionError(f"header={self.header!r} must be True, False or 'auto'")
         whole(self.skip_rows, "skip_rows", 0)

@@ -76,8 +76,9 @@ def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
     units = [unit for unit, ticks in _TICKS.items() if _YEAR_1990 <= first / ticks < _YEAR_2100]
     if units:
         raise OptionError(
-            f"{table.path}: {table.title(index)} begins at {first:.6g}, which looks like a clock "
-            f"of {units[0]} since 1970; say time_unit={units[0]!r}, or time_unit='s' if it is not"
+            f"{table.path}: {table.title(index)} begins at {first:.6g}, which looks like a "
+            f"clock of {units[0]} since 1970; give time_unit={units[0]!r}, or time_unit='s' "
+            "if it is not"
         )
 
 
@@ -93,8 +94,8 @@ def _check_day_count(table: Table, index: int, values: FloatArray) -> None:
         return
     raise OptionError(
         f"{table.path}: {table.title(index)} begins at {values[0]:.9g} and runs in steps of "
-        f"{step:.6g}, which looks like dates in days (Excel, datenum); say time_unit='day', or "
-        "time_unit='s' if it is not"
+        f"{step:.6g}, which looks like dates in days (Excel, datenum); give time_unit='day', "
+        "or time_unit='s' if it is not"
     )
 
 
@@ -102,7 +103,9 @@ def _from_stamps(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> Floa
     missing = np.isnat(stamps)
     if missing.any():
         row = int(np.argmax(missing))
-        raise DataError(f"{table.path}: {table.title(index)}, {table.place(row)}: no time there")
+        raise DataError(
+            f"{table.path}: {table.title(index)}, {table.place(row)}: the time is missing"
+        )
     return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
 
 
@@ -121,14 +124,14 @@ def _parsed_dates(
             pd.Series(cells), format=time_format or "ISO8601", utc=True, errors="coerce"
         )
     except (ValueError, TypeError) as error:
-        raise OptionError(f"time_format={time_format!r} is no format of time: {error}") from error
+        raise OptionError(f"time_format={time_format!r} is not a time format: {error}") from error
     bad = stamps.isna().to_numpy()
     if bad.any():
         row = int(np.argmax(bad))
         raise DataError(
-            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is no "
-            f"number and no time as {time_format or 'ISO 8601 writes it'}; say time_format=, "
-            "or dt= to do without the column"
+            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is "
+            f"neither a number nor a time in the format {time_format or 'ISO 8601'}; give "
+            "time_format=, or dt= to ignore the column"
         )
     return np.asarray(stamps.dt.tz_localize(None).to_numpy())
 
@@ -144,8 +147,8 @@ def _parsed_times_of_day(
     for row, part in enumerate(parts):
         if part is None:
             raise DataError(
-                f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is "
-                "no time of day"
+                f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} "
+                "is not a time of day"
             )
     short = next((row for row, part in enumerate(parts) if part and part[3] is None), None)
     factors = _FACTORS.get(_FIRST.get(unit, plain_unit(unit)))
@@ -153,14 +156,14 @@ def _parsed_times_of_day(
         factors = _FACTORS["h"]
     elif factors is None:
         raise OptionError(
-            f"{table.path}: {table.title(index)}, {table.place(short)}: {cells[short]!r} may be "
-            "hours and minutes, or minutes and seconds; say time_unit='h' or time_unit='min', the "
-            "unit of its first number"
+            f"{table.path}: {table.title(index)}, {table.place(short)}: {cells[short]!r} may "
+            "be hours and minutes, or minutes and seconds; give time_unit='h' or "
+            "time_unit='min', the unit of the first field"
         )
     elif any(part and part[3] is not None for part in parts):
         raise DataError(
-            f"{table.path}: {table.title(index)} has times of two numbers and of three, such as "
-            f"{cells[short]!r}"
+            f"{table.path}: {table.title(index)} mixes times with two and three fields, such "
+            f"as {cells[short]!r}"
         )
     # in whole nanoseconds, for 0.1 s is no binary fraction
     stamps = np.array(

@@ -91,6 +91,6 @@ def checked_time_unit(unit: str) -> str:
     plain = plain_unit(unit) if isinstance(unit, str) else None
     if plain not in TIME_UNITS:
         raise OptionError(
-            f"{unit!r} is not a known unit of time; say time_unit= one of " + ", ".join(TIME_UNITS)
+            f"{unit!r} is not a known unit of time; give time_unit= one of " + ", ".join(TIME_UNITS)
         )
     return plain

@@ -100,7 +100,7 @@ def campaign_plot(
 def _groups(campaign: Campaign) -> dict[float, list[CampaignRow]] | None:
     """Group by step height; None where that shows less than the names do."""
     if not campaign.good:
-        raise DataError("no record of the campaign was identified; there is nothing to draw")
+        raise DataError("no record of the campaign was identified; there is nothing to plot")
     groups: dict[float, list[CampaignRow]] = {}
     for row in campaign.good:
         groups.setdefault(float(f"{row.amplitude:.2g}"), []).append(row)

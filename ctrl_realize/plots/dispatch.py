@@ -83,7 +83,7 @@ def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
     'time [s]'
     """
     raise errors.OptionError(
-        f"there is no picture of a {type(result).__name__}; there is one of "
+        f"there is no plot of a {type(result).__name__}; there is one of "
         f"{', '.join(sorted(kind.__name__ for kind in draw.registry if kind is not object))}"
     )
 

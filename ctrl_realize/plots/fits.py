@@ -130,8 +130,8 @@ def _delay_fit(given: Any) -> OutputErrorFit:
     result = given.fit if isinstance(given, DelayedStateSpace) else given
     if not isinstance(result, OutputErrorFit):
         raise OptionError(
-            f"got {given!r}, which holds no output-error fit; "
-            "use fit_output_error or identify(record)"
+            f"got {given!r}, which has no output-error fit; use fit_output_error or "
+            "identify(record)"
         )
     return result
 

@@ -54,11 +54,11 @@ def curves_of(
     for item in items:
         if not isinstance(item, ct.LTI):
             raise UnsuitableSystemError(
-                f"got a {type(item).__name__}; needed are systems of python-control or FRFs"
+                f"expected systems of python-control or FRFs, got a {type(item).__name__}"
             )
         check_single_channel(item, str(item.name))
     if not items:
-        raise DataError("no frequency response to draw")
+        raise DataError("no frequency response to plot")
     data = [item for item in items if isinstance(item, ct.FrequencyResponseData)]
     grid = _grid(items, data) if frequency_hz is None else numbers(frequency_hz, "frequency_hz")
     delays = [float(np.max(item.dead_time)) for item in items if hasattr(item, "dead_time")]

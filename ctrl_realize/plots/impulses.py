@@ -60,8 +60,9 @@ def impulse_plot(
     """
     if not isinstance(impulse, ImpulseResponse):
         raise DataError(
-            f"got a {type(impulse).__name__}; needed is an ImpulseResponse first, and after it the "
-            "models. The response of a model alone is drawn by control.impulse_response(...).plot()"
+            f"got a {type(impulse).__name__}; expected an ImpulseResponse first, followed by "
+            "the models. To plot the response of a model alone use "
+            "control.impulse_response(...).plot()"
         )
     models = [systems] if isinstance(systems, DelayedStateSpace) else list(systems)
     for model in models:

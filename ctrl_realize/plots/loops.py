@@ -55,7 +55,7 @@ def margins_plot(
     """
     if not isinstance(result, Margins):
         raise DataError(
-            f"got a {type(result).__name__}; needed are the margins of a loop, such as "
+            f"got a {type(result).__name__}; expected the margins of a loop, such as "
             "design.margins(plant, controller)"
         )
     omega, values = result.response

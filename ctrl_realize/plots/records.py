@@ -199,12 +199,12 @@ def _steps(given: Any) -> list[StepResponse]:
     several = isinstance(given, Iterable) and not isinstance(given, ct.InputOutputSystem)
     items = list(given) if several else [given]
     if not items:
-        raise DataError("no step responses to draw")
+        raise DataError("no step responses to plot")
     for item in items:
         if not isinstance(item, Record | StepResponse):
             raise DataError(
-                f"got a {type(item).__name__}; needed is a Record or StepResponse first, and after "
-                "it the model"
+                f"got a {type(item).__name__}; expected a Record or StepResponse first, "
+                "followed by the model"
             )
     return [unit_step(item) if isinstance(item, Record) else item for item in items]
 

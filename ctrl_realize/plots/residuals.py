@@ -105,7 +105,7 @@ def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) 
     'lag [samples]'
     """
     if not fit.checks:
-        raise OptionError("all records have gaps; there is no simulation to draw them beside")
+        raise OptionError("all records have gaps; there is no simulation to plot")
     return residual_plot(fit.checks[whole(record, "record", 0, len(fit.checks) - 1)], **kwargs)
 
 

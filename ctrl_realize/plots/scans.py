@@ -59,8 +59,8 @@ def delay_plot(
     result = scan.fit if isinstance(scan, DelayedStateSpace) else scan
     if not isinstance(result, DelayScan):
         raise OptionError(
-            f"got {scan!r}, which holds no delay scan; use estimate_delay or "
-            "identify(record, method='scan')"
+            f"got {scan!r}, which has no delay scan; use estimate_delay or identify(record, "
+            "method='scan')"
         )
     looks = {"color": style.MODEL, "label": f"order {result.order}", **kwargs}
     low, high = result.delay_interval
@@ -208,8 +208,8 @@ def _singular_values(result: Any, count: int) -> tuple[FloatArray, int, float | 
         values = result.singular_values[result.delay][:count]
         return values, result.order, result.noise_floor, result.impulse.name
     raise OptionError(
-        f"got a {type(result).__name__}, which holds no singular values; realize, "
-        "estimate_delay and scan_orders give some"
+        f"got a {type(result).__name__}, which has no singular values; use the result of "
+        "realize, estimate_delay or scan_orders"
     )
 
 

@@ -104,8 +104,8 @@ def write_identification(
     as_record(record)
     if not isinstance(system, DelayedStateSpace):
         raise UnsuitableSystemError(
-            f"system is a {type(system).__name__}; needed is a model with dead time, as identify "
-            "gives it, and after it its record"
+            f"system is a {type(system).__name__}; expected a model with dead time, as "
+            "returned by identify, followed by its record"
         )
     return _write(
         path,

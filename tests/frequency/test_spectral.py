@@ -168,7 +168,7 @@ def test_inputs_that_move_together_are_refused():
         cr.spectral_frf(two_by_two(5000, together=True))
     with pytest.raises(ValueError, match="'H1'"):
         cr.spectral_frf(two_by_two(5000), method="H2")
-    with pytest.raises(ValueError, match="period is for one of each"):
+    with pytest.raises(ValueError, match="expected one of each with period"):
         cr.spectral_frf(two_by_two(5000), period=500)
 
 

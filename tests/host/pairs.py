@@ -77,7 +77,7 @@ def answers(result: Any) -> list[Any]:
     if isinstance(result, ct.TimeResponseData):
         parts = [result.t, result.y, result.x, result.u, np.asarray(result.outputs)]
         labels = [result.output_labels, result.input_labels, result.state_labels, result.sysname]
-        # an impulse response holds array(None) for its input
+        # an impulse response has array(None) for its input
         arrays = [np.asarray(part) for part in parts if np.asarray(part).dtype.kind in "fc"]
         return [*arrays, len(arrays), *labels]
     if isinstance(result, dict):

@@ -129,7 +129,7 @@ def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records
     os.mkfifo(path)
     again = cr.identify_campaign(records[:1], method="paper", store=store)
     assert again.delays == first.delays
-    assert "is not replaced" in again.rows[0].warnings[-1]
+    assert "will not be replaced" in again.rows[0].warnings[-1]
     assert path.is_fifo()
 
 
@@ -200,7 +200,7 @@ def test_what_is_no_regular_file_is_not_replaced(tmp_path):
             lambda path: write_text(path, "text"),
             lambda path: write_csv(path, table, index=False),
         ):
-            with pytest.raises(OSError, match="is not replaced"):
+            with pytest.raises(OSError, match="will not be replaced"):
                 write(target)
     assert stat.S_ISFIFO(pipe.stat().st_mode)
     assert link.is_symlink()

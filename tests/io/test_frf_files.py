@@ -73,13 +73,13 @@ def test_columns_and_units_are_chosen(tmp_path):
         (written("a,re,im", F, F, F), {}, OptionError, "which column is the frequency"),
         (written("f,re,b", F, F, F), {}, OptionError, "which column is the response.*2 'b'"),
         (written("f,re,im,re", F, F, F, F), {}, OptionError, "2 columns that could be real"),
-        (written("f,re,im", -F, F, F), {}, DataError, "needed is >= 0"),
+        (written("f,re,im", -F, F, F), {}, DataError, "expected a value >= 0"),
         (written("f,re,im,coh", F, F, F, F), {}, DataError, "a.csv: coherence runs from"),
         (written("f,re,im", F, F, F * np.nan), {}, DataError, "line 2: 'nan': a value is missing"),
         (written("f,re,im", F, F, F), {"phase_unit": "turns"}, OptionError, "phase_unit='turns'"),
         (written("f,re,im", F, F, F), {"magnitude_unit": "V"}, OptionError, "'abs', 'db'"),
         (written("f,re,im", F, F, F), {"frequency": "w"}, OptionError, "frequency='w'"),
-        ("hello\n", {}, FileFormatError, "no columns of numbers"),
+        ("hello\n", {}, FileFormatError, "no numeric columns"),
     ],
 )  # fmt: skip
 def test_what_is_not_clear_is_asked(tmp_path, text, kwargs, error, match):

@@ -187,7 +187,7 @@ CUT = {
 def test_a_last_line_that_was_cut_is_left_out_with_a_warning(tmp_path, end):
     file = tmp_path / "a.csv"
     file.write_text("t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n" + end)
-    with pytest.warns(DataWarning, match="the last line is left out") as caught:
+    with pytest.warns(DataWarning, match="the last line is skipped") as caught:
         record = read_record(file)
     check(record, time=T[:4], input=U[:4], output=Y[:4])
     assert caught[0].filename == __file__
@@ -225,7 +225,7 @@ def test_a_bad_row_is_named(tmp_path, row, error, match):
     [
         ("t,valve,level,flow\n", {}, r"which column is the input.*1 'valve', 2 'level', 3 'flow'"),
         ("t,u,level,flow\n", {}, r"which column is the output.*2 'level', 3 'flow'"),
-        ("a,u,y,b\n", {}, r"which column is time; say time=name or number, or dt="),
+        ("a,u,y,b\n", {}, r"which column is time; give time=name or number, or dt="),
         ("t,time,u,y\n", {}, r"2 columns that could be time"),
         ("t,u,y,y\n", {"output": "y"}, r"fits 2 columns"),
         ("t,u,y,z\n", {"input": "U2"}, r"input='U2'.*columns 0 't', 1 'u'"),
@@ -233,10 +233,10 @@ def test_a_bad_row_is_named(tmp_path, row, error, match):
         ("t,u,y,z\n", {"input": -1}, r"input=-1.*count from 0"),
         ("t,u,y,z\n", {"input": True}, r"must be a column's name or number"),
         ("t,u,y,z\n", {"input": []}, r"must name one or more"),
-        ("t,u,y,z\n", {"time": 0, "dt": 1.0}, r"both given"),
+        ("t,u,y,z\n", {"time": 0, "dt": 1.0}, r"got both"),
         ("t,u,y,z\n", {"dt": -1.0}, r"dt=-1.0 must be a positive"),
         ("t,u,y,z\n", {"dt": math.nan}, r"dt=nan must be a positive"),
-        ("t,u,y,z\n", {"input": "u", "output": "u"}, r"asked for twice"),
+        ("t,u,y,z\n", {"input": "u", "output": "u"}, r"selected twice"),
         ("t [ticks],u,y,z\n", {}, r"'ticks' is not a known unit of time"),
         ("t,u,y,z\n", {"time_unit": "years"}, r"'years' is not a known unit of time"),
         ("", {}, r"which column is the input.*4 columns without a header"),
@@ -300,7 +300,7 @@ def test_a_clock_of_ticks_since_1970_is_not_taken_for_seconds(tmp_path, unit, ti
     start = int(1.77e9 * ticks)  # in the year 2026
     rows = [f"{start + int(k * ticks / 10)},0,{k}" for k in range(5)]
     file.write_text("time,u,y\n" + "\n".join(rows) + "\n")
-    with pytest.raises(OptionError, match=rf"clock of {unit} since 1970; say time_unit='{unit}'"):
+    with pytest.raises(OptionError, match=rf"clock of {unit} since 1970; give time_unit='{unit}'"):
         read_record(file)
     assert read_record(file, time_unit=unit).dt == pytest.approx(0.1)
     assert read_record(file, time_unit="s").dt == pytest.approx(0.1 * ticks)

@@ -136,11 +136,11 @@ def _check_points(points: MeasuredPoints) -> None:
     count = points.frequency_hz.size
     if count < 3 or np.any(np.diff(points.frequency_hz) <= 0):
         raise DataError(
-            f"the response has {count} points above 0 rad/s, needed are at least 3 distinct "
+            f"the response has {count} points above 0 rad/s, expected at least 3 distinct "
             "ones; average repeated frequencies first"
         )
     if np.any(points.response == 0):
-        raise DataError("the response is 0 at some frequency; leave that point out")
+        raise DataError("the response is 0 at some frequency; remove that point")
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,9 @@ def _on_grid(other: Any, omega: FloatArray) -> _Beside:
         return _Beside(loop(omega), loop.delay, loop.integrators())
     points = _above_zero(other)
     if not np.array_equal(points.omega, omega):
-        raise DataError("the two responses have different frequencies; interpolate one first")
+        raise DataError(
+            "the two responses have different frequencies; interpolate one of them first"
+        )
     return _Beside(points.response)
 
 

@@ -187,8 +187,7 @@ def delay_robustness(
     interval = interval_of_dead_time(plant, dead_time_interval)
     if interval is None:
         raise OptionError(
-            "the system carries no interval of its dead time; give "
-            "dead_time_interval=(low, high) in s"
+            "the model has no dead-time interval; give dead_time_interval=(low, high) in s"
         )
     loop = open_loop(plant, controller)
     return over_interval(plant, loop, loop_margins(loop), interval, MAX_DELAYS)

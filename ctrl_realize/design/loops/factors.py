@@ -128,8 +128,8 @@ def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> F
     den = np.trim_zeros(den, "f")
     if num.size > den.size:
         raise UnsuitableSystemError(
-            f"{system.name!r} is improper (numerator of degree {num.size - 1} over "
-            f"{den.size - 1}); give its derivative a filter"
+            f"{system.name!r} is improper (numerator of degree {num.size - 1}, denominator of "
+            f"degree {den.size - 1}); add a derivative filter"
         )
     delay = 0
     while dt and den.size > num.size and den[-1] == 0:

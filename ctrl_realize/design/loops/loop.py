@@ -170,14 +170,13 @@ def _time_base(system: Any) -> float | None:
         return None
     if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
         raise UnsuitableSystemError(
-            f"got a {type(system).__name__}; needed is a control.StateSpace, TransferFunction, "
+            f"got a {type(system).__name__}; expected a control.StateSpace, TransferFunction, "
             "FrequencyResponseData or a number"
         )
     if not system.issiso():
         raise UnsuitableSystemError(
-            f"{system.name!r} has {system.ninputs} inputs and {system.noutputs} outputs; margins "
-            "are for one input and one output. Take one channel, or look at "
-            "control.singular_values_response"
+            f"{system.name!r} has {system.ninputs} inputs and {system.noutputs} outputs; "
+            "expected one of each. Take one channel, or use control.singular_values_response"
         )
     if system.dt is True:
         raise UnsuitableSystemError(

@@ -106,18 +106,18 @@ def margins(
     ):
         if dead_time:
             raise OptionError(
-                "dead_time is for continuous systems; multiply the data by "
-                "exp(-j omega tau) instead"
+                "dead_time is for continuous systems; for data, multiply them by exp(-j "
+                "omega tau) instead"
             )
         return _from_data(data_loop(loop, controller, unstable_poles, integrators))
     if unstable_poles or integrators is not None:
         raise OptionError(
-            "unstable_poles and integrators are for measured responses; the poles of systems "
-            "are known"
+            "unstable_poles and integrators are for measured responses; for systems they are "
+            "computed"
         )
     wait = real(dead_time, "dead_time", "dead time in s, >= 0")
     if wait < 0:
-        raise OptionError(f"dead_time={wait:g} s; needed is >= 0")
+        raise OptionError(f"dead_time={wait:g} s; expected a value >= 0")
     exact = open_loop(loop, controller, wait)
     if wait and exact.dt:
         raise OptionError(

@@ -156,8 +156,9 @@ def performance(
     setpoint, load, settled = settled_responses(plant, controller, guess or loop)
     if not settled:
         warnings.warn(
-            f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its errors "
-            "are those up to there. A longer sample time would show all of it",
+            f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its "
+            "errors are those up to then. Use a longer sample time to cover the whole "
+            "response",
             ModelWarning,
             stacklevel=3,  # one frame more: the limit of BLAS threads
         )
@@ -184,8 +185,8 @@ def loop_time(plant: DelayedStateSpace, controller: Any, name: str = "") -> floa
     if not found.stable:
         raise UnsuitableSystemError(
             f"the loop{f' with {name!r}' if name else ''} is not stable: it has "
-            f"{found.unstable_poles} poles on or outside the unit circle, and no step response "
-            "that ends; see design.margins"
+            f"{found.unstable_poles} poles on or outside the unit circle, so its step "
+            "response does not settle; see design.margins"
         )
     crossovers = found.gain_crossovers
     return max(plant_time(plant), 1 / float(crossovers[0]) if crossovers.size else 0.0)

@@ -70,11 +70,11 @@ def unwrapped_phase(
     wait = None if dead_time is None else real(dead_time, "dead_time", "dead time in s")
     if isinstance(system, ct.FrequencyResponseData):
         if omega is not None:
-            raise OptionError("omega is given with data, whose frequencies are fixed; leave it out")
+            raise OptionError("omega is given, but the frequencies of data are fixed; omit it")
         phase = _of_data(system, wait)
     else:
         if omega is None:
-            raise OptionError("omega is missing; a system needs the frequencies in rad/s")
+            raise OptionError("omega is missing; for a system give the frequencies in rad/s")
         grid = numbers(omega, "omega")
         if grid.ndim != 1 or np.any(grid < 0) or not np.all(np.isfinite(grid)):
             raise DataError("omega must be a one-dimensional array of frequencies >= 0 in rad/s")

@@ -209,13 +209,15 @@ def uncertainty_bound(
     if nominal is None:
         nominal = getattr(systems, "system", None) or (models[0] if models else None)
     if nominal is None:
-        raise OptionError("no systems and no nominal one; give nominal and dead_time_interval")
+        raise OptionError(
+            "expected systems or a nominal system, got neither; give nominal and dead_time_interval"
+        )
     plant = delayed_system(nominal, "an uncertainty bound")
     warn_unresolved(plant)
     interval = interval_of_dead_time(plant, dead_time_interval)
     if not models and interval is None:
         raise OptionError(
-            "no systems to compare and no interval of the dead time; give dead_time_interval in s"
+            "no systems to compare and no dead-time interval; give dead_time_interval in s"
         )
     grid = _grid(plant, omega)
     base = _response(plant, grid)
@@ -305,7 +307,7 @@ def _models(systems: Any) -> list[Any]:
         return [row.system for row in good]
     if isinstance(systems, ct.StateSpace) or not isinstance(systems, Iterable):
         raise OptionError(
-            f"systems is a {type(systems).__name__}; needed is a Campaign or a list of systems"
+            f"systems is a {type(systems).__name__}; expected a Campaign or a list of systems"
         )
     return list(systems)
 
@@ -320,7 +322,7 @@ def _grid(plant: DelayedStateSpace, omega: ArrayLike | None) -> FloatArray:
         return np.geomspace(low, 0.999 * top, GRID_POINTS)
     grid = numbers(omega, "omega")
     if grid.ndim != 1 or grid.size == 0 or grid[0] <= 0 or np.any(np.diff(grid) <= 0):
-        raise DataError("omega must rise and be > 0, in rad/s")
+        raise DataError("omega must be increasing and > 0, in rad/s")
     return grid
 
 

@@ -109,7 +109,7 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     wait = real(dead_time, "dead_time", "dead time in s, >= 0")
     most = whole(order, "order", 1, MAX_PADE_ORDER)
     if wait < 0:
-        raise DelayRangeError(f"dead_time={wait:g} s; needed is >= 0")
+        raise DelayRangeError(f"dead_time={wait:g} s; expected a value >= 0")
     samples, rest = split_dead_time(wait, step)
     if rest == 0.0:
         return DelayedStateSpace(ct.ss([], [], [], [[1.0]], step), samples)

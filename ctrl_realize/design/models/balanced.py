@@ -199,7 +199,7 @@ def reduce(
         if wanted < 0 or order > core.nstates:
             raise OrderError(
                 f"order={order}; the core has order {core.nstates}, of which {kept} state(s) on or "
-                f"outside the unit circle are kept: needed is {kept}...{core.nstates}"
+                f"outside the unit circle are kept: expected {kept}...{core.nstates}"
             )
     A, B, C, values = balanced_truncation(A, B, C, wanted)
     n = A.shape[0]

@@ -205,7 +205,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     if not isinstance(plant.delay, int):
         raise UnsuitableSystemError(
             f"the channels have different delays ({plant.input_delays} at the inputs, "
-            f"{plant.output_delays} at the outputs); convert them one by one"
+            f"{plant.output_delays} at the outputs); convert one channel at a time"
         )
     core, dt = plant.delay_free, float(plant.dt)
     _check_logarithm(np.asarray(core.poles()))
@@ -238,9 +238,10 @@ def _check_logarithm(poles: FloatArray) -> None:
     bad = poles[(np.abs(poles) < 1e-12) | ((np.abs(poles.imag) < 1e-9) & (poles.real < 0))]
     if bad.size:
         raise UnsuitableSystemError(
-            f"the core has a pole at z = {complex(bad[0]):.6g}, which no continuous system of this "
-            "order has behind a zero-order hold. A lower order often has none (design.reduce), "
-            "and so has a fit of dead time and lags (design.reduce_fopdt with method='optimal')"
+            f"the core has a pole at z = {complex(bad[0]):.6g}, which no continuous system of "
+            "this order has with a zero-order hold. A lower order often has none "
+            "(design.reduce), and so has a fit of dead time and lags (design.reduce_fopdt "
+            "with method='optimal')"
         )
 
 
@@ -285,7 +286,7 @@ def to_discrete(
             # Else to_discrete(model, 0.05), meant as a sample time, would put 0.05 s of dead time
             # in place of the model's own, and keep the sample time.
             raise OptionError(
-                f"the model has a dead time of its own, {core.dead_time:.6g} s; say dt=... for "
+                f"the model already has a dead time, {core.dead_time:.6g} s; give dt=... for "
                 "another sample time, or dead_time= and dt= to replace both"
             )
         dead_time = core.dead_time if dead_time is None else dead_time
@@ -295,8 +296,8 @@ def to_discrete(
     system = proper_ss(core, "to_discrete")
     if system.isdtime(strict=True):
         raise UnsuitableSystemError(
-            f"{system.name!r} is discrete already (dt={system.dt!r}); put a delay before it with "
-            "delayed_ss(system, delay), or sample it anew with to_discrete(to_continuous(system), "
-            "dt=...)"
+            f"{system.name!r} is already discrete (dt={system.dt!r}); add a delay with "
+            "delayed_ss(system, delay), or resample it with "
+            "to_discrete(to_continuous(system), dt=...)"
         )
     return delayed_ss(system, dead_time=0.0 if dead_time is None else dead_time, dt=step, **names)

@@ -67,12 +67,14 @@ class ProcessModel(Result):
             )
         if not self.lag >= self.second_lag >= 0 or self.dead_time < 0:
             raise OptionError(
-                f"lag={self.lag:g}, second_lag={self.second_lag:g}, dead_time={self.dead_time:g}; "
-                "needed are lag >= second_lag >= 0 and dead_time >= 0 in s"
+                f"lag={self.lag:g}, second_lag={self.second_lag:g}, "
+                f"dead_time={self.dead_time:g}; expected lag >= second_lag >= 0 and dead_time "
+                ">= 0 in s"
             )
         if self.lag == 0 and not self.integrating:
             raise OptionError(
-                "lag=0; a model without a lag is a pure dead time, no tuning rule fits"
+                "lag=0; a model without a lag is a pure dead time, for which there is no "
+                "tuning rule"
             )
 
     def transfer_function(self) -> ct.TransferFunction:

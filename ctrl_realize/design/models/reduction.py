@@ -184,8 +184,8 @@ def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool
     at_one = np.abs(poles - 1) < 1e-9
     if np.any(np.abs(poles[~at_one]) > 1 - 1e-12) or at_one.sum() > 1:
         raise UnsuitableSystemError(
-            "the system is unstable or has more than one integrator; lags and a dead time cannot "
-            "stand for it"
+            "the system is unstable or has more than one integrator; it cannot be "
+            "approximated by lags and a dead time"
         )
     integrating = bool(at_one.any())
     slowest = float(np.abs(poles[~at_one]).max(initial=0.0))
@@ -194,7 +194,9 @@ def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool
     step = plant.step(count)
     gain = _slope(core) if integrating else float(np.real(core.dcgain()))
     if gain == 0 or not np.isfinite(gain):
-        raise UnsuitableSystemError(f"the static gain is {gain:g}; there is nothing to reduce to")
+        raise UnsuitableSystemError(
+            f"the static gain is {gain:g}, so it cannot be approximated by this model"
+        )
     stride = max(1, count // FIT_POINTS)
     return np.arange(count)[::stride] * dt, step[::stride], integrating, float(gain)
 

@@ -132,8 +132,8 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     own = tuple(q - common for q in plant.output_delays)
     if sum(own) > MOST_APART:
         raise DelayRangeError(
-            f"the delays of the outputs differ by {sum(own)} samples together; a Riccati equation "
-            f"takes them up to {MOST_APART}. Sample the system more slowly, or use one output"
+            f"the delays of the outputs differ by {sum(own)} samples together, the limit is "
+            f"{MOST_APART}. Use a longer sample time, or use one output"
         )
     A, C = _with_outputs(core, own)
     noise = np.zeros_like(A)

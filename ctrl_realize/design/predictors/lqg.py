@@ -155,8 +155,8 @@ def _several_channels(
     n, m = into.shape
     if n + sum(plant.input_delays) > MAX_STATES:
         raise DelayRangeError(
-            f"the controller of several channels has {n + sum(plant.input_delays)} states in a "
-            f"dense matrix; {MAX_STATES} are the most. Sample the plant more slowly, "
+            f"the controller of several channels has {n + sum(plant.input_delays)} states in "
+            f"a dense matrix, the limit is {MAX_STATES}. Use a longer sample time, "
             "cr.design.to_discrete(core, dead_time, dt), or close one channel at a time"
         )
     free = inner, into, np.zeros((1, n)), np.zeros((1, m))

@@ -33,8 +33,8 @@ from .riccati import has_states, riccati, weight_matrix
 MOST_MEMORY = 2e9
 """Bytes for the laws of inputs that act after different delays."""
 TOO_LONG = (
-    "An unstable core is not predicted over so long a dead time in double precision; sample it "
-    "more slowly, or shorten the dead time"
+    "An unstable core cannot be predicted over such a long dead time in double precision; "
+    "use a longer sample time, or a shorter dead time"
 )
 
 
@@ -209,8 +209,8 @@ def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
         )
     if not np.all(np.isfinite(lines)):
         raise UnsuitableSystemError(
-            f"the core is unstable, and grows beyond all numbers within the delay of {max(delays)} "
-            "samples: no controller can stabilize it through so long a dead time"
+            f"the core is unstable and overflows within the delay of {max(delays)} samples: "
+            "no controller can stabilize it over such a long dead time"
         )
     # What is on its way to an output has left the core: no input can change it any more.
     passed = np.zeros((gain.shape[0], sum(plant.output_delays)))
@@ -245,9 +245,9 @@ def _check_forgetting_time(states: int, delays: tuple[int, ...]) -> None:
     size = 8 * steps * states * len(delays)
     if size > MOST_MEMORY:
         raise DelayRangeError(
-            f"the delays of the inputs differ by up to {steps} samples, and the regulator of all "
-            f"of them takes {size / 1e9:.3g} GB; {MOST_MEMORY / 1e9:g} GB are the most. Sample the "
-            "system more slowly, cr.design.to_discrete(core, dead_time, dt), or use one input"
+            f"the delays of the inputs differ by up to {steps} samples, and the regulator "
+            f"would take {size / 1e9:.3g} GB, the limit is {MOST_MEMORY / 1e9:g} GB. Use a "
+            "longer sample time, cr.design.to_discrete(core, dead_time, dt), or use one input"
         )
 
 
@@ -257,8 +257,8 @@ def _check_coupling(price: FloatArray, delays: tuple[int, ...]) -> None:
         i, j = (int(x) for x in np.argwhere(apart & (price != 0))[0])
         raise OptionError(
             f"R couples the inputs {i} and {j}, which have the delays {delays[i]} and "
-            f"{delays[j]}: sent together, they act at different times. Set R[{i}, {j}] to 0, or "
-            "use control.dlqr on the augmented system"
+            f"{delays[j]}: simultaneous inputs act at different times. Set R[{i}, {j}] to 0, "
+            "or use control.dlqr on the augmented system"
         )
 
 

@@ -17,7 +17,10 @@ def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray
     """Return a symmetric weight or covariance of the size that is needed."""
     weight = np.atleast_2d(numbers(given, name))
     if weight.shape != (size, size):
-        raise DataError(f"{name} has shape {weight.shape}; there are {size} {of}")
+        raise DataError(
+            f"{name} has shape {weight.shape}; expected {size} by {size}, one row for each of "
+            f"the {size} {of}"
+        )
     if not np.all(np.isfinite(weight)):
         raise DataError(f"{name} has non-finite entries")
     if not np.allclose(weight, weight.T, rtol=1e-9, atol=0):
@@ -29,9 +32,9 @@ def has_states(core: ct.StateSpace, purpose: str) -> None:
     """Refuse a static core, which has no state to regulate or to estimate."""
     if core.nstates == 0:
         raise UnsuitableSystemError(
-            f"{purpose} needs a core with states; this plant is a static gain behind its dead time"
-            ". design.pid(rule='optimal') or design.smith_predictor with an integral controller "
-            "work on it"
+            f"{purpose} needs a core with states; this plant is a static gain with dead time. "
+            "Use design.pid(rule='optimal'), or design.smith_predictor with an integral "
+            "controller"
         )
 
 
@@ -44,8 +47,9 @@ def riccati(
     # Slycot, where it is there, has errors of its own, all of them ArithmeticErrors.
     except (ArithmeticError, ct.ControlArgument, ValueError) as error:
         raise UnsuitableSystemError(
-            f"the Riccati equation of the core has no stabilizing solution for these {weights} "
-            f"({error}); an unstable or integrating mode may be out of reach or without weight"
+            "the Riccati equation of the core has no stabilizing solution for these "
+            f"{weights} ({error}); an unstable or integrating mode may be uncontrollable, "
+            "unobservable or unweighted"
         ) from error
     return (
         np.atleast_2d(np.asarray(gain, dtype=np.float64)),

@@ -118,12 +118,13 @@ def smith_predictor(
     seconds = None if filter_time is None else positive(filter_time, "filter_time", "time in s")
     if integrating and seconds is None:
         raise UnsuitableSystemError(
-            "the core integrates: in a plain Smith predictor the integrator is a hidden mode that "
-            "drifts, and a load leaves a lasting error. Give filter_time, half the dead time for "
-            f"a start ({0.5 * d * plant.dt:.3g} s)"
+            "the core integrates: in a plain Smith predictor the integrator is an "
+            "uncontrollable mode that drifts, and a load disturbance leaves a steady-state "
+            "error. Give filter_time, for instance half the dead time "
+            f"({0.5 * d * plant.dt:.3g} s)"
         )
     if remove_slow and seconds is None:
-        raise OptionError("remove_slow needs filter_time: it is the filter that removes them")
+        raise OptionError("remove_slow needs filter_time: the filter removes the slow poles")
     slow = _slow_poles(poles, d) if remove_slow else np.zeros(0)
     drop = np.concatenate([slow, [1.0]]) if integrating else slow
     removed, kept = split_modes(
@@ -156,8 +157,8 @@ def smith_predictor(
     refuse_unstable(
         check,
         "the Smith predictor",
-        "Its closed loop is that of core and controller alone: give a controller whose loop with "
-        "system.delay_free is stable (design.margins(system.delay_free, controller))",
+        "Its closed loop is that of the core and the controller: choose a controller that "
+        "stabilizes system.delay_free (design.margins(system.delay_free, controller))",
     )
     warn_of(check, "give a longer filter_time or a slower controller", stacklevel=3)
     return made(check=check, robustness=check.robustness)
@@ -167,15 +168,15 @@ def _refuse_unstable(poles: FloatArray) -> None:
     outside = poles[np.abs(poles) > 1 + ON_CIRCLE]
     if outside.size:
         raise UnsuitableSystemError(
-            f"the core is unstable (pole at {complex(outside[0]):.6g}): the predictor holds a copy "
-            "of the unstable mode that no measurement corrects, so any error grows. Use "
-            "design.lqg, whose estimator corrects it"
+            f"the core is unstable (pole at {complex(outside[0]):.6g}): the predictor "
+            "contains a copy of the unstable mode that no measurement corrects, so any error "
+            "grows. Use design.lqg, whose estimator corrects it"
         )
     on = poles[np.abs(np.abs(poles) - 1) <= ON_CIRCLE]
     if np.any(np.abs(on - 1) > ON_CIRCLE) or on.size > 1:
         raise UnsuitableSystemError(
-            f"the core has {on.size} poles on the unit circle; at most one, at z = 1, can be taken "
-            "out of the predictor. Use design.lqg"
+            f"the core has {on.size} poles on the unit circle; at most one, at z = 1, can be "
+            "removed from the predictor. Use design.lqg"
         )
 
 
@@ -193,7 +194,8 @@ def _filter(
     alpha = float(np.exp(-plant.dt / seconds))
     if np.any(np.abs(slow - alpha) < 1e-6):
         raise OptionError(
-            f"filter_time={seconds:g} s is the time constant of a pole to remove; choose another"
+            f"filter_time={seconds:g} s equals the time constant of a pole to be removed; "
+            "choose another value"
         )
     return predictor_filter(alpha, int(plant.delay), slow, integrating=integrating)
 

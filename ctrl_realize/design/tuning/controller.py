@@ -82,12 +82,12 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         self.check = check
         if self.td < 0 or self.tf < 0 or (self.td > 0 and self.tf == 0):
             raise OptionError(
-                f"td={self.td:g} s, tf={self.tf:g} s; needed are td >= 0 and, with a derivative, "
-                "tf > 0 (td/10 is usual)"
+                f"td={self.td:g} s, tf={self.tf:g} s; expected td >= 0 and, with a "
+                "derivative, tf > 0 (td/10 is usual)"
             )
         step = real(dt, "dt", "sample time in s, 0 for continuous")
         if step < 0:
-            raise OptionError(f"dt={step:g}; needed is a sample time in s, or 0 for continuous")
+            raise OptionError(f"dt={step:g}; expected a sample time in s, or 0 for continuous")
         self.kind = "P" + "I" * (self.ti < float("inf")) + "D" * (self.td > 0)
         super().__init__(
             *self._matrices(step),

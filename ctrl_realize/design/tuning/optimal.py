@@ -149,8 +149,8 @@ def _problem(
     poles = np.abs(np.asarray(plant.delay_free.poles()))
     if np.any(poles > 1 + 1e-9):
         raise UnsuitableSystemError(
-            "the plant is unstable; the limit on the sensitivity does not tell stability there. "
-            "Use design.lqg"
+            "the plant is unstable, where a limit on the sensitivity does not imply "
+            "stability. Use design.lqg"
         )
     loop = open_loop(plant)
     # Finer than for bracketing: the limit is read at the points of the grid.

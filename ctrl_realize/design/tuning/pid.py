@@ -172,18 +172,20 @@ def tuned(
     method = one_of(method, "method", DISCRETIZATIONS)
     known = kinds_of(rule)
     if kind not in known:
-        raise OptionError(f"rule={rule!r} has no {kind}; it knows {', '.join(known)}")
+        raise OptionError(f"rule={rule!r} has no {kind}; available: {', '.join(known)}")
     ratio = real(derivative_filter, "derivative_filter", "td / tf")
     if not 1 <= ratio <= 100:
-        raise OptionError(f"derivative_filter={ratio:g}; needed is td / tf in 1...100")
+        raise OptionError(f"derivative_filter={ratio:g}; expected td / tf in 1...100")
     target = None
     if closed_loop_time is not None:
         if rule not in ("simc", "lambda", "imc"):
-            raise OptionError(f"closed_loop_time is for simc, lambda and imc, not for {rule!r}")
+            raise OptionError(
+                f"closed_loop_time is an argument of simc, lambda and imc, not of {rule!r}"
+            )
         target = positive(closed_loop_time, "closed_loop_time", "time in s")
     limit = real(max_sensitivity, "max_sensitivity", "Ms")
     if not 1.01 <= limit <= 10:
-        raise OptionError(f"max_sensitivity={limit:g}; needed is Ms in 1.01...10")
+        raise OptionError(f"max_sensitivity={limit:g}; expected Ms in 1.01...10")
     plant, step = reference_plant(system, dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
@@ -231,7 +233,7 @@ def _one_that_works(system: Any, rule: str, kind: str, options: dict[str, Any]) 
         if found.stable and found.ms <= MOST_SENSITIVE:
             how = f"rule={name!r}, kind={form!r}, reduction={reduction!r}"
             return f"Use {how}, which is stable on it with Ms = {found.ms:.3g}"
-    return "None of the other rules does better; look at design.compare_pid, or use design.lqg"
+    return "No other rule does better; see design.compare_pid, or use design.lqg"
 
 
 def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, float]:
@@ -247,8 +249,8 @@ def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, f
     warn_unresolved(plant)
     if dt is not None:
         raise OptionError(
-            f"dt={dt:g} is for process models; the controller of a system takes its sample time, "
-            f"{plant.dt:g} s"
+            f"dt={dt:g} is an argument for process models; the controller of a sampled system "
+            f"has its sample time, {plant.dt:g} s"
         )
     return plant, float(plant.dt)
 
@@ -275,11 +277,13 @@ def _total_time(system: Any, plant: DelayedStateSpace) -> float:
 
 def _ultimate(plant: DelayedStateSpace, kind: str) -> Parameters:
     if np.any(np.abs(np.asarray(plant.delay_free.poles())) > 1 + 1e-9):
-        raise UnsuitableSystemError("the plant is unstable; it has no ultimate gain to start from")
+        raise UnsuitableSystemError("the plant is unstable and has no ultimate gain")
     reverse = bool(np.real(plant.step(plant.delay + SETTLED)[-1]) < 0)
     found = margins(-plant if reverse else plant)
     if found.gain_margins.size == 0:
-        raise UnsuitableSystemError("the plant never turns by 180 deg: it has no ultimate gain")
+        raise UnsuitableSystemError(
+            "the phase of the plant never reaches -180 deg: it has no ultimate gain"
+        )
     at = int(np.argmin(found.gain_margins))
     gain, omega = float(found.gain_margins[at]), float(found.phase_crossovers[at])
     kp, ti, td = ultimate(gain, 2 * np.pi / omega, kind)

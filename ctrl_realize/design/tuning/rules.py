@@ -32,8 +32,8 @@ def simc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Para
         return kp, ti if "I" in kind else INF, 0.0
     if second == 0:
         raise OptionError(
-            "simc gives a derivative only for a second lag; use kind='PI', or a model from "
-            "reduce_sopdt"
+            "simc has a derivative only for models with a second lag; use kind='PI', or a "
+            "model from reduce_sopdt"
         )
     if "I" not in kind:
         return kp, INF, second
@@ -123,14 +123,14 @@ def ultimate(gain: float, period: float, kind: str) -> Parameters:
 
 def _dead_time(model: ProcessModel, rule: str) -> float:
     if model.dead_time <= 0:
-        raise OptionError(f"rule={rule!r} divides by the dead time, and the model has none")
+        raise OptionError(f"rule={rule!r} divides by the dead time, but the model has none")
     return model.dead_time
 
 
 def _needs_lag(model: ProcessModel, rule: str) -> None:
     if model.integrating or not np.isfinite(model.lag):
         raise UnsuitableSystemError(
-            f"rule={rule!r} is for models with a lag, not for integrating ones; use 'simc', "
+            f"rule={rule!r} is for models with a lag, not for integrating models; use 'simc', "
             "'lambda', 'amigo' or 'optimal'"
         )
 

@@ -202,7 +202,7 @@ def compare_pid(
             made.append((controller.checked(check), check.margins, reached))
     if not made:
         reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
-        raise OptionError(f"no rule could tune this plant: {reasons or 'none knows these kinds'}")
+        raise OptionError(f"no rule could tune this plant: {reasons or 'none has these kinds'}")
     controllers, found_margins, found_performance = zip(*made, strict=True)
     return PIDComparison(controllers, found_margins, found_performance, tuple(refused))
 

@@ -176,7 +176,7 @@ def identify_row(
         return store.save(key, row)
     except (CtrlRealizeError, OSError) as error:
         # A full disk, or labels that no file takes: the result is there, and will be made again.
-        text = spelled_out(f"not kept in the store: {error}"[:_LONGEST_ERROR])
+        text = spelled_out(f"not saved in the store: {error}"[:_LONGEST_ERROR])
         return replace(row, warnings=(*row.warnings, text))
 
 
@@ -184,7 +184,7 @@ def read_source(source: RecordSource) -> Record:
     """Return a source's record, read if it is a function."""
     record = source if isinstance(source, Record) else source()
     if not isinstance(record, Record):
-        raise DataError(f"the function gave a {type(record).__name__}; needed is a Record")
+        raise DataError(f"the function returned a {type(record).__name__}; expected a Record")
     return record
 
 

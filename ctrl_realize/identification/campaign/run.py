@@ -72,16 +72,16 @@ def identify_campaign(
     method = one_of(method, "method", METHODS)
     _check_options(options)
     if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or not 0 < abs(n_jobs) <= 10_000:
-        raise OptionError(f"n_jobs={n_jobs!r}; needed is a number of processes, or -1 for all")
+        raise OptionError(f"n_jobs={n_jobs!r}; expected a number of processes, or -1 for all")
     if not isinstance(records, Iterable):
-        raise DataError(f"records is a {type(records).__name__}; needed are several records")
+        raise DataError(f"records is a {type(records).__name__}; expected several records")
     sources = list(records)
     if not sources:
         raise DataError("there are no records to identify")
     for position, source in enumerate(sources):
         if not isinstance(source, Record) and not callable(source):
             raise DataError(
-                f"records[{position}] is a {type(source).__name__}; needed is a Record, or a "
+                f"records[{position}] is a {type(source).__name__}; expected a Record, or a "
                 "function that returns one (functools.partial(read_record, path))"
             )
     found = identified(sources, n_jobs, method, options, store)

@@ -93,6 +93,8 @@ def _dead(source: RecordSource, position: int, error: Exception) -> CampaignRow:
     how = f" ({codes[1]})" if codes else ""
     return CampaignRow(
         source_name(source, position),
-        error=f"the process that identified this record was killed by the system{how}, also where "
-        "it had nothing else to do; most often the memory is exhausted",
+        error=(
+            f"the process that identified this record was killed by the system{how}, even "
+            "when run alone; the usual cause is lack of memory"
+        ),
     )

@@ -135,7 +135,9 @@ def impulse_from_io(
     kernel = one_of(kernel, "kernel", ("auto", "TC", "DC", "SS"))
     start = one_of(start, "start", ("unknown", "rest"))
     if arx_order is not None and method != "okid":
-        raise OptionError(f"arx_order={arx_order!r} belongs to method='okid', not {method!r}")
+        raise OptionError(
+            f"arx_order={arx_order!r} is an argument of method='okid', not of {method!r}"
+        )
     group = as_group(records)
     longest = max(record.n_samples for record in group)
     most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].ninputs), 2)

@@ -155,7 +155,7 @@ def through_arx(
             )
         orders = orders[:-1]
     if not np.all(np.diag(equations.gram) > 0):
-        raise DataError("an output does not move at all: no ARX model follows from it")
+        raise DataError("an output is constant: no ARX model can be estimated")
     if excited_directions(equations.gram) < equations.gram.shape[0]:
         # Without noise the output follows many models of high order; any of them will do.
         equations = replace(
@@ -168,8 +168,9 @@ def through_arx(
             fit = solve_arx(equations.take(columns), order, order + 1)
         except np.linalg.LinAlgError:
             raise DataError(
-                f"the equations of an ARX model of order {order} are rounding: the output moves "
-                "by too little beside its level; take the level out, or record more digits"
+                f"the equations of an ARX model of order {order} are dominated by rounding: "
+                "the output moves too little compared with its level; subtract the level, or "
+                "record more digits"
             ) from None
         misfit = equations.rows * np.linalg.slogdet(fit.noise)[1]
         fits[misfit + p * len(columns) * np.log(equations.rows)] = (order, fit)
@@ -227,8 +228,8 @@ def _with_moving_outputs(equations: NormalEquations) -> NormalEquations:
 
 def _unexcited(excited: int, wanted: int) -> str:
     return (
-        f"the input does not excite {wanted - excited} of the {wanted} lags asked for (a constant "
-        "excites none, a sine two); choose a shorter length"
+        f"the input does not excite {wanted - excited} of the {wanted} requested lags (a "
+        "constant excites none, a sine two); choose a shorter length"
     )
 
 
@@ -245,14 +246,17 @@ def _check_rows(equations: Sequence[NormalEquations], needed: int, past: int) ->
     if freedom < needed:
         raise DataError(
             f"only {sum(e.rows for e in equations)} samples have a complete past of {past} "
-            f"samples, and {needed + len(equations)} are needed; choose a shorter length, take "
-            "more records, or start='rest' when the plant was at rest before"
+            f"samples, at least {needed + len(equations)} are needed; choose a shorter "
+            "length, use more records, or start='rest' if the plant was at rest before"
         )
 
 
 def _silence(silent: NDArray[np.bool_]) -> tuple[Flag, ...]:
     """Flag the outputs that do not follow the input."""
     return tuple(
-        Flag("no_response", f"output {a} shows no response to the input above the noise")
+        Flag(
+            "no_response",
+            f"output {a} shows no response to the input above the noise level level level level",
+        )
         for a in np.flatnonzero(silent)
     )

@@ -65,7 +65,7 @@ def common_sample_time(records: tuple[Record, ...]) -> float:
         if abs(record.dt - first) > 1e-6 * first:
             raise DataError(
                 f"{named('record', record.name)} has dt={record.dt:g} s, the first has "
-                f"{first:g} s; records that are fitted together need one sample time"
+                f"{first:g} s; records fitted together need the same sample time"
             )
     return first
 

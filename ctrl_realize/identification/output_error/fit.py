@@ -215,7 +215,9 @@ def _fit_mean(
         mean = mean_step(steps, skip)
         data = step_data(mean.output, mean.input, mean.dt, [(mean.edge, 1)])
         if data.motion is None:
-            raise DataError("the mean of the records does not leave its rest level by 5 sigma")
+            raise DataError(
+                "the mean of the records does not leave its baseline by 5 standard deviations"
+            )
         fit = fit_step_record(data, latest=latest, **settings)
         own = own_regressors(data, fit.poles if fit.relaxing else None)
         repeats = repeatability(steps, mean, fit.fitted, fit.delay, own)
@@ -241,13 +243,13 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
         moves = float(np.ptp(record.output))
         if moves < LEAST_MOVE:
             raise DataError(
-                f"the output of {named('record', record.name)} does not leave its rest level: it "
-                f"moves by {moves:.3g} in all"
+                f"the output of {named('record', record.name)} does not leave its baseline: "
+                f"its range is {moves:.3g}"
             )
         if not record.issiso():
             raise DataError(
                 f"{named('record', record.name)} has {record.ninputs} inputs and "
-                f"{record.noutputs} outputs; choose one of each when it is made"
+                f"{record.noutputs} outputs; select one of each when the record is made"
             )
     return several
 
@@ -260,10 +262,10 @@ def _structures(structures: Sequence[tuple[int, int]] | None) -> tuple[Structure
         try:
             n, r = (int(number) for number in pair)
         except (TypeError, ValueError):
-            raise OptionError(f"structure {pair!r}; needed is (order, relative_degree)") from None
+            raise OptionError(f"structure {pair!r}; expected (order, relative_degree)") from None
         if not (1 <= r <= n <= MOST_ORDER):
             raise OrderError(
-                f"structure ({n}, {r}); needed is 1 <= relative degree <= order <= {MOST_ORDER}"
+                f"structure ({n}, {r}); expected 1 <= relative degree <= order <= {MOST_ORDER}"
             )
         chosen.append(Structure(n, r))
     if not chosen:
@@ -280,8 +282,9 @@ def _step_data(record: Record) -> StepData | None:
     data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edges])
     if data.motion is None:
         raise DataError(
-            f"the output of {named('record', record.name)} does not leave its rest level by "
-            f"5 sigma ({5 * data.sigma:.3g}) for long after the step at {edges[0].time:.6g} s"
+            f"the output of {named('record', record.name)} does not leave its baseline by 5 "
+            f"standard deviations ({5 * data.sigma:.3g}) for long after the step at "
+            f"{edges[0].time:.6g} s"
         )
     if len(edges) > 1 and edges[1].index - edges[0].index < _DWELL * data.motion.crossing:
         return None

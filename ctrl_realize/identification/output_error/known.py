@@ -25,20 +25,20 @@ def known_factor(known: Any) -> KnownFactor:
         return KnownFactor()
     if not isinstance(known, (ct.StateSpace, ct.TransferFunction)):
         raise UnsuitableSystemError(
-            f"known is a {type(known).__name__}; needed is a control.TransferFunction or StateSpace"
+            f"known is a {type(known).__name__}; expected a control.TransferFunction or StateSpace"
         )
     if not known.issiso() or not known.isctime():
         raise UnsuitableSystemError(
-            f"known has {known.ninputs} inputs, {known.noutputs} outputs and dt={known.dt}; needed "
-            "is a continuous system with one of each (a sensor, a filter)"
+            f"known has {known.ninputs} inputs, {known.noutputs} outputs and dt={known.dt}; "
+            "expected a continuous system with one of each (a sensor or a filter)"
         )
     zeros, poles, gain = _zeros_poles_gain(known)
     if zeros.size > poles.size:
-        raise UnsuitableSystemError("known has more zeros than poles; needed is a proper system")
+        raise UnsuitableSystemError("known has more zeros than poles; expected a proper system")
     if poles.size and np.max(poles.real) >= 0:
         raise UnsuitableSystemError(
-            f"known has a pole at {complex(poles[np.argmax(poles.real)]):.3g} rad/s; needed is a "
-            "stable system (give integrators to the plant)"
+            f"known has a pole at {complex(poles[np.argmax(poles.real)]):.3g} rad/s; expected "
+            "a stable system (count integrators to the plant)"
         )
     numerator = np.atleast_1d(np.real(np.poly(zeros))) * gain
     return KnownFactor(_apart(poles), numerator.astype(np.float64))

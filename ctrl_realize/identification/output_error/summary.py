@@ -92,7 +92,7 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     elif fit.correlation > 1:
         reasons.append(
             f"the residual is correlated: {fit.correlation:.3g} samples count as one "
-            "independent sample independent sample independent sample"
+            "independent sample"
         )
     return tuple(reasons)
 

@@ -119,9 +119,9 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
     rank = int(np.count_nonzero(models.singular_values[delay, :order]))
     if rank < order:
         raise OrderError(
-            f"order={order}, but at the best delay of {delay} samples the data have the "
-            f"numerical rank {rank}; "
-            + (f"use an order of at most {rank}" if rank else "they are zero: a pure gain")
+            f"order={order}, but at the best delay of {delay} samples the numerical rank of "
+            f"the data is {rank}; "
+            + (f"use an order of at most {rank}" if rank else "the data are zero: a pure gain")
         )
     system = realize(
         surface.impulse,

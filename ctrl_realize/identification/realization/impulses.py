@@ -32,9 +32,7 @@ def as_impulse(impulse: ImpulseResponse | ArrayLike, dt: float | None) -> Impuls
     """Return an impulse response as it is, or make one of an array with a sample time."""
     if isinstance(impulse, ImpulseResponse):
         if dt is not None and dt != impulse.dt:
-            raise OptionError(
-                f"dt={dt!r}, the impulse response has dt={impulse.dt:g}; leave dt out"
-            )
+            raise OptionError(f"dt={dt!r}, the impulse response has dt={impulse.dt:g}; omit dt")
         return impulse
     if dt is None:
         raise OptionError(
@@ -106,10 +104,10 @@ def settled_samples(impulse: ImpulseResponse, order: int, max_delay: int) -> int
     affordable = MOST_WORK // (max_delay + 1)
     if affordable < min(fits, max(3 * max_delay, 256, 8 * order)):
         raise DataError(
-            f"a scan of {max_delay + 1} delays over {fits} samples would take hours: the response "
-            "is sampled far more finely than it moves; take every so many samples (of the record, "
-            "behind a low-pass), give max_delay= and samples=, or use fit_output_error, which "
-            "takes samples together by itself"
+            f"a scan of {max_delay + 1} delays over {fits} samples would take hours: the "
+            "response is strongly oversampled; decimate the record (after a low-pass "
+            "filter), give max_delay= and samples=, or use fit_output_error, which averages "
+            "neighbouring samples itself"
         )
     return min(fits, affordable, max(3 * settled, 256, 8 * order))
 

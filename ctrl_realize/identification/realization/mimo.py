@@ -154,7 +154,7 @@ def delay_matrix(
     data = as_impulse(impulse, dt)
     share = real(level, "level", "part of the largest Markov parameter")
     if not 0 <= share < 1:
-        raise OptionError(f"level={level!r}; needed is a part of the largest value, 0 <= level < 1")
+        raise OptionError(f"level={level!r}; expected a part of the largest value, 0 <= level < 1")
     size = np.abs(channels(data))
     top = size.max(axis=-1, keepdims=True)
     limit = np.maximum(share * top, 1e-12 * size.max())
@@ -257,7 +257,7 @@ def realize_mimo(
     found = delay_matrix(data, level=level) if delays is None else given_delays(delays, markov)
     known = found >= 0
     if not known.any():
-        raise DataError("no channel has a response; is the input connected?")
+        raise DataError("no channel has a response; check that the input is connected")
     splits = split_delays(found, known)
     if choice == "auto" and not np.any(known & (found != np.add.outer(*splits[0]))):
         choice = "common"
@@ -301,11 +301,11 @@ def given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
     p, m, N = markov.shape
     if found.shape != (p, m) or found.dtype.kind not in "iu" or np.any(found < -1):
         raise DelayRangeError(
-            f"delays has shape {found.shape} and dtype {found.dtype}; needed are whole numbers "
+            f"delays has shape {found.shape} and dtype {found.dtype}; expected whole numbers "
             f">= -1 of shape {(p, m)}"
         )
     if found.max() > N - 3:
-        raise DelayRangeError(f"a delay of {found.max()} leaves nothing of {N} samples to realize")
+        raise DelayRangeError(f"a delay of {found.max()} leaves none of the {N} samples to realize")
     return found.astype(np.int64)
 
 

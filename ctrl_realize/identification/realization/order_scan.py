@@ -265,6 +265,6 @@ def _orders(orders: int | Iterable[int]) -> tuple[int, ...]:
     if isinstance(orders, Iterable):
         tried = sorted({whole(order, "orders", 1) for order in orders})
         if not tried:
-            raise OptionError("orders is empty; needed is at least one order")
+            raise OptionError("orders is empty; expected at least one order")
         return tuple(tried)
     return tuple(range(1, whole(orders, "orders", 1) + 1))

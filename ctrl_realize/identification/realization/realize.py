@@ -120,8 +120,9 @@ def realize(
     rank = int(np.count_nonzero(model.singular_values[:order]))
     if rank < order:
         raise OrderError(
-            f"order={order}, but the data behind {delay} samples have the numerical rank {rank}; "
-            + (f"use an order of at most {rank}" if rank else "they are zero: a pure gain")
+            f"order={order}, but the numerical rank of the data after {delay} samples is "
+            f"{rank}; "
+            + (f"use an order of at most {rank}" if rank else "the data are zero: a pure gain")
         )
     direct = uses_feedthrough(data, delay, feedthrough)
     D = markov[:, :, delay] if direct else np.zeros(markov.shape[:2])

@@ -195,7 +195,7 @@ def _from_start(
     unseen = sum(flag.code == "no_response" for flag in impulse.flags)
     if unseen == group[0].noutputs:
         raise DataError(
-            "no output shows a response to the inputs above the noise; are the channels right?"
+            "no output shows a response to the inputs above the noise level; check the columns"
         )
     search = Search(group, markov, max(asked or ORDERS), enough)
     orders = search.orders(asked)
@@ -227,7 +227,10 @@ def _silence(best: Candidate) -> tuple[Flag, ...]:
     count = 2 * best.order + best.found.model.D.shape[1] * best.feedthrough
     gain = found.counts * np.log(found.spread / found.variance)
     return tuple(
-        Flag("no_response", f"output {a} shows no response to the input above the noise")
+        Flag(
+            "no_response",
+            f"output {a} shows no response to the input above the noise level",
+        )
         for a in np.flatnonzero(gain < count * np.log(found.counts))
     )
 
@@ -301,7 +304,7 @@ def refine_state_space(
     model = as_delayed(system, group[0], stable=False)
     core = model.delay_free
     if core.nstates == 0:
-        raise UnsuitableSystemError("the system is a pure gain; it has no dynamics to refine")
+        raise UnsuitableSystemError("the system is a pure gain without dynamics to refine")
     given = bool(np.any(core.D)) if feedthrough is None else bool(feedthrough)
     shares = model.input_delays, model.output_delays
     found = fit_sections(
@@ -316,18 +319,18 @@ def _orders(order: int | Iterable[int] | None) -> tuple[int, ...] | None:
     given = order if isinstance(order, Iterable) else (order,)
     orders = tuple(sorted({whole(n, "order", 1) for n in given}))
     if not orders:
-        raise OrderError("order is empty; needed is at least one order")
+        raise OrderError("order is empty; expected at least one order")
     return orders
 
 
 def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
     if feedthrough not in (None, True, False):
-        raise OptionError(f"feedthrough={feedthrough!r}; needed is True, False or None")
+        raise OptionError(f"feedthrough={feedthrough!r}; expected True, False or None")
     for i, record in enumerate(group):
         if np.isnan(record.input).any():
             raise DataError(
-                f"record {i} has gaps in its input: what the plant does then is not known; use "
-                "the records between them, or impulse_from_io"
+                f"record {i} has missing samples in its input; use the parts between the gaps "
+                "as records, or impulse_from_io"
             )
     for name in ("input", "output"):
         known = [np.atleast_2d(getattr(record, name)) for record in group]
@@ -338,8 +341,8 @@ def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
         size = np.fmax.reduce(ends, axis=0)
         if np.any(size < LEAST):
             raise DataError(
-                f"{name} {int(np.argmin(size))} stays below {LEAST:g}; squares of it vanish: "
-                "choose another unit, or is it connected?"
+                f"{name} {int(np.argmin(size))} stays below {LEAST:g}, where squares "
+                "underflow; choose another unit, or check that it is connected"
             )
 
 

@@ -122,7 +122,7 @@ class Search:
         missing = sorted(set(tried) - set(possible))
         if missing and (asked is not None or not possible):
             why = (
-                f"{self._samples} samples are too few"
+                f"{self._samples} samples are not enough"
                 if missing[0] > self.highest
                 else "the input does not excite enough (a sine, or inputs that move together)"
             )

@@ -85,7 +85,7 @@ def impulse_from_step(
     [0.     0.     0.01   0.0099]
     """
     if not isinstance(step, StepResponse):
-        raise DataError(f"step is a {type(step).__name__}; needed is a StepResponse, see unit_step")
+        raise DataError(f"step is a {type(step).__name__}; expected a StepResponse, see unit_step")
     order = whole(filter_order, "filter_order", 1, 10)
     difference = one_of(difference, "difference", ("backward", "central"))
     cutoff = _cutoff(step, cutoff_hz)
@@ -125,8 +125,8 @@ def _cutoff(step: StepResponse, cutoff_hz: float | str | None) -> float | None:
     cutoff = positive(cutoff_hz, "cutoff_hz", "cut-off in Hz")
     if cutoff >= rate / 2:
         raise OptionError(
-            f"cutoff_hz={cutoff:g} Hz; needed is below half the sample rate, {rate / 2:g} Hz "
-            "(None filters nothing)"
+            f"cutoff_hz={cutoff:g} Hz; expected a value below half the sample rate, "
+            f"{rate / 2:g} Hz (None filters nothing)"
         )
     if settling_samples(cutoff, step.dt) > 10 * (step.output.size + step.pre_step.size):
         raise OptionError(

@@ -85,13 +85,13 @@ def found_step(
         spikes = whole(spike_samples, "spike_samples", 0, record.n_samples // 3)
     share = real(min_share, "min_share", "part of the input's range, above 0 and below 1")
     if not 0 < share < 1:
-        raise OptionError(f"min_share={share:g}; needed is above 0 and below 1")
+        raise OptionError(f"min_share={share:g}; expected a value above 0 and below 1")
     found = find_edges(signal, spikes, share, most)
     if not found and np.ptp(signal) == 0:
         raise NoStepError(
-            f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the record "
-            "begins with its step, put samples of the rest before it in front; if not, check which "
-            "column is the input"
+            f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the "
+            "record begins with its step, prepend samples of the steady state before it; "
+            "otherwise check which column is the input"
         )
     if not found:
         raise NoStepError(
@@ -103,7 +103,10 @@ def found_step(
     edges = tuple(_to_step_edge(edge, record) for edge in found)
     highest = max(abs(edge.amplitude) for edge in edges)
     if highest < 1 / EXTREME:
-        raise NoStepError(f"the largest edge {_of(record)} is {highest:g} high, which is nothing")
+        raise NoStepError(
+            f"the largest edge {_of(record)} has the height {highest:g} and cannot be "
+            "distinguished from zero"
+        )
     main = next(edge for edge in edges if abs(edge.amplitude) >= 0.5 * highest)
     if main.index + main.samples >= record.n_samples:
         raise NoStepError(
@@ -160,14 +163,14 @@ def unit_step(
     y = _single(record.output, "output", record)
     at = detect_step(record) if edge is None else edge
     if not isinstance(at, StepEdge):
-        raise OptionError(f"edge is a {type(at).__name__}; needed is what detect_step returns")
+        raise OptionError(f"edge is a {type(at).__name__}; expected the result of detect_step")
     if not (0 <= at.index < at.stop <= record.n_samples and 0 <= at.start <= at.index):
         raise DataError(
             f"the edge lies at samples {at.start}...{at.index}...{at.stop}, the record has "
-            f"{record.n_samples} samples; is it the edge of another record?"
+            f"{record.n_samples} samples; check that it belongs to this record"
         )
     if abs(at.amplitude) < 1 / EXTREME:
-        raise DataError(f"the edge is {at.amplitude:g} high; nothing can be divided by that")
+        raise DataError(f"the edge has the amplitude {at.amplitude:g}, which cannot be divided by")
     if at.stop - at.index < 5:
         raise DataError(
             f"only {at.stop - at.index} samples follow the step {_of(record)} before the next "
@@ -196,8 +199,8 @@ def _single(signal: FloatArray, what: str, record: Record) -> FloatArray:
     check_complete(record, "a step response")
     if signal.ndim == 2 and signal.shape[0] > 1:
         raise DataError(
-            f"the record has {signal.shape[0]} {what}s ({', '.join(_labels(record, what))}); a "
-            "step response is taken of one, choose it when the record is made"
+            f"the record has {signal.shape[0]} {what}s ({', '.join(_labels(record, what))}); "
+            "a step response has one; select it when the record is made"
         )
     return signal if signal.ndim == 1 else signal[0]
 

@@ -18,7 +18,7 @@ def check_candidates(min_delay: int, max_delay: int) -> tuple[int, int]:
     """Return the first and the last candidate."""
     low, high = whole(min_delay, "min_delay", 0), whole(max_delay, "max_delay", 0)
     if high <= low:
-        raise DelayRangeError(f"delays {low}...{high} leave nothing to choose from")
+        raise DelayRangeError(f"delays {low}...{high} leave only one candidate")
     return low, high
 
 
@@ -27,13 +27,13 @@ def check_forgetting_time(forgetting_time: float, dt: float, max_delay: int) -> 
     span = positive(forgetting_time, "forgetting_time", "time in s") / dt
     if span > LONGEST:
         raise OptionError(
-            f"forgetting_time={forgetting_time:g} s is {span:.4g} samples; needed are at most "
+            f"forgetting_time={forgetting_time:g} s is {span:.4g} samples; expected at most "
             f"{LONGEST:g}"
         )
     if span <= max_delay:
         raise DelayRangeError(
             f"forgetting_time={forgetting_time:g} s is {span:.4g} samples, and delays up to "
-            f"{max_delay} samples are to be seen; needed is a longer forgetting_time"
+            f"{max_delay} samples are to be seen; expected a longer forgetting_time"
         )
     return span
 
@@ -51,17 +51,15 @@ def model_noise(model: ct.StateSpace, given: float | None) -> float:
 def check_start(core: ct.StateSpace) -> None:
     """Refuse a model that cannot be followed by simulation."""
     if not isinstance(core, ct.StateSpace) or not core.issiso():
-        raise UnsuitableSystemError("the model to start from must be a system of one channel")
+        raise UnsuitableSystemError("the initial model must have one input and one output")
     if not core.isdtime(strict=True) or core.dt is True:
-        raise UnsuitableSystemError(
-            "the model to start from must be discrete, with its sample time"
-        )
+        raise UnsuitableSystemError("the initial model must be discrete, with a sample time")
     check_entries(core)
     worst = np.abs(core.poles()).max(initial=0.0)
     if worst > 1 + 1e-9:
         raise UnsuitableSystemError(
-            f"the model to start from is unstable (a pole at |z| = {worst:.6g}), so its output "
-            "cannot be followed by simulation"
+            f"the initial model is unstable (a pole at |z| = {worst:.6g}); expected a stable "
+            "one, whose output can be simulated"
         )
     if not np.any(core.C) and not np.any(core.D):
-        raise OptionError("the model to start from is zero")
+        raise OptionError("the initial model is zero")

@@ -205,15 +205,15 @@ class DelayTracker:
             u, y = float(u), float(y)
         except (TypeError, ValueError):
             raise DataError(
-                f"sample {self._count} is u={u!r}, y={y!r}; needed is one number each (run takes "
-                "a whole record)"
+                f"sample {self._count} is u={u!r}, y={y!r}; expected one number each (for a "
+                "whole record see run)"
             ) from None
         if not (np.isfinite(u) and np.isfinite(y)):
-            raise DataError(f"sample {self._count} is u={u}, y={y}; needed are finite numbers")
+            raise DataError(f"sample {self._count} is u={u}, y={y}; expected finite numbers")
         if max(abs(u), abs(y)) > EXTREME:
             raise DataError(
                 f"sample {self._count} is u={u:g}, y={y:g}; beyond {EXTREME:g}, where squares "
-                "overflow, there is no measurement"
+                "overflow, is not a plausible measurement"
             )
         if self._count == 0:
             # What was before is rest; large offsets would cost digits.
@@ -295,7 +295,7 @@ class DelayTracker:
         """
         check_complete(record, "DelayTracker.run")
         if not record.issiso():
-            raise DataError(f"{record!r} has several channels; needed is one input and one output")
+            raise DataError(f"{record!r} has several channels; expected one input and one output")
         if not np.isclose(record.dt, self.dt, rtol=1e-3, atol=0):
             raise DataError(
                 f"the record has the sample time {record.dt:g} s, the model {self.dt:g} s"

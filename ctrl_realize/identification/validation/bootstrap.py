@@ -95,7 +95,9 @@ class Bootstrap(Result):
         """Whether draws failed, and whether the output's rounding hides from them."""
         found = []
         if self.failed:
-            found.append(Flag("failed_draws", f"the method gave an error for {self.failed} draws"))
+            found.append(
+                Flag("failed_draws", f"the estimator raised an error for {self.failed} draws")
+            )
         fitted = () if self.system.fit is None else self.system.fit.flags
         if any(flag.code == "coarse_quantisation" for flag in fitted):
             found.append(
@@ -228,7 +230,7 @@ def bootstrap(
     count = whole(repeats, "repeats", 2)
     whole(seed, "seed", 0)
     if not callable(estimator):
-        raise OptionError(f"estimator={estimator!r}; needed is a function of the records")
+        raise OptionError(f"estimator={estimator!r}; expected a function of the records")
     several = as_records(records)
     system = estimator(records)
     draws: list[Any]
@@ -256,7 +258,7 @@ def bootstrap(
     models = Parallel(n_jobs=n_jobs)(delayed(_identified)(estimator, draw) for draw in draws)
     found = tuple(model for model in models if model is not None)
     if len(found) < 2:
-        raise DataError(f"the method gave an error for {count - len(found)} of {count} draws")
+        raise DataError(f"the estimator raised an error for {count - len(found)} of {count} draws")
     return Bootstrap(
         system,
         tuple(model for model, _ in found),
@@ -270,7 +272,7 @@ def bootstrap(
 def _band(values: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
     """Middle part of the values (B, K), at every K."""
     if not 0 < level < 1:
-        raise OptionError(f"level={level!r}; needed is above 0 and below 1")
+        raise OptionError(f"level={level!r}; expected a value above 0 and below 1")
     return _middle(values, level)
 
 

@@ -75,7 +75,7 @@ def cross_validate(
     several = as_records(records)
     models = systems if isinstance(systems, Mapping) else {_name(systems): systems}
     if not models:
-        raise DataError("no models; needed is at least one, such as {'mine': model}")
+        raise DataError("no models; expected at least one, such as {'mine': model}")
 
     def mean_fit(system: Any, record: Record) -> float:
         simulated = simulate_record(system, record, start)

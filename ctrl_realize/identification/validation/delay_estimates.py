@@ -102,7 +102,7 @@ def compare_delay_estimates(
     (True, ['output error', 'scan', 'cross-correlation'])
     """
     if record is None and frf is None:
-        raise DataError("neither a record nor an FRF is given")
+        raise DataError("expected a record or an FRF, got neither")
     if max_delay is not None:
         whole(max_delay, "max_delay", 0)
     if order is not None:
@@ -135,7 +135,7 @@ def _from_record(
 ) -> None:
     check_complete(record, "compare_delay_estimates")
     if not record.issiso():
-        raise DataError(f"{record!r} has several channels; needed is one input and one output")
+        raise DataError(f"{record!r} has several channels; expected one input and one output")
     dt = record.dt
     total, model_order, stepped = 0.1 * record.n_samples * dt, 2, False
     try:

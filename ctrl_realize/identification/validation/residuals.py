@@ -175,5 +175,5 @@ def _level(confidence: float) -> float:
     level = real(confidence, "confidence", "a probability between 0 and 1")
     # beyond, 1 - confidence is lost among the digits, or the bound is zero
     if not 1e-12 <= level <= 1 - 1e-12:
-        raise OptionError(f"confidence={confidence!r}; needed is a number between 0 and 1")
+        raise OptionError(f"confidence={confidence!r}; expected a number between 0 and 1")
     return level

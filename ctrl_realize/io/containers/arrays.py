@@ -60,7 +60,7 @@ def table_of_arrays(path: Path, arrays: Mapping[str, AnyArray], variable: str | 
             columns += _columns(name, squeezed, nameless=len(arrays) == 1)
     if not columns:
         found = ", ".join(f"{name} {array.shape}" for name, array in list(arrays.items())[:20])
-        raise FileFormatError(f"{path} has no columns of numbers; it has {found or 'nothing'}")
+        raise FileFormatError(f"{path} has no numeric columns; it has {found or 'nothing'}")
     return Table(path, tuple(columns), constants, place="sample {}".format)
 
 

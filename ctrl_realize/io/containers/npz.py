@@ -55,9 +55,7 @@ def _members(path: Path, max_bytes: float) -> dict[str, AnyArray]:
             kind = "an Excel workbook" if "xl/workbook.xml" in archive.namelist() else "a zip file"
             raise FileFormatError(f"{path} is {kind} without arrays: save the data as CSV")
         if len(members) > MAX_ARRAYS:
-            raise FileFormatError(
-                f"{path} has {len(members)} arrays, at most {MAX_ARRAYS} are read"
-            )
+            raise FileFormatError(f"{path} has {len(members)} arrays, the limit is {MAX_ARRAYS}")
         check_size(path, sum(member.file_size for member in members), max_bytes, ", unpacked,")
         for member in members:
             if member.filename.endswith(".npy"):
@@ -76,18 +74,16 @@ def _array(path: Path, file: IO[bytes], what: str, size: int, max_bytes: float) 
     }.get(version)
     if read_header is None:
         raise FileFormatError(
-            f"{path}{what} has version {version} of the .npy format, 1 or 2 is read"
+            f"{path}{what} has version {version} of the .npy format; expected 1 or 2"
         )
     shape, fortran, dtype = read_header(file)
     if dtype.hasobject:
         raise FileFormatError(
-            f"{path}{what} holds Python objects; these run code when read, save plain numbers"
+            f"{path}{what} holds Python objects, which can run code when read; save plain numbers"
         )
     n_bytes = math.prod(shape) * dtype.itemsize
     check_size(path, n_bytes, max_bytes, what)
     if n_bytes > size:
-        raise FileFormatError(
-            f"{path}{what} is cut off: {n_bytes} bytes are announced, {size} there"
-        )
+        raise FileFormatError(f"{path}{what} is truncated: {n_bytes} bytes expected, got {size}")
     flat = np.frombuffer(file.read(n_bytes), dtype=dtype)
     return flat.reshape(shape, order="F" if fortran else "C")

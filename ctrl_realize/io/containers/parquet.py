@@ -61,14 +61,12 @@ def read_parquet(path: Path, *, max_bytes: float) -> Table:
         import pyarrow.parquet as pq
     except ImportError as error:
         raise FileFormatError(
-            f"{path} is a Parquet file; reading it needs pyarrow: pip install pyarrow"
+            f"{path} is a Parquet file; install pyarrow to read it: pip install pyarrow"
         ) from error
     with _said_if_damaged(path), pq.ParquetFile(path) as file:
         fields = list(file.schema_arrow)
         if len(fields) > MAX_COLUMNS:
-            raise FileFormatError(
-                f"{path} has {len(fields)} columns, at most {MAX_COLUMNS} are read"
-            )
+            raise FileFormatError(f"{path} has {len(fields)} columns, the limit is {MAX_COLUMNS}")
     if not fields:
         raise FileFormatError(f"{path} has no columns")
     limit = min(max_bytes, max(_FREE_BYTES, _MAX_RATIO * path.stat().st_size))
@@ -102,8 +100,8 @@ class _Reader:
             if count is not None:
                 return np.empty(0, dtype=object)
             raise FileFormatError(
-                f"{self.path}: column {field.name!r} holds {str(field.type)[:60]} values; needed "
-                "are numbers or times"
+                f"{self.path}: column {field.name!r} holds {str(field.type)[:60]} values; "
+                "expected numbers or times"
             )
         # of texts each different one is kept once
         once = [field.name] if kind == "text" else None

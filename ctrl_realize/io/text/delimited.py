@@ -35,7 +35,7 @@ def read_delimited(path: Path, options: TextOptions) -> Table:
     _check_parsed(path, layout, frame)
     cut = _cut_last_line(path, layout)
     if cut and len(frame) > 1:
-        warnings.warn(f"{path}: the last line is left out, {cut}", DataWarning, stacklevel=4)
+        warnings.warn(f"{path}: the last line is skipped: {cut}", DataWarning, stacklevel=4)
         # columns that are text only because of the cut line become numbers in Table.numbers
         frame = frame.iloc[:-1]
     while len(frame) and _is_blank(frame.iloc[-1]):
@@ -88,8 +88,9 @@ def _parse(path: Path, layout: TextLayout) -> Any:
         raise FileFormatError(f"{path} is not a table: {reason}") from error
     if frame.shape[1] != layout.n_columns:
         raise FileFormatError(
-            f"{path}: line {layout.first_line + 1} has {frame.shape[1]} cells, most lines have "
-            f"{layout.n_columns}; say delimiter=, or skip_rows= if the table starts further down"
+            f"{path}: line {layout.first_line + 1} has {frame.shape[1]} cells, most lines "
+            f"have {layout.n_columns}; give delimiter=, or skip_rows= if the table starts "
+            "further down"
         )
     return frame
 
@@ -104,13 +105,13 @@ def _check_parsed(path: Path, layout: TextLayout, frame: Any) -> None:
             same = float(parsed) == float(cell.replace(",", "."))
         if not same:
             raise FileFormatError(
-                f"{path}: line {layout.first_line + 1} begins the data, and its cell {cell!r} was "
-                f"read as {str(parsed)[:60]!r}; are its quotes and line ends in order?"
+                f"{path}: line {layout.first_line + 1} is the first data line, and its cell "
+                f"{cell!r} was read as {str(parsed)[:60]!r}; check its quotes and line ends"
             )
     if layout.whole and len(frame) < layout.n_rows:
         raise FileFormatError(
-            f"{path} has {layout.n_rows} lines of data, of which {len(frame)} were read; are its "
-            "quotes and line ends in order?"
+            f"{path} has {layout.n_rows} lines of data, of which {len(frame)} were read; "
+            "check its quotes and line ends"
         )
 
 

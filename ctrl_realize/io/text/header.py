@@ -69,8 +69,8 @@ def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
     elif texts and len(head.cells[first - 1]) > 1:
         raise FileFormatError(
             f"line {head.rows[first - 1] + 1} of {head.path} has {len(head.cells[first - 1])} "
-            f"cells, the lines below have {head.width}; say delimiter=, decimal=, skip_rows=, "
-            "or header=False and column numbers"
+            f"cells, the lines below have {head.width}; give delimiter=, decimal=, "
+            "skip_rows=, or header=False and column numbers"
         )
     else:
         names = _names_in_comments(head, head.rows[first])

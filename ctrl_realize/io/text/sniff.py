@@ -85,13 +85,13 @@ def sniff(path: Path, options: TextOptions) -> TextLayout:
         and not (comment and lines[index].lstrip().startswith(comment))
     ]
     if not rows:
-        raise FileFormatError(f"{path} has no lines of data in its first {len(head_bytes)} bytes")
+        raise FileFormatError(f"{path} has no data lines in its first {len(head_bytes)} bytes")
     lower = [lines[index] for index in rows[len(rows) // 2 :]]
     delimiter, decimal = _delimiter_and_decimal(path, lower[:_SAMPLE_LINES], options)
     cells = [split_line(lines[index], delimiter) for index in rows]
     width = Counter(map(len, cells[len(rows) // 2 :])).most_common(1)[0][0]
     if width > MAX_COLUMNS:
-        raise FileFormatError(f"{path} has {width} columns, at most {MAX_COLUMNS} are read")
+        raise FileFormatError(f"{path} has {width} columns, the limit is {MAX_COLUMNS}")
     head = Head(path, lines, rows, cells, delimiter, decimal, comment, width)
     first = first_data_row(head, options.header)
     names, units = ([""] * width,) * 2 if options.header is False else column_names(head, first)
@@ -118,7 +118,7 @@ def _encoding(path: Path, head: bytes) -> str:
         head_text = head.rstrip(b"\0")
         if b"\0" in head_text or not head_text:
             raise FileFormatError(
-                f"{path} is binary; text (CSV, TSV), .npz, .mat and Parquet can be read"
+                f"{path} is binary; expected text (CSV, TSV), .npz, .mat or Parquet"
             )
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
@@ -149,7 +149,7 @@ def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) 
                 best, best_score = (delimiter, decimal), score
     if best_score[0] < 0.3:
         raise FileFormatError(
-            f"{path} has no columns of numbers that could be found; a line in its first ones is "
+            f"{path} has no recognisable numeric columns; one of its first lines is "
             f"{sample[0][:60]!r}; try delimiter=, decimal= and skip_rows="
         )
     return best

@@ -159,7 +159,7 @@ def test_noise_is_the_rest_treated_as_the_response():
 
 
 def test_what_is_no_step_response_is_named():
-    with pytest.raises(DataError, match="step is a list; needed is a StepResponse, see unit_step"):
+    with pytest.raises(DataError, match="step is a list; expected a StepResponse, see unit_step"):
         cr.impulse_from_step([1.0, 2.0])
     for order in (1, 10):
         assert (

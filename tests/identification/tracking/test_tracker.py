@@ -113,8 +113,8 @@ def test_an_input_that_rests_does_not_tell():
         bank.update(record.input[-1], rest_y + noise)
     last = bank.estimate()
     assert not last.resolved
-    assert "nothing moved" in last.reason
-    assert "no: nothing moved" in last.report()
+    assert "no movement above the noise" in last.reason
+    assert "no: no movement" in last.report()
 
 
 def test_an_output_that_is_stuck_does_not_tell():
