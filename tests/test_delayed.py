@@ -307,7 +307,11 @@ def test_interconnect_and_feedback_with_names_work():
         (lambda: cr.delayed_ss(R3, dead_time=np.nan, dt=TS), OptionError, "finite"),
         (lambda: cr.delayed_ss(R3, 1, dead_time=0.1, dt=TS), OptionError, "one of them"),
         (lambda: cr.delayed_ss(R3, 1, dt=-1.0), OptionError, "positive sample time"),
-        (lambda: cr.delayed_ss(CONTROLLER, dead_time=1.5 * TS), DelayRangeError, "whole samples"),
+        (
+            lambda: cr.delayed_ss(CONTROLLER, dead_time=1.5 * TS),
+            DelayRangeError,
+            "needs a whole number",
+        ),
         (lambda: cr.delayed_ss(CONTROLLER, 1, dt=0.1), OptionError, "sample time"),
         (lambda: cr.delayed_ss(1 + R3, dead_time=1.5 * TS, dt=TS), UnsuitableSystemError, "jumps"),
         (lambda: cr.DelayedStateSpace(ct.ss(R3), 3), UnsuitableSystemError, "sample time"),

@@ -76,7 +76,7 @@ ERRORS = {
     ],
     NoStepError: [
         (lambda: cr.detect_step(QUIET), "no step"),
-        (lambda: cr.identify(cr.Record(T, 1.0 * (T > 39.85), DRIVEN.output)), "after it"),
+        (lambda: cr.identify(cr.Record(T, 1.0 * (T > 39.85), DRIVEN.output)), "followed by"),
     ],
     UnsuitableSystemError: [
         (lambda: fit(known=ct.tf([1], [1, -2.0])), r"2\+0j rad/s.*stable"),
@@ -112,7 +112,10 @@ ERRORS = {
     ],
     OptionError: [
         (lambda: cr.identify(STEP, method="magic"), "'output_error', 'scan', 'paper'"),
-        (lambda: cr.identify(STEP, method="scan", known=LAG), "known: not for method='scan'"),
+        (
+            lambda: cr.identify(STEP, method="scan", known=LAG),
+            "known: not an argument of method='scan'",
+        ),
         (lambda: cr.identify(STEP, order=0), "order=0"),
         (lambda: cr.identify(STEP, order=2, structures=[(1, 1)]), "got both"),
         (lambda: fit(structures=[]), "empty"),

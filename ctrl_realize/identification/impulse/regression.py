@@ -256,7 +256,7 @@ def _silence(silent: NDArray[np.bool_]) -> tuple[Flag, ...]:
     return tuple(
         Flag(
             "no_response",
-            f"output {a} shows no response to the input above the noise level level level level",
+            f"output {a} shows no response to the input above the noise level",
         )
         for a in np.flatnonzero(silent)
     )

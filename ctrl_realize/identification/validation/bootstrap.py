@@ -149,7 +149,7 @@ class Bootstrap(Result):
             ("gain", f"{self.gains.mean():.5g} +- {self.gains.std(ddof=1):.2g}"),
         ]
         if self.block:
-            rows.append(("blocks", f"{self.block} samples of the residual each each each"))
+            rows.append(("blocks", f"{self.block} samples of the residual each"))
         rows.append(("not included", "bias of the method, which is common to all records"))
         return rows
 
