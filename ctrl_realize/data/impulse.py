@@ -12,8 +12,8 @@ from scipy.signal import sosfreqz
 from .._checks import numbers, one_of, positive
 from ..errors import DataError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.constants import LARGEST
 from ..numerics.signals.filters import butterworth, butterworth_group_delay
-from ..numerics.signals.time_axis import EXTREME
 from ..results import Drawable
 from .step import StepResponse
 
@@ -132,7 +132,7 @@ class ImpulseResponse(Drawable):
                 "N >= 2"
             )
         # the quotient of a record's largest output and smallest step; its square is a double
-        if np.abs(values).max() > EXTREME**2:
+        if np.abs(values).max() > LARGEST**2:
             raise DataError(
                 f"markov goes up to {np.abs(values).max():g}, which is not a plausible measurement"
             )

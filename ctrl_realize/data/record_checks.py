@@ -9,7 +9,8 @@ import numpy as np
 from .._checks import spelled_out
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
-from ..numerics.signals.time_axis import EXTREME, UNIFORM_WITHIN, AxisFault
+from ..numerics.constants import LARGEST
+from ..numerics.signals.time_axis import UNIFORM_WITHIN, AxisFault
 
 
 def check_shape(values: FloatArray, what: str, samples: int) -> None:
@@ -37,11 +38,11 @@ def check_finite(values: FloatArray, what: str, *, allow_nan: bool = False) -> N
 def check_size(values: FloatArray, what: str) -> None:
     """Refuse numbers that no instrument shows and whose squares overflow."""
     # NaN stands for a missing sample here, and is not larger than anything
-    large = np.abs(values) > EXTREME
+    large = np.abs(values) > LARGEST
     if large.any():
         first = int(np.flatnonzero(large.any(axis=0) if values.ndim == 2 else large)[0])
         raise DataError(
-            f"{what} is larger than {EXTREME:g} at index {first}; check the file and the unit"
+            f"{what} is larger than {LARGEST:g} at index {first}; check the file and the unit"
         )
 
 

@@ -68,15 +68,6 @@ def augment(core: Matrices, before: tuple[int, ...], behind: tuple[int, ...]) ->
     return A, B, C, D
 
 
-def later(values: FloatArray, delay: int) -> FloatArray:
-    """Delay a signal that was zero before its first sample."""
-    if delay == 0:
-        return values
-    out = np.zeros_like(values)
-    out[delay:] = values[: max(values.size - delay, 0)]
-    return out
-
-
 def powers(points: ComplexArray, delays: tuple[int, ...]) -> ComplexArray:
     """Stack x^-d for each delay, shape (delays, K)."""
     return np.stack([points ** (-d) for d in delays])

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from .._checks import finite, whole
 from ..errors import DataError
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import ComplexArray, FloatArray, later
 from ..numerics.state_space import responses
-from .chains import later, powers
+from .chains import powers
 from .parts import CoreAndDelays
 
 

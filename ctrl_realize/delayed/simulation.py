@@ -12,7 +12,7 @@ from .._checks import one_of
 from ..data import Record
 from ..data.given import check_complete
 from ..errors import DataError, UnsuitableSystemError
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import FloatArray, later
 from ..numerics.state_space.responses import markov, step_response
 from . import DelayedStateSpace
 
@@ -66,7 +66,7 @@ def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
         steps = step_response(core.A, core.B, core.C, core.D, N)
         for j in range(m):
             pulses = [
-                _later(steps[:, [j]], first) - _later(steps[:, [j]], last)
+                later(steps[:, [j]], first) - later(steps[:, [j]], last)
                 for first, last in _pieces(min(model.input_delays[j], N))
             ]
             if pulses:
@@ -84,15 +84,9 @@ def _pieces(samples: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in pairwise(edges)]
 
 
-def _later(responses: FloatArray, samples: int) -> FloatArray:
-    out = np.zeros_like(responses)
-    out[..., samples:] = responses[..., : max(responses.shape[-1] - samples, 0)]
-    return out
-
-
 def _through_outputs(responses: FloatArray, model: DelayedStateSpace) -> FloatArray:
     """Delay responses (p, columns, N) at the outputs, and lay them out as (p N, columns)."""
-    late = np.stack([_later(r, q) for r, q in zip(responses, model.output_delays, strict=True)])
+    late = np.stack([later(r, q) for r, q in zip(responses, model.output_delays, strict=True)])
     return late.transpose(0, 2, 1).reshape(-1, responses.shape[1])
 
 

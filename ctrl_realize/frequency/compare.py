@@ -13,15 +13,13 @@ from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
+from ..numerics.constants import SMALLEST
 from ..numerics.rational.spectra import hold_response, unwrapped_phase
 from ..results import Flag
 from .comparison import FRFComparison, decibels, hertz
 from .disagreement import disagreement
 from .points import MeasuredPoints, check_single_channel, measured_points, same_time, sampled_every
 from .trusted_band import trusted_points
-
-_LEAST = 1e-70
-"""What is smaller is zero: nothing can be put in relation to it."""
 
 
 @single_threaded
@@ -168,7 +166,7 @@ def _comparable(
 ) -> tuple[MeasuredPoints, tuple[Flag, ...]]:
     """Leave out zeros and what a model of this sample time cannot follow."""
     frequency = points.frequency_hz
-    usable = np.abs(points.response) > _LEAST
+    usable = np.abs(points.response) > SMALLEST
     flags = []
     if dt is not None:
         beyond = frequency >= 0.5 / dt

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
+from ..numerics.constants import Z_95
 from ..numerics.rational.fit import FRFData, RationalFit
 from ..numerics.rational.model import chain_state_space
 from ..numerics.rational.search import (
@@ -221,7 +222,7 @@ def _cover(
     ends = np.array(within)
     # exp(-BIC / 2) is the evidence for a structure: the interval is that of the mixture.
     share = np.exp(-0.5 * np.array([row.bic - best.bic for row in rows[: len(within)]]))
-    spread = np.maximum((ends[:, 1] - ends[:, 0]) / 3.92, 1e-12 * bound)
+    spread = np.maximum((ends[:, 1] - ends[:, 0]) / (2 * Z_95), 1e-12 * bound)
     centre = ends.mean(axis=1)
     low = min(interval[0], mixture_quantile(0.025, centre, spread, share))
     high = max(interval[1], mixture_quantile(0.975, centre, spread, share))

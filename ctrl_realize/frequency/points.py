@@ -11,6 +11,7 @@ import numpy as np
 from .._checks import band, one_of
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
+from ..numerics.constants import SMALLEST
 
 _SMOOTHED_POINTS = 9
 """Neighbours over which standard deviations are smoothed; odd."""
@@ -18,8 +19,6 @@ _MANY_POINTS = 50
 """Points from which on they are."""
 _SIGNIFICANT = 6.0
 """Mean power over that of noise, in ``1 / sqrt(points)``, from which there is a signal."""
-_LEAST = 1e-70
-"""What is smaller is zero: its squares vanish."""
 _WIDEST = 1e15
 """Largest ratio of two frequencies."""
 
@@ -54,7 +53,7 @@ def frf_points(
     points = measured_points(frf)
     weighting = one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
     frequency = points.frequency_hz
-    usable = (frequency > _LEAST) & (np.abs(points.response) > _LEAST)
+    usable = (frequency > SMALLEST) & (np.abs(points.response) > SMALLEST)
     usable &= np.isfinite(points.response) & (frequency < below_hz)
     if band_hz is not None:
         low, high = band(band_hz, "band_hz", "frequencies in Hz")

@@ -20,6 +20,43 @@ def read_only(values: FloatArray) -> FloatArray:
     return locked(np.asarray(values, dtype=np.float64))
 
 
+def later(values: FloatArray, samples: int) -> FloatArray:
+    """Delay signals (..., N) that were zero before their first sample."""
+    if samples == 0:
+        return values
+    out = np.zeros_like(values)
+    out[..., samples:] = values[..., : max(values.shape[-1] - samples, 0)]
+    return out
+
+
+def block_powers(first: FloatArray, A: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Stack C, CA, ..., CA^(count-1) by doubling, and return a power of A beside it.
+
+    Parameters
+    ----------
+    first : ndarray, shape (..., p, n)
+        C.
+    A : ndarray, shape (..., n, n)
+    count : int
+
+    Returns
+    -------
+    stack : ndarray, shape (..., count, p, n)
+    power : ndarray, shape (..., n, n)
+        A^count if count is a power of two, a higher one otherwise.
+    """
+    *many, p, n = first.shape
+    stack = np.empty((*many, count * p, n))
+    stack[..., :p, :] = first
+    power, have = A, p
+    while have < count * p:
+        more = min(have, count * p - have)
+        np.matmul(stack[..., :more, :], power, out=stack[..., have : have + more, :])
+        power = power @ power
+        have += more
+    return stack.reshape(*many, count, p, n), power
+
+
 def locked(values: NDArray[Entry]) -> NDArray[Entry]:
     """Copy an array of any kind and lock the copy."""
     kept = np.array(values)

@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 
 from ..._wording import in_time
+from ...numerics.constants import Z_95
 from ...numerics.validation.own_response import homogeneity
 from ...results import Flag
 from ..output_error.repeat_flags import BY_CHANCE, NO_COMMON_GAIN, SAME
@@ -75,7 +76,7 @@ def _different_times(rows: Rows) -> list[Flag]:
         values = np.array([getattr(row, name) for row in rows])
         low, high = np.array([getattr(row, ends) for row in rows]).reshape(-1, 2).T
         with np.errstate(invalid="ignore"):
-            errors = (high - low) / 3.92
+            errors = (high - low) / (2 * Z_95)
         # The flat set of a scan claims no level, and is no standard error.
         errors[~(errors > 0) | ~np.isfinite([row.gain_std for row in rows])] = np.inf
         statistic, chance = homogeneity(values, errors)

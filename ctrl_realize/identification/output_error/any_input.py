@@ -12,6 +12,7 @@ from ..._wording import named
 from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
+from ...numerics.constants import SMALLEST
 from ...numerics.output_error.input_fit import SampledFit, fit_sampled
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
@@ -28,8 +29,6 @@ from .summary import summarise
 FOLLOWS = 36.0
 """Least chi-square of the response to the input: six standard deviations. White noise that has
 nothing to do with the input reached 23 in 25 records, with the best of all delays and lags."""
-LEAST_MOVE = 1e-70
-"""Least move of a signal that is fitted: squares of less underflow."""
 _APART = 5.0  # standard deviations by which a record's gain may lie from the others'
 
 
@@ -83,7 +82,7 @@ def _fit(
 def _check_moves(record: Record) -> None:
     for name, values in zip(("output", "input"), _signals(record), strict=True):
         moves = float(np.ptp(values))
-        if moves < LEAST_MOVE:
+        if moves < SMALLEST:
             raise DataError(
                 f"the {name} of {named('record', record.name)} is constant (range "
                 f"{moves:.3g}): there is nothing to fit"

@@ -11,6 +11,7 @@ from ..._wording import named
 from ...data import Record, StepResponse
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
+from ...numerics.constants import Z_95
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse, homogeneity, own_step_response
@@ -194,8 +195,8 @@ def widened(
     between = float(repeats.delays[list(used)].std(ddof=1)) / np.sqrt(len(used))
     return replace(
         fit,
-        low=max(fit.low - 1.96 * between, 0.0),
-        high=fit.high + 1.96 * between,
+        low=max(fit.low - Z_95 * between, 0.0),
+        high=fit.high + Z_95 * between,
         std=float(np.hypot(fit.std, between)),
     )
 

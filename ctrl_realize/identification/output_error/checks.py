@@ -13,6 +13,7 @@ import numpy as np
 from ..._wording import in_time
 from ...data import Record
 from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.constants import Z_95
 from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.held_output import held_share, longest_hold, samples_at_limit
 from ...numerics.validation.innovations import feedback_chance, nonlinear_chance
@@ -35,7 +36,7 @@ _EXPLAINED = 0.05
 """Part of the residual that products of inputs must explain to be worth a flag."""
 _REACHED = 1.5
 """Total delays over which products of inputs must reach, lest they make up for what is cut off."""
-_TWO_SIDED = 1.96
+_TWO_SIDED = Z_95
 _OFF = 0.2
 """Relative difference of gains or total delays that is worth a flag."""
 _MOST_SAMPLES, _REGRESSED = 20_000, 4000

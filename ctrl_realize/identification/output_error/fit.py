@@ -17,12 +17,13 @@ from ...delayed import DelayedStateSpace, delayed_ss
 from ...errors import DataError, NoStepError, OptionError, OrderError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
+from ...numerics.constants import SMALLEST
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, own_regressors, step_data
 from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.separable.varpro import KnownFactor, Structure
 from ..step.steps import found_step
-from .any_input import LEAST_MOVE, fit_any_input
+from .any_input import fit_any_input
 from .averaging import aligned_steps, delay_outliers, mean_step, repeatability, widened
 from .checks import checked
 from .flags import fit_flags
@@ -241,7 +242,7 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
                 f"gain and lags needs at least {FEWEST_SAMPLES}"
             )
         moves = float(np.ptp(record.output))
-        if moves < LEAST_MOVE:
+        if moves < SMALLEST:
             raise DataError(
                 f"the output of {named('record', record.name)} does not leave its baseline: "
                 f"its range is {moves:.3g}"

@@ -13,8 +13,9 @@ from ...data import ImpulseResponse
 from ...data.impulse_estimate import ImpulseEstimate
 from ...delayed import DelayedStateSpace
 from ...errors import DataError, DelayRangeError, OptionError
-from ...numerics.arrays import FloatArray, IntArray, read_only
+from ...numerics.arrays import FloatArray, IntArray, locked, read_only
 from ...numerics.blas_threads import single_threaded
+from ...numerics.signals.edges import difference_noise
 from ...numerics.state_space.delay_split import split_delays
 from ...results import Flag, ModelFit
 from .impulses import as_impulse, channels
@@ -161,9 +162,9 @@ def delay_matrix(
     if isinstance(data, ImpulseEstimate):
         noise = np.reshape(data.std, size.shape)
     else:
-        # Steps from sample to sample in the second half, where a response has become smooth.
-        steps = np.diff(channels(data)[..., size.shape[-1] // 2 :], axis=-1)
-        noise = np.median(np.abs(steps), axis=-1, keepdims=True) / (0.6745 * np.sqrt(2))
+        # In the second half a response has become smooth.
+        late = channels(data)[..., size.shape[-1] // 2 :]
+        noise = np.apply_along_axis(difference_noise, -1, late)[..., None]
     limit = np.maximum(limit, NOISE_STDS * noise)
     seen = size > limit
     return np.where(seen.any(axis=-1), np.maximum(seen.argmax(axis=-1) - 1, 0), -1).astype(np.int64)
@@ -281,8 +282,8 @@ def realize_mimo(
     return pieces.system(
         data.dt,
         MimoRealization(
-            delays=_locked(found),
-            residual_delays=_locked(np.where(known, found - np.add.outer(behind, before), 0)),
+            delays=locked(found),
+            residual_delays=locked(np.where(known, found - np.add.outer(behind, before), 0)),
             output_delays=pieces.outputs,
             input_delays=pieces.inputs,
             structure=way,
@@ -307,9 +308,3 @@ def given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
     if found.max() > N - 3:
         raise DelayRangeError(f"a delay of {found.max()} leaves none of the {N} samples to realize")
     return found.astype(np.int64)
-
-
-def _locked(delays: IntArray) -> IntArray:
-    locked = np.array(delays, dtype=np.int64)
-    locked.flags.writeable = False
-    return locked

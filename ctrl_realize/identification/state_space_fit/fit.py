@@ -17,6 +17,7 @@ from ...delayed.simulation import as_delayed
 from ...errors import DataError, DataWarning, OptionError, OrderError, UnsuitableSystemError
 from ...numerics.arrays import IntArray
 from ...numerics.blas_threads import single_threaded
+from ...numerics.constants import SMALLEST
 from ...numerics.state_space.delay_split import split_delays
 from ...numerics.state_space.section_fit import fit_sections
 from ...numerics.state_space.sections import in_sections
@@ -39,8 +40,6 @@ STARTS: tuple[tuple[Start, Method], ...] = (
 )
 """Estimates of the impulse response to start from: the next one where the residual of the best
 model so far still follows the input."""
-LEAST = 1e-70
-"""Least size of a signal, in its unit."""
 STILL = 10
 """Samples that an input stands still at the start of a record for the plant to count as at rest."""
 
@@ -339,9 +338,9 @@ def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
             -np.fmin.reduce(x, axis=1) for x in known
         ]
         size = np.fmax.reduce(ends, axis=0)
-        if np.any(size < LEAST):
+        if np.any(size < SMALLEST):
             raise DataError(
-                f"{name} {int(np.argmin(size))} stays below {LEAST:g}, where squares "
+                f"{name} {int(np.argmin(size))} stays below {SMALLEST:g}, where squares "
                 "underflow; choose another unit, or check that it is connected"
             )
 

@@ -12,9 +12,9 @@ from ...data import Record, StepEdge, StepResponse
 from ...data.given import as_record, check_complete
 from ...errors import DataError, NoStepError, OptionError
 from ...numerics.arrays import FloatArray
+from ...numerics.constants import SMALLEST
 from ...numerics.signals.baseline import rest_line
 from ...numerics.signals.edges import Edge, difference_noise, find_edges
-from ...numerics.signals.time_axis import EXTREME
 
 
 def detect_step(
@@ -102,7 +102,7 @@ def found_step(
         )
     edges = tuple(_to_step_edge(edge, record) for edge in found)
     highest = max(abs(edge.amplitude) for edge in edges)
-    if highest < 1 / EXTREME:
+    if highest < SMALLEST:
         raise NoStepError(
             f"the largest edge {_of(record)} has the height {highest:g} and cannot be "
             "distinguished from zero"
@@ -169,7 +169,7 @@ def unit_step(
             f"the edge lies at samples {at.start}...{at.index}...{at.stop}, the record has "
             f"{record.n_samples} samples; check that it belongs to this record"
         )
-    if abs(at.amplitude) < 1 / EXTREME:
+    if abs(at.amplitude) < SMALLEST:
         raise DataError(f"the edge has the amplitude {at.amplitude:g}, which cannot be divided by")
     if at.stop - at.index < 5:
         raise DataError(

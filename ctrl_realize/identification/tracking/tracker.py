@@ -15,8 +15,8 @@ from ...delayed import DelayedStateSpace
 from ...errors import DataError, UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
+from ...numerics.constants import LARGEST
 from ...numerics.regression.recursive import DelayBank, RunningResidual
-from ...numerics.signals.time_axis import EXTREME
 from ...numerics.state_space.pole_sensitivity import (
     Core,
     Direction,
@@ -210,9 +210,9 @@ class DelayTracker:
             ) from None
         if not (np.isfinite(u) and np.isfinite(y)):
             raise DataError(f"sample {self._count} is u={u}, y={y}; expected finite numbers")
-        if max(abs(u), abs(y)) > EXTREME:
+        if max(abs(u), abs(y)) > LARGEST:
             raise DataError(
-                f"sample {self._count} is u={u:g}, y={y:g}; beyond {EXTREME:g}, where squares "
+                f"sample {self._count} is u={u:g}, y={y:g}; beyond {LARGEST:g}, where squares "
                 "overflow, is not a plausible measurement"
             )
         if self._count == 0:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import FloatArray, IntArray, block_powers
 
 
 def markov_stack(A: FloatArray, B: FloatArray, C: FloatArray, count: int) -> FloatArray:
@@ -33,26 +33,12 @@ def markov_stack(A: FloatArray, B: FloatArray, C: FloatArray, count: int) -> Flo
     ndarray, shape (D, count)
         Not finite where an unstable model leaves the range of floats.
     """
-    models, order = B.shape
+    models = len(B)
     block = 1 << max(0, int(np.ceil(0.5 * np.log2(max(count, 1)))))
-    rows = np.empty((models, block, order))
-    rows[:, 0] = C
-    power = A
-    have = 1
-    while have < block:
-        np.matmul(rows[:, :have], power, out=rows[:, have : 2 * have])
-        power = np.matmul(power, power)
-        have *= 2
+    rows, power = block_powers(C[:, None], A, block)
     needed = -(-count // block)
-    columns = np.empty((models, order, needed))
-    columns[:, :, 0] = B
-    have = 1
-    while have < needed:
-        more = min(have, needed - have)
-        np.matmul(power, columns[:, :, :more], out=columns[:, :, have : have + more])
-        power = np.matmul(power, power)
-        have += more
-    response: FloatArray = np.matmul(columns.transpose(0, 2, 1), rows.transpose(0, 2, 1))
+    columns, _ = block_powers(B[:, None], power.transpose(0, 2, 1), needed)
+    response: FloatArray = np.matmul(columns[:, :, 0], rows[:, :, 0].transpose(0, 2, 1))
     return response.reshape(models, -1)[:, :count]
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from ..arrays import ComplexArray, FloatArray
 
@@ -122,7 +123,7 @@ def largest_gain(shape: ComplexArray, distance: float) -> tuple[float, int]:
 def smallest_on_line(
     function: Callable[[float], float], low: float, high: float, points: int = 16
 ) -> tuple[float, float]:
-    """Minimize over a logarithmic range: a scan, then golden sections around the best point.
+    """Minimize over a logarithmic range: a scan, then Brent's method around the best point.
 
     Returns
     -------
@@ -132,16 +133,10 @@ def smallest_on_line(
     values = [function(float(x)) for x in grid]
     best = int(np.argmin(values))
     a, b = np.log(grid[max(best - 1, 0)]), np.log(grid[min(best + 1, points - 1)])
-    ratio = (np.sqrt(5) - 1) / 2
-    c, d = b - ratio * (b - a), a + ratio * (b - a)
-    at_c, at_d = function(float(np.exp(c))), function(float(np.exp(d)))
-    while b - a > 1e-4:
-        if at_c < at_d:
-            b, d, at_d = d, c, at_c
-            c = b - ratio * (b - a)
-            at_c = function(float(np.exp(c)))
-        else:
-            a, c, at_c = c, d, at_d
-            d = a + ratio * (b - a)
-            at_d = function(float(np.exp(d)))
-    return (float(np.exp(c)), at_c) if at_c < at_d else (float(np.exp(d)), at_d)
+    found = minimize_scalar(
+        lambda x: function(float(np.exp(x))),
+        bounds=(a, b),
+        method="bounded",
+        options={"xatol": 1e-4},
+    )
+    return float(np.exp(found.x)), float(found.fun)

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray
+from ..constants import Z_95
 from ..separable.dispersion import DispersedFlow, flow_profile
 from ..separable.lag_chains import (
     FREE_IN_A_CHAIN,
@@ -104,7 +105,7 @@ def likelihood_fit(
     if onset is not None and open_start:
         low, high = _opened(low, high, chosen.delay, onset, scales)
     first, last = profile_limits(*own)
-    interval = DelayInterval(low, high, (last - first) / 3.92)
+    interval = DelayInterval(low, high, (last - first) / (2 * Z_95))
     found = assembled(
         whole,
         chosen,

@@ -22,6 +22,7 @@ from ..separable.varpro import KnownFactor, Problem
 from ..separable.window import Window
 from ..signals.baseline import relaxation
 from ..signals.bins import BINS_AT_REST, Bins, response_bins
+from ..signals.filters import moving_mean
 from ..signals.noise import (
     colouring,
     hum_frequencies,
@@ -156,7 +157,7 @@ def stop_at(data: StepData, part: float) -> int:
         return n
     motion, edge = data.motion, data.edge
     width = int(np.clip(0.02 * (n - edge), 1, 9))
-    moved = np.convolve(data.quiet - motion.rest, np.ones(width) / width, "same")
+    moved = moving_mean(data.quiet - motion.rest, width)
     reached = np.flatnonzero(moved[edge:] * motion.sign > part * motion.span)
     if not reached.size:
         reached = np.flatnonzero(np.abs(moved[edge:]) > part * motion.span)

@@ -45,6 +45,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..constants import Z_95
 from ..separable.compared_fits import at_delay
 from ..separable.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, needless_parameters
 from ..separable.varpro import KnownFactor, Structure, evaluate
@@ -180,7 +181,7 @@ def _robust_fit(
     low, high = float(delays[1]), float(delays[-1])
     profiles = {chosen.structure: profile_of(whole, chosen)}
     fixed = at_delay(whole.problem, chosen, whole.scales, delay)
-    interval = DelayInterval(low, high, (high - low) / 3.92)
+    interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
     return assembled(whole, fixed, False, views, profiles, interval, own, relaxing=relaxing)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray
 
@@ -24,9 +25,7 @@ def running_median(values: FloatArray, length: int) -> FloatArray:
     [1. 1. 1. 1. 1.]
     """
     half = min(length // 2, (values.size - 1) // 2)
-    padded = np.pad(values, half, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
-    return np.asarray(np.median(windows, axis=1), dtype=np.float64)
+    return np.asarray(median_filter(values, size=2 * half + 1, mode="nearest"))
 
 
 def widest_run(good: NDArray[np.bool_], frequency: FloatArray) -> NDArray[np.bool_]:

@@ -18,12 +18,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..constants import CHI2_95, Z_95
 from .fit import FRFData, RationalFit, refine
 from .model import full_jacobian, project
 
 _LEAST_INFORMATION = 1e-10
-# 95 % point of chi-square with one degree of freedom.
-_CHI2_95 = 3.841458820694124
 
 
 def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
@@ -130,13 +129,13 @@ def profile_interval(
 ) -> tuple[float, float]:
     """Find the dead times at which the misfit has grown by what 95 % confidence allows."""
     # Rise of the misfit by chi-square times the variance (Venzon and Moolgavkar 1988).
-    allowed = 0.5 * scale * _CHI2_95
+    allowed = 0.5 * scale * CHI2_95
     best = fit.theta[fit.order]
     ends = []
     for side in (-1.0, 1.0):
         bound = 0.0 if side < 0 else data.max_dead_time
         reach = abs(bound - best)
-        step = min(max(1.96 * std if np.isfinite(std) else 0.1 * reach, 1e-9), reach)
+        step = min(max(Z_95 * std if np.isfinite(std) else 0.1 * reach, 1e-9), reach)
         inside, outside, grown_inside = 0.0, None, 0.0
         start = fit.theta
         for _ in range(12):

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
-from ..signals.time_axis import EXTREME
+from ..constants import LARGEST
 
 
 class RunningResidual:
@@ -210,7 +210,7 @@ class DelayBank:
         peak = float(np.einsum("dii->di", gram).max(initial=0.0))
         # An input that never moved leaves zeros, one that moved by less than any measurement
         # squares that underflow; the floor is far below any information.
-        floor = 1e-13 * peak if peak > EXTREME**-2 else 1.0
+        floor = 1e-13 * peak if peak > LARGEST**-2 else 1.0
         precision = np.maximum(precision, floor)
         matrix = gram + np.diag(precision)
         # Ljung, section 11.2: theta = R^-1 f, both sums weighted by powers of lambda.

@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..constants import Z_95
 from .poles import parameters_from_poles
 from .structures import Candidate, Scales
 from .varpro import Problem, Structure, evaluate
@@ -168,7 +169,7 @@ def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArr
 
 def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
     """Ends of the 95 % interval of the delay, what is hidden taken off the lower one."""
-    delay, half = chain.candidate.delay, 1.96 * chain.error
+    delay, half = chain.candidate.delay, Z_95 * chain.error
     low = max(delay - half - chain.hidden, scales.earliest)
     return low, min(delay + half, scales.latest)
 

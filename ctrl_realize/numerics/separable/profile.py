@@ -19,12 +19,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import CHI2_95
 from .polish import polish, solve_level
-from .profile_ends import THRESHOLD, bracket_ends, root_of
+from .profile_ends import bracket_ends, root_of
 from .structures import Candidate, Scales, parameter_bounds
 from .varpro import Bounds, Problem, evaluate
 
-_EDGE = float(np.sqrt(THRESHOLD))
+_EDGE = float(np.sqrt(CHI2_95))
 _SOLVED = 1e-6  # standard errors, and samples, to which an end is solved
 _MOST_TRIES = 12
 
@@ -88,7 +89,7 @@ def delay_profile(
         bounds,
         scales.dt,
         delay_fixed=True,
-        level=candidate.cost + THRESHOLD * variance,
+        level=candidate.cost + CHI2_95 * variance,
     )
     points = {
         float(at): Candidate(structure, x, float(c))
@@ -128,7 +129,7 @@ def _end(
     """
     least, variance = level
     inside, outside = ends
-    structure, goal = inside.structure, least + THRESHOLD * variance
+    structure, goal = inside.structure, least + CHI2_95 * variance
     below, above = (root_of((end.cost - least) / variance) - _EDGE for end in ends)
     point = inside if -below < above else outside
     found: list[Candidate] = []

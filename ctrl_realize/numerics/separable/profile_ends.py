@@ -15,9 +15,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import CHI2_95
 
-THRESHOLD = 3.84
-"""Chi-square of one degree of freedom below which 95 % lie."""
 _SOLVED = 1e-6  # standard errors to which an end is solved
 _MOST_TRIES = 20
 
@@ -25,7 +24,7 @@ _MOST_TRIES = 20
 def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
     """Pairs of neighbours, inside and outside, at the lower and upper end, where there are any."""
     delays = sorted(excess)
-    inside = [i for i, at in enumerate(delays) if excess[at] <= THRESHOLD]
+    inside = [i for i, at in enumerate(delays) if excess[at] <= CHI2_95]
     first, last = inside[0], inside[-1]
     found = [(delays[first], delays[first - 1])] if first > 0 else []
     return found + ([(delays[last], delays[last + 1])] if last < len(delays) - 1 else [])
@@ -37,7 +36,7 @@ def solve_ends(excess_at: Callable[[float], float], excess: Mapping[float, float
     Regula falsi (Illinois) in the root of the excess, which is linear in the delay where the
     misfit is.
     """
-    edge = float(np.sqrt(THRESHOLD))
+    edge = float(np.sqrt(CHI2_95))
     for inside, outside in bracket_ends(excess):
         a, b = inside, outside
         below, above = (root_of(excess[at]) - edge for at in (a, b))
@@ -63,9 +62,9 @@ def root_of(excess: float) -> float:
 
 
 def profile_limits(
-    delay: FloatArray, excess: FloatArray, threshold: float = THRESHOLD
+    delay: FloatArray, excess: FloatArray, threshold: float = CHI2_95
 ) -> tuple[float, float]:
-    """Ends of the set of delays with an excess below the threshold (95 %: 3.84)."""
+    """Ends of the set of delays with an excess below the threshold (default: 95 %)."""
     inside = np.flatnonzero(excess <= threshold)
     first, last = int(inside[0]), int(inside[-1])
     root = np.sqrt(np.maximum(excess, 0.0))

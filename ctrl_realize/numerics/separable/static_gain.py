@@ -19,6 +19,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from ..arrays import ComplexArray, FloatArray
+from ..constants import Z_95
 from .lag_chains import lag_sum
 from .poles import poles_from_parameters
 from .structures import Candidate
@@ -27,7 +28,7 @@ from .varpro import Problem, evaluate, partial_fractions, respond
 INTEGRATOR = 5e-3
 """Poles slower than this, times the length of the record, cannot be told from integrators."""
 
-SIGNIFICANT = 1.96  # standard errors: a gain of less may as well be none, or have the other sign
+SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or have the other sign
 
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
 _HALVINGS = 60

@@ -1,8 +1,7 @@
 """Level and slope before a step: constant, drifting, or still settling from an earlier move.
 
-A slope counts as real by our own rule: where it is `SIGNIFICANT` standard errors, the error being
-that of a straight line with as many independent samples as the correlation leaves; where the sum of
-the autocorrelation ends elsewhere is Geyer's rule [1]_.
+A slope counts as real by the rule of `noise.is_drift`, the correlation of the residual after
+Geyer [1]_.
 
 References
 ----------
@@ -17,13 +16,12 @@ from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray
 from .edges import difference_noise
-from .noise import correlation_time
+from .noise import correlation_time, is_drift
 
 FEW = 5
 """With fewer samples before the step, those after it that are still at rest are added."""
 
 MIN_DRIFT_SAMPLES = 50
-SIGNIFICANT = 5.0
 
 
 def rest_line(
@@ -48,30 +46,10 @@ def rest_line(
     index = np.arange(-before.size, 0, dtype=np.float64)
     if remove_drift or (remove_drift is None and before.size >= MIN_DRIFT_SAMPLES):
         slope, level = np.polyfit(index, before, 1)
-        if remove_drift or _slope_is_real(before - level - slope * index, slope):
+        residual = before - level - slope * index
+        if remove_drift or is_drift(float(slope), float(residual.std()), residual):
             return float(level), float(slope)
     return float(np.mean(before)), 0.0
-
-
-def _slope_is_real(residual: FloatArray, slope: float) -> bool:
-    """Compare a slope with its standard error, correlated residuals allowed for."""
-    n = residual.size
-    sigma = float(residual.std())
-    scale = float(np.abs(slope)) * n
-    if sigma <= 1e-12 * scale:
-        return scale > 0
-    # Correlation over lags makes n samples worth less: the sum of the autocorrelation up to
-    # its first zero says by how much.
-    centred = residual - residual.mean()
-    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    correlation = np.fft.irfft(spectrum)[:n]
-    correlation = correlation / correlation[0]
-    negative = np.flatnonzero(correlation <= 0)
-    lags = int(negative[0]) if negative.size else n
-    inflation = max(1.0, 2 * float(correlation[:lags].sum()) - 1)
-    error = sigma * np.sqrt(12 * inflation / n**3)
-    # A drift that is lost in the noise over the record before the step does no harm.
-    return bool(abs(slope) > SIGNIFICANT * error)
 
 
 def _level_from_start(values: FloatArray) -> float:

@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import gammaincc, ndtri
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, later
 from ..hankel.matrix import fft_length
 
 
@@ -129,16 +129,10 @@ def predict_ahead(signal: FloatArray, coefficients: FloatArray, steps: int) -> F
     """
     N = signal.size
     # ahead[j][k]: what samples up to k say about e[k + j]; j <= 0 are the samples themselves.
-    ahead = {-i: _later(signal, i) for i in range(coefficients.size)}
+    ahead = {-i: later(signal, i) for i in range(coefficients.size)}
     for j in range(1, steps + 1):
         ahead[j] = sum(
             (c * ahead[j - i] for i, c in enumerate(coefficients, start=1)), start=np.zeros(N)
         )
     ahead[steps][: max(coefficients.size - 1, 0)] = 0.0
-    return _later(ahead[steps], steps)
-
-
-def _later(signal: FloatArray, samples: int) -> FloatArray:
-    out = np.zeros_like(signal)
-    out[samples:] = signal[: max(signal.size - samples, 0)]
-    return out
+    return later(ahead[steps], steps)

@@ -18,6 +18,7 @@ References
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from ..arrays import FloatArray
 from ..hankel.matrix import fft_length
@@ -31,6 +32,7 @@ _MOST_OF_A_LINE = 45.0
 _BLOCK = 4096  # samples over which a phase is turned on at a time
 _TOGETHER = 2**18  # samples that are looked at together
 _FIRST_LAGS = 2**12
+_DRIFT_ERRORS = 5.0  # a drift that is lost in the noise does no harm
 _FEW = 8  # samples at rest below which the whole record must tell the noise
 
 
@@ -113,8 +115,21 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
         settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
         if settled.size:
             sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
-    error = sigma * np.sqrt(12 * correlation_time(left) / before.size**3)
-    return sigma, float(slope) if abs(slope) > 5 * error else 0.0
+    return sigma, float(slope) if is_drift(slope, sigma, left) else 0.0
+
+
+def is_drift(slope: float, sigma: float, residual: FloatArray) -> bool:
+    """Tell whether a slope per sample is five standard errors, correlation allowed for.
+
+    Parameters
+    ----------
+    slope, sigma : float
+        Of a line, and of the noise about it.
+    residual : ndarray, shape (P,)
+        What the line leaves, for its correlation.
+    """
+    error = sigma * np.sqrt(12 * correlation_time(residual) / residual.size**3)
+    return bool(abs(slope) > _DRIFT_ERRORS * error)
 
 
 def _robust_line(values: FloatArray, quantum: float) -> tuple[float, FloatArray]:
@@ -237,7 +252,7 @@ def sine_pair(index: FloatArray, frequency: float) -> FloatArray:
 
 
 def _refine(values: FloatArray, frequency: float) -> float:
-    """Improve the frequency of a line by golden steps on its least-squares power."""
+    """Improve the frequency of a line: its periodogram is largest between two bins."""
     # Turned to the frequency within blocks, and then from block to block.
     whole = values.size // _BLOCK * _BLOCK
     blocks, rest = values[:whole].reshape(-1, _BLOCK), values[whole:]
@@ -249,8 +264,10 @@ def _refine(values: FloatArray, frequency: float) -> float:
         return float(np.abs(starts[:-1] @ sums + starts[-1] * (turn[: rest.size] @ rest)))
 
     width = 1.0 / values.size
-    for _ in range(14):
-        trials = frequency + width * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-        frequency = float(trials[np.argmax([power(f) for f in trials])])
-        width /= 2
-    return frequency
+    found = minimize_scalar(
+        lambda f: -power(f),
+        bounds=(frequency - width, frequency + width),
+        method="bounded",
+        options={"xatol": 1e-5 * width},
+    )
+    return float(found.x)

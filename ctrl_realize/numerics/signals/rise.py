@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import FloatArray
+from .filters import moving_mean
 
 
 def rise_time(step: FloatArray, dt: float) -> float:
@@ -31,7 +32,8 @@ def rise_time(step: FloatArray, dt: float) -> float:
     shape = step / final
     window = max(step.size // 20, 1)
     while True:
-        smooth = _moving_mean(shape, window)
+        half = window // 2
+        smooth = moving_mean(np.append(shape, np.full(half, shape[-1])), 2 * half + 1)[: shape.size]
         high = int(np.argmax(smooth >= 0.9)) if (smooth >= 0.9).any() else smooth.size - 1
         low_side = np.flatnonzero(smooth[: high + 1] <= 0.1)
         low = int(low_side[-1]) if low_side.size else 0
@@ -40,16 +42,6 @@ def rise_time(step: FloatArray, dt: float) -> float:
             break
         window = max(window // 2, 1)
     return best * dt
-
-
-def _moving_mean(values: FloatArray, window: int) -> FloatArray:
-    if window == 1:
-        return values
-    half = window // 2
-    padded = np.concatenate([np.zeros(half), values, np.full(half, values[-1])])
-    sums = np.cumsum(np.concatenate([[0.0], padded]))
-    width = 2 * half + 1
-    return np.asarray((sums[width:] - sums[:-width])[: values.size] / width)
 
 
 def _crossing(values: FloatArray, index: int, level: float) -> float:

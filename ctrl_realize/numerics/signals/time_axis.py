@@ -11,18 +11,13 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import LARGEST, SMALLEST
 
 UNIFORM_WITHIN = 0.05
 """Largest distance of a time stamp from the uniform grid, in samples.
 
 Time stamps printed with few digits (0.000073 s steps of 73.24 us) stay well inside it; a
 missed sample is twenty times as large.
-"""
-
-EXTREME = 1e70
-"""Numbers beyond this, and steps below its inverse, are no measurement.
-
-The square of a quotient of two numbers inside is still a double.
 """
 
 
@@ -80,11 +75,11 @@ def axis_fault(time: FloatArray) -> AxisFault | None:
         Finite time stamps in s.
     """
     far = int(np.argmax(np.abs(time)))
-    if abs(time[far]) > EXTREME:
+    if abs(time[far]) > LARGEST:
         return AxisFault("extreme", far, time[far])
     steps = np.diff(time)
     typical = float(np.median(steps))
-    if 0 < typical < 1 / EXTREME:
+    if 0 < typical < SMALLEST:
         return AxisFault("tiny_steps", 0, typical)
     if typical < 0 and np.all(steps < 0):
         return AxisFault("backwards", 1, time[1], time[0])

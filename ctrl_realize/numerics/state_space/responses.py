@@ -23,7 +23,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.linalg import matrix_balance, schur
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray, block_powers
 
 BLOCK = 64
 """Samples that are computed together; block powers are built by doubling up to here."""
@@ -97,37 +97,6 @@ def frequency_response(
     return (left @ states).reshape(left.shape[0], m, K) + D[:, :, None]
 
 
-def _observability_blocks(
-    A: FloatArray, C: FloatArray, count: int
-) -> tuple[FloatArray, FloatArray]:
-    """Stack C, CA, ..., CA^(count-1) by doubling; also return A^count. Count: a power of two."""
-    p, n = C.shape
-    stack = np.empty((count * p, n))
-    stack[:p] = C
-    power = A
-    have = p
-    while have < count * p:
-        np.matmul(stack[:have], power, out=stack[have : 2 * have])
-        power = power @ power
-        have *= 2
-    return stack.reshape(count, p, n), power
-
-
-def _reachability_blocks(A: FloatArray, B: FloatArray, count: int) -> FloatArray:
-    """Stack B, AB, ..., A^(count-1)B by doubling, shape (m, count, n)."""
-    n, m = B.shape
-    stack = np.empty((m, count, n))
-    stack[:, 0] = B.T
-    power = A.T
-    have = 1
-    while have < count:
-        more = min(have, count - have)
-        np.matmul(stack[:, :more], power, out=stack[:, have : have + more])
-        power = power @ power
-        have += more
-    return stack
-
-
 def markov(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: int) -> FloatArray:
     """Compute the Markov parameters D, CB, CAB, ....
 
@@ -149,8 +118,9 @@ def markov(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: in
         return out
     # About as many rows as columns: the product of both then is nearly all of the work.
     block = 1 << (((count - 2).bit_length() + 1) // 2)
-    rows, jump = _observability_blocks(A, C, block)
-    columns = _reachability_blocks(jump, B, -(-(count - 1) // block))
+    rows, jump = block_powers(C, A, block)
+    columns, _ = block_powers(B.T, jump.T, -(-(count - 1) // block))
+    columns = columns.transpose(1, 0, 2)
     padded = np.empty((p, m, 1 + columns.shape[1] * block))
     padded[:, :, 0] = D
     for i in range(p):
@@ -211,13 +181,13 @@ def simulate(
     padded[:, :N] = inputs
     U = padded.reshape(m, blocks, L).transpose(1, 2, 0).reshape(blocks, L * m)
 
-    rows, jump = _observability_blocks(A, C, L)
+    rows, jump = block_powers(C, A, L)
     pulses = markov(A, B, C, D, L).transpose(2, 0, 1)  # (L, p, m)
     inside = np.zeros((L, p, L, m))
     for lag in range(L):
         index = np.arange(L - lag)
         inside[index + lag, :, index, :] = pulses[lag]
-    reach, _ = _observability_blocks(A.T, B.T, L)  # (B^T (A^T)^l) = (A^l B)^T
+    reach, _ = block_powers(B.T, A.T, L)  # (B^T (A^T)^l) = (A^l B)^T
     into = reach[::-1].transpose(2, 0, 1).reshape(n, L * m)
 
     kicks = U @ into.T

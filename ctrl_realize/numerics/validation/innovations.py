@@ -26,6 +26,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from ..arrays import FloatArray, IntArray
+from ..signals.noise import mad_sigma
 
 OWN_PAST = 12
 """Past outputs: with them lags and coloured noise of the usual kinds leave a white residual."""
@@ -156,7 +157,7 @@ def _past(output: FloatArray, drive: FloatArray, past: int, ahead: int) -> _Past
 
 def _tamed(values: FloatArray) -> FloatArray:
     """Cut what lies far out; an input that rests between its moves is left as it is."""
-    spread = 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    spread = mad_sigma(values)
     if spread <= _SPARSE * float(values.std()):
         return values
     return np.asarray(np.clip(values, -_WILD * spread, _WILD * spread))

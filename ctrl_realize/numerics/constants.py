@@ -1,0 +1,13 @@
+"""Numbers that many modules use, each under one name."""
+
+CHI2_95 = 3.841458820694124
+"""95 % point of chi-square with one degree of freedom, ``scipy.special.chdtri(1, 0.05)``."""
+
+Z_95 = CHI2_95**0.5
+"""Two-sided 95 % point of the normal distribution, 1.96."""
+
+LARGEST = 1e70
+"""Numbers beyond this are no measurement: the square of a quotient of two inside is a double."""
+
+SMALLEST = 1 / LARGEST
+"""Signals, responses and steps of time below this count as nothing: their squares vanish."""
