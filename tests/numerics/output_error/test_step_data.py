@@ -155,7 +155,9 @@ def test_profile_limits_are_where_a_parabola_crosses():
     delay = np.linspace(-4, 8, 13)
     low, high = profile_limits(delay, ((delay - 2) / 1.5) ** 2)
     # the root of the excess is linear, so that interpolation is exact
-    assert_allclose([low, high], [2 - 1.5 * np.sqrt(3.841458820694124), 2 + 1.5 * np.sqrt(3.84)])
+    assert_allclose(
+        [low, high], [2 - 1.5 * np.sqrt(3.841458820694124), 2 + 1.5 * np.sqrt(3.841458820694124)]
+    )
     assert profile_limits(delay, np.zeros(13)) == (-4, 8)
 
 
