@@ -162,6 +162,13 @@ class ModelFit(Result):
         What was fitted; empty where it was no record.
     choices : tuple of str
     flags : tuple of Flag
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> fit = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan").fit
+    >>> isinstance(fit, cr.results.ModelFit), fit.interval_kind
+    (True, 'flatness')
     """
 
     if TYPE_CHECKING:

@@ -7,7 +7,6 @@ from .impulse.from_io import impulse_from_io as impulse_from_io
 from .methods import identify as identify
 from .output_error.fit import fit_output_error as fit_output_error
 from .output_error.result import OutputErrorFit as OutputErrorFit
-from .output_error.result import StructureRow as StructureRow
 from .realization.delay_scan import estimate_delay as estimate_delay
 from .realization.delay_scan_result import DelayScan as DelayScan
 from .realization.mimo import MimoRealization as MimoRealization

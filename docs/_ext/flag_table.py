@@ -34,7 +34,7 @@ COMPOSED = {
     "outlying_records": "left out of the mean: …",
     "structured_misfit": "no model leaves only noise: the plant is not linear or has more dynamics "
     "than the model; the dead time is the median of several views and the interval spans them",
-    "estimates_disagree": "far from the median lie: …",
+    "estimates_disagree": "delay estimates far from their median: …",
 }
 """Messages that are put together from parts."""
 
