@@ -314,3 +314,13 @@ def test_without_known_noise_the_least_order_of_nearly_the_least_misfit_is_sugge
     least = scan.iae.min(axis=1)
     assert least[1] <= 1.1 * least.min()
     assert least[0] > 1.1 * least.min()
+
+
+def test_an_input_that_does_not_hold_its_level_is_any_input():
+    rng = np.random.default_rng(0)
+    # an edge of 4, and half a unit of noise at every sample: an eighth; or a whole one: a quarter
+    for size, stepped in ((0.2, True), (1.0, False)):
+        u = np.repeat([0.0, 4.0], 150) + size * rng.standard_normal(300)
+        fit = cr.fit_output_error(driven(u, noise=0.05), **ONE).fit
+        assert np.isfinite(fit.onset) == stepped
+        assert fit.delay == pytest.approx(5, abs=0.5)

@@ -24,7 +24,7 @@ from ctrl_realize.errors import (
 )
 from ctrl_realize.io import read_frf, read_record
 from ctrl_realize.io.text.csv_files import as_text, write_csv
-from ctrl_realize.io.units import split_unit
+from ctrl_realize.io.units import split_unit, to_seconds
 
 U = np.array([0.0, 0.0, 1.5, 1.5, -1.5])
 Y = np.array([10.25, 10.0, 9.75, 12.5, 12.0])
@@ -439,3 +439,11 @@ def test_every_measured_frequency_response_is_read(shared_data):
         turns = (np.angle(frf.frdata[0, 0], deg=True) - phase) / 360
         # angle() and exp() round, and 2160 degrees cost three digits
         np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("unit", "seconds"),
+    [("s", 7.0), ("ms", 7e-3), ("µs", 7e-6), ("ns", 7e-9), ("min", 420.0), ("Hours", 25200.0)],
+)
+def test_scaled_time_is_the_double_nearest_to_the_decimal_number(unit, seconds):
+    assert to_seconds(np.array([7.0]), unit)[0] == seconds

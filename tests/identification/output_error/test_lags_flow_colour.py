@@ -240,3 +240,15 @@ def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow(shared_data):
     assert high - low <= 0.3 * fit.onset
     first, last = cr.identify(data, noise="white").fit.interval
     assert last - first > 2 * (high - low)
+
+
+def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
+    rng = np.random.default_rng(1)
+    k = np.arange(1400)
+    y = np.where(k > 543, -np.expm1(-(k - 543) / 60), 0)
+    for burst in rng.integers(0, 1390, 25):
+        y[burst : burst + 6] += 0.05 * rng.standard_normal()
+    fit = cr.fit_output_error(cr.Record(0.1 * k, 1.0 * (k >= 500), y)).fit
+    assert "generalised" not in fit.report()
+    low, high = fit.delay_interval
+    assert low <= 43 <= high

@@ -226,3 +226,17 @@ def test_outliers_count_for_little_with_hubers_loss():
         size[huber] = found.noise
     assert size[False] > 10 * 0.1
     assert size[True] < 1.2 * 0.1
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9, 0.97])
+def test_slow_noise_is_no_drift(pole):
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(40):
+        slow = lfilter([1.0], [1.0, -pole], rng.standard_normal(1200))[200:]
+        found.append(rest_noise(slow[:500], slow, 0.0)[1])
+    # five standard errors: none of 40, where white ones make 10 and 24 of 40 a drift
+    assert not np.any(found)
+    assert rest_noise(slow[:500] + 0.5 * np.arange(500), slow, 0.0)[1] == pytest.approx(
+        0.5, abs=0.05
+    )

@@ -258,3 +258,19 @@ def test_a_delay_that_is_fixed_is_kept_wherever_it_is():
         trials = np.stack([np.full(3, delay), rates], axis=1)
         slower, at, faster = evaluate(problem(noisy()), ONE, trials).cost
         assert at <= min(slower, faster)
+
+
+@pytest.mark.parametrize("structure", [ONE, JUMP, TWO, ZERO])
+def test_sensitivity_is_the_size_of_the_derivative_of_the_model(structure):
+    pair = [-np.log(LAG), np.log(1.2)][: structure.order]
+    x = np.concatenate([[3.37], pair])
+    weight = np.linspace(0.5, 2.0, SIZE)
+    made = problem(noisy(), root_weight=weight)
+    state = evaluate(made, structure, x[None])
+    b = state.numerator[0]
+    for q in range(x.size):
+        step = 1e-6 * (np.arange(x.size) == q)
+        change = respond(train(), NOTHING, b, x + step) - respond(train(), NOTHING, b, x - step)
+        size = np.linalg.norm(weight * change / 2e-6)
+        # no sample lies where the response breaks off; central differences of 1e-6
+        assert state.sensitivity[0, q] == pytest.approx(size, rel=1e-6)

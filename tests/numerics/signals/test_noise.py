@@ -10,9 +10,11 @@ from scipy.signal import lfilter
 
 from ctrl_realize.numerics.signals.bins import response_bins
 from ctrl_realize.numerics.signals.noise import (
+    correlation_time,
     hum_frequencies,
     quantisation_step,
     rest_noise,
+    winsorised_sigma,
 )
 from ctrl_realize.numerics.signals.noise_model import (
     noise_covariance,
@@ -128,3 +130,18 @@ def test_means_over_bins_become_white_exactly():
     # the ridge is 1e-9 of the variance of a sample, the smallest eigenvalue of `among` 2e-4
     assert white @ among @ white.T == pytest.approx(np.eye(len(among)), abs=1e-4)
     assert np.all(np.triu(white, 1) == 0)
+
+
+def test_clipped_noise_is_as_large_as_gaussian_noise_is():
+    # 200 000 samples tell a standard deviation to 0.16 %
+    values = 3.0 * np.random.default_rng(0).standard_normal(200_000)
+    assert winsorised_sigma(values, 0.0) == pytest.approx(3.0, rel=0.01)
+    spoilt = np.where(np.arange(values.size) % 100 == 0, 1e3, values)
+    assert winsorised_sigma(spoilt, 0.0) == pytest.approx(3.0, rel=0.03)
+
+
+@pytest.mark.parametrize("pole", [0.4, 0.7, 0.95])
+def test_the_correlation_time_of_a_lag(pole):
+    found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))
+    # summed over some ten times its length: known to sqrt(20 time / 60 000), 12 % for the slowest
+    assert found == pytest.approx((1 + pole) / (1 - pole), rel=0.2)
