@@ -15,7 +15,6 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.cli import main
-from ctrl_realize.cli.staging import appearing
 
 FAST = ["--method", "scan", "--order", "3", "--max-delay", "80"]
 
@@ -178,22 +177,6 @@ def test_the_same_call_gives_the_same_files(folder, first, tmp_path):
     # the report tells the folder, the manifest the time
     for name in files_in(out) - {"report.html", "manifest.json"}:
         assert (out / name).read_bytes() == (first[0] / name).read_bytes(), name
-
-
-def test_a_folder_appears_whole_or_not_at_all(tmp_path):
-    def fails(place):
-        with appearing(place) as staged:
-            (staged / "half.txt").write_text("half", encoding="utf-8")
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        fails(tmp_path / "a" / "b")
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "there").mkdir()
-    (tmp_path / "there" / "half.txt").write_text("whole", encoding="utf-8")
-    with pytest.raises(KeyboardInterrupt):
-        fails(tmp_path / "there")
-    assert (tmp_path / "there" / "half.txt").read_text(encoding="utf-8") == "whole"
 
 
 def test_the_package_runs_as_a_module():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
@@ -91,19 +90,6 @@ def test_a_stopped_campaign_goes_on_where_it_was_with_the_same_files(
         assert main(command) == 0
         assert len(calls) == COUNT - 2
     assert contents(out) == straight
-
-
-def test_a_disk_that_is_full_while_rows_are_kept_loses_no_result(files, tmp_path, monkeypatch):
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr("ctrl_realize.io.store.write_text", full)
-    records = [cr.read_record(file) for file in files]
-    store = cr.io.CampaignStore(tmp_path)
-    kept = cr.identify_campaign(records, method="scan", order=3, max_delay=80, store=store)
-    assert len(kept.good) == COUNT
-    assert all("No space left" in row.warnings[-1] for row in kept.rows)
-    assert len(store) == 0
 
 
 QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]

@@ -216,13 +216,6 @@ def test_a_fractional_dead_time_is_sampled_exactly(samples, dt):
     assert S.delay_free.nstates == 3
 
 
-def test_transfer_function_has_the_delay_as_zeros_of_the_denominator():
-    S = valve(300)
-    G = S.to_tf()
-    assert G.den[0][0].size == 304
-    assert_allclose(G(circle(20)), S(circle(20)), rtol=1e-6)
-
-
 def test_several_channels_have_their_own_delays():
     core = mimo_core()
     S = cr.delayed_ss(core, [2, 5], output_delay=[0, 3, 1])

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, DataWarning
+from ctrl_realize.errors import DataWarning
 
 HZ = np.array([0.5, 2.0, 8.0])
 OMEGA = 2 * np.pi * HZ
@@ -125,16 +125,6 @@ def test_the_hold_of_two_responses_is_told_or_warned_of(operation, second, hold,
     assert made.repeats == 5
 
 
-def test_a_dead_time_is_found_the_same_after_scaling():
-    w = 2 * np.pi * np.geomspace(0.1, 5, 60)
-    true = cr.delayed_ss(ct.tf([1], [0.05, 1]), dead_time=9.45 * DT, dt=DT)
-    frf = cr.MeasuredFRF(true(np.exp(1j * w * DT)), w / (2 * np.pi), sample_time=DT)
-    before = cr.fit_frf(frf, 1).fit.dead_time
-    assert before / DT == pytest.approx(9.45, abs=0.02)
-    # 9.95 where the hold of half a sample was forgotten
-    assert cr.fit_frf(2 * frf, 1).fit.dead_time == pytest.approx(before, rel=1e-6)
-
-
 def test_channels_are_multiplied_as_matrices():
     rng = np.random.default_rng(1)
     H = rng.standard_normal((2, 3, 3)) + 1j * rng.standard_normal((2, 3, 3))
@@ -160,23 +150,6 @@ def test_channels_are_multiplied_as_matrices():
         change = cr.MeasuredFRF(moved, HZ).feedback(back).frdata - closed.frdata
         total += np.abs(change / 1e-6) ** 2 * std[i, j] ** 2
     assert_allclose(closed.std, np.sqrt(total), rtol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("operation", "match"),
-    [
-        (lambda H: H * cr.MeasuredFRF([1.0, 2.0], [1.0, 2.0]), "different frequencies"),
-        (lambda H: H + cr.MeasuredFRF(PLANT, HZ * 1.001), "different frequencies"),
-        (lambda H: np.ones((2, 2)) * H * np.ones((3, 1)), "as many inputs"),
-        (lambda H: H.feedback(np.ones((2, 2))), "feedback of shape"),
-        (lambda H: H * ct.tf([1], [1, 0.5], True), "dt=True"),
-        (lambda H: 1 / ct.append(H, H), "one channel"),
-        (lambda H: ct.append(H, H) ** 2, "one channel"),
-    ],
-)
-def test_what_does_not_fit_is_refused(operation, match):
-    with pytest.raises(DataError, match=match):
-        operation(bare())
 
 
 UNSORTED_HZ = np.array([3.0, 1.0, 2.0])
@@ -210,15 +183,3 @@ def test_coherence_and_deviation_go_with_the_channels(frf, key, rows, columns):
         assert_array_equal(getattr(part, name), values[np.ix_(rows, columns, rising)])
     assert_array_equal(part.frequency_hz, [1.0, 2.0, 3.0])
     assert part.repeats == part.between_hz(1.0, 2.0).repeats == 7
-
-
-def test_one_channel_of_many_is_fitted_with_its_own_weights():
-    f = np.geomspace(0.1, 10, 40)
-    s = 2j * np.pi * f
-    response = np.array([[1 / (0.1 * s + 1), np.exp(-0.05 * s) / (0.1 * s + 1)]])
-    std = np.array([[np.full(40, 0.3), np.full(40, 0.01)]])
-    frf = cr.MeasuredFRF(response, f, std=std)
-    fit = cr.fit_frf(frf[0, 1], 1, dt=1e-3).fit
-    assert fit.noise_known
-    assert np.all(fit.sigma == pytest.approx(0.01))
-    assert fit.dead_time == pytest.approx(0.05, abs=1e-6)

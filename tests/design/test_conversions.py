@@ -40,17 +40,6 @@ def test_continuous_and_back_is_the_identity(valve, dead_time):
     np.testing.assert_allclose(again.step(500), plant.step(500), atol=1e-11)
 
 
-@given(
-    pole=st.floats(-5.0, -0.01), gain=st.floats(-3, 3).filter(lambda x: abs(x) > 0.01),
-    fraction=st.floats(0.02, 0.98), samples=st.integers(0, 50),
-)  # fmt: skip
-def test_a_fraction_of_a_sample_is_found_again(pole, gain, fraction, samples):
-    plant = cr.delayed_ss(ct.ss(pole, 1, gain, 0), dead_time=0.1 * (samples + fraction), dt=0.1)
-    core, dead_time = cr.design.to_continuous(plant)
-    assert dead_time == pytest.approx(0.1 * (samples + fraction), rel=1e-9)
-    assert core.poles()[0] == pytest.approx(pole, rel=1e-9)
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 5, 10, 15, 20])
 def test_pade_is_the_ratio_of_exact_polynomials(order):
     """Q(-s)/Q(s) with integer coefficients, in 60 digits."""
@@ -69,15 +58,6 @@ def test_pade_is_the_ratio_of_exact_polynomials(order):
         exact = [complex(Q(-1j * mp.mpf(w) * tau) / Q(1j * mp.mpf(w) * tau)) for w in omega]
     np.testing.assert_allclose(delay(1j * omega), exact, atol=1e-13)
     assert np.all(delay.poles().real < 0)
-
-
-def test_continuous_model_with_pade_is_close_to_the_sampled_plant(valve):
-    model = cr.design.to_continuous(valve(37))
-    omega = 2 * np.pi * 2.0
-    held = (1 - np.exp(-1j * omega * DT)) / (1j * omega * DT)
-    expected = valve(37)(np.exp(1j * omega * DT))
-    # The hold's sinc is the only difference that is left: folded bands are below 1e-3.
-    assert model.pade(8)(1j * omega) * held == pytest.approx(expected, rel=1e-3)
 
 
 @given(order=st.integers(1, 6), delay=st.floats(0.5, 40.0))

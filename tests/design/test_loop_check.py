@@ -68,13 +68,6 @@ def test_a_controller_that_is_unstable_on_its_own_model_is_refused_for_one_that_
     assert made.check.margins.ms == pytest.approx(float(ms), rel=5e-3)
 
 
-def test_a_process_model_is_checked_in_continuous_time():
-    model = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029)
-    made = cr.design.pid(model)
-    exact = cr.design.margins(model.transfer_function(), made, dead_time=0.029)
-    assert made.check.margins.delay_margin == pytest.approx(exact.delay_margin, rel=1e-12)
-
-
 @pytest.mark.parametrize("gain", [1.0, -3.0])
 def test_a_dead_time_within_the_interval_that_makes_the_loop_unstable_is_said(gain):
     plant = quick() * gain

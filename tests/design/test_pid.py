@@ -112,14 +112,3 @@ def test_table_numbers_are_those_of_brute_force_simulation(valve, kind):
         late = np.flatnonzero(np.abs(setpoint - 1) > 0.02)[-1] + 1
         assert row.settling_time == pytest.approx(late * DT, abs=1.5 * DT)
         assert row.ms == pytest.approx(cr.design.margins(plant, controller).ms)
-
-
-@pytest.mark.parametrize("method", ["tustin", "forward", "backward"])
-def test_discrete_controller_tends_to_the_continuous_one(method):
-    slow = cr.design.PIDController(2.0, 3.0, 0.5, 0.1, method=method)
-    s = 0.7j
-    expected = 2 * (1 + 1 / (3 * s) + 0.5 * s / (0.1 * s + 1))
-    assert slow(s) == pytest.approx(expected, rel=1e-12)
-    errors = [abs(slow.discretised(h)(np.exp(s * h)) - expected) for h in (0.02, 0.01)]
-    assert errors[1] < 0.55 * errors[0]  # first order through the derivative
-    assert slow.discretised(0.01).continuous(s) == pytest.approx(expected, rel=1e-12)

@@ -139,23 +139,6 @@ def test_filter_equals_dlqe_of_the_augmented_system(balanced, delay):
     )
 
 
-@pytest.mark.parametrize("late", [(4, 4), (0, 3), (2, 5), (7, 1)])
-def test_filter_of_late_outputs_equals_that_of_the_augmented_system(late):
-    plant = several_inputs((1, 0), output_delay=late)
-    QN, RN = np.eye(3) + 0.1, np.diag([1.0, 0.5])
-    found = cr.design.kalman_predictor(plant, QN, RN)
-    K, P, _ = ct.dlqr(plant.A.T, plant.C.T, enlarged(plant, QN), RN)
-    L = np.delete(K.T, 3, axis=0)  # the input on its way is known
-    np.testing.assert_allclose(found.gain, L, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.covariance, P[:3, :3], rtol=1e-9)
-    own = cr.delayed_ss(plant.delay_free, 0, output_delay=late)
-    poles = np.linalg.eigvals(own.A - found.gain @ own.C)
-    # poles at 0 are defective: they scatter by eps^(1 / delay)
-    largest, expected = (np.sort(np.abs(x))[-3:] for x in (poles, found.poles))
-    np.testing.assert_allclose(largest, expected, rtol=1e-6)
-    assert found.poles.size == 3 + sum(late)
-
-
 @pytest.mark.parametrize(("delays", "late"), [((0, 6), (0, 0)), ((2, 5), (3, 1)), ((0, 0), (4, 4))])
 def test_lqg_of_several_channels_has_the_poles_of_regulator_and_estimator(delays, late):
     plant = several_inputs(delays, output_delay=late)
@@ -174,34 +157,3 @@ def test_lqg_of_several_channels_has_the_poles_of_regulator_and_estimator(delays
     assert expected.size >= 5
     found = np.sort(np.abs(loop.poles()))[-expected.size :]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-3)
-
-
-def test_an_output_that_is_late_costs_the_controller_what_a_late_input_does():
-    # one input and output: only the sum of the delays counts
-    core = ct.ss([[1.02]], [[1.0]], [[0.1]], [[0.0]], 0.01)
-    first, second = (
-        cr.design.margins(plant, cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0))
-        for plant in (
-            cr.delayed_ss(core, 10),
-            cr.delayed_ss(core, 4, output_delay=6),
-        )
-    )
-    assert second.gain_margin == pytest.approx(first.gain_margin, rel=1e-9)
-    assert second.delay_margin == pytest.approx(first.delay_margin, rel=1e-9)
-
-
-@pytest.mark.parametrize("delay", [0, 1, 20])
-@pytest.mark.parametrize("kind", ["stable", "integrating", "unstable", "resonant", "direct"])
-def test_lqg_closes_the_loop_at_the_poles_of_regulator_and_estimator(cores, kind, delay):
-    plant = cr.delayed_ss(cores[kind], delay)
-    n = cores[kind].nstates
-    controller = cr.design.lqg(plant, np.eye(n), 1.0, np.eye(n), 1.0)
-    assert controller.nstates == n + delay
-    loop = ct.ss(plant) * ct.ss(controller)
-    poles = np.linalg.eigvals(loop.A - loop.B @ loop.C)
-    expected = np.concatenate([controller.regulator.poles, controller.estimator.poles])
-    # The chain's own poles at 0 are defective and scatter to |z| = eps^(1/20) or so.
-    expected = np.sort(np.abs(expected[np.abs(expected) > 0.6]))[::-1]
-    found = np.sort(np.abs(poles))[::-1][: expected.size]
-    np.testing.assert_allclose(found, expected, rtol=1e-5)  # close pairs cost half the digits
-    assert cr.design.margins(plant, controller).stable

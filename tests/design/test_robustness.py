@@ -9,7 +9,6 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize.design import performance
 from ctrl_realize.io import FitSummary
-from ctrl_realize.numerics.rational.phase import dead_time_from_phase
 
 DT = 7.8125e-4
 
@@ -43,16 +42,6 @@ def test_a_robust_loop_is_stable_for_every_plant_within(valve, pi_controller):
         assert np.all(np.abs(loop.poles()) < 1)
         ms = cr.design.margins(other, pi_controller(0.5, 0.1)).ms
         assert ms <= found.performance * (1 + 1e-6)
-
-
-def test_the_margin_is_how_much_the_bound_may_grow(valve, pi_controller):
-    plant = valve(37)
-    found = cr.design.uncertainty_bound([1.1 * plant], plant).check(pi_controller(0.5, 0.1))
-    # A pure gain error of 10 %: the bound is 0.1 at all frequencies, the margin 10 / max |T|.
-    z = np.exp(1j * found.uncertainty.omega * DT)
-    loop = plant(z) * pi_controller(0.5, 0.1)(z)
-    assert found.margin == pytest.approx(10 / np.abs(loop / (1 + loop)).max(), rel=1e-6)
-    np.testing.assert_allclose(found.uncertainty.bound, 0.1, rtol=1e-9)
 
 
 def test_a_loop_that_some_plant_destabilizes_is_not_called_robust(valve, pi_controller):
@@ -128,16 +117,3 @@ def test_sixty_measured_points_are_unwrapped_without_being_told_the_delay(valve,
     np.testing.assert_allclose(told, exact, atol=0.1)
     # What plain unwrapping makes of it: whole turns are missing.
     assert np.abs(np.unwrap(np.angle(response)) - exact).max() > 6 or delay == 37
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-def test_how_long_a_dead_time_can_be_told_depends_on_the_spacing_and_not_its_unit(unit):
-    # 4.5 rad from point to point at least: beyond half a turn, within one
-    uneven = np.cumsum([1.0, 1.0, 1.3, 1.1, 1.5, 1.2, 1.0, 1.4, 1.7, 1.3])
-    found = dead_time_from_phase(uneven / unit, np.exp(-4.5j * uneven))
-    assert found == pytest.approx(4.5 * unit, rel=1e-6)
-    # evenly spaced, 4.5 rad is 1.8 rad the other way round, which no delay is
-    even = np.arange(1.0, 11.0)
-    assert dead_time_from_phase(even / unit, np.exp(-2.5j * even)) == pytest.approx(2.5 * unit)
-    # the last delay tried is half a turn, or a sixty-fourth more
-    assert dead_time_from_phase(even / unit, np.exp(-4.5j * even)) < 1.05 * np.pi * unit

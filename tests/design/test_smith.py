@@ -7,15 +7,9 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import ModelWarning, UnsuitableSystemError
-from ctrl_realize.io import FitSummary
 from tests.oracles.dense import step_response
 
 DT = 7.8125e-4
-
-
-def fit_with_interval(interval):
-    return FitSummary("Fit", "Fit", (), values=(("dead_time_interval", interval),))
 
 
 def closed(plant, controller):
@@ -74,17 +68,6 @@ def test_a_filtered_predictor_leaves_no_error_after_a_load(valve, pi_controller,
     assert abs(step_response(loaded(plant, predictor), 6000)[-1]) < 1e-6
 
 
-def test_an_integrating_core_needs_the_filter_and_then_rejects_loads(cores, pi_controller):
-    plant = cr.delayed_ss(cores["integrating"], 37)
-    with pytest.raises(UnsuitableSystemError, match=r"integrates.*filter_time"):
-        cr.design.smith_predictor(plant, pi_controller(2.0, 3.0))
-    predictor = cr.design.smith_predictor(plant, pi_controller(2.0, 3.0), filter_time=0.1)
-    found = cr.design.margins(plant, predictor)
-    assert found.stable
-    assert np.all(np.abs(closed(plant, predictor).poles()) < 1)  # no hidden integrator either
-    assert abs(step_response(loaded(plant, predictor), 40_000)[-1]) < 1e-5
-
-
 def test_a_filter_widens_the_range_of_dead_times(valve, pi_controller):
     plant, controller = valve(37), pi_controller(3.0, 0.08)
     reach = [
@@ -106,13 +89,3 @@ def test_the_range_of_stable_dead_times_ends_where_it_says(valve, pi_controller)
     assert checked.stable
     assert checked.worst_modulus_margin == checked.table()["modulus_margin"].min()
     assert "stable" in checked.report()
-
-
-def test_the_identified_interval_is_checked(valve, pi_controller):
-    sure = valve(37).replace(fit=fit_with_interval((0.028, 0.030)))
-    predictor = cr.design.smith_predictor(sure, pi_controller(3.0, 0.08))
-    assert predictor.robustness.stable
-    unsure = valve(37).replace(fit=fit_with_interval((0.01, 0.2)))
-    with pytest.warns(ModelWarning, match="unstable for some dead time"):
-        predictor = cr.design.smith_predictor(unsure, pi_controller(3.0, 0.08))
-    assert not predictor.robustness.stable

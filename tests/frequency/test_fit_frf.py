@@ -170,15 +170,6 @@ def test_structures_disagree_is_said_where_they_do_by_a_tenth_of_the_dead_time(t
         assert fit.interval[0] <= 0.04 <= fit.interval[1]
 
 
-def test_superfluous_zero_takes_the_dead_time_away_and_is_said():
-    # Theorem: no information on the dead time where the numerator is freer than the plant's.
-    fit = cr.fit_frf(noisy(1), 2, relative_degree=1, dt=1e-3).fit
-    exact = cr.fit_frf(noisy(1), 2, relative_degree=2, dt=1e-3).fit
-    assert fit.interval[1] - fit.interval[0] > 5 * (exact.interval[1] - exact.interval[0])
-    assert fit.interval[0] <= 0.04 <= fit.interval[1]
-    assert fit.total_delay == pytest.approx(exact.total_delay, rel=0.01)
-
-
 @settings(max_examples=6)
 @given(st.floats(1e-6, 1e6), st.floats(1e-3, 1e3))
 def test_units_of_output_and_time_change_nothing_else(size, rate):
@@ -229,23 +220,6 @@ def test_leading_phase_is_told_and_a_missing_delay_is_not_taken_for_it():
     assert "phase_leads" not in codes(0.0)
 
 
-def test_resonances_over_three_decades_are_found_in_noise():
-    """Six pairs, damping 1 %, 3 % noise: nothing tells where they are but the response."""
-    f = np.geomspace(1, 1000, 300)
-    s = 2j * np.pi * f
-    centres = 2 * np.pi * np.array([2.0, 7.0, 20.0, 55.0, 160.0, 480.0])
-    response = sum(1 / (s**2 / w**2 + 0.02 * s / w + 1) / (k + 1) for k, w in enumerate(centres))
-    rng = np.random.default_rng(3)
-    scatter = 0.03 * (rng.standard_normal(300) + 1j * rng.standard_normal(300)) / np.sqrt(2)
-    measured = response * np.exp(-s * 2e-4) * (1 + scatter)
-    fit = cr.fit_frf(cr.MeasuredFRF(measured, f), 12, relative_degree=2).fit
-    assert fit.weighted_rms == pytest.approx(0.03, rel=0.15)
-    for w in centres:
-        k = int(np.argmin(np.abs(fit.poles - w * complex(-0.01, 1))))
-        assert abs(fit.poles[k] - w * complex(-0.01, 1)) < 4 * fit.pole_std[k] < 0.02 * w
-    assert fit.dead_time == pytest.approx(2e-4, abs=4 * fit.std_given_structure)
-
-
 def test_hold_is_divided_out_where_the_input_was_held():
     dt = 0.004
     plant = cr.delayed_ss(ct.tf([2], [0.08, 1]), dead_time=0.0243, dt=dt)
@@ -256,15 +230,6 @@ def test_hold_is_divided_out_where_the_input_was_held():
     # Aliases of a first-order lag are not part of the hold: (30/250)^2 at the last points.
     assert with_hold == pytest.approx(0.0243, abs=5e-5)
     assert without - with_hold == pytest.approx(dt / 2, rel=0.1)
-
-
-def test_direct_term_is_fitted_and_its_delay_rounded_and_said():
-    response = np.exp(-S * 0.0105) * (S + 40) / (S + 10)
-    model = cr.fit_frf(cr.MeasuredFRF(response, F), 1, relative_degree=0, dt=0.002)
-    assert model.fit.dead_time == pytest.approx(0.0105, abs=1e-7)
-    assert model.delay == 5
-    assert model.fit.matrices[3][0, 0] == pytest.approx(1.0, rel=1e-6)
-    assert model.fit.flags[0].code == "dead_time_rounded"
 
 
 def test_dead_time_as_a_parameter_beats_rational_approximation_of_the_same_order():
@@ -291,20 +256,6 @@ def test_dead_time_as_a_parameter_beats_rational_approximation_of_the_same_order
     assert ours < 2.5e-4  # sqrt(4 parameters / 160 values) of the noise, and half again
     assert errors[2] > 100 * ours
     assert errors[26] > 5 * ours
-
-
-def test_coherence_weights_points_that_have_no_deviation():
-    rng = np.random.default_rng(9)
-    coherence = np.where(F > 10, 0.01, 0.9999)
-    relative = np.sqrt((1 - coherence) / coherence)
-    noise = relative * (rng.standard_normal(F.size) + 1j * rng.standard_normal(F.size))
-    response = second_order(S) * (1 + noise / np.sqrt(2))
-    with_coherence = cr.MeasuredFRF(response, F, coherence=coherence)
-    known = cr.fit_frf(with_coherence, 2, relative_degree=2, dt=1e-3).fit
-    blind = cr.fit_frf(cr.MeasuredFRF(response, F), 2, relative_degree=2, dt=1e-3).fit
-    assert known.dead_time == pytest.approx(0.04, abs=2e-3)
-    assert abs(blind.dead_time - 0.04) > 3 * abs(known.dead_time - 0.04)
-    assert not known.noise_known
 
 
 def test_noise_alone_is_refused():

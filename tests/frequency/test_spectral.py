@@ -163,30 +163,6 @@ def test_deviations_of_several_channels_are_those_of_their_scatter():
     assert np.sqrt(np.mean(score, axis=(0, 3))) == pytest.approx(np.ones((2, 2)), abs=0.1)
 
 
-def test_inputs_that_move_together_are_refused():
-    with pytest.raises(ValueError, match="independently"):
-        cr.spectral_frf(two_by_two(5000, together=True))
-    with pytest.raises(ValueError, match="'H1'"):
-        cr.spectral_frf(two_by_two(5000), method="H2")
-    with pytest.raises(ValueError, match="expected one of each with period"):
-        cr.spectral_frf(two_by_two(5000), period=500)
-
-
-def test_random_record_of_the_simulated_valve_agrees_with_its_sampled_truth():
-    valve = cr.bench.valve()
-    bits = np.random.default_rng(0).integers(0, 2, 1600)
-    record = valve.record(8 + 8 * np.repeat(bits, 40), rng=1)
-    frf = cr.spectral_frf(record, segment=2048, delay=37).between_hz(0.6, 8)
-    # Held samples in, so the hold is in the estimate, which knows: it stays in the model too.
-    held = cr.compare_frf(valve.truth.sampled, frf)
-    assert held.hold is None
-    assert held.band_hz[1] > 6
-    # Leakage of the valve's own memory, 0.1 s in segments of 1.6 s, is most of it.
-    assert held.rms_relative_error < 0.05
-    divided = cr.compare_frf(valve.truth.sampled, frf, hold="zoh")
-    assert np.mean(divided.phase_error_deg) > np.mean(held.phase_error_deg) + 0.3
-
-
 @pytest.mark.parametrize("dt", [0.02, 0.1])
 def test_an_estimate_from_samples_knows_its_hold_and_every_function_reckons_with_it(dt):
     core = ct.tf([2.0], [0.8, 1])

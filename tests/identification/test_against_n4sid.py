@@ -65,15 +65,6 @@ def test_realization_predicts_as_well_as_a_subspace_method(
     assert fit > max(theirs, default=0.0) - 1.0
 
 
-@pytest.mark.filterwarnings("ignore:the input excites:ctrl_realize.errors.DataWarning")
-def test_the_robot_arm_needs_no_choice_of_method_or_length(shared_data):
-    # 36 % with the regularized estimate, 97 % with what the default takes
-    first, second = halves(shared_data, "robot_arm")
-    impulse = cr.impulse_from_io(first)
-    assert impulse.method.startswith("OKID")
-    assert cr.validation.analyse_residuals(cr.realize(impulse, 6), second).fit_percent[0] > 95
-
-
 @pytest.mark.parametrize(
     ("plant", "orders", "gain"),
     [

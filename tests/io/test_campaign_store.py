@@ -7,20 +7,16 @@ import hashlib
 import json
 import os
 import signal
-import stat
 import subprocess
 import sys
 import time
 
-import control as ct
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.io.atomic import replaced_when_complete, write_text
-from ctrl_realize.io.text.csv_files import write_csv
+from ctrl_realize.io.atomic import replaced_when_complete
 from tests.rigs import step_record
 
 
@@ -94,13 +90,6 @@ def test_a_damaged_row_is_made_anew(records, tmp_path, damage):
     assert_same_results(first, again)
 
 
-def test_workers_write_to_one_store(records, tmp_path):
-    store = cr.io.CampaignStore(tmp_path)
-    parallel = cr.identify_campaign(records, method="paper", store=store, n_jobs=2)
-    assert len(store) == 4
-    assert_same_results(parallel, cr.identify_campaign(records, method="paper"))
-
-
 @pytest.mark.parametrize("package", ["ctrl-realize", "numpy", "scipy"])
 def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
     store = cr.io.CampaignStore(tmp_path)
@@ -118,19 +107,6 @@ def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
     again = cr.identify_campaign(records[:1], method="paper", store=store)
     assert_same_results(first, again)
     assert json.loads(path.read_text())["versions"] != content["versions"]
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are those of POSIX")
-def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records, tmp_path):
-    store = cr.io.CampaignStore(tmp_path)
-    first = cr.identify_campaign(records[:1], method="paper", store=store)
-    (path,) = tmp_path.glob("row-*.json")
-    path.unlink()
-    os.mkfifo(path)
-    again = cr.identify_campaign(records[:1], method="paper", store=store)
-    assert again.delays == first.delays
-    assert "will not be replaced" in again.rows[0].warnings[-1]
-    assert path.is_fifo()
 
 
 SCRIPT = """
@@ -185,24 +161,3 @@ def test_after_a_failure_the_old_file_is_whole_and_the_folder_clean(tmp_path, re
         raise reason
     assert file.read_text() == "old"
     assert names(tmp_path) == ["a.txt"]
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
-def test_what_is_no_regular_file_is_not_replaced(tmp_path):
-    pipe, link = tmp_path / "pipe", tmp_path / "link"
-    os.mkfifo(pipe)
-    link.symlink_to(pipe)
-    model = cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 37)
-    table = pd.DataFrame({"a": [1]})
-    for target in (pipe, link, "/dev/null"):
-        for write in (
-            lambda path: cr.save_model(path, model),
-            lambda path: write_text(path, "text"),
-            lambda path: write_csv(path, table, index=False),
-        ):
-            with pytest.raises(OSError, match="will not be replaced"):
-                write(target)
-    assert stat.S_ISFIFO(pipe.stat().st_mode)
-    assert link.is_symlink()
-    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
-    assert names(tmp_path) == ["link", "pipe"]

@@ -6,7 +6,6 @@ import contextlib
 import pickle
 import struct
 import sys
-import tracemalloc
 import zipfile
 
 import numpy as np
@@ -249,23 +248,3 @@ def test_parquet_files_are_read(tmp_path):
     frame["time_ms"] = pd.Timestamp("2026-03-01") + pd.to_timedelta(T, unit="s")
     frame.to_parquet(tmp_path / "b.parquet")
     check(read_record(tmp_path / "b.parquet", time="time_ms"))
-
-
-def test_only_the_wanted_columns_of_a_parquet_file_are_read(tmp_path):
-    pq = pytest.importorskip("pyarrow.parquet")
-    pa = pytest.importorskip("pyarrow")
-    long = pa.DictionaryArray.from_arrays(np.zeros(N, dtype=np.int32), ["x" * 1_000_000])
-    columns = {"time_s": T, "u": U, "y": Y, "note": long, "matrix": [[1.0, 2.0]] * N}
-    path = tmp_path / "a.parquet"
-    pq.write_table(pa.table(columns), path, store_schema=False)
-    tracemalloc.start()
-    try:
-        check(read_record(path))
-        with pytest.raises(DataError, match=r"'note', row 0: 'xxx"):
-            read_record(path, output="note")
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak < 5e6  # N texts of a million letters would be 200 MB
-    with pytest.raises(FileFormatError, match=r"column 'matrix' holds list"):
-        read_record(path, output="matrix")

@@ -229,11 +229,3 @@ def test_other_files_are_refused(tmp_path, text, match):
     (tmp_path / "a.json").write_text(text, encoding="latin-1")
     with pytest.raises(FileFormatError, match=match):
         load_model(tmp_path / "a.json")
-
-
-def test_a_model_of_any_delay_that_was_saved_is_read_by_default(tmp_path, model):
-    far = model.replace(delay=900_000)
-    save_model(tmp_path / "a.json", far)
-    read = load_model(tmp_path / "a.json")
-    assert read.delay == 900_000
-    assert_array_equal(read(1j), far(1j))

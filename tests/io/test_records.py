@@ -22,7 +22,7 @@ from ctrl_realize.errors import (
     OptionError,
     TimeAxisError,
 )
-from ctrl_realize.io import read_frf, read_record
+from ctrl_realize.io import read_record
 from ctrl_realize.io.text.csv_files import as_text, write_csv
 from ctrl_realize.io.units import split_unit, to_seconds
 
@@ -294,20 +294,6 @@ def test_every_double_comes_back_to_the_last_bit(tmp_path_factory, rows, delimit
     assert_array_equal(record.output, [y for _, y in rows])
 
 
-@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
-def test_a_clock_of_ticks_since_1970_is_not_taken_for_seconds(tmp_path, unit, ticks):
-    file = tmp_path / "logger.csv"
-    start = int(1.77e9 * ticks)  # in the year 2026
-    rows = [f"{start + int(k * ticks / 10)},0,{k}" for k in range(5)]
-    file.write_text("time,u,y\n" + "\n".join(rows) + "\n")
-    with pytest.raises(OptionError, match=rf"clock of {unit} since 1970; give time_unit='{unit}'"):
-        read_record(file)
-    assert read_record(file, time_unit=unit).dt == pytest.approx(0.1)
-    assert read_record(file, time_unit="s").dt == pytest.approx(0.1 * ticks)
-    file.write_text(f"time_{unit},u,y\n" + "\n".join(rows) + "\n")
-    assert read_record(file).dt == pytest.approx(0.1)
-
-
 N = 12
 ENDS = ["\n", "\r\n", "\r", "\r\r\n"]
 
@@ -341,24 +327,6 @@ def test_no_sample_is_lost_whatever_the_line_ends_and_the_header(
     record = read_record(path, input=1, output=2)
     is_whole(record)
     assert "".join(record.output_labels[0].split()) == "".join(header[2].split())
-
-
-@pytest.mark.parametrize(
-    ("header", "unit", "cells", "dt"),
-    [
-        ("time", "min", ["59:58", "59:59", "00:00"], 1.0),
-        ("time", "h", ["23:58", "23:59", "00:00"], 60.0),
-        ("time [mm:ss]", "auto", ["00:59.5", "01:00.0", "01:00.5"], 0.5),
-        ("time [hh:mm]", "auto", ["99:58", "99:59", "100:00"], 60.0),
-        ("time", "min", ["119:59", "120:00", "120:01"], 1.0),
-        ("time", "auto", ["23:59:59.9", "00:00:00.0", "00:00:00.1"], 0.1),
-    ],
-)
-def test_a_clock_runs_in_the_unit_that_was_said(tmp_path, header, unit, cells, dt):
-    path = tmp_path / "a.csv"
-    path.write_text(f"{header},u,y\n" + "".join(f"{cell},{k},1\n" for k, cell in enumerate(cells)))
-    record = read_record(path, time_unit=unit)
-    assert record.dt == pytest.approx(dt, rel=1e-12)
 
 
 FORMULA_SIGNS = "=+-@\t\r\n\uff1d\uff0b\uff0d\uff20"
@@ -426,19 +394,6 @@ def test_every_measured_record_in_text_is_read_to_the_last_bit(shared_data):
         outputs = [k for k, name in enumerate(names) if name.startswith("output")]
         assert_array_equal(np.atleast_2d(record.input), table[inputs])
         assert_array_equal(np.atleast_2d(record.output), table[outputs])
-
-
-def test_every_measured_frequency_response_is_read(shared_data):
-    files = list(shared_data.rglob("*frf*.csv"))
-    assert len(files) >= 5
-    for file in files:
-        frf = read_frf(file)
-        frequency, magnitude, phase = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
-        assert_array_equal(frf.frequency_hz, frequency)
-        np.testing.assert_allclose(np.abs(frf.frdata[0, 0]), magnitude, rtol=1e-15)
-        turns = (np.angle(frf.frdata[0, 0], deg=True) - phase) / 360
-        # angle() and exp() round, and 2160 degrees cost three digits
-        np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
 
 
 @pytest.mark.parametrize(

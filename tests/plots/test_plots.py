@@ -14,7 +14,6 @@ import ctrl_realize as cr
 from ctrl_realize import plots
 from ctrl_realize.errors import OptionError
 from ctrl_realize.plots import style
-from tests import rigs
 
 
 @pytest.fixture(scope="module")
@@ -138,20 +137,6 @@ def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
         exact = -360 * 0.25 * hertz - np.degrees(np.arctan(2 * np.pi * hertz * 0.08))
         # The model lags by half a sample more: 7 degrees at 50 Hz.
         assert_allclose(phase, exact, atol=8.0)
-
-
-def test_records_of_any_input_are_drawn_one_after_the_other_and_steps_as_their_mean():
-    rng = np.random.default_rng(0)
-    plant = cr.delayed_ss(ct.ss(ct.tf([1], [0.2, 1])), dead_time=0.3, dt=0.05)
-    moving = []
-    for _ in range(2):
-        u = np.repeat(rng.choice([-1.0, 1.0], 40), 5)
-        y = plant.simulate(u) + 0.02 * rng.standard_normal(200)
-        moving.append(cr.Record(0.05 * np.arange(200), u, y))
-    steps = [rigs.step_record(noise=0.01, seed=k, before=400, after=900) for k in range(2)]
-    for records, label in ((moving, "measured"), (steps, "mean of 2 records")):
-        drawn = plots.fit_plot(cr.fit_output_error(records, structures=[(1, 1)]))
-        assert drawn.lines[0, 0][0].get_label() == label
 
 
 @pytest.fixture(autouse=True)

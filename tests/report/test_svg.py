@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-import json
 import re
 from xml.etree import ElementTree
 
@@ -13,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from ctrl_realize.plots import style
-from ctrl_realize.report.svg import envelope, inline_svg, laid_out, scales
+from ctrl_realize.report.svg import envelope, inline_svg, laid_out
 
 
 def drawn(draw, key, size, description):
@@ -37,26 +35,6 @@ def test_a_drawn_figure_is_well_formed_and_has_its_own_ids():
     used = set(re.findall(r"#([\w-]+)[)\"]", one))
     assert used
     assert used <= ids[0]
-
-
-def test_a_figure_says_where_its_axes_are_and_what_they_show():
-    def draw(figure):
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        upper.set_xlim(1.0, 100.0)
-        upper.set_xscale("log")
-        upper.set_ylim(-3.0, 5.0)
-        lower.set_xlabel('"time" [ms]')
-        lower.set_yticks([0, 1], ["one", "two"])
-
-    figure = laid_out(draw, (4.0, 3.0))
-    upper, lower = json.loads(scales(figure))
-    assert upper["x"] == [1.0, 100.0, True, "ms"]  # the unit stands below the lower axes
-    assert upper["y"] == [-3.0, 5.0, False, ""]
-    assert lower["y"] is None  # names, not values
-    left, top, width, height = upper["box"]
-    assert 0 < left < left + width <= 4 * 72
-    assert 0 <= top < top + height < lower["box"][1] < 3 * 72
-    assert json.dumps(json.loads(scales(figure))) in html.unescape(inline_svg(figure, "k", "d"))
 
 
 @given(

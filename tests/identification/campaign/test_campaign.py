@@ -17,7 +17,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.identification.campaign.packed_model import PackedModel
-from ctrl_realize.identification.campaign.rows import fingerprint
 from ctrl_realize.io import FitSummary
 from tests.rigs import TS, step_record
 
@@ -105,28 +104,6 @@ TIME = DT * np.arange(200)
 def record(name="", step=-4.0, offset=0.0, **labels):
     moved = step * (np.arange(200) >= 60)
     return cr.Record(TIME, moved, offset + 2 * moved, name=name, **labels)
-
-
-@pytest.mark.parametrize(
-    "known",
-    [
-        lambda pole=2.0, gain=1.0, dt=0: ct.tf([gain], [1.0, pole], dt),
-        lambda pole=2.0, gain=1.0, dt=0: ct.ss([[-pole]], [[1.0]], [[gain]], [[0.0]], dt),
-        lambda pole=2.0, gain=1.0, dt=0: ct.ss([[-2.0]], [[pole]], [[1.0]], [[gain]], dt),
-    ],
-)
-def test_the_key_knows_a_system_by_all_its_digits(known):
-    one = record()
-
-    def key(system):
-        return fingerprint(one, "output_error", {"known": system})
-
-    same = known()
-    same.name = "sensor"
-    assert key(same) == key(known())
-    # python-control prints eight digits
-    others = [known(pole=2 + 1e-12), known(gain=1 + 1e-12), known(dt=DT)]
-    assert len({key(system) for system in [same, *others]}) == 4
 
 
 RNG = np.random.default_rng(1)

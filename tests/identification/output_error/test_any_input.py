@@ -120,19 +120,6 @@ def random_binary(poles, noise, disturbance=0.0, seed=0):
     return cr.Record(t, u, y)
 
 
-@pytest.mark.parametrize("noise", [0.005, 0.03])
-def test_many_lags_are_no_dead_time_under_any_input(noise):
-    five = cr.fit_output_error(random_binary([1, 1.5, 2, 3, 5], noise)).fit
-    assert five.interval[0] <= 0.8 <= five.interval[1]
-    # three poles with two zeros, the best of the smaller models, say 1.15 s
-    assert abs(five.dead_time - 0.8) < 0.2
-    eight = cr.fit_output_error(random_binary([3.0] * 8, noise)).fit
-    assert eight.interval[0] <= 0.8 <= eight.interval[1]
-    assert abs(eight.dead_time - 0.8) < 0.05
-    assert eight.order == 8
-    assert eight.at_noise_level
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_slow_disturbance_does_not_move_the_dead_time(seed):
     # a fifth of the response, over a period of 60 s: the fit was half a second late

@@ -69,15 +69,6 @@ def test_delays_that_no_split_explains_take_the_fewest_states(delays, structure)
     assert core.nstates >= fit.states - 1
 
 
-def test_other_units_change_no_delay_and_no_pole():
-    data = separate(np.array([[3, 4], [9, 10]]))
-    units = np.array([1e3, 1e-2])[:, None, None] * np.array([5.0, 0.1])[:, None]
-    plain, other = (cr.identification.realize_mimo(d, 3, dt=DT) for d in (data, units * data))
-    assert np.array_equal(plain.delay, other.delay)
-    for unit in (1e-9, 1e9):
-        assert np.array_equal(cr.identification.delay_matrix(unit * data, dt=DT), [[3, 4], [9, 10]])
-
-
 def test_noise_is_not_taken_for_a_response():
     plant = cr.DelayedStateSpace(CORE, (4, 7), output_delay=(0, 2, 0))
     rng = np.random.default_rng(0)

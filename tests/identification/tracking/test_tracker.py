@@ -137,18 +137,6 @@ def test_a_delay_beyond_the_candidates_is_not_claimed():
     assert "max_delay=20" in fixed.estimate().reason
 
 
-def test_offsets_and_units_do_not_matter():
-    record, _ = worn_valve(seconds=10, last=37.0)
-    moved = cr.Record(record.time, record.input + 1e4, 1e3 * record.output - 5e6)
-    plain, other = tracker(forgetting_time=2.0), tracker(1000 * R3, forgetting_time=2.0)
-    plain.track(record)
-    other.track(moved)
-    first, second = plain.estimate(), other.estimate()
-    assert second.delay == first.delay
-    assert second.interval == first.interval
-    assert abs(second.gain_ratio - first.gain_ratio) < 1e-6
-
-
 def test_a_tracker_goes_on_after_pickling_as_if_nothing_had_happened():
     record, _ = worn_valve(seconds=4, last=37.0)
     one = tracker(forgetting_time=1.0)

@@ -15,22 +15,12 @@ from ctrl_realize.numerics.hankel.matrix import (
 )
 from ctrl_realize.numerics.hankel.recurrence import extreme_pairs
 from ctrl_realize.numerics.hankel.svd import leading_triplets
-from tests.oracles import dense
 from tests.oracles.plants import modal, valve_pulse
 
 
 @pytest.fixture
 def rng():
     return np.random.default_rng(7)
-
-
-@pytest.mark.parametrize(("p", "m"), [(1, 1), (2, 3), (3, 1)])
-@pytest.mark.parametrize(
-    ("rows", "columns", "length"), [(4, 4, 7), (5, 3, 7), (4, 6, 5), (1, 1, 1)]
-)
-def test_block_hankel_has_the_entries_of_its_definition(rng, p, m, rows, columns, length):
-    h = rng.standard_normal((p, m, length))
-    assert np.array_equal(hankel_matrix(h, rows, columns), dense.hankel(h, rows, columns))
 
 
 @pytest.mark.parametrize("size", [1, 2, 17, 500])
@@ -101,32 +91,6 @@ def test_values_inside_the_noise_cluster_are_the_dense_ones():
         # nothing but noise: neighbours differ by a percent
         assert_allclose(np.abs(pairs.values[d]), dense[:6], rtol=0, atol=1e-10 * dense[0])
         assert dense[6] * 0.9 <= pairs.following[d] <= dense[6] * (1 + 1e-9)
-
-
-def test_a_power_of_two_scales_every_bit():
-    h = windows(valve_pulse("causal"), 200, 4)
-    plain, scaled = leading_eigenpairs(h, 200, 3), leading_eigenpairs(h * 2.0**-900, 200, 3)
-    assert np.array_equal(plain.vectors, scaled.vectors)
-    assert np.array_equal(plain.values * 2.0**-900, scaled.values)
-
-
-@pytest.mark.parametrize("size", [40, 100, 300])
-@pytest.mark.parametrize("rank", [0, 1, 2, 5])
-def test_beyond_the_numerical_rank_there_are_zeros(size, rank):
-    A, B, C, _ = modal(np.random.default_rng(rank), max(rank, 1))
-    pulse = np.array([(C @ np.linalg.matrix_power(A, k) @ B)[0, 0] for k in range(2 * size)])
-    pairs = leading_eigenpairs(windows(pulse * (rank > 0), size, 1), size, 8)
-    assert np.count_nonzero(pairs.values[0]) == rank
-    assert np.count_nonzero(np.abs(pairs.vectors[0]).max(axis=1)) == rank
-
-
-@pytest.mark.parametrize("size", [50, 200, 2000])  # dense, dense fallback, ARPACK
-def test_a_pulse_has_one_and_minus_one_many_times(size):
-    pulse = np.zeros(2 * size)
-    pulse[20] = 1.0
-    pairs = leading_eigenpairs(windows(pulse, size, 1), size, 8)
-    # one start vector sees each value once; the rest must not be taken for zero
-    assert_allclose(np.abs(pairs.values[0]), np.ones(8), rtol=1e-13)
 
 
 @pytest.mark.parametrize("place", [3, 40, 77])

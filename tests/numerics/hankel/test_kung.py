@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.hankel.delay_models import realize_at, realize_at_delays
+from ctrl_realize.numerics.hankel.delay_models import realize_at
 from ctrl_realize.numerics.hankel.iae import integrated_absolute_error, markov_stack
 from ctrl_realize.numerics.hankel.kung import realize_block, realize_symmetric, tail_bound
 from ctrl_realize.numerics.hankel.matrix import hankel_matrix
@@ -109,28 +109,6 @@ def test_data_times_c_scale_values_and_gain_and_nothing_else(scale, seed):
         scale * np.linalg.norm(one.B) * np.linalg.norm(one.C),
         rtol=1e-8,
     )
-
-
-@pytest.mark.parametrize("delays", [[0, 1, 2, 3, 4, 5], [5, 0, 3], [2]])
-@pytest.mark.parametrize("channels", [(1, 1), (2, 2)])
-def test_many_delays_together_are_the_single_realizations(channels, delays):
-    rng = np.random.default_rng(4)
-    g = np.concatenate([np.zeros((*channels, 3)), exact(3, *channels, 460, 1)], axis=2)
-    g += 1e-3 * rng.standard_normal(g.shape)
-    together = realize_at_delays(g, np.array(delays), 450, 3, padded=False, tol=1e-12)
-    for i, d in enumerate(delays):
-        alone = realize_at(g, d, 450, 3, padded=False)
-        assert_allclose(together.A[i], alone.A, atol=1e-9)
-        assert_allclose(together.singular_values[i], alone.singular_values[:3], rtol=1e-12)
-
-
-def test_states_beyond_the_rank_do_nothing():
-    g = exact(2, 1, 1, 200, 1)
-    model = realize_at_delays(g, np.array([0]), 199, 5, padded=False)
-    assert np.count_nonzero(model.singular_values) == 2
-    assert not model.A[0, 2:].any()
-    assert not model.A[0, :, 2:].any()
-    assert not model.B[0, 2:].any()
 
 
 def test_block_formulas_agree_with_the_textbook():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import control as ct
 import numpy as np
 import pytest
 from hypothesis import given
@@ -182,18 +181,6 @@ def test_given_frequency_is_plain_linear_least_squares():
         )
 
 
-def test_a_drift_that_is_fitted_too_widens_the_phasor_as_in_linear_least_squares():
-    omega = 2.5  # little more than a period: sine and drift are alike
-    y = sine(omega, 1 + 0.5j, 0.3, -0.2) + 0.1 * np.random.default_rng(3).standard_normal(N)
-    fit = fit_sines(T, y[None, None], np.array([omega]), free_frequency=False, drift=True)
-    design = np.stack([np.cos(omega * T), -np.sin(omega * T), np.ones(N), T], axis=1)
-    expected, squares, _, _ = np.linalg.lstsq(design, y, rcond=None)
-    assert_allclose(fit.phasor[0, 0], expected[0] + 1j * expected[1], atol=1e-12)
-    assert_allclose([fit.offset[0, 0], fit.slope[0, 0]], expected[2:], atol=1e-12)
-    covariance = squares / (N - 4) * np.linalg.inv(design.T @ design)[:2, :2]
-    assert_allclose(fit.phasor_covariance[0, 0], covariance, rtol=1e-9)
-
-
 def test_noisy_estimates_scatter_as_the_stated_standard_deviations_say():
     rng = np.random.default_rng(2)
     runs, omega, sigma = 1500, 17.0, np.array([0.02, 0.4])
@@ -218,17 +205,6 @@ def test_noisy_estimates_scatter_as_the_stated_standard_deviations_say():
 def test_hold_lags_by_half_a_sample_1_83_degrees_at_13_hz():
     hold = hold_response(2 * np.pi * np.array([2.0, 13.0]), 7.8125e-4)
     assert_allclose(-np.degrees(np.angle(hold)), [0.28125, 1.828125], rtol=1e-12)
-
-
-def test_hold_is_what_sampling_an_integrator_adds():
-    # Sampled integrator dt/(z-1) against 1/s: ratio exactly hold x (aliases of 1/s, summed).
-    dt, omega = 0.1, np.array([0.5, 3.0])
-    sampled = ct.sample_system(ct.tf([1], [1, 0]), dt, "zoh")
-    ratio = sampled(np.exp(1j * omega * dt)) * 1j * omega
-    # Aliases turn sinc into x cot(x) with the same half-sample phase.
-    half = omega * dt / 2
-    assert_allclose(np.angle(ratio), np.angle(hold_response(omega, dt)), atol=1e-12)
-    assert_allclose(np.abs(ratio), half / np.sin(half), rtol=1e-12)
 
 
 def test_segment_sums_are_those_of_scipys_csd():

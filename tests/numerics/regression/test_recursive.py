@@ -101,25 +101,6 @@ def test_a_moved_core_has_the_moved_poles_and_the_same_gain():
         assert abs(after - before) < 0.1
 
 
-def test_an_integrator_stays_where_it_is_and_the_lag_beside_it_moves():
-    lag_alone = np.exp(-0.1)
-    A = np.array([[1.0, 0.0], [0.1, lag_alone]])
-    core = (A, np.array([0.1, 0.0]), np.array([0.0, 1.0]), 0.0)
-    directions = pole_directions(np.linalg.eigvals(A), 0.1)
-    assert [what for what, _, _ in directions] == ["speed"]
-    made = moved_core(core, np.zeros(0, complex), directions, np.array([-0.2]), 0.1)
-    assert made is not None
-    slower = np.exp(-0.1 * np.exp(-0.2))
-    assert_allclose(np.sort(np.linalg.eigvals(made[0][0])), [slower, 1.0], rtol=1e-12)
-    assert made[1][0][1] == pytest.approx(slower)
-
-    def pulse(A, B, C, D):
-        return markov(A, B[:, None], C[None], np.array([[D]]), 400)[0, 0]
-
-    # what a pulse leaves for ever stays as it was
-    assert pulse(*made[0])[-1] == pytest.approx(pulse(*core)[-1], rel=1e-9)
-
-
 @pytest.mark.parametrize("angle", [0.1, 0.3, 0.5, np.pi / 4, 1.0, np.pi / 2, 2.0])
 @pytest.mark.parametrize("move", [-0.2, -1.0])
 def test_a_pair_that_has_lost_its_damping_is_no_moved_model_however_it_is_rounded(angle, move):

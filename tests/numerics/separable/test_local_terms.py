@@ -52,23 +52,6 @@ def test_what_a_record_has_for_itself_disappears(theta):
     assert_allclose(left, 0.0, atol=1e-9 * np.abs(data).max())
 
 
-@pytest.mark.parametrize("theta", THETA.values(), ids=THETA.keys())
-def test_own_terms_are_continued_at_other_times(theta):
-    poles, _ = poles_from_parameters(np.array([theta]))
-    between = Stretches(np.array([0, 50, 90]), np.r_[:50.0, :40.0] + 0.5, np.ones((90, 1)))
-    level = Stretches(EDGES, CLOCK, np.ones((180, 1)))
-    weight = np.linspace(1, 2, 180)
-    own = OwnTerms(FixedTerms(level, weight), poles)
-    slow = np.array([1.0, 3.0])  # of the two records, beside their levels 5 and 7
-    data, expected = (
-        np.repeat(slow, sizes) * np.exp(clock[:, None] * poles[0]).sum(axis=1).real
-        + np.repeat([5.0, 7.0], sizes)
-        for sizes, clock in (([70, 110], CLOCK), ([50, 40], between.clock))
-    )
-    found = own.fitted((weight * data)[None], between)[0]
-    assert_allclose(found, expected, rtol=1e-7)
-
-
 def test_nothing_else_disappears_and_records_do_not_mix():
     poles, _ = poles_from_parameters(np.array([THETA["three"]]))
     own = OwnTerms(FixedTerms(STRETCHES, np.ones(180)), poles)

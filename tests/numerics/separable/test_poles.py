@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
-from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput, SeveralInputs
+from ctrl_realize.numerics.separable.responses import MoveTrain
 from ctrl_realize.numerics.separable.structures import (
     PLAUSIBLE,
     Candidate,
@@ -20,8 +20,6 @@ from ctrl_realize.numerics.separable.structures import (
     search,
 )
 from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
-
-GAP = 0.01  # relative distance that coinciding poles of one pair are given
 
 
 def ordered(poles):
@@ -67,21 +65,6 @@ def test_derivatives_are_those_of_differences(zeta, omega, rate):
             continue  # moved apart, which the derivative does not follow
         # curvature of the root near a damping of one: h / (zeta - 1)
         assert_allclose(derivative[0, :, q], ((up - down) / (2 * h))[0], atol=1e-4 * size)
-
-
-def real_poles(*rates):
-    return poles_from_parameters(parameters_from_poles(-np.array(rates) + 0j)[np.newaxis])[0][
-        0
-    ].real
-
-
-def test_equal_poles_of_different_factors_are_moved_to_faster_ones():
-    found = np.sort(-real_poles(3.0, 3.0, 9.0))
-    assert_allclose(found, [3.0, 3.0 * (1 + GAP), 9.0], rtol=1e-9)
-    many = np.sort(-real_poles(3.0, 3.0, 3.0, 3.0, 3.0))
-    assert np.min(np.diff(many)) > 0.4 * GAP * 3
-    assert many[0] > 3 * (1 - GAP)
-    assert many[-1] < 3 * (1 + 6 * GAP)
 
 
 def candidate(n: int, r: int, cost: float = 1.0, poles: object = None) -> Candidate:
@@ -191,15 +174,3 @@ def test_means_over_bins_are_those_of_their_samples(poles, widest):
             means = (sums.T / width).T
             # a pole of 1e-9: a series to the second order, a ten-millionth of it
             np.testing.assert_allclose(one[row], means, rtol=1e-8, atol=1e-12)
-
-
-def test_several_records_stand_one_after_the_other_without_their_first_samples():
-    rng = np.random.default_rng(1)
-    parts = tuple(SampledInput(rng.standard_normal(n), 0.1) for n in (7, 5, 9))
-    tau = np.array([0.12, 0.2])
-    found = SeveralInputs(parts, (2, 0, 3)).modes(tau, POLES)
-    alone = [part.modes(tau, POLES) for part in parts]
-    for i, one in enumerate(found):
-        assert one.shape[1] == 5 + 5 + 6
-        pieces = [alone[0][i][:, 2:], alone[1][i], alone[2][i][:, 3:]]
-        assert np.array_equal(one, np.concatenate(pieces, axis=1))

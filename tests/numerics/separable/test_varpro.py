@@ -159,18 +159,6 @@ def noisy(gain=2.0, level=5.0, noise=0.02, seed=0):
 # --- responses
 
 
-def test_known_dynamics_stand_in_cascade():
-    # 1.2 / (s + 0.4) behind (6 + s) / (s + 3): by partial fractions, static gain 6
-    known = KnownFactor(np.array([-3.0 + 0j]), np.array([1.0, 6.0]))
-    found = respond(train(), known, np.array([1.2]), np.array([3.3, np.log(0.4)]))
-    since = TIME - 5.3
-    slow = 1.2 * 5.6 / (-0.4 * 2.6)
-    fast = 1.2 * 3.0 / (-3.0 * -2.6)
-    expected = 6.0 + slow * np.exp(-0.4 * since) + fast * np.exp(-3.0 * since)
-    assert 6.0 + slow + fast == pytest.approx(0.0, abs=1e-12)
-    assert found == pytest.approx(np.where(since > 0, expected, 0.0), abs=1e-12)
-
-
 @pytest.mark.parametrize("known", [np.ones(1), np.array([0.2, 0.0, 0.3])])
 def test_partial_fractions_add_up(known):
     poles = np.array([[-0.4 + 0j, -0.3 + 2j, -0.3 - 2j], [-1.0, -2.0, -7.0]])
@@ -205,19 +193,6 @@ def test_the_residual_is_that_of_weighted_least_squares():
         # b over s + a has the static gain b / a
         assert state.numerator[row, 0] / np.exp(rate) == pytest.approx(best[0])
         assert state.regression[row, 0] == pytest.approx(best[1])
-
-
-def test_a_whitener_stands_in_for_the_weights():
-    data = noisy()
-    white = np.tril(np.random.default_rng(0).standard_normal((SIZE, SIZE))) + 3 * np.eye(SIZE)
-    columns = np.random.default_rng(1).standard_normal((2, SIZE, 3))
-    made = problem(data, whitener=white)
-    assert made.weighted(columns) == pytest.approx(np.stack([white @ one for one in columns]))
-    assert made.weighted_data == pytest.approx(white @ data)
-    diagonal = problem(data, whitener=np.diag(np.linspace(0.5, 2, SIZE)))
-    weighted = problem(data, root_weight=np.linspace(0.5, 2, SIZE))
-    both = [evaluate(one, ONE, TRUTH[None]).residual for one in (diagonal, weighted)]
-    assert both[0] == pytest.approx(both[1], abs=1e-12)
 
 
 def test_own_terms_are_taken_out_of_data_and_model():

@@ -44,32 +44,6 @@ def test_a_clean_straight_rise_begins_where_it_begins(delay, length, gain, up, o
     assert found.span == pytest.approx(gain, rel=1e-6)
 
 
-@pytest.mark.parametrize("quantum", [0.05, 0.1])
-def test_a_coarse_output_moves_by_more_than_its_rounding(quantum):
-    output = quantum * np.round(ramp(25, 200) / quantum)
-    found = first_motion(output, EDGE, 0.0, quantum, 0.0)
-    # 1.5 steps of rounding: the second step is the motion, at 1.5 steps of the straight line
-    assert found.crossing == pytest.approx(25 + 1.5 * quantum * 200, abs=1.01)
-    # a line through two of the steps is right to one of them
-    assert found.onset == pytest.approx(25, abs=quantum * 200)
-    flicker = quantum * (np.arange(1000) % 2)
-    assert first_motion(flicker, EDGE, 0.0, quantum, 0.0) is None
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_small_steps_are_seen_in_means_of_eight_and_of_sixtyfour(seed):
-    noise = np.random.default_rng(seed).standard_normal(4000)
-    k = np.arange(4000)
-    for height, blur in ((3.0, 8), (1.2, 64)):
-        output = height * (k >= 1200) + noise
-        found = first_motion(output, 1000, 1.0, 0.0, 0.0)
-        assert found.sign == 1
-        # a mean reaches half its length ahead
-        assert abs(found.onset - 200) <= blur
-        assert found.span == pytest.approx(height, abs=1.0)
-    assert first_motion(noise, 1000, 1.0, 0.0, 0.0) is None
-
-
 def test_a_plant_of_third_order_is_seen_to_move_after_its_delay():
     time = rigs.TS * np.arange(-400, 1200)
     output = rigs.exact_step(rigs.R3, time - 60 * rigs.TS)
@@ -113,26 +87,6 @@ def test_a_drift_is_continued_to_the_step(remove):
     # standard errors of a line through 400 samples: sigma sqrt(12 / n^3) and sigma sqrt(4 / n)
     assert slope == pytest.approx(0.002, abs=4 * 0.01 * np.sqrt(12 / 400**3))
     assert level == pytest.approx(3, abs=4 * 0.01 * np.sqrt(4 / 400))
-
-
-def standard_error(noise):
-    """Of the slope of a line through `noise`; its correlation ends as in Geyer (1992), 3.3."""
-    n = noise.size
-    correlation = np.correlate(noise, noise, "full")[n - 1 :] / (noise @ noise)
-    pairs = correlation[: n // 2 * 2].reshape(-1, 2).sum(axis=1)
-    time = 2 * pairs[: np.flatnonzero(pairs <= 0)[0]].sum() - 1
-    return noise.std() * np.sqrt(12 * (time if time > 1.5 else 1) / n**3)
-
-
-@pytest.mark.parametrize("pole", [-0.5, 0.0, 0.6, 0.9])
-@pytest.mark.parametrize("seed", range(4))
-def test_five_standard_errors_decide(pole, seed):
-    k = np.arange(-300, 0)
-    noise = lfilter([1], [1, -pole], white(300, seed))
-    noise -= np.polyval(np.polyfit(k, noise, 1), k)  # its own line taken off
-    error = standard_error(noise)
-    assert rest_line(7 + noise + 4.99 * error * k, AFTER, None)[1] == 0
-    assert rest_line(7 + noise + 5.01 * error * k, AFTER, None)[1] == pytest.approx(5.01 * error)
 
 
 def noise(count, seed=0):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import control as ct
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.state_space.delay_split import joined_columns, joined_rows, split_delays
+from ctrl_realize.numerics.state_space.delay_split import joined_rows, split_delays
 from ctrl_realize.numerics.state_space.process_models import half_rule, process_step
 from ctrl_realize.numerics.state_space.responses import markov
 from ctrl_realize.numerics.state_space.sampling import (
@@ -108,19 +107,6 @@ def test_rows_behind_tapped_lines_have_the_delay_of_each_entry(parts):
             assert_allclose(whole[i, j], late, rtol=0, atol=1e-14)
 
 
-def test_columns_in_front_of_tapped_lines_have_the_delay_of_each_entry(parts):
-    turned = [(A.T, C.T, B.T, D.T) for A, B, C, D in parts]
-    taps = np.array([[0, 2, 5], [3, 0, 1]])
-    A, B, C, D = joined_columns(turned, taps)
-    whole = markov(A, B, C, D, 30)
-    for j, part in enumerate(turned):
-        single = markov(*part, 30)[:, 0]
-        for i in range(2):
-            late = np.concatenate([np.zeros(taps[i, j]), single[i]])[:30]
-            assert_allclose(whole[i, j], late, rtol=0, atol=1e-14)
-    assert ct.ss(A, B, C, D, 1.0).nstates == 6 + 5 + 3
-
-
 def reduced(lags, leads, dead_time, order=1):
     factor, kept, theta = half_rule(np.array(lags), np.array(leads), np.zeros(0), dead_time, order)
     return factor, kept.tolist(), theta
@@ -145,9 +131,6 @@ def test_a_lead_is_cancelled_by_its_rule(lags, leads, dead_time, factor, kept):
     assert theta == dead_time
 
 
-TIME = np.linspace(0, 20, 41)
-
-
 @pytest.mark.parametrize(("lag", "second"), [(3.0, 0.0), (3.0, 0.5), (0.5, 3.0), (3.0, 3.0)])
 @pytest.mark.parametrize("integrating", [False, True])
 def test_the_response_obeys_its_differential_equation(lag, second, integrating):
@@ -159,13 +142,3 @@ def test_the_response_obeys_its_differential_equation(lag, second, integrating):
     forced = lag * second * bend + (lag + second) * slope + y[1]
     # second differences: h^2 / 12 of the fourth derivative, below 1 / 0.5^4
     assert_allclose(forced, t - 1.5 if integrating else 1.0, atol=1e-5)
-
-
-@pytest.mark.parametrize("integrating", [False, True])
-@pytest.mark.parametrize("near", [0.9e-6, 1.1e-6, 1e-4])
-def test_equal_lags_are_the_limit_of_nearly_equal_ones(integrating, near):
-    equal = process_step(TIME, 2.0, 2.0, 1.0, integrating=integrating)
-    nearly = process_step(TIME, 2.0, 2.0 * (1 - near), 1.0, integrating=integrating)
-    # the response changes by at most d/dT of it, about 1 a second, times the lag's change;
-    # digits that cancel in the difference of the lags: 1e-16 / near
-    assert_allclose(nearly, equal, atol=2 * 2.0 * near + 20e-16 / near * 20)

@@ -78,14 +78,6 @@ def test_sampling_is_that_of_the_continuous_step(dt, fraction):
     assert delay in (int(np.floor(fraction)), int(np.floor(fraction)) + 1)
 
 
-def test_integrators_are_sampled_exactly():
-    A, B, C, D = np.zeros((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1))
-    *model, delay = sampling.sample_with_dead_time(A, B, C, D, 0.5, 0.75)
-    step = responses.step_response(*model, 6)[0, 0]
-    assert delay == 2
-    assert_allclose(step, 0.5 * np.arange(6) + 0.25, atol=1e-15)
-
-
 SAMPLES = 60
 
 
