@@ -54,6 +54,6 @@ def check_complete(record: Record, task: str) -> None:
     as_record(record)
     if record.missing == "keep" and record.n_missing:
         raise DataError(
-            f"{task} needs complete data, but {record.n_missing} samples of this record are "
-            "missing; select a complete part with record.between(t0, t1), or interpolate"
+            f"{task} needs complete data; missing samples in this record: {record.n_missing}. "
+            "Select a complete part with record.between(t0, t1), or interpolate"
         )
