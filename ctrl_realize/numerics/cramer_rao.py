@@ -19,7 +19,7 @@ import numpy as np
 from .arrays import ComplexArray, FloatArray
 from .separable.poles import parameters_from_poles
 from .separable.profile import delay_error
-from .separable.responses import MoveTrain
+from .separable.responses import StepSequence
 from .separable.structures import Candidate
 from .separable.varpro import KnownFactor, Problem, Structure, respond
 
@@ -78,7 +78,7 @@ def delay_bound(
     count = before + after
     time = dt * np.arange(-before, after, dtype=np.float64)
     single = np.ones(count, dtype=np.int64)
-    drive = MoveTrain(time, single, dt, np.zeros(1), np.ones(1))
+    drive = StepSequence(time, single, dt, np.zeros(1), np.ones(1))
     factor = known or KnownFactor()
     parameters = np.concatenate([[delay], parameters_from_poles(poles)])
     model = respond(drive, factor, numerator, parameters)

@@ -7,7 +7,7 @@ import pytest
 
 from ctrl_realize.numerics.cramer_rao import delay_bound
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.responses import StepSequence
 from ctrl_realize.numerics.separable.varpro import KnownFactor, respond
 from tests import rigs
 
@@ -39,7 +39,7 @@ def test_fisher_matrix_loses_one_rank_with_a_superfluous_zero(extra, deficiency)
     # nothing here knows of the elimination that the fit uses.
     poles = rigs.R3.poles().astype(complex)
     time = rigs.TS * np.arange(-50, 1100)
-    drive = MoveTrain(time, np.ones(1150, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
+    drive = StepSequence(time, np.ones(1150, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
     unit = 2 * np.pi * 8  # rad/s: numerator coefficients of comparable size
     numerator = np.zeros(1 + extra)
     numerator[0] = np.prod(-poles).real

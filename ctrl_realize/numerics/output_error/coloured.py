@@ -44,7 +44,7 @@ def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
     Noise that is white at rest stays so: what is coloured in the residual then is a misfit.
     """
     bins = whole.window.bins
-    if data.coarse or bins is None or whole.problem.stretches is not None:
+    if data.coarse or bins is None or whole.problem.segments is not None:
         return whole
     error = whole.window.output - whole.window.predict(whole.problem, whole.best)
     rest = error[: data.edge]

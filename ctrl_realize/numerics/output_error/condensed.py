@@ -195,7 +195,7 @@ def _free_pulse(y: FloatArray, u: FloatArray, lags: int, *, huber: bool) -> Floa
 def _pieces(
     outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], past: int
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Stretches of all records, each with the past that its first row needs."""
+    """Segments of all records, each with the past that its first row needs."""
     for y, u in zip(outputs, inputs, strict=True):
         if y.size <= 2 * past:
             continue

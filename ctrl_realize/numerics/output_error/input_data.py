@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..separable.local_terms import Stretches
+from ..separable.local_terms import Segments
 from ..separable.responses import SampledInput, SeveralInputs
 from ..separable.varpro import KnownFactor, Problem
 from ..signals.excitation import lively_start
@@ -83,8 +83,8 @@ class SampledData:
         most = max(shape.shape[1] for shape in shapes)
         # A shorter record has fewer cosines.
         shapes = [np.pad(shape, ((0, 0), (0, most - shape.shape[1]))) for shape in shapes]
-        stretches = Stretches(self.edges, np.concatenate(clocks), np.concatenate(shapes))
-        return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, stretches)
+        segments = Segments(self.edges, np.concatenate(clocks), np.concatenate(shapes))
+        return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, segments)
 
 
 def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) -> SampledData:

@@ -1,7 +1,7 @@
 """Output-error fit for inputs that are no steps: random, pseudo-random, sweeps, operation.
 
 One record or several of one plant: poles, numerator and delay are common, level, drift and initial
-state are each record's own (see `own_terms`).
+state are each record's own (see `local_terms`).
 
 Output error [1]_ with linear terms eliminated [2]_. Which samples count and when slow cosines are
 fitted along are our own rules.
@@ -114,7 +114,7 @@ def fit_sampled(
     What was before a record is an initial state, which is eliminated with level and drift. What
     was on its way through the dead time is not known: the first samples are left out, as many as
     one and a half delays of the first-order model that fits best, half the record at most.
-    Where the residual is coloured and slow cosines take half of it, they are own terms as well.
+    Where the residual is coloured and slow cosines take half of it, they are local terms as well.
     """
     factor = known or KnownFactor()
     data = cut(outputs, inputs, dt)
@@ -242,7 +242,7 @@ def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor)
     problem = data.problem(known)
     parameters = np.concatenate([[fit.delay], parameters_from_poles(fit.poles)])
     model = respond(problem.drive, known, fit.numerator, parameters)
-    own = problem.own_terms(poles_from_parameters(parameters[None, 1:])[0])
+    own = problem.local_terms(poles_from_parameters(parameters[None, 1:])[0])
     rest = (problem.data - model)[None, :, None]
     return np.asarray(problem.data - own.without(rest)[0, :, 0])
 
@@ -257,10 +257,10 @@ def _noise_levels(data: SampledData, whole: WindowFit) -> FloatArray:
 
 
 def _explained(whole: WindowFit) -> float:
-    """Chi-square of the forced response: own terms alone against own terms and input."""
+    """Chi-square of the forced response: local terms alone against local terms and input."""
     problem, best = whole.problem, whole.best
-    assert problem.stretches is not None
-    own = problem.own_terms(best.poles[None])
+    assert problem.segments is not None
+    own = problem.local_terms(best.poles[None])
     alone = float(np.sum(own.without(problem.data[None, :, None]) ** 2))
     return (alone - best.cost) / max(whole.variance, 1e-300)
 
@@ -298,10 +298,10 @@ def _first_order(
 def _own_delay(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> OwnResponse:
     """Gauss-Newton steps for gain and delay, everything else of the model being common."""
     problem = data.problem(known)
-    assert problem.stretches is not None
-    own = problem.own_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
+    assert problem.segments is not None
+    own = problem.local_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
     target = own.without(problem.data[None, :, None])[0, :, 0]
-    lost = problem.own_count(fit.poles.size)
+    lost = problem.local_count(fit.poles.size)
     h = 0.25 * data.dt
 
     def response(delay: float, stretch: float = 1.0) -> FloatArray:

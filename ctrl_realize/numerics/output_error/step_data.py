@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray, IntArray
-from ..separable.local_terms import Stretches, own_columns
-from ..separable.responses import MoveTrain
+from ..separable.local_terms import Segments, local_columns
+from ..separable.responses import StepSequence
 from ..separable.structures import Scales
 from ..separable.varpro import KnownFactor, Problem
 from ..separable.window import Window
@@ -178,31 +178,31 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     index, size = input_moves(data.input, data.edges, stop)
     moves = _at(index, data.dt)
     columns = fixed_regressors(data)[:stop]
-    own: tuple[Stretches | None, Stretches | None] = None, None
+    own: tuple[Segments | None, Segments | None] = None, None
     if data.relaxing:
         own = _free_response(data, bins, columns)
         columns = columns[:, :0]
     problem = Problem(
         bins.average(data.output[:stop]),
         np.sqrt(_weights(data, bins)),
-        MoveTrain(_at(bins.first, data.dt), bins.width, data.dt, moves, size),
+        StepSequence(_at(bins.first, data.dt), bins.width, data.dt, moves, size),
         bins.average(columns),
         known,
         own[0],
     )
     single = np.broadcast_to(np.int64(1), stop)  # no memory for ones
-    drive = MoveTrain(_at(np.arange(stop), data.dt), single, data.dt, moves, size)
+    drive = StepSequence(_at(np.arange(stop), data.dt), single, data.dt, moves, size)
     return Window(data.edge, data.output[:stop], problem, drive, columns, bins, own[1])
 
 
-def _free_response(data: StepData, bins: Bins, columns: FloatArray) -> tuple[Stretches, Stretches]:
-    """Own terms of the record, on bins and at every sample: regressors and free response."""
+def _free_response(data: StepData, bins: Bins, columns: FloatArray) -> tuple[Segments, Segments]:
+    """Local terms of the record, on bins and at every sample: regressors and free response."""
     # In the middle of a bin: they are narrow beside what is left of the free response there.
     middle = data.dt * (bins.first + (bins.width - 1) / 2)
     every = data.dt * np.arange(len(columns), dtype=np.float64)
     return (
-        Stretches(np.array([0, middle.size]), middle, bins.average(columns)),
-        Stretches(np.array([0, every.size]), every, columns),
+        Segments(np.array([0, middle.size]), middle, bins.average(columns)),
+        Segments(np.array([0, every.size]), every, columns),
     )
 
 
@@ -245,8 +245,8 @@ def own_regressors(data: StepData, poles: ComplexArray | None) -> FloatArray:
     if poles is None:
         return fixed
     clock = data.dt * np.arange(len(fixed), dtype=np.float64)
-    stretch = Stretches(np.array([0, clock.size]), clock, fixed)
-    return np.asarray(own_columns(stretch, poles[None])[0])
+    stretch = Segments(np.array([0, clock.size]), clock, fixed)
+    return np.asarray(local_columns(stretch, poles[None])[0])
 
 
 def _weights(data: StepData, bins: Bins) -> FloatArray:

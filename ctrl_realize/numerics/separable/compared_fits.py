@@ -115,7 +115,7 @@ def _near_minimum(
                 *_with_a_pole_more(structure, scales, found),
             ]
         ).reshape(-1, old.parameters.size)
-        if problem.stretches is None and len(more):
+        if problem.segments is None and len(more):
             cost = evaluate(problem, structure, more).cost
             promising = np.argsort(cost)[:_STARTS]
             near = cost[promising] <= old.cost * (1 + _PROMISING / problem.data.size)

@@ -30,7 +30,7 @@ from scipy.special import wofz
 from ..arrays import ComplexArray, FloatArray
 from .lag_chains import time_moments
 from .profile_ends import solve_ends
-from .responses import MoveTrain
+from .responses import StepSequence
 from .structures import PLAUSIBLE, Candidate, Scales
 from .varpro import Problem, partial_fractions
 
@@ -149,7 +149,7 @@ def fit_flows(
         told. Empty where `like` spreads in time by less than a sample, and where the record has a
         free response, which a flow has no poles for.
     """
-    if problem.stretches is not None or not isinstance(problem.drive, MoveTrain):
+    if problem.segments is not None or not isinstance(problem.drive, StepSequence):
         return []
     mean, square = time_moments(problem, like)
     if not square > scales.dt**2:
@@ -195,7 +195,7 @@ def flow_profile(
     problem: Problem, flow: DispersedFlow, scales: Scales, variance: float
 ) -> tuple[FloatArray, FloatArray]:
     """Misfit over the delay, as `delay_profile`."""
-    assert isinstance(problem.drive, MoveTrain)
+    assert isinstance(problem.drive, StepSequence)
     fit = _FlowFit(problem, problem.drive, scales, flow.lag > 0)
     best = fit.parameters(flow)
     low, high = (float(bound[0]) for bound in fit.bounds)
@@ -231,7 +231,7 @@ class _FlowFit:
     """
 
     problem: Problem
-    drive: MoveTrain
+    drive: StepSequence
     scales: Scales
     lagging: bool
 

@@ -205,7 +205,7 @@ def _chain(
     start = np.array([mean - lag * float(lags.sum()), np.log(lag), law.first])
     candidate, x = _fit(problem, order, law, start, scales)
     value = candidate.cost / variance + (FREE_IN_A_CHAIN + 2) * penalty
-    value += problem.own_count(order)
+    value += problem.local_count(order)
     return LagChain(candidate, value, _error(problem, candidate, law, x, variance))
 
 

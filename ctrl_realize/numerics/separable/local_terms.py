@@ -35,7 +35,7 @@ from ..arrays import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
-class Stretches:
+class Segments:
     """Parts of the data with an initial state each.
 
     Attributes
@@ -61,28 +61,28 @@ class Stretches:
 
     @cached_property
     def shapes(self) -> int:
-        """Number of known shapes of all stretches together."""
+        """Number of known shapes of all segments together."""
         return sum(int(self.regressors[rows].any(axis=0).sum()) for rows in self.rows)
 
 
 class FixedTerms:
-    """What does not depend on the plant in the own terms, orthonormalised once.
+    """What does not depend on the plant in the local terms, orthonormalised once.
 
     Parameters
     ----------
-    stretches : Stretches
+    segments : Segments
     root_weight : ndarray, shape (m,)
     """
 
-    def __init__(self, stretches: Stretches, root_weight: FloatArray) -> None:
-        self.stretches = stretches
+    def __init__(self, segments: Segments, root_weight: FloatArray) -> None:
+        self.segments = segments
         self.weight = root_weight
-        weighted = stretches.regressors * root_weight[:, None]
-        self.parts = [_orthonormal(weighted[rows]) for rows in stretches.rows]
+        weighted = segments.regressors * root_weight[:, None]
+        self.parts = [_orthonormal(weighted[rows]) for rows in segments.rows]
 
 
-class OwnTerms:
-    """Own terms of all stretches at B sets of poles, ready to be taken out.
+class LocalTerms:
+    """Local terms of all segments at B sets of poles, ready to be taken out.
 
     Parameters
     ----------
@@ -92,14 +92,14 @@ class OwnTerms:
     """
 
     def __init__(self, fixed: FixedTerms, poles: ComplexArray) -> None:
-        stretches = fixed.stretches
+        segments = fixed.segments
         self._fixed = fixed
-        self._rows = stretches.rows
+        self._rows = segments.rows
         self._poles = poles
         self._weight = fixed.weight
-        self._clock = stretches.clock
-        self._decay = _decay(stretches, poles)
-        self._known = stretches.regressors.shape[1]
+        self._clock = segments.clock
+        self._decay = _decay(segments, poles)
+        self._known = segments.regressors.shape[1]
         columns = _free_columns(self._decay, poles) * self._weight[:, None]
         self._bases: list[FloatArray] = []
         self._triangles: list[FloatArray] = []
@@ -118,7 +118,7 @@ class OwnTerms:
             self._norms.append(norm)
 
     def without(self, columns: FloatArray) -> FloatArray:
-        """Take the own terms out of weighted columns (B, m, k)."""
+        """Take the local terms out of weighted columns (B, m, k)."""
         left = np.empty_like(columns)
         for rows, (q, _, _), basis in zip(self._rows, self._fixed.parts, self._bases, strict=True):
             part = columns[:, rows]
@@ -132,7 +132,7 @@ class OwnTerms:
         Parameters
         ----------
         rest : ndarray, shape (B, m)
-            Weighted data less the forced response; the own terms are fitted to it.
+            Weighted data less the forced response; the local terms are fitted to it.
         dpoles : ndarray, shape (B, n, n)
             Poles (rows) by their parameters (columns).
         """
@@ -143,19 +143,19 @@ class OwnTerms:
             out[:, rows] = (slope @ (amplitudes[:, :, None] * dpoles)).real
         return out * self._weight[:, None]
 
-    def fitted(self, rest: FloatArray, where: Stretches) -> FloatArray:
-        """Own terms as they are fitted to `rest` (B, m), at the rows of other stretches (B, N).
+    def fitted(self, rest: FloatArray, where: Segments) -> FloatArray:
+        """Local terms as they are fitted to `rest` (B, m), at the rows of other segments (B, N).
 
-        The stretches are the same ones, looked at more or less closely.
+        The segments are the same ones, looked at more or less closely.
         """
-        columns = own_columns(where, self._poles)
+        columns = local_columns(where, self._poles)
         out = np.empty(columns.shape[:2])
         for i, rows in enumerate(where.rows):
             out[:, rows] = np.einsum("bmk,bk->bm", columns[:, rows], self._weights(i, rest))
         return out
 
     def _weights(self, i: int, rest: FloatArray) -> FloatArray:
-        """Coefficients of the own terms of stretch i, fitted to weighted data (B, m)."""
+        """Coefficients of the local terms of stretch i, fitted to weighted data (B, m)."""
         q, r, norm = self._fixed.parts[i]
         part = rest[:, self._rows[i]]
         inside = np.einsum("bmk,bm->bk", self._bases[i], part - (part @ q) @ q.T)
@@ -174,17 +174,17 @@ class OwnTerms:
         return out
 
 
-def own_columns(stretches: Stretches, poles: ComplexArray) -> FloatArray:
+def local_columns(segments: Segments, poles: ComplexArray) -> FloatArray:
     """Regressors, and free responses at poles (B, n); shape (B, m, q + n)."""
-    return _columns(stretches, _decay(stretches, poles), poles)
+    return _columns(segments, _decay(segments, poles), poles)
 
 
-def _decay(stretches: Stretches, poles: ComplexArray) -> ComplexArray:
-    return np.asarray(np.exp(stretches.clock[:, None] * poles[:, None, :]))
+def _decay(segments: Segments, poles: ComplexArray) -> ComplexArray:
+    return np.asarray(np.exp(segments.clock[:, None] * poles[:, None, :]))
 
 
-def _columns(stretches: Stretches, decay: ComplexArray, poles: ComplexArray) -> FloatArray:
-    fixed = np.broadcast_to(stretches.regressors, (len(poles), *stretches.regressors.shape))
+def _columns(segments: Segments, decay: ComplexArray, poles: ComplexArray) -> FloatArray:
+    fixed = np.broadcast_to(segments.regressors, (len(poles), *segments.regressors.shape))
     return np.concatenate([fixed, _free_columns(decay, poles)], axis=2)
 
 

@@ -10,8 +10,8 @@ over the moves that have arrived, t > t_l + tau. Derivatives need dE_j/dp_j in a
 
     T_j(t) = sum_l d_l (t - t_l - tau) exp(p_j (t - t_l - tau)).
 
-`MoveTrain` evaluates their means over bins of samples for a few moves (steps, ramps), many delays
-and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
+`StepSequence` evaluates their means over bins of samples for a few moves (steps, ramps), many
+delays and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
 
 Exact for a held input, as sampling is in [1]_; a delay of a fraction of a sample needs nothing of
 its own, since moves have times and not sample numbers.
@@ -55,7 +55,7 @@ class HeldInput(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class MoveTrain:
+class StepSequence:
     """A few moves of the input; the response is wanted as means over bins of samples.
 
     Attributes
@@ -82,7 +82,7 @@ class MoveTrain:
     moves: FloatArray
     sizes: FloatArray
 
-    def pieces(self) -> list[MoveTrain]:
+    def pieces(self) -> list[StepSequence]:
         """Cut the bins, of which every one stands for itself, into short pieces."""
         stops = range(_PIECE, self.first.size, _PIECE)
         parts = zip(np.split(self.first, stops), np.split(self.width, stops), strict=True)

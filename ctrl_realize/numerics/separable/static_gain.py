@@ -121,8 +121,8 @@ def static_gain(
     seen = np.any(gradient != 0, axis=0)
     slopes, gradient = slopes[:, seen], gradient[:, seen]
     columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
-    if problem.stretches is not None:
-        columns = problem.own_terms(candidate.poles[None]).without(columns[None])[0]
+    if problem.segments is not None:
+        columns = problem.local_terms(candidate.poles[None]).without(columns[None])[0]
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
     _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)

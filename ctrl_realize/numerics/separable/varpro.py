@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray, IntArray
-from .local_terms import FixedTerms, OwnTerms, Stretches, solve_upper
+from .local_terms import FixedTerms, LocalTerms, Segments, solve_upper
 from .poles import poles_from_parameters
 from .responses import HeldInput
 
@@ -55,7 +55,7 @@ class KnownFactor:
 class Problem:
     """What is fitted: data (m,), root weights (m,), input, fixed regressors (m, q).
 
-    With `stretches` each of them has an initial state and regressors of its own besides. Without
+    With `segments` each of them has an initial state and regressors of its own besides. Without
     them, a `whitener` (m, m) may stand in for the weights: it makes coloured noise white.
     """
 
@@ -64,7 +64,7 @@ class Problem:
     drive: HeldInput
     regressors: FloatArray
     known: KnownFactor
-    stretches: Stretches | None = None
+    segments: Segments | None = None
     whitener: FloatArray | None = None
 
     def weighted(self, columns: FloatArray) -> FloatArray:
@@ -83,18 +83,18 @@ class Problem:
 
     @cached_property
     def _fixed(self) -> FixedTerms:
-        assert self.stretches is not None
-        return FixedTerms(self.stretches, self.root_weight)
+        assert self.segments is not None
+        return FixedTerms(self.segments, self.root_weight)
 
-    def own_terms(self, poles: ComplexArray) -> OwnTerms:
-        """Own terms of the stretches, which there must be, at poles (B, n)."""
-        return OwnTerms(self._fixed, poles)
+    def local_terms(self, poles: ComplexArray) -> LocalTerms:
+        """Local terms of the segments, which there must be, at poles (B, n)."""
+        return LocalTerms(self._fixed, poles)
 
-    def own_count(self, order: int) -> int:
-        """Linear terms that all stretches have for themselves, of a model of an order."""
-        if self.stretches is None:
+    def local_count(self, order: int) -> int:
+        """Linear terms that all segments have for themselves, of a model of an order."""
+        if self.segments is None:
             return 0
-        return self.stretches.shapes + order * (int(self.stretches.edges.size) - 1)
+        return self.segments.shapes + order * (int(self.segments.edges.size) - 1)
 
 
 @dataclass(frozen=True)
@@ -157,8 +157,8 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     columns = problem.weighted(np.concatenate([basis, fixed], axis=2))
     data = np.tile(problem.weighted_data, (batch, 1))
     own = None
-    if problem.stretches is not None:
-        own = problem.own_terms(free)
+    if problem.segments is not None:
+        own = problem.local_terms(free)
         forced, whole = columns, data
         columns, data = own.without(columns), own.without(data[:, :, None])[:, :, 0]
     # Variable projection: residual = (I - Q Q') data (Golub and Pereyra 1973).

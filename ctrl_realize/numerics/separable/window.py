@@ -27,7 +27,7 @@ from ..arrays import FloatArray
 from ..signals.bins import Bins
 from ..signals.noise import correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
-from .local_terms import Stretches
+from .local_terms import Segments
 from .responses import HeldInput
 from .static_gain import StaticGain, static_gain
 from .structures import PLAUSIBLE, Candidate, Scales, choose, criteria, parameter_charge, search
@@ -55,8 +55,8 @@ class Window:
     columns : ndarray, shape (N, q)
         Regressors at every sample.
     bins : Bins or None
-    own : Stretches or None
-        Own terms at every sample, where the problem has them on bins.
+    own : Segments or None
+        Local terms at every sample, where the problem has them on bins.
     samples : int or None
         That the output stands for, where it is none of them itself.
     """
@@ -67,7 +67,7 @@ class Window:
     drive: HeldInput
     columns: FloatArray
     bins: Bins | None
-    own: Stretches | None = None
+    own: Segments | None = None
     samples: int | None = None
 
     def with_output(self, values: FloatArray) -> Problem:
@@ -86,7 +86,7 @@ class Window:
         model += self.columns @ state.regression[0]
         if self.own is not None:
             weight = problem.root_weight
-            terms = problem.own_terms(candidate.poles[None])
+            terms = problem.local_terms(candidate.poles[None])
             rest = weight * (problem.data - respond(problem.drive, *setting))
             model = model + terms.fitted(rest[None], self.own)[0]
         return np.asarray(model)
@@ -159,7 +159,7 @@ class WindowFit:
     def criteria(self, candidates: dict[Structure, Candidate]) -> dict[Structure, float]:
         """Information criterion of other candidates on the same data."""
         values = criteria(candidates, self.variance, self.independent)
-        return {s: value + self.problem.own_count(s.order) for s, value in values.items()}
+        return {s: value + self.problem.local_count(s.order) for s, value in values.items()}
 
 
 def fit_window(
@@ -206,7 +206,7 @@ def fit_window(
         candidates = on_new_data(problem, candidates)
     criterion = criteria(candidates, rest.variance, rest.independent)
     # One initial value more for a pole fits noise alone by one variance.
-    criterion = {s: value + problem.own_count(s.order) for s, value in criterion.items()}
+    criterion = {s: value + problem.local_count(s.order) for s, value in criterion.items()}
     chosen = candidates[choose(criterion)]
     freedom = max(problem.data.size - rest.lost, 1)
     misfit = float(np.sqrt(chosen.cost / freedom)) / sigma
@@ -257,7 +257,7 @@ def _left(
     value = {
         s: problem.data.size * float(np.log(max(c.cost, 1e-300)))
         + (s.order + s.zeros + 2) * parameter_charge(samples)
-        + problem.own_count(s.order)
+        + problem.local_count(s.order)
         for s, c in candidates.items()
     }
     best = candidates[choose(value)]
@@ -265,7 +265,7 @@ def _left(
     kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
     after = kept[window.start :]
     lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
-    lost += problem.own_count(best.structure.order)
+    lost += problem.local_count(best.structure.order)
     level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
     # Far below the noise the residual is rounding, and its correlation says nothing.
     floor = 0.3 * sigma

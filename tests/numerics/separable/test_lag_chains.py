@@ -18,7 +18,7 @@ from ctrl_realize.numerics.separable.lag_chains import (
 )
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
-from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.responses import StepSequence
 from ctrl_realize.numerics.separable.structures import Candidate, Scales, parameter_bounds, search
 from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure, fit_batch
 
@@ -134,7 +134,7 @@ def flow_problem(
         for s, at in zip(size, (0.1, 0.6), strict=True)
     )
     y = 5 + 2 * y + noise * np.random.default_rng(3).standard_normal(y.size)
-    train = MoveTrain(time, np.ones(time.size, dtype=np.int64), dt, np.array([0.1, 0.6]), size)
+    train = StepSequence(time, np.ones(time.size, dtype=np.int64), dt, np.array([0.1, 0.6]), size)
     factor = known or KnownFactor()
     problem = Problem(y, np.ones(y.size), train, np.ones((y.size, 1)), factor)
     scales = Scales(onset=0.05, rise=0.1, length=1.1, dt=dt, latest=0.08)

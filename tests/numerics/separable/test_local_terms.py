@@ -9,9 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.separable.compared_fits import at_delay
-from ctrl_realize.numerics.separable.local_terms import FixedTerms, OwnTerms, Stretches
+from ctrl_realize.numerics.separable.local_terms import FixedTerms, LocalTerms, Segments
 from ctrl_realize.numerics.separable.poles import poles_from_parameters
-from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput, SeveralInputs
+from ctrl_realize.numerics.separable.responses import SampledInput, SeveralInputs, StepSequence
 from ctrl_realize.numerics.separable.structures import Candidate, Scales
 from ctrl_realize.numerics.separable.varpro import (
     KnownFactor,
@@ -26,7 +26,7 @@ from ctrl_realize.numerics.signals.bins import response_bins
 CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
 EDGES = np.array([0, 70, 180])
 SHAPES = np.stack([np.ones(180), CLOCK], axis=1)
-STRETCHES = Stretches(EDGES, CLOCK, SHAPES)
+STRETCHES = Segments(EDGES, CLOCK, SHAPES)
 # real; a ringing pair; the same pair just on either side of critical damping; all of them
 THETA = {
     "real": [-3.0],
@@ -41,7 +41,7 @@ THETA = {
 def test_what_a_record_has_for_itself_disappears(theta):
     poles, _ = poles_from_parameters(np.array([theta]))
     rng = np.random.default_rng(0)
-    own = OwnTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
+    own = LocalTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
     data = np.zeros(180)
     for rows in STRETCHES.rows:
         # every real free response: with conjugate amplitudes
@@ -54,7 +54,7 @@ def test_what_a_record_has_for_itself_disappears(theta):
 
 def test_nothing_else_disappears_and_records_do_not_mix():
     poles, _ = poles_from_parameters(np.array([THETA["three"]]))
-    own = OwnTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
+    own = LocalTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
     data = np.zeros(180)
     data[:70] = np.random.default_rng(0).normal(size=70)
     left = own.without(data[None, :, None])[0, :, 0]
@@ -92,7 +92,7 @@ def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, 
         # central differences of step 1e-5: 1e-10 from curvature, 1e-7 from rounding
         scale = np.abs(derivative).max()
         assert_allclose(state.jacobian[0, :, q], derivative, rtol=0, atol=5e-6 * scale)
-    assert exact.own_count(n) == 2 * (2 + n)
+    assert exact.local_count(n) == 2 * (2 + n)
 
 
 ONE, TWO, ZERO = Structure(1, 1), Structure(2, 2), Structure(2, 1)
@@ -102,7 +102,7 @@ TRUTH = np.array([3.7, np.log(0.2)])  # delay and rate, in s and 1/s
 
 
 def drive(first, width):
-    return MoveTrain(DT * first, width, DT, np.array([EDGE * DT]), np.ones(1))
+    return StepSequence(DT * first, width, DT, np.array([EDGE * DT]), np.ones(1))
 
 
 def windows():
@@ -147,13 +147,13 @@ def test_a_free_response_is_predicted_at_every_sample():
     single = 1.0 * (means.bins.width == 1)
     none = np.ones((means.bins.first.size, 0))
     level = np.ones((SIZE, 1))
-    own = Stretches(np.array([0, SIZE]), clock, level)
+    own = Segments(np.array([0, SIZE]), clock, level)
     problem = replace(
         means.problem,
         data=means.bins.average(means.output + free),
         root_weight=single,
         regressors=none,
-        stretches=Stretches(np.array([0, middle.size]), middle, means.bins.average(level)),
+        segments=Segments(np.array([0, middle.size]), middle, means.bins.average(level)),
     )
     window = replace(means, problem=problem, columns=np.ones((SIZE, 0)), own=own)
     found = window.predict(problem, Candidate(ONE, TRUTH, 0.0))

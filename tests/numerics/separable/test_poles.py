@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
-from ctrl_realize.numerics.separable.responses import MoveTrain
+from ctrl_realize.numerics.separable.responses import StepSequence
 from ctrl_realize.numerics.separable.structures import (
     PLAUSIBLE,
     Candidate,
@@ -143,7 +143,7 @@ def close(found, expected):
 
 def train(first, width, moves, sizes, dt=0.1):
     first = dt * np.asarray(first, dtype=float)
-    return MoveTrain(first, np.asarray(width), dt, np.array(moves), np.array(sizes))
+    return StepSequence(first, np.asarray(width), dt, np.array(moves), np.array(sizes))
 
 
 @pytest.mark.parametrize("poles", [POLES, np.array([[-0.4 + 0j, -3.0], [-1.1, -0.02]])])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.separable.local_terms import Stretches
+from ctrl_realize.numerics.separable.local_terms import Segments
 from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
-from ctrl_realize.numerics.separable.responses import MoveTrain, SampledInput
+from ctrl_realize.numerics.separable.responses import SampledInput, StepSequence
 from ctrl_realize.numerics.separable.structures import Scales, parameter_bounds, search
 from ctrl_realize.numerics.separable.varpro import (
     Bounds,
@@ -23,7 +23,7 @@ from ctrl_realize.numerics.separable.varpro import (
 from tests import rigs
 
 ONES = np.ones(300, dtype=np.int64)
-TRAIN = MoveTrain(np.arange(300.0), ONES, 1.0, np.array([0.0, 50.0]), np.array([1.0, 0.5]))
+TRAIN = StepSequence(np.arange(300.0), ONES, 1.0, np.array([0.0, 50.0]), np.array([1.0, 0.5]))
 RANDOM = SampledInput(np.random.default_rng(0).normal(size=30).repeat(10), 1.0)
 KNOWN = KnownFactor(np.array([-0.3 + 0j]), np.array([0.2, 0.3]))
 THETA = {
@@ -61,7 +61,7 @@ def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, 
 def test_the_response_is_the_closed_form_at_any_fraction_of_a_sample():
     poles = rigs.R3.poles().astype(complex)
     time = rigs.TS * np.arange(-50, 900)
-    drive = MoveTrain(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
+    drive = StepSequence(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
     for delay in (0.0, 36.25, 37.0, 41.9):
         x = np.concatenate([[delay * rigs.TS], parameters_from_poles(poles)])
         ours = respond(drive, KnownFactor(), np.array([np.prod(-poles).real]), x)
@@ -74,8 +74,8 @@ def test_means_over_bins_are_means_of_samples_also_where_moves_arrive():
     first = np.concatenate([[0], np.cumsum(width)[:-1]])
     poles, _ = poles_from_parameters(np.log([[0.03, 0.1, 0.2], [1e-7, 0.3, 0.02]]))
     tau = np.array([7.3, 41.9])
-    bins = MoveTrain(first.astype(float), width, 1.0, moves, sizes).modes(tau, poles)
-    samples = MoveTrain(np.arange(300.0), ONES, 1.0, moves, sizes).modes(tau, poles)
+    bins = StepSequence(first.astype(float), width, 1.0, moves, sizes).modes(tau, poles)
+    samples = StepSequence(np.arange(300.0), ONES, 1.0, moves, sizes).modes(tau, poles)
     for mean, values in zip(bins, samples, strict=True):
         expected = np.add.reduceat(values, first, axis=1)
         expected = expected / width.reshape(1, -1, *[1] * (values.ndim - 2))
@@ -87,7 +87,7 @@ def test_means_over_bins_are_means_of_samples_also_where_moves_arrive():
 def test_exact_data_give_their_own_parameters_back(zeta):
     poles = (rigs.lag(2.2) * rigs.pair(8.0, zeta)).poles().astype(complex)
     time = rigs.TS * np.arange(-50, 900)
-    drive = MoveTrain(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
+    drive = StepSequence(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
     truth = np.concatenate([[36.4 * rigs.TS], parameters_from_poles(poles)])
     data = 2.0 + respond(drive, KnownFactor(), np.array([np.prod(-poles).real]), truth)
     problem = Problem(data, np.ones(950), drive, np.ones((950, 1)), KnownFactor())
@@ -112,7 +112,7 @@ def test_no_random_start_beats_the_few_that_are_tried():
         delay = rng.uniform(30, 45)
         data = rigs.exact_step(rigs.R3, time - delay * rigs.TS)
         data = data + 0.003 * rng.standard_normal(time.size)
-        drive = MoveTrain(time, np.ones(500, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
+        drive = StepSequence(time, np.ones(500, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
         problem = Problem(data, np.ones(500), drive, np.ones((500, 1)), KnownFactor())
         scales = Scales(52 * rigs.TS, 90 * rigs.TS, 480 * rigs.TS, rigs.TS, 75 * rigs.TS)
         found = search(problem, [Structure(3, 3)], scales)[Structure(3, 3)]
@@ -134,7 +134,7 @@ BOX = Bounds(np.array([0.0, np.log(0.02)]), np.array([9.0, np.log(4.0)]))
 
 def train(unit=1.0, at=2.0):
     ones = np.ones(SIZE, dtype=np.int64)
-    return MoveTrain(unit * TIME, ones, unit * DT, np.array([unit * at]), np.ones(1))
+    return StepSequence(unit * TIME, ones, unit * DT, np.array([unit * at]), np.ones(1))
 
 
 def problem(data, **changed):
@@ -196,14 +196,14 @@ def test_the_residual_is_that_of_weighted_least_squares():
 
 
 def test_own_terms_are_taken_out_of_data_and_model():
-    # a free response of the plant and a level of its own in each of two stretches
+    # a free response of the plant and a level of its own in each of two segments
     free = np.concatenate([4.0 * np.exp(-TIME[:40] / LAG), 1.0 - 2 * np.exp(-TIME[:50] / LAG)])
     clock = np.concatenate([TIME[:40], TIME[:50]])
-    pieces = Stretches(np.array([0, 40, SIZE]), clock, np.ones((SIZE, 1)))
+    pieces = Segments(np.array([0, 40, SIZE]), clock, np.ones((SIZE, 1)))
     data = respond(train(), NOTHING, np.array([0.8]), TRUTH) + free
     none = np.empty((SIZE, 0))
     weight = np.linspace(0.5, 2.0, SIZE)
-    made = problem(data, regressors=none, stretches=pieces, root_weight=weight)
+    made = problem(data, regressors=none, segments=pieces, root_weight=weight)
     state = evaluate(made, ONE, TRUTH[None])
     assert state.cost[0] < 1e-20
     assert state.numerator[0] == pytest.approx([0.8])
