@@ -31,15 +31,15 @@ class NoStepError(DataError):
 
 
 class OrderError(CtrlRealizeError, ValueError):
-    """The asked model order does not fit the data."""
+    """The requested model order does not fit the data."""
 
 
 class DelayRangeError(CtrlRealizeError, ValueError):
-    """The asked delay or range of delays does not fit the data."""
+    """The requested delay or range of delays does not fit the data."""
 
 
 class OptionError(CtrlRealizeError, ValueError):
-    """An argument has a value that makes no sense."""
+    """An argument has an invalid value."""
 
 
 class UnsuitableSystemError(CtrlRealizeError, ValueError):
@@ -47,11 +47,11 @@ class UnsuitableSystemError(CtrlRealizeError, ValueError):
 
 
 class FileFormatError(CtrlRealizeError, ValueError):
-    """The file is there, but is not what it should be."""
+    """The file exists, but its content is not as expected."""
 
 
 class MissingFileError(CtrlRealizeError, FileNotFoundError):
-    """The file is not there."""
+    """The file does not exist."""
 
 
 class CtrlRealizeWarning(UserWarning):
@@ -59,7 +59,7 @@ class CtrlRealizeWarning(UserWarning):
 
 
 class DataWarning(CtrlRealizeWarning):
-    """The data were usable only in part."""
+    """Only part of the data could be used."""
 
 
 class ModelWarning(CtrlRealizeWarning):
@@ -67,7 +67,7 @@ class ModelWarning(CtrlRealizeWarning):
 
 
 class UnresolvedWarning(ModelWarning):
-    """The record behind a model does not resolve something that a design relies on."""
+    """The record of a model does not determine a quantity that a design relies on."""
 
 
 def warn_caller(message: str, category: type[Warning]) -> None:

@@ -110,7 +110,7 @@ class Result(Drawable):
         return [str(flag) for flag in flags]
 
     def report(self) -> str:
-        """Tell the result as plain text, choices and flags included."""
+        """Return the result as plain text, choices and flags included."""
         return text_card(self._title(), self._rows(), self._choices(), self._notes())
 
     def _repr_html_(self) -> str:

@@ -64,7 +64,7 @@ class ValveTruth(Result):
 
     @property
     def total_delay(self) -> float:
-        """Delay of slow signals in s: dead time and the sum of all lags."""
+        """Total delay at DC in s: dead time plus the sum of all lags."""
         A, B, C, _ = self.matrices
         first = np.linalg.solve(A, B)
         return self.dead_time + float((C @ np.linalg.solve(A, first))[0, 0]) / self.gain

@@ -209,7 +209,7 @@ class Record(Drawable):
         max_jitter: float = 0.5,
         **labels: Any,
     ) -> Record:
-        """Make a record of samples whose time jitters, by linear interpolation.
+        """Make a record of samples with time jitter, by linear interpolation.
 
         Parameters
         ----------
@@ -232,7 +232,7 @@ class Record(Drawable):
 
     @classmethod
     def from_response(cls, response: ct.TimeResponseData, *, name: str | None = None) -> Record:
-        """Take over a simulated response of python-control, which must hold its input.
+        """Make a record of a simulated response of python-control, which must contain its input.
 
         Examples
         --------
@@ -260,7 +260,7 @@ class Record(Drawable):
         )
 
     def to_response(self) -> ct.TimeResponseData:
-        """Hand the record to python-control's time-response functions and plots."""
+        """Convert the record to time-response data of python-control."""
         return ct.TimeResponseData(
             self.time,
             self.output,

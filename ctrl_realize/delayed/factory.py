@@ -29,7 +29,7 @@ def delayed_ss(
     inputs: str | Sequence[str] | None = None,
     outputs: str | Sequence[str] | None = None,
 ) -> DelayedStateSpace:
-    """Put a dead time before a system.
+    """Add a dead time to a system.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Simulation of a model with the input of a record, from a start that nobody has measured."""
+"""Simulate a model on a record, with estimated initial state and offset."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PIECES = 16
 
 
 def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatArray:
-    """Simulate the outputs of a record, shape (p, N), with the start that fits it best.
+    """Simulate the outputs of a record, shape (p, N), with the best initial state.
 
     Misses count as parts of the range of each output. An offset of every output is always free.
     With ``start="estimate"`` so are the state of the core, and what was on its way through the

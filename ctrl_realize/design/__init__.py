@@ -1,4 +1,4 @@
-"""Controllers for plants with dead time, and what one must know before closing the loop.
+"""Controllers for plants with dead time, and analysis of the closed loop.
 
 Systems in, `control` systems out. Everything works on core and delay apart, so it is exact at any
 delay.

@@ -1,4 +1,4 @@
-"""How far a model is from a measured frequency response, and where the measurement is good."""
+"""Comparison of a model with a measured frequency response in the trusted band."""
 
 from __future__ import annotations
 

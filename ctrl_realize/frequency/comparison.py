@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FRFComparison(Result):
-    """A model beside a measured frequency response, point by point.
+    """Comparison of a model with a measured frequency response, point by point.
 
     With ``r = model / measured``: ``gain_error_db == 20 log10 |r|``, ``phase_error_deg`` is the
     unwrapped angle of ``r`` in degrees, and ``relative_error == |r - 1|``. A positive phase error

@@ -1,4 +1,4 @@
-"""Say so where a measured frequency response contradicts a model."""
+"""Flag of a measured frequency response that contradicts a model."""
 
 from __future__ import annotations
 

@@ -150,7 +150,7 @@ class FRFFit(ModelFit):
 
     @property
     def total_delay(self) -> float:
-        """Delay of slow signals in s: dead time and all lags of the core."""
+        """Total delay at DC in s: dead time plus all lags of the core."""
         A, B, C, _ = self.matrices
         slope = C @ np.linalg.solve(A, np.linalg.solve(A, B))
         return self.dead_time + float(slope[0, 0]) / self.gain

@@ -1,4 +1,4 @@
-"""Lags behind a dead time, or any modes and zeros: which of two models a record asks for.
+"""Choose between a transfer function with dead time and a general state-space model.
 
 A record of one input and one output is fitted with lags first. Where their residual still follows
 the input, a model of sampled sections is fitted as well (`fit_state_space`), and both are compared
@@ -58,7 +58,7 @@ Residuals = list[FloatArray]
 def with_modes_judged(
     system: DelayedStateSpace, max_delay: int | None, *, asked: bool = False
 ) -> DelayedStateSpace:
-    """Try modes where the residual of lags follows the input; return the better model.
+    """Try a state-space model where the residual follows the input; return the better model.
 
     With `asked`, the structure is what the user wants: its residual is judged, nothing is tried.
     """

@@ -1,4 +1,4 @@
-"""What a loop does when the dead time is not the one it was designed for."""
+"""Robustness of a loop to the dead time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a design function looks at before it hands out a controller.
+"""Check of the closed loop before a design function returns a controller.
 
 The loop is closed on the model as it is, not on what a tuning rule made of it, and over the
 interval of dead times that the identification left open.
@@ -30,7 +30,7 @@ them is known from its crossovers, see `DelayRobustness`."""
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopCheck(Result):
-    """What closing the loop on its own model showed.
+    """Result of closing the loop on the design model.
 
     ``stable`` is ``margins.stable``; `robustness`, where there is an interval of dead times, has
     the nominal delay and the ends of the interval among its `delays`.

@@ -1,4 +1,4 @@
-"""What is known of the stability of a loop."""
+"""Result of a stability analysis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stability margins that are right at any dead time."""
+"""Stability margins, exact at any dead time."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def margins(
     unstable_poles: int = 0,
     integrators: int | None = None,
 ) -> Margins:
-    """Gain, phase, modulus and delay margin of a loop, exact at any dead time.
+    """Compute gain, phase, modulus and delay margin of a loop, exact at any dead time.
 
     All crossovers are bracketed on the exact frequency response, core(z) z^-d, and found by root
     finding. Stability is decided by a Nyquist count.

@@ -1,4 +1,4 @@
-"""What a closed loop does to steps of set-point and load."""
+"""Responses of a closed loop to steps of set-point and load."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def step_responses(
 def performance(
     plant: DelayedStateSpace, controller: Any, total_time: float | None = None
 ) -> Performance:
-    """Measure how a stable loop answers steps of its set-point and of a load at the plant's input.
+    """Compute the response of a stable loop to steps of set-point and load at the plant input.
 
     Parameters
     ----------

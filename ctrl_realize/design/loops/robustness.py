@@ -1,4 +1,4 @@
-"""From what the identification is unsure of to what the loop can stand."""
+"""Robust stability against the uncertainty of an identified model."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class UncertaintyBound(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobustnessCheck(Result):
-    """Whether a loop stays stable for every plant within a bound (small gain).
+    """Result of a robust-stability test (small-gain theorem).
 
     ``robust`` is ``nominal.stable`` and ``|T| bound < 1`` at every frequency; `margin` is by how
     much the bound may be multiplied until that fails.
@@ -159,7 +159,7 @@ def uncertainty_bound(
     *,
     dead_time_interval: tuple[float, float] | None = None,
 ) -> UncertaintyBound:
-    """Bound the relative error of a nominal model by the spread of many and the unsure dead time.
+    """Bound the relative error of a nominal model by the spread of models and of the dead time.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ MAX_PADE_ORDER = 20
 
 
 def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.StateSpace:
-    """Pade approximant of a dead time in state space, well-conditioned to order 20.
+    """Compute the Pade approximant of a dead time in state space, well-conditioned to order 20.
 
     All-pass, of equal numerator and denominator degree; realized as a lossless ladder whose
     Gramians are the identity. (`control.pade` gives polynomial coefficients; for 29 ms and order
@@ -66,7 +66,7 @@ def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.
 
 
 def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
-    """Discrete all-pass for a dead time that is no multiple of the sample time.
+    """Compute the Thiran all-pass for a dead time that is not a multiple of the sample time.
 
     Whole samples stay a delay; a Thiran filter of order N makes the rest, N - 0.5...N + 0.5
     samples, with maximally flat group delay at frequency 0. For a plant behind a zero-order

@@ -85,7 +85,7 @@ class BalancedReduction(ModelFit):
 
 @single_threaded
 def hankel_singular_values(system: Any) -> FloatArray:
-    """Hankel singular values of the stable part of a discrete core, falling.
+    """Compute the Hankel singular values of the stable part of a discrete core, descending.
 
     The delay has no part in it: with the chain each input would add d values of its own.
 
@@ -127,7 +127,7 @@ def hankel_singular_values(system: Any) -> FloatArray:
 def reduce(
     system: Any, order: int | None = None, *, tolerance: float | None = None
 ) -> DelayedStateSpace:
-    """Reduce the order of the core by balanced truncation; the delay stays.
+    """Reduce the order of the core by balanced truncation, and keep the delay.
 
     Poles on or outside the unit circle are split off and kept. python-control's ``balred`` runs
     the continuous algorithm on discrete systems and returns a continuous one.

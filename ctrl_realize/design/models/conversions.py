@@ -157,7 +157,7 @@ def _rebuild_model(
 
 @single_threaded
 def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
-    """Undo the zero-order hold of the core; the dead time stays apart.
+    """Convert the core to continuous time (inverse zero-order hold), and keep the dead time apart.
 
     Exact where it exists: every pole of the core needs a logarithm. Of the many continuous models
     with the same samples, the one with all poles below the Nyquist frequency is given. A direct
@@ -248,7 +248,7 @@ def _check_logarithm(poles: FloatArray) -> None:
 def to_discrete(
     core: Any, dead_time: float | None = None, dt: float | None = None, **names: Any
 ) -> DelayedStateSpace:
-    """Sample a continuous model behind a zero-order hold, any dead time included exactly.
+    """Sample a continuous model with a zero-order hold, any dead time included exactly.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class ProcessModel(Result):
         return ct.tf([self.gain], den, inputs=["u"], outputs=["y"])
 
     def system(self, dt: float) -> DelayedStateSpace:
-        """Sampled behind a zero-order hold, dead time exact."""
+        """Sample the model with a zero-order hold, dead time exact."""
         return delayed_ss(self.transfer_function(), dead_time=self.dead_time, dt=dt)
 
     def step(self, time: ArrayLike) -> FloatArray:

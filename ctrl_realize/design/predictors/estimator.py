@@ -1,4 +1,4 @@
-"""Kalman filter of a core behind its dead time."""
+"""Kalman filter of a core with dead time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_APART = 2000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KalmanPredictor(Result):
-    """Steady Kalman filter of the core behind its dead time.
+    """Stationary Kalman filter of a core with dead time.
 
     ``x[k+1] = A x[k] + B u[k-d] + gain (y[k] - C x[k] - D u[k-d])``. The inputs on their way are
     known, so the chain needs no gain: the filter of the whole system is ``[gain; 0]``.
@@ -75,7 +75,7 @@ class KalmanPredictor(Result):
 
 @single_threaded
 def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) -> KalmanPredictor:
-    """Steady Kalman filter of a system with dead time.
+    """Compute the stationary Kalman filter of a system with dead time.
 
     Equal to `control.dlqe` of the augmented system with process noise on the core's states only,
     at the cost of a Riccati equation of the core: what all outputs are late by is a prediction.

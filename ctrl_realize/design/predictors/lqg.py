@@ -33,7 +33,7 @@ def lqg(
     *,
     name: str = "lqg",
 ) -> ct.StateSpace:
-    """Output feedback: Kalman predictor, prediction over the dead time, state feedback.
+    """Design an LQG controller: Kalman filter, prediction over the dead time, state feedback.
 
     Works for unstable and integrating cores too, where a Smith predictor cannot. Its states are
     those of the core and of the delay line. It has no integral action: for that, put an integrator

@@ -12,7 +12,7 @@ Filter = tuple[FloatArray, FloatArray, FloatArray, float]
 
 
 def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating: bool) -> Filter:
-    r"""Low-pass filter of unit gain that takes given poles out of the predictor.
+    r"""Design a low-pass filter of unit gain that removes given poles from the predictor.
 
     In the basis ``phi_j = (1-a)/(z-a) ((z-1)/(z-a))^j`` the filter F meets ``F(1) = 1``,
     ``F(p) = p^d`` at each pole, and ``F'(1) = d`` for an integrating core: then

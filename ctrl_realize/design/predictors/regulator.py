@@ -110,7 +110,7 @@ class PredictorLQR(Result):
 
 @single_threaded
 def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
-    """Linear-quadratic regulator of a system with dead time.
+    """Compute the linear-quadratic regulator of a system with dead time.
 
     Equal to `control.dlqr` of the augmented system with Q on the core's states, at the price of
     the core's Riccati equation: milliseconds at any delay.

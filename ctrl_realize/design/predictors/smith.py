@@ -30,7 +30,7 @@ def smith_predictor(
     remove_slow: bool | None = None,
     name: str = "smith",
 ) -> DelayLineController:
-    """Wrap a controller that was designed for the core so that it copes with the dead time.
+    """Make a Smith predictor of a controller that was designed for the delay-free core.
 
     The result C_s is used like any controller, ``loop = system * C_s`` with negative feedback.
     Without a filter the closed loop from set-point to output is that of core and controller

@@ -1,4 +1,4 @@
-"""PID controllers that remember their parameters."""
+"""PID controllers with their parameters."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Campaign(Result):
-    """Models of many records, and what they say together.
+    """Models of many records, with their statistics.
 
     ``statistics(trim)`` is over ``[row.delay for row in rows if row.system]``; `best` is the row
     of least residual; `system` is the final model.

@@ -1,4 +1,4 @@
-"""Say what one should know before trusting the table of a campaign."""
+"""Flags of a campaign."""
 
 from __future__ import annotations
 

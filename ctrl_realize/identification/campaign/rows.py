@@ -32,7 +32,7 @@ _LONGEST_ERROR = 1000  # characters; a text of megabytes would fill table and re
 
 @dataclass(frozen=True, eq=False)
 class CampaignRow:
-    """What one record gave.
+    """Result of one record.
 
     Exactly one of `system` and `error` is None; without a system all numbers are NaN. A campaign
     has thousands of rows, so that each keeps its model packed, a few kB.

@@ -25,7 +25,7 @@ def identify_campaign(
     store: RowStore | None = None,
     **options: Any,
 ) -> Campaign:
-    """Identify every record of a campaign; one bad record never stops the rest.
+    """Identify every record of a campaign; a bad record does not stop the others.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a record says against the model that was fitted to it: tests that know no plant.
+"""Tests of a record against the model that was fitted to it.
 
 One model with one gain and one dead time, no feedback, an output that is measured at every
 sample, and an input that did nothing before the record: each of these is asked for.

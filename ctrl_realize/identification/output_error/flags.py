@@ -1,4 +1,4 @@
-"""Say what one should know before trusting an output-error fit."""
+"""Flags of an output-error fit."""
 
 from __future__ import annotations
 

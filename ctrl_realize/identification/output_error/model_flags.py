@@ -1,4 +1,4 @@
-"""What poles, zeros and rival structures of a fit say of gain and total delay."""
+"""Flags from the poles, zeros and competing structures of a fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Say what several records of one plant say about each other."""
+"""Flags of several records of one plant."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NO_COMMON_GAIN = 0.2
 
 
 def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
-    """List what several records say about each other."""
+    """List the flags of several records of one plant."""
     flags = []
     if result.outlying:
         flags.append(

@@ -1,4 +1,4 @@
-"""What an output-error fit found, and how far to trust it."""
+"""Result of an output-error fit."""
 
 from __future__ import annotations
 

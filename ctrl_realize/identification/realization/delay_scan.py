@@ -1,4 +1,4 @@
-"""The paper's delay estimate: realize behind every delay, take the one of least misfit."""
+"""The delay estimate of the paper: realize after every delay, choose the smallest IAE."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def estimate_delay(
     hankel: str = "square",
     dt: float | None = None,
 ) -> DelayedStateSpace:
-    """Estimate the delay of an impulse response by the paper's scan, and realize behind it.
+    """Estimate the delay of an impulse response by the scan of the paper, and realize the model.
 
     For every d in 0...max_delay the response from d on is realized at the
     given order, z^-d is put back, and the integrated absolute error against
@@ -112,7 +112,7 @@ def estimate_delay(
 
 
 def best_of(surface: Surface, order: int) -> DelayedStateSpace:
-    """Realize behind the best delay of one order, and tell how it was found."""
+    """Realize the model of one order after its best delay."""
     iae, rounding = surface.row(order), surface.rounding
     delay = best_delay(iae, rounding)
     models = surface.models

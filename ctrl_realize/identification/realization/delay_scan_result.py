@@ -1,4 +1,4 @@
-"""Misfit over delay, and the models behind it."""
+"""IAE over delay, and the models of every delay."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Candidates(Sequence[DelayedStateSpace]):
 
 @dataclass(frozen=True, eq=False)
 class DelayScan(ModelFit):
-    """Misfit of the best model behind every candidate delay.
+    """IAE of the best model for every candidate delay.
 
     ``iae[d]`` is the sum of ``|impulse.markov[k] - candidates[d].markov(n)[k]|``
     over the fixed window ``n = samples + max_delay + 1``, all channels

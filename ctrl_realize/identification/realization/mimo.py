@@ -31,7 +31,7 @@ ALIKE, EXACT = 1.5, 1e-9
 
 @dataclass(frozen=True, eq=False)
 class MimoRealization(ModelFit):
-    """How a model of several channels was put together.
+    """Result of a MIMO realization.
 
     ``delays[i, j] == output_delays[i] + input_delays[j] + residual_delays[i, j]``, where
     `residual_delays` are inside the core; entries without response have the delay -1.
@@ -117,7 +117,7 @@ class MimoRealization(ModelFit):
 def delay_matrix(
     impulse: ImpulseResponse | ArrayLike, *, level: float = 0.1, dt: float | None = None
 ) -> IntArray:
-    """Find the delay of every channel where its response sets in.
+    """Find the delay of every input-output pair from the onset of its response.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def realize_mimo(
     hankel: str = "square",
     dt: float | None = None,
 ) -> DelayedStateSpace:
-    """Realize a response of several channels, each with its own delay, with few states.
+    """Realize a MIMO response, with a delay for each input-output pair, with few states.
 
     The delays are split into those of inputs and of outputs, the data are aligned by them, and
     realized with one A. Where no split leaves all channels aligned, this is compared with a model

@@ -1,4 +1,4 @@
-"""Misfit over order and delay, from one decomposition for each delay."""
+"""IAE over order and delay, from one decomposition for each delay."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class OrderScan(Result):
-    """Misfit of the best models over order and delay.
+    """IAE of the best models over order and delay.
 
     ``iae[i, d]`` is the integrated absolute error of order ``orders[i]``
     behind d samples, as `DelayScan.iae` has it; ``delays[i]`` is the best
@@ -191,7 +191,7 @@ def scan_orders(
     hankel: str = "square",
     dt: float | None = None,
 ) -> OrderScan:
-    """Compute the misfit over order and delay, and suggest an order.
+    """Compute the IAE over order and delay, and suggest an order.
 
     The models of all orders are leading parts of one decomposition for each
     delay, so the whole surface costs little more than its highest order.

@@ -1,4 +1,4 @@
-"""Kung's realization of an impulse response behind a known delay."""
+"""Kung's realization of an impulse response after a known delay."""
 
 from __future__ import annotations
 

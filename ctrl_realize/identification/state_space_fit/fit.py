@@ -1,4 +1,4 @@
-"""Output-error fit of a model of several channels to whole records."""
+"""Output-error fit of state-space models with several inputs and outputs."""
 
 from __future__ import annotations
 
@@ -258,7 +258,7 @@ def refine_state_space(
     *,
     feedthrough: bool | None = None,
 ) -> DelayedStateSpace:
-    """Fit all parameters of a model to records, and leave its order and delays as they are.
+    """Fit all parameters of a model to records, with fixed order and delays.
 
     Parameters
     ----------

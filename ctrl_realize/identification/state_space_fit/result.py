@@ -1,4 +1,4 @@
-"""A model of several channels that was fitted to records, and how it came out."""
+"""Result of a state-space fit."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Timing:
 
 @dataclass(frozen=True, eq=False)
 class StateSpaceFit(ModelFit):
-    """How a model was fitted to records of one or several channels.
+    """Result of a state-space fit to records of one or several channels.
 
     Attributes
     ----------

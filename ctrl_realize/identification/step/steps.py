@@ -119,7 +119,7 @@ def found_step(
 def unit_step(
     record: Record, edge: StepEdge | None = None, *, remove_drift: bool | None = None
 ) -> StepResponse:
-    """Cut out the response to one step, take its rest level off and scale it to a unit step.
+    """Cut out the response to one step, subtract its baseline and scale it to a unit step.
 
     Parameters
     ----------

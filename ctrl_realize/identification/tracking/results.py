@@ -1,4 +1,4 @@
-"""What a delay tracker says: at one moment, and over a record."""
+"""Results of a delay tracker: at one time, and over a record."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...results import Flag, IntervalKind, ModelFit, Result
 
 @dataclass(frozen=True, eq=False)
 class TrackPoint(ModelFit):
-    """What the samples of the forgetting window say at one moment.
+    """Estimate of a delay tracker at one time.
 
     ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
     ``interval`` to half a sample where `resolved` is true. Where it is false, `reason` says what is

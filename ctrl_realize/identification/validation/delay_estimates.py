@@ -1,4 +1,4 @@
-"""Estimate one delay in every way that the data allow."""
+"""Compare the delay estimates of all methods that the data allow."""
 
 from __future__ import annotations
 

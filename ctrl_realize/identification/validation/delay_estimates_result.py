@@ -1,4 +1,4 @@
-"""One delay, seen in many ways: a table, and whether they agree."""
+"""Comparison of delay estimates: a table, and whether they agree."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Kind = Literal["dead time", "upper bound"]
 
 @dataclass(frozen=True)
 class DelayEstimate:
-    """One way to look at the delay, in s.
+    """One delay estimate, in s.
 
     ``low <= value <= high``. A view of kind ``"dead time"`` estimates the dead time itself; an
     ``"upper bound"`` sees the dead time and part of the lags: the dead time is not above `high`.
@@ -56,7 +56,7 @@ class DelayEstimate:
 
 @dataclass(frozen=True, eq=False)
 class DelayComparison(Result):
-    """Delay from several methods side by side.
+    """Delay estimates of several methods side by side.
 
     `agree` is true when one dead time lies in the interval of every dead-time view that counts and
     not above any upper bound; `common` is then the interval of such dead times. Otherwise `common`
