@@ -28,7 +28,7 @@ def _case(code: str, due: World, not_due: World, result: str = "fit_output_error
 
 MOVING = "fit_output_error, moving input"
 CASES = [
-    _case("gain_open", steps.ends_while_rising, described.one_lag),
+    _case("gain_not_resolved", steps.ends_while_rising, described.one_lag),
     _case("not_settled", steps.ends_while_rising, described.two_lags),
     _case("held_output", sensors.analyser, described.fine_converter),
     _case("output_at_limit", sensors.clipped, described.one_lag),
@@ -36,7 +36,7 @@ CASES = [
     _case("not_linear", steps.fills_faster_than_it_empties, described.several_steps),
     _case("feedback", loops.set_points, described.random_binary, MOVING),
     _case("not_linear", driven.pipe_with_random_flows, described.random_levels, MOVING),
-    _case("gain_open", driven.drawn_in, described.random_levels, MOVING),
+    _case("gain_not_resolved", driven.drawn_in, described.random_levels, MOVING),
     _case("cancelled_pair", driven.rocking, described.random_levels, MOVING),
     _case("time_varying", driven.ageing, described.random_levels, MOVING),
 ]

@@ -43,7 +43,7 @@ DELAY = MODEL | {
     "held_output",
 }
 """Flags that doubt the dead time."""
-GAIN = MODEL | {"not_settled", "integrating", "gain_open"}
+GAIN = MODEL | {"not_settled", "integrating", "gain_not_resolved"}
 """Flags that doubt gain and total delay."""
 
 

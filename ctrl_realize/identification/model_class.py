@@ -43,6 +43,7 @@ _KEPT = (
     "amplitude_trend",
     "same_records",
     "feedback",
+    "unstable",
     "cancelled_pair",
     "held_output",
     "output_at_limit",
@@ -148,7 +149,9 @@ def _chosen(
     if lags.residual <= HOPELESS * float(modes.noise_std[0]):
         low, high = min(low, lags.interval[0]), max(high, lags.interval[1])
     dead_time = dt * _delay(system)
-    flags = [*cut, *modes.flags, *(flag for flag in lags.flags if flag.code in _KEPT)]
+    known = {flag.code for flag in modes.flags}
+    kept = [flag for flag in lags.flags if flag.code in _KEPT and flag.code not in known]
+    flags = [*cut, *modes.flags, *kept]
     if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
         check = modes.checks[0]
         signals = check.record.output, check.simulated, check.record.input

@@ -38,11 +38,12 @@ TIME_NAMES = frozenset(
 )  # fmt: skip
 INPUT_NAMES = frozenset(
     {"u", "in", "input", "inputs", "input signal", "drive", "command", "cmd", "excitation",
-     "stimulus", "eingang", "entrée", "entree", "entrada", "ingresso"}
+     "stimulus", "op", "controller output", "manipulated variable", "eingang", "entrée", "entree",
+     "entrada", "ingresso"}
 )  # fmt: skip
 OUTPUT_NAMES = frozenset(
     {"y", "out", "output", "outputs", "output signal", "response", "measured", "measurement",
-     "ausgang", "sortie", "salida", "uscita"}
+     "pv", "process variable", "process value", "ausgang", "sortie", "salida", "uscita"}
 )  # fmt: skip
 _DT_NAMES = frozenset({"dt", "ts", "sample time", "sampletime", "sampling time"})
 _RATE_NAMES = frozenset({"fs", "sample rate", "samplerate", "sampling rate"})

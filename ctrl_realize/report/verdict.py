@@ -13,22 +13,24 @@ from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
-from ..identification.output_error.result import gain_in_words
+from ..identification.output_error.result import gain_in_words, sign_is_told
 from ..identification.realization.delay_scan_result import DelayScan
 from ..plots.delays import estimate_of, interval_of
 from ..results import INTERVAL_LABELS, Flag, ModelFit
 
 _CONTRADICTED = "frf_disagrees"
 
-WRONG_MODEL = frozenset({_CONTRADICTED, "no_common_gain", "gain_not_resolved"})
-"""Flags after which the model should not be used as it stands, first in the list of reasons."""
+_GAIN_OPEN = "gain_not_resolved"
+
+WRONG_MODEL = frozenset({_CONTRADICTED, "no_common_gain", "unstable", _GAIN_OPEN})
+"""Flags after which the model should not be used as it stands, first in the list of reasons; a gain
+that is not resolved only where its sign is not told."""
 
 WRONG_DELAY = frozenset(
     {
         "delay_at_bound",
         "no_delay_resolved",
         "order_in_noise",
-        "unstable",
     }
 )
 """Flags after which the dead time should not be used as it stands."""
@@ -92,9 +94,8 @@ def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Ve
     caution - Use with care: see the remarks below.
     """
     flags = (*more_flags, *_flags_of(system))
-    return Verdict(
-        _level(flags), headline_of(system), facts_of(system), _reasons(flags), _judged(flags)
-    )
+    level, judgement = _judged(system, flags)
+    return Verdict(level, headline_of(system), facts_of(system), _reasons(flags), judgement)
 
 
 def campaign_verdict(campaign: Campaign, more_flags: Sequence[Flag] = ()) -> Verdict:
@@ -115,9 +116,8 @@ def campaign_verdict(campaign: Campaign, more_flags: Sequence[Flag] = ()) -> Ver
         ("scatter (std)", scatter),
         *facts_of(system),
     ]
-    return Verdict(
-        _level(flags), headline_of(system), tuple(facts), _reasons(flags), _judged(flags)
-    )
+    level, judgement = _judged(system, flags)
+    return Verdict(level, headline_of(system), tuple(facts), _reasons(flags), judgement)
 
 
 def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> Verdict:
@@ -155,7 +155,7 @@ def headline_of(system: DelayedStateSpace) -> str:
         sentence += f", {interval_name(system)} {interval_in_time(*interval)}"
     order = system.delay_free.nstates
     gain = _gain(system)
-    if not _gain_is_resolved(system):
+    if not _sign_is_told(system):
         return f"{sentence}. Model without the delay: order {order}, gain not determined."
     behind = "integrating" if gain == INTEGRATING else f"gain {gain}"
     return f"{sentence}. Model without the delay: order {order}, {behind}."
@@ -200,8 +200,9 @@ def _gain(system: DelayedStateSpace) -> str:
     return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
 
 
-def _gain_is_resolved(system: DelayedStateSpace) -> bool:
-    return not any(_code(flag) == "gain_not_resolved" for flag in _flags_of(system))
+def _sign_is_told(system: DelayedStateSpace) -> bool:
+    flagged = any(_code(flag) == _GAIN_OPEN for flag in _flags_of(system))
+    return not flagged or sign_is_told(getattr(system.fit, "gain_interval", None))
 
 
 def _gain_with_interval(system: DelayedStateSpace) -> str:
@@ -239,17 +240,14 @@ def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
     return (*flags, SCANNED) if isinstance(system.fit, DelayScan) else flags
 
 
-def _level(flags: Sequence[Any]) -> Level:
-    if any(_code(flag) in WRONG_MODEL | WRONG_DELAY for flag in flags):
-        return "poor"
-    return "caution" if flags else "good"
-
-
-def _judged(flags: Sequence[Any]) -> str:
+def _judged(system: DelayedStateSpace, flags: Sequence[Any]) -> tuple[Level, str]:
     codes = {_code(flag) for flag in flags}
-    if _CONTRADICTED in codes:
-        return _CONTRADICTION
-    return _WRONG_MODEL if codes & WRONG_MODEL else _JUDGEMENTS[_level(flags)]
+    if _sign_is_told(system):
+        codes.discard(_GAIN_OPEN)
+    if codes & WRONG_MODEL:
+        return "poor", _CONTRADICTION if _CONTRADICTED in codes else _WRONG_MODEL
+    level: Level = "poor" if codes & WRONG_DELAY else "caution" if flags else "good"
+    return level, _JUDGEMENTS[level]
 
 
 def _reasons(flags: Sequence[Any]) -> tuple[str, ...]:

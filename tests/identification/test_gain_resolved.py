@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -28,6 +30,14 @@ def wandering(seed, n=300):
     y = cr.delayed_ss(core, 3).simulate(u)
     y = y + 0.25 * np.cumsum(rng.standard_normal(n)) + 0.3 * rng.standard_normal(n)
     return cr.Record(np.arange(n) * 1.0, u, y)
+
+
+def warned(design, *given):
+    """What a design says of a record that does not resolve what it needs."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UnresolvedWarning)
+        design(*given)
+    return " | ".join(str(one.message) for one in caught)
 
 
 def codes(system):
@@ -74,8 +84,8 @@ def test_a_gain_whose_sign_is_not_told_is_called_so(unknown):
     assert low < 0 < high
     verdict = report.verdict_of(unknown)
     assert verdict.level == "poor"
-    assert "not resolved" in verdict.headline
-    assert "resolve the gain" in verdict.reasons[0]
+    assert "not determined" in verdict.headline
+    assert "neither the gain nor its sign" in verdict.reasons[0]
 
 
 @pytest.mark.parametrize(
@@ -91,6 +101,54 @@ def test_a_gain_whose_sign_is_not_told_is_called_so(unknown):
 def test_no_controller_is_designed_for_a_gain_of_unknown_sign(unknown, design):
     with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
         design(unknown)
+
+
+def test_structures_that_differ_in_gain_are_warned_of_and_refuse_no_design():
+    """Little of two equal lags is seen: the sign of the gain is told, and not much more."""
+    record = step(30, order=2, noise=0.02, seed=1)
+    system = cr.fit_output_error(record, structures=[(1, 1), (2, 2), (2, 1), (3, 3)])
+    told = [str(flag) for flag in system.fit.flags if flag.code == "gain_not_resolved"]
+    assert len(told) == 1
+    assert system.fit.gain_interval[0] > 0
+    assert report.verdict_of(system).level == "caution"
+    assert "does not determine the gain:" in warned(cr.design.pid, system)
+
+
+def test_a_predictor_warns_of_a_dead_time_that_may_be_none():
+    t = np.arange(200.0)
+    u = np.where(t < 50, 0.0, 1.0)
+    y = np.where(t < 50, 0.0, -np.expm1(-np.maximum(t - 50, 0) / 10))
+    noise = 0.01 * np.random.default_rng(0).standard_normal(t.size)
+    system = cr.identify(cr.Record(t, u, y + noise), structures=[(1, 1)])
+    assert "no_delay_resolved" in codes(system)
+    assert "a dead time to predict over" in warned(cr.design.predictor_lqr, system, 1.0, 1.0)
+    cr.design.margins(system, 0.01)  # relies on no dead time
+
+
+def held_by_a_controller(pole, n=420):
+    rng = np.random.default_rng(0)
+    target = np.repeat(rng.choice([-1.0, 0.0, 1.0], n // 60), 60)
+    u, y, state = np.zeros(n), np.zeros(n), 0.0
+    for k in range(n):
+        y[k] = state + 0.02 * rng.standard_normal()
+        u[k] = 2 * (target[k] - y[k])
+        state = pole * state + 0.05 * (u[k - 2] if k >= 2 else 0.0)
+    return cr.Record(0.1 * np.arange(n), u, y)
+
+
+@pytest.mark.parametrize(
+    "fit",
+    [
+        lambda record: cr.fit_output_error(record, structures=[(1, 1)]),
+        lambda record: cr.fit_state_space(record, 1),
+    ],
+)
+def test_an_unstable_plant_in_a_loop_is_called_so(fit):
+    system = fit(held_by_a_controller(1.03))
+    assert "unstable" in codes(system)
+    assert report.verdict_of(system).level == "poor"
+    assert "whether the plant is stable" in warned(cr.design.margins, system, 0.01)
+    assert "unstable" not in codes(fit(held_by_a_controller(0.97)))
 
 
 @pytest.mark.parametrize("seed", [3, 5, 22])

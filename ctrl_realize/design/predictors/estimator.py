@@ -123,7 +123,7 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     [[0.5377]]
     """
     plant = delayed_system(system, "kalman_predictor", siso=False)
-    warn_unresolved(plant)
+    warn_unresolved(plant, predicts=True)
     core = plant.delay_free
     has_states(core, "kalman_predictor")
     weight = weight_matrix(QN, core.nstates, "QN", "core state(s)")

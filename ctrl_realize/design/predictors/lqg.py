@@ -93,7 +93,7 @@ def lqg(
     """
     plant = delayed_system(system, "lqg", siso=False)
     check_sign(plant, "lqg")
-    warn_unresolved(plant)
+    warn_unresolved(plant, predicts=True)
     core = plant.delay_free
     has_states(core, "lqg")
     law = regulator(plant, Q, R)

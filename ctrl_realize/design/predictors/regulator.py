@@ -190,7 +190,7 @@ def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     """Solve for the gain, see `predictor_lqr`, without a look at the loop."""
     plant = delayed_system(system, "predictor_lqr", siso=False)
     check_sign(plant, "predictor_lqr")
-    warn_unresolved(plant)
+    warn_unresolved(plant, predicts=True)
     delays = tuple(plant.input_delays)
     core = plant.delay_free
     has_states(core, "predictor_lqr")

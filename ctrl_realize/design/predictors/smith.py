@@ -109,7 +109,7 @@ def smith_predictor(
     """
     plant = delayed_system(system, "a Smith predictor")
     check_sign(plant, "a Smith predictor")
-    warn_unresolved(plant)
+    warn_unresolved(plant, predicts=True)
     primary = same_rate(controller, plant.dt, "a Smith predictor")
     core, d = plant.delay_free, int(plant.delay)
     poles = np.asarray(core.poles())

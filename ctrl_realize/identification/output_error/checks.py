@@ -14,18 +14,14 @@ from ..._wording import in_time
 from ...data import Record
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import Z_95
-from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.held_output import held_share, longest_hold, samples_at_limit
-from ...numerics.validation.innovations import feedback_chance, nonlinear_chance
+from ...numerics.validation.innovations import nonlinear_chance
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
 from ...numerics.validation.white_step import WhiteStep, white_step
 from ...results import Flag
+from .loop_flags import RARE, REGRESSED, feedback_flags, past_inputs, unstable_flags
 from .result import OutputErrorFit
 
-RARE = 1e-4
-"""Chance of an alarm by noise alone, of each test. Of 290 records without feedback (29 worlds of
-`benchmarks.worlds`) the least chance was 1e-3; of 60 loops that are no pure limit cycle, all were
-below 1e-4."""
 _HELD = 0.5
 """Part of the moving samples that repeat the one before, from which an output counts as held."""
 _GAINS_APART = 0.1
@@ -39,9 +35,7 @@ _REACHED = 1.5
 _TWO_SIDED = Z_95
 _OFF = 0.2
 """Relative difference of gains or total delays that is worth a flag."""
-_MOST_SAMPLES, _REGRESSED = 20_000, 4000
-"""Samples that are looked at; of the long regressions."""
-_LEAST_PAST, _MOST_PAST = 30, 150
+_MOST_SAMPLES = 20_000
 
 
 def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
@@ -68,6 +62,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     stepped = bool(np.isfinite(fit.onset))
     loop = () if stepped else feedback_flags(fit.records, fit.delay_interval[1])
     flags += loop
+    flags += unstable_flags(fit.records, fit.delay_interval[1])
     if len(fit.records) == 1:
         shown = _shown(fit)
         flags += _limit_flags(shown.output)
@@ -134,7 +129,7 @@ def _white_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
     gain, total = _TWO_SIDED * step.gain_error, _TWO_SIDED * step.total_error
     return [
         Flag(
-            "gain_open",
+            "gain_not_resolved",
             "the disturbances are coloured: weighted accordingly, gain and total delay are "
             f"{step.gain:.3g} +- {gain:.2g} and {in_time(step.total)} -+ {in_time(total)}: "
             "neither is well determined; use a longer record, or one with smaller "
@@ -145,32 +140,6 @@ def _white_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
 
 def _moves(drive: FloatArray) -> int:
     return int(np.count_nonzero(np.abs(np.diff(drive)) > 0.1 * np.ptp(drive)))
-
-
-def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:
-    """Tell whether an input follows the output; `delay`, in samples, is not exceeded."""
-    chances = []
-    for record in records:
-        start = lively_start(np.atleast_2d(record.input), _REGRESSED)
-        part = slice(start, start + _REGRESSED)
-        output, drive = np.ravel(record.output)[part], np.ravel(record.input)[part]
-        chances.append(feedback_chance(output, drive, _past(output.size, delay)))
-    if min(chances) >= RARE / len(chances):
-        return ()
-    return (
-        Flag(
-            "feedback",
-            f"the innovations of input and output are correlated (p = {min(chances):.1g}): a "
-            "controller or an operator closes the loop, or the output responds within the "
-            "same sample; dead time, gain and lags may be those of the inverse of the "
-            "controller: repeat the test in open loop",
-        ),
-    )
-
-
-def _past(size: int, delay: float) -> int:
-    """Past inputs that reach beyond a dead time, also one that is found wrong."""
-    return int(min(max(size // 12, _LEAST_PAST, 1.5 * delay + 10), _MOST_PAST, size // 6))
 
 
 def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
@@ -210,8 +179,8 @@ def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...
     Not of step records, where such products are but other functions of the time since the step,
     nor where the regression does not reach over the response; `delay` and `total` in samples.
     """
-    output, drive = shown.output[:_REGRESSED], shown.drive[:_REGRESSED]
-    past = min(2 * _past(output.size, delay), output.size // 5)
+    output, drive = shown.output[:REGRESSED], shown.drive[:REGRESSED]
+    past = min(2 * past_inputs(output.size, delay), output.size // 5)
     # Of a total delay beyond a tenth of the record flags of its own tell.
     if past < _REACHED * min(total, output.size / 10):
         return ()

@@ -11,7 +11,7 @@ from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
-from .model_flags import cancelled_pair, open_gain, slow_modes
+from .model_flags import cancelled_pair, slow_modes, unresolved_gain
 from .result import is_firm
 from .words import ESTIMATE_WORDS, model_words
 
@@ -54,7 +54,7 @@ def model_flags(
     fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
 ) -> list[Flag | None]:
     """List what the model itself shows."""
-    extrapolated = slow_modes(fit, length), open_gain(fit)
+    extrapolated = slow_modes(fit, length), unresolved_gain(fit, length)
     firm = "" if any(extrapolated) else _only_total(fit)
     return [
         _apparent(fit),
@@ -66,7 +66,6 @@ def model_flags(
         *extrapolated,
         cancelled_pair(fit),
         _disagreement(dt, fit, firm),
-        _gain(fit, length),
         _inverse(fit),
     ]
 
@@ -200,27 +199,9 @@ def _open_start(fit: OutputErrorEstimate, firm: str) -> Flag | None:
         "onset_open",
         "the best model has a zero, which can imitate a smooth onset: how much of the time "
         "before the visible onset is dead time is not identifiable; it is between "
-        f"{interval_in_time(fit.low, fit.high)}{firm}",
-    )
-
-
-def _gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
-    """Say so where the record does not tell the sign of the gain."""
-    low, high = fit.gain_ends
-    if fit.static is None or not low <= 0 <= high:
-        return None
-    if fit.static.resolved:
-        why = f"its 95 % interval is {low:.3g} to {high:.3g}"
-    else:
-        why = (
-            f"its slowest time constant is {in_time(float(1 / np.abs(fit.poles).min()))} in a "
-            f"record of {in_time(length)}, and the standard error of the gain is "
-            f"{fit.static.gain_std:.3g}"
-        )
-    return Flag(
-        "gain_not_resolved",
-        "the record determines neither the gain nor its sign: the gain of the model is "
-        f"{fit.static.gain:.4g}, but {why}. Record for longer, or move the input further",
+        f"{interval_in_time(fit.low, fit.high)}{firm}. Play or friction that holds a valve stem "
+        "at first looks the same at one step amplitude: fit records of several amplitudes "
+        "together, whose delays then differ",
     )
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..._wording import interval_in_time
+from ..._wording import in_time, interval_in_time
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.separable.lag_chains import lag_sum
+from ...numerics.separable.static_gain import INTEGRATOR, StaticGain
 from ...results import Flag
+from .result import sign_is_told
 
 _GAINS_APART = 0.2  # part of gain or total delay by which structures may differ
 _AS_GOOD = 4.0  # excess of a criterion that chance explains: chi-square, one degree, 95 %
 _CANCELLED = 0.05  # of its frequency: distance of a pole from a zero that hides it
 
-INTEGRATOR = 5e-3
-"""Poles slower than this, times the length of the record, cannot be told from integrators."""
 SETTLED = 3.0
 """Time constants after which a lag counts as settled: 95 % of its step response."""
 
@@ -44,8 +44,13 @@ def slow_modes(fit: OutputErrorEstimate, length: float) -> Flag | None:
     )
 
 
-def open_gain(fit: OutputErrorEstimate) -> Flag | None:
-    """Tell whether structures that are not ruled out differ in gain or total delay."""
+def unresolved_gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
+    """Tell whether gain or total delay are open: their structures differ, or not even its sign.
+
+    Whether the sign is told is what the interval of the gain says (`sign_is_told`).
+    """
+    if fit.static is not None and not sign_is_told(fit.gain_ends):
+        return Flag("gain_not_resolved", _no_sign(fit, fit.static, length))
     kept = [line for line in fit.structures if line.delta_bic <= _AS_GOOD]
     gain, total = _gain_and_total(fit)
     gains = np.array([gain, *(line.gain for line in kept)])
@@ -53,11 +58,27 @@ def open_gain(fit: OutputErrorEstimate) -> Flag | None:
     if fit.delay_estimates or not (_apart(gains) or _apart(totals)):
         return None
     return Flag(
-        "gain_open",
+        "gain_not_resolved",
         f"structures that the data cannot rule out have gains of {gains.min():.3g} to "
         f"{gains.max():.3g} and total delays of "
         f"{interval_in_time(totals.min(), totals.max())}: neither is well determined; use a "
         "longer record, or one with smaller disturbances",
+    )
+
+
+def _no_sign(fit: OutputErrorEstimate, static: StaticGain, length: float) -> str:
+    low, high = fit.gain_ends
+    if static.resolved:
+        why = f"its 95 % interval is {low:.3g} to {high:.3g}"
+    else:
+        why = (
+            f"its slowest time constant is {in_time(float(1 / np.abs(fit.poles).min()))} in a "
+            f"record of {in_time(length)}, and the standard error of the gain is "
+            f"{static.gain_std:.3g}"
+        )
+    return (
+        "the record determines neither the gain nor its sign: the gain of the model is "
+        f"{static.gain:.4g}, but {why}. Record for longer, or move the input further"
     )
 
 

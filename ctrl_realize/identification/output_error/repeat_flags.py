@@ -36,11 +36,12 @@ def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
         )
     flags += _response_flags(result)
     if result.trend_error > 0 and abs(result.trend) > 3 * result.trend_error:
+        pause = "; play or friction ends the sooner the larger the step" * (result.trend < 0)
         flags.append(
             Flag(
                 "amplitude_trend",
                 f"the dead time changes with the step amplitude ({result.trend:.2g} +- "
-                f"{result.trend_error:.2g} s per unit): the plant is nonlinear",
+                f"{result.trend_error:.2g} s per unit): the plant is nonlinear{pause}",
             )
         )
     return tuple(flags)

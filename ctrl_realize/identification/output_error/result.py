@@ -31,7 +31,7 @@ _TOTAL_IN_DOUBT = frozenset(
     {
         "not_settled",
         "integrating",
-        "gain_open",
+        "gain_not_resolved",
         "cancelled_pair",
         "structured_misfit",
         "input_in_residual",
@@ -368,6 +368,11 @@ def is_firm(value: float, interval: tuple[float, float]) -> bool:
     """Whether an interval reaches a tenth of the estimate to either side at most."""
     low, high = interval
     return bool(max(high - value, value - low) <= _FIRM * abs(value))
+
+
+def sign_is_told(interval: tuple[float, float] | None) -> bool:
+    """Whether the interval of a gain, if there is one, leaves its sign no question."""
+    return interval is not None and (interval[0] > 0 or interval[1] < 0)
 
 
 def gain_in_words(gain: float, interval: tuple[float, float]) -> str:

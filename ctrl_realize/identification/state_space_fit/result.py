@@ -13,6 +13,7 @@ from ...delayed import DelayedStateSpace
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.state_space.balancing import balanced_truncation
 from ...results import Flag, IntervalKind, ModelFit
+from ..output_error.loop_flags import unstable_flags
 from ..output_error.result import OutputErrorFit
 from ..validation.residuals import analyse_residuals
 from ..validation.residuals_result import ResidualAnalysis
@@ -82,7 +83,7 @@ class StateSpaceFit(ModelFit):
         What was chosen, and why.
     flags : tuple of Flag
         Those of the checks, and ``"highest_order"``, ``"no_response"``,
-        ``"coloured_residual"``.
+        ``"coloured_residual"``, ``"unstable"``.
 
     Examples
     --------
@@ -211,6 +212,8 @@ def fitted_system(
         analyse_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
     )
     seen = {flag.code: flag for check in checks for flag in check.flags}
+    latest = max(best.inputs) + max(best.outputs)
+    loop = unstable_flags(tuple(complete), latest) if complete else ()
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
     if neighbours > COLOURED:
         longest = max(r.n_samples for r in group)
@@ -246,7 +249,7 @@ def fitted_system(
         checks=checks,
         records=group,
         choices=choices,
-        flags=(*flags, *seen.values()),
+        flags=(*flags, *seen.values(), *loop),
     )
     first = group[0]
     labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}

@@ -68,6 +68,26 @@ def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
     assert fit.repeatability.trend / TS == pytest.approx(1 / 8, rel=0.3)
 
 
+def through_play(height, seed):
+    """Two lags of 8 s behind 10 s of dead time, and play of a fifth of the smallest step."""
+    t = np.arange(400.0)
+    x = np.clip(t - 110, 0, None) / 8
+    y = np.clip(height * (1 - (1 + x) * np.exp(-x)) - 0.1, 0, None)
+    noise = 0.002 * np.random.default_rng(seed).standard_normal(t.size)
+    return cr.Record(t, height * (t >= 100), y + noise)
+
+
+def test_play_that_one_height_takes_for_dead_time_is_told_by_several():
+    one = cr.fit_output_error(through_play(1.0, 0)).fit
+    assert one.interval[0] > 10
+    told = [str(flag) for flag in one.flags if flag.code == "onset_open"]
+    assert "Play or friction" in told[0]
+    heights = (1.0, 1.5, 2.0, 3.0)
+    several = cr.fit_output_error([through_play(h, k) for k, h in enumerate(heights)]).fit
+    assert "amplitude_trend" in codes(several)
+    assert several.repeatability.trend < 0
+
+
 def moving(seed: int, *, drifts: bool) -> cr.Record:
     """Two lags behind 0.6 s: a drift of its own, or an earlier step 5 to 9 s before."""
     rng = np.random.default_rng(seed)
