@@ -221,7 +221,7 @@ def _parts(
     for signal, found in (("input", inputs), ("output", outputs)):
         if not found:
             raise OptionError(
-                f"{table.path}: cannot tell which column is the {signal}; say {signal}=name or "
+                f"{table.path}: cannot tell which column is the {signal}; give {signal}=name or "
                 f"number; it has {table.listing()}"
             )
     used = [*inputs, *outputs] + ([] if clock is None else [clock])

@@ -69,7 +69,7 @@ def test_columns_and_units_are_chosen(tmp_path):
         (written("f,gain,phase_deg", F, -F, F), {}, OptionError, "negative values; is it in dB"),
         (written("f,gain_dB,phase_deg", F, 1e3 * F, PHASE), {}, DataError, "10000 dB"),
         (written("f,gain,phase [turns]", F, F, F), {}, OptionError, "in 'turns'; say phase_unit"),
-        (written("f [rpm],re,im", F, F, F), {}, OptionError, "in 'rpm'; say frequency_unit"),
+        (written("f [rpm],re,im", F, F, F), {}, OptionError, "in 'rpm'; give frequency_unit"),
         (written("a,re,im", F, F, F), {}, OptionError, "which column is the frequency"),
         (written("f,re,b", F, F, F), {}, OptionError, "which column is the response.*2 'b'"),
         (written("f,re,im,re", F, F, F, F), {}, OptionError, "2 columns that could be real"),
