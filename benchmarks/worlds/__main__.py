@@ -92,6 +92,8 @@ def page(seen: dict[tuple[str, int], Judged]) -> list[str]:
     lines = [
         f"*Simulated; {len(strange)} records of {len(rows) - len(described.WORLDS)} worlds that no "
         f"rule was made for, {len(plain)} of {len(described.WORLDS)} that the model describes. "
+        f"Seeds {min(one.seed for one in seen.values())} to "
+        f"{max(one.seed for one in seen.values())}. "
         f"`python -m benchmarks.worlds`, {date.today().isoformat()}, ctrl_realize "
         f"{cr.__version__}, Python {platform.python_version()}, numpy {np.__version__}, scipy "
         f"{scipy.__version__}.*",
