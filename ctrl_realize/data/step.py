@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..numerics.arrays import FloatArray, read_only
+from ..numerics.signals.edges import Edge
 from ..results import Drawable
 from .record import Record
 
 
 @dataclass(frozen=True)
-class StepEdge:
+class StepEdge(Edge):
     """Where and how far an input stepped.
 
     ``input[index - 1]`` is still at rest, ``input[index]`` has moved, and from
@@ -45,13 +46,7 @@ class StepEdge:
     (100, 1.0, 4.0, 8.0, 1)
     """
 
-    index: int
     time: float
-    amplitude: float
-    baseline: float
-    samples: int
-    start: int
-    stop: int
     edges: tuple[StepEdge, ...] = field(default=(), repr=False)
 
 

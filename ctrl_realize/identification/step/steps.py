@@ -14,7 +14,7 @@ from ...errors import DataError, NoStepError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.signals.baseline import rest_line
-from ...numerics.signals.edges import Edge, difference_noise, find_edges
+from ...numerics.signals.edges import difference_noise, find_edges
 
 
 def detect_step(
@@ -100,7 +100,7 @@ def found_step(
             f"for more than {spikes} samples. Check which column is the input; for other inputs "
             "use impulse_from_io"
         )
-    edges = tuple(_to_step_edge(edge, record) for edge in found)
+    edges = tuple(StepEdge(**vars(e), time=float(record.time[e.index])) for e in found)
     highest = max(abs(edge.amplitude) for edge in edges)
     if highest < SMALLEST:
         raise NoStepError(
@@ -211,15 +211,3 @@ def _labels(record: Record, what: str) -> tuple[str, ...]:
 
 def _of(record: Record) -> str:
     return f"of {named('record', record.name)}"
-
-
-def _to_step_edge(edge: Edge, record: Record) -> StepEdge:
-    return StepEdge(
-        edge.index,
-        float(record.time[edge.index]),
-        edge.amplitude,
-        edge.rest,
-        edge.samples,
-        edge.start,
-        edge.stop,
-    )

@@ -13,7 +13,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import median_filter, rank_filter
@@ -28,11 +28,14 @@ _PIECE = 2**18  # samples that are looked at together
 
 @dataclass(frozen=True)
 class Edge:
-    """Samples index...index + samples - 1 lead from `rest` to `rest + amplitude`."""
+    """Samples index...index + samples - 1 lead from `baseline` to `baseline + amplitude`.
+
+    The level before it holds from sample `start` on, that after it up to sample `stop`.
+    """
 
     index: int
     amplitude: float
-    rest: float
+    baseline: float
     samples: int
     start: int
     stop: int
@@ -114,13 +117,10 @@ def find_edges(
             if most is not None and len(edges) > most:
                 break
     return [
-        Edge(
-            e.index,
-            e.amplitude,
-            e.rest,
-            e.samples,
-            edges[i - 1].index + edges[i - 1].samples - 1 if i else 0,
-            edges[i + 1].index if i + 1 < len(edges) else int(clean.size),
+        replace(
+            e,
+            start=edges[i - 1].index + edges[i - 1].samples - 1 if i else 0,
+            stop=edges[i + 1].index if i + 1 < len(edges) else int(clean.size),
         )
         for i, e in enumerate(edges)
     ]

@@ -59,7 +59,7 @@ def test_a_ramp_is_measured_from_first_to_last_sample(length, up, spike):
     slack = int(np.ceil(0.02 * length))  # left, and reached, within 2 %
     assert abs(found.index - 200) <= slack
     assert abs(found.index + found.samples - (200 + length)) <= slack
-    assert_allclose([found.rest, found.amplitude], [0, values[-1]], atol=1e-12)
+    assert_allclose([found.baseline, found.amplitude], [0, values[-1]], atol=1e-12)
 
 
 def test_edges_are_found_anywhere_in_a_long_record():
