@@ -68,7 +68,7 @@ def test_columns_and_units_are_chosen(tmp_path):
         (written("f,gain,phase", F, abs(G), PHASE), {}, OptionError, "in degrees or in radians"),
         (written("f,gain,phase_deg", F, -F, F), {}, OptionError, "negative values; is it in dB"),
         (written("f,gain_dB,phase_deg", F, 1e3 * F, PHASE), {}, DataError, "10000 dB"),
-        (written("f,gain,phase [turns]", F, F, F), {}, OptionError, "in 'turns'; say phase_unit"),
+        (written("f,gain,phase [turns]", F, F, F), {}, OptionError, "in 'turns'; give phase_unit"),
         (written("f [rpm],re,im", F, F, F), {}, OptionError, "in 'rpm'; give frequency_unit"),
         (written("a,re,im", F, F, F), {}, OptionError, "which column is the frequency"),
         (written("f,re,b", F, F, F), {}, OptionError, "which column is the response.*2 'b'"),
@@ -79,7 +79,7 @@ def test_columns_and_units_are_chosen(tmp_path):
         (written("f,re,im", F, F, F), {"phase_unit": "turns"}, OptionError, "phase_unit='turns'"),
         (written("f,re,im", F, F, F), {"magnitude_unit": "V"}, OptionError, "'abs', 'db'"),
         (written("f,re,im", F, F, F), {"frequency": "w"}, OptionError, "frequency='w'"),
-        ("hello\n", {}, FileFormatError, "no numeric columns"),
+        ("hello\n", {}, FileFormatError, "numeric columns"),
     ],
 )  # fmt: skip
 def test_what_is_not_clear_is_asked(tmp_path, text, kwargs, error, match):
