@@ -16,6 +16,7 @@ from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
+from ..paper import SETTINGS
 from .model_class import with_modes_judged
 from .output_error.fit import MOST_ORDER, fit_output_error
 from .output_error.result import OutputErrorFit
@@ -32,9 +33,6 @@ METHODS: tuple[str, ...] = ("output_error", "scan", "paper")
 
 SCANNED_ORDERS = range(1, 6)
 """Orders that the scan chooses from; above 5 the realization models noise, or the delay."""
-
-PAPER_ORDER, PAPER_SAMPLES, PAPER_MAX_DELAY, PAPER_CUTOFF_HZ = 3, 1000, 100, 50.0
-"""Section 3.2 of the paper (`ctrl_realize.paper.SETTINGS`, which stands above this layer)."""
 
 
 @single_threaded
@@ -246,8 +244,8 @@ def _paper(
     samples: int | None,
     feedthrough: bool | None,
 ) -> DelayedStateSpace:
-    reach = PAPER_MAX_DELAY if max_delay is None else max_delay
-    behind = PAPER_SAMPLES if samples is None else samples
+    reach = SETTINGS.max_delay if max_delay is None else max_delay
+    behind = SETTINGS.samples if samples is None else samples
     if reach + behind + 1 > step.n_samples:
         raise DelayRangeError(
             f"the settings of the paper need {reach + behind + 1} samples after the step "
@@ -256,13 +254,13 @@ def _paper(
         )
     impulse = impulse_from_step(
         step,
-        cutoff_hz=PAPER_CUTOFF_HZ if cutoff_hz == "auto" else cutoff_hz,
+        cutoff_hz=SETTINGS.cutoff_hz if cutoff_hz == "auto" else cutoff_hz,
         zero_phase=False,
         difference="central",
     )
     system = estimate_delay(
         impulse,
-        PAPER_ORDER if order is None else order,
+        SETTINGS.order if order is None else order,
         max_delay=reach,
         samples=behind,
         feedthrough=True if feedthrough is None else feedthrough,

@@ -11,18 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize import paper
-from ctrl_realize.identification import identify as identify_module
 from tests.rigs import step_record
-
-
-def test_the_papers_settings_are_those_of_the_paper():
-    # The layer below cannot read ctrl_realize.paper; the two must not drift apart.
-    settings = paper.SETTINGS
-    assert settings.order == identify_module.PAPER_ORDER
-    assert settings.samples == identify_module.PAPER_SAMPLES
-    assert settings.max_delay == identify_module.PAPER_MAX_DELAY
-    assert settings.cutoff_hz == identify_module.PAPER_CUTOFF_HZ
 
 
 def test_the_papers_method_is_the_paper_step_by_step():
