@@ -114,14 +114,10 @@ def test_a_structure_that_was_asked_for_is_only_judged():
     assert "fit_state_space" in str(flag)
 
 
-def test_lags_that_leave_little_more_widen_the_interval():
+def test_a_small_resonance_beside_a_lag_leaves_the_dead_time_its_interval():
     rng = np.random.default_rng(6)
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 3)
     ringing = LAG + 0.2 * ct.tf([144.0], [1, 0.6, 144.0])
     y = cr.delayed_ss(ringing, dead_time=0.55, dt=DT).simulate(u)
     found = cr.identify(cr.Record(DT * np.arange(600), u, y + 0.2 * rng.standard_normal(600)))
-    fit = found.fit
-    assert isinstance(fit, cr.identification.StateSpaceFit)
-    assert fit.lags.residual < 2 * fit.noise_std[0]
-    assert fit.interval[0] <= min(fit.dead_time, fit.lags.interval[0])
-    assert fit.interval[1] >= max(fit.dead_time, fit.lags.interval[1])
+    assert found.fit.interval[0] <= 0.55 <= found.fit.interval[1]
