@@ -113,7 +113,7 @@ def test_nothing_is_written_where_no_record_is_usable(folder, tmp_path, capsys):
     [
         (["identify", "{folder}/nix.csv", "-o", "{out}"], "there is no such file"),
         (["identify", "{folder}", "-o", "{out}"], "is a folder"),
-        (["identify", "{folder}/text.csv", "-o", "{out}"], "no numeric columns"),
+        (["identify", "{folder}/text.csv", "-o", "{out}"], "numeric columns"),
         (["identify", "{folder}/flat.csv", "-o", "{out}", "--method", "scan"], "no step"),
         (["identify", "{folder}/step_0.csv", "-o", "{folder}/frf.csv"], "is a file"),
         (["identify", "{folder}/step_0.csv"], "output"),

@@ -32,7 +32,9 @@ def codes_in_source() -> set[str]:
 
 
 def test_every_flag_of_the_package_has_a_world_in_which_it_is_due():
-    assert codes_in_source() - {case.code for case in runs.FLAG_CASES} == set()
+    # a loop has this one, not a record: tests/design/test_loop_check.py
+    of_loops = {"unstable_within_interval"}
+    assert codes_in_source() - {case.code for case in runs.FLAG_CASES} == of_loops
     assert {case.code for case in runs.FLAG_CASES} - codes_in_source() == set()
 
 

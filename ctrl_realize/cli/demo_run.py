@@ -17,7 +17,7 @@ from ..frequency import FRFComparison, compare_frf, stepped_sine_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
 from ..identification.output_error.fit import fit_output_error
-from ..identification.realization.delay_scan_result import DelayScan
+from ..identification.realization.result import Realization
 from .terminal import progress
 
 
@@ -98,7 +98,7 @@ def _without_filter(system: DelayedStateSpace, frf: MeasuredFRF) -> ct.Frequency
     """Divide the filter that is left in the data out of a model's frequency response."""
     omega = 2 * np.pi * frf.frequency_hz
     response = np.asarray(system(np.exp(1j * omega * system.dt)))
-    left = fit_of(system, DelayScan).impulse.filter
+    left = fit_of(system, Realization).impulse.filter
     values = response if left is None else response / left.response(omega)
     return ct.frd(values, omega, smooth=True, name="filter divided out")
 

@@ -1,4 +1,8 @@
-"""Numbers that many modules use, each under one name."""
+"""Numbers that many modules use, each under one name.
+
+The percentage points are those of the standard distributions; the limits of size are our own: the
+square of a quotient of two numbers inside of them is still a double.
+"""
 
 CHI2_95 = 3.841458820694124
 """95 % point of chi-square with one degree of freedom, ``scipy.special.chdtri(1, 0.05)``."""

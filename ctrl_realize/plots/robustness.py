@@ -93,7 +93,7 @@ def uncertainty_plot(
     >>> bound = cr.design.uncertainty_bound([1.3 * plant], plant, dead_time_interval=(0.025, 0.035))
     >>> cplt = plots.uncertainty_plot(bound)
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
-    ['bound', 'spread of the systems', 'unsure dead time']
+    ['bound', 'spread of the systems', 'uncertain dead time']
     """
     with style.canvas(ax, title=title, default_title="Multiplicative uncertainty") as (axes,):
         hertz = result.omega / HERTZ

@@ -143,7 +143,7 @@ class Page:
     ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
     ... )
     >>> print(page.title, "-", page.verdict.facts[0])
-    Valve 7 - ('dead time', '34.38 ms')
+    Valve 7 - ('dead time', '34.4 ms')
     """
 
     title: str

@@ -34,6 +34,8 @@ COMPOSED = {
     "outlying_records": "left out of the mean: …",
     "structured_misfit": "no model leaves only noise: the plant is not linear or has more dynamics "
     "than the model; the dead time is the median of several views and the interval spans them",
+    "gain_not_resolved": "structures that the data cannot rule out differ in gain or total delay, "
+    "or the interval of the gain contains zero",
     "estimates_disagree": "delay estimates far from their median: …",
 }
 """Messages that are put together from parts."""

@@ -127,11 +127,11 @@ def test_an_output_that_stays_where_it_is_is_not_fitted(level, height):
 
 @pytest.mark.parametrize("still", ["input", "output"])
 def test_what_stays_for_as_long_as_the_fit_looks_is_not_fitted(still):
-    # the fit takes the first 4000 samples: what they do not move in is as good as constant
+    # noise levels of 0 over the stretch that is fitted: ZeroDivisionError
     u = np.random.default_rng(0).choice([-1.0, 1.0], 4500)
     y = np.convolve(u, 0.1 * 0.9 ** np.arange(50))[: u.size]
     {"input": u, "output": y}[still][:4200] = 0.0
-    with pytest.raises(DataError, match=f"the {still} of record 'r' moves by 0 in its first 4000"):
+    with pytest.raises(DataError, match="does not respond to the input"):
         cr.identify(cr.Record(np.arange(4500.0), u, y, name="r"))
 
 
@@ -207,11 +207,11 @@ def test_an_edited_number_in_a_store_is_not_believed(tmp_path):
 @pytest.mark.parametrize(
     ("response", "frequency", "match"),
     [
-        (["a", "b"], [1.0, 2.0], "response has"),
+        (["a", "b"], [1.0, 2.0], "response holds"),
         ([[1.0], [1.0, 2.0]], [1.0, 2.0], "rows have different lengths"),
         ([1.0, 2.0], ["1", "2"], "frequency_hz holds"),
-        ([1.0, 2.0], [1.0, 1.7e308], "frequency_hz is beyond"),
-        ([1.0, 1.7e308 + 1.7e308j], [1.0, 2.0], "response is beyond"),
+        ([1.0, 2.0], [1.0, 1.7e308], "frequency_hz is larger"),
+        ([1.0, 1.7e308 + 1.7e308j], [1.0, 2.0], "response is larger"),
     ],
 )
 def test_what_is_no_measured_response_is_refused(response, frequency, match):

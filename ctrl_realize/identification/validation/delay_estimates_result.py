@@ -90,7 +90,7 @@ class DelayComparison(Result):
     >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
     >>> check = cr.validation.compare_delay_estimates(record, order=1)
     >>> print(f"{check.common[0]:.3f} to {check.common[1]:.3f} s, take that of the {check.rely_on}")
-    0.113 to 0.126 s, take that of the output error
+    0.112 to 0.126 s, take that of the output error
     """
 
     estimates: tuple[DelayEstimate, ...]

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from ..arrays import ComplexArray, FloatArray
-from ..constants import Z_95
+from ..constants import SMALLEST, Z_95
 from .lag_chains import lag_sum
 from .poles import poles_from_parameters
 from .structures import Candidate
@@ -127,7 +127,7 @@ def static_gain(
     size[size == 0] = 1.0
     _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
     along = turned[:, : seen.sum()] @ (gradient / size[: seen.sum()]).T
-    along /= np.maximum(singular, _NOTHING * singular[0])[:, None]
+    along /= np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))[:, None]
     gain_std, total_std, rate_std = np.sqrt(variance * np.sum(along**2, axis=0))
     gain, total, rate = (float(value) for value in told(point))
     slow = np.abs(candidate.poles)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..constants import SMALLEST
 from .poles import parameters_from_poles, poles_from_parameters
 from .varpro import Bounds, Problem, Structure, fit_batch
 
@@ -175,8 +176,9 @@ def criteria(
     are.
     """
     # Schwarz (1978) with known variance; delay, poles, numerator (zeros + 1) are the parameters.
-    # Schwarz (1978) with known variance; delay, poles, numerator (zeros + 1) are the parameters.
     penalty = parameter_charge(samples)
+    # A record that stands still has no noise, and nothing to compare.
+    variance = max(variance, SMALLEST)
     return {s: c.cost / variance + (s.order + s.zeros + 2) * penalty for s, c in candidates.items()}
 
 

@@ -24,6 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import SMALLEST
 from ..signals.bins import Bins
 from ..signals.noise import correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
@@ -209,7 +210,7 @@ def fit_window(
     criterion = {s: value + problem.local_count(s.order) for s, value in criterion.items()}
     chosen = candidates[choose(criterion)]
     freedom = max(problem.data.size - rest.lost, 1)
-    misfit = float(np.sqrt(chosen.cost / freedom)) / sigma
+    misfit = float(np.sqrt(chosen.cost / freedom)) / max(sigma, SMALLEST)
     rounding = quantum / np.sqrt(12) if is_coarse(sigma, quantum) else 0.0
     return WindowFit(
         window, problem, candidates, criterion, scales, rest.level, rest.correlation, misfit,

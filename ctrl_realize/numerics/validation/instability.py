@@ -2,9 +2,12 @@
 
 Every structure that is fitted is stable, and follows an unstable plant in a closed loop as well
 as it can. One-step predictions know better: of an output ``y = (B u + C e) / A`` the regression on
-its own past and that of the input tends to ``A/C`` and ``B/C`` with a stable C (Ljung, System
-Identification, 2nd ed., 1999, sections 3.2 and 4.2; in closed loop 13.4), so that an unstable pole
-stays a zero of the polynomial of past outputs.
+its own past and that of the input tends to ``A/C`` and ``B/C`` with a stable C [1]_, so that
+an unstable pole stays a zero of the polynomial of past outputs.
+
+References
+----------
+.. [1] Ljung, System Identification, 2nd ed., 1999, sections 3.2 and 4.2; in closed loop 13.4.
 """
 
 from __future__ import annotations

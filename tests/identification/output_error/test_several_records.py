@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.special import chdtrc
+from scipy.stats import norm
 
 import ctrl_realize as cr
 from ctrl_realize import report
@@ -202,9 +203,10 @@ def test_an_interval_takes_up_the_scatter_of_records_that_differ():
     delays = [10.0, 12.0, 8.0, 50.0]
     between = np.std(delays[:3], ddof=1) / np.sqrt(3)
     wide = widened(fit, repeats_of(delays, 1e-6), (0, 1, 2))
+    z = norm.ppf(0.975)
     assert_allclose(
         [wide.low, wide.high, wide.std],
-        [9 - 1.96 * between, 11 + 1.96 * between, np.sqrt(0.25 + between**2)],
+        [9 - z * between, 11 + z * between, np.sqrt(0.25 + between**2)],
     )
     # a delay is not negative
     assert widened(Fit(0.1, 11.0, 0.5), repeats_of(delays, 1e-6), (0, 1, 2)).low == 0

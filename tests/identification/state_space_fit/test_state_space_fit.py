@@ -90,7 +90,7 @@ def test_an_integrator_that_is_not_found_is_told_with_what_finds_it():
     (flag,) = (
         f for f in cr.fit_state_space(data, [1, 2]).fit.flags if f.code == "coloured_residual"
     )
-    assert "integrator: fit_output_error" in str(flag)
+    assert "use fit_output_error" in str(flag)
     found = cr.identify(data)
     assert found.fit.delay_interval[0] <= 3 <= found.fit.delay_interval[1]
     assert_allclose(np.ravel(found.markov(30))[5:], 0.1, rtol=0.05)
