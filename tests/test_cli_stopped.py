@@ -191,7 +191,12 @@ def test_an_interruption_while_the_program_is_loaded_is_one_line(tmp_path):
         "import sys, time\nprint('loading', flush=True)\ntime.sleep(60)\n", encoding="utf-8"
     )
     paths = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
-    process = started("identify", "a.csv", env={**os.environ, "PYTHONPATH": paths})
+    # where the tests run detached, the interruption is ignored by what they start, too
+    listening = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process = started("identify", "a.csv", env={**os.environ, "PYTHONPATH": paths})
+    finally:
+        signal.signal(signal.SIGINT, listening)
     assert process.stdout.readline() == "loading\n"
     process.send_signal(signal.SIGINT)
     assert process.communicate(timeout=60) == ("", "ctrl-realize: interrupted\n")
