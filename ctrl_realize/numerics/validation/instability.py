@@ -7,7 +7,8 @@ an unstable pole stays a zero of the polynomial of past outputs.
 
 References
 ----------
-.. [1] Ljung, System Identification, 2nd ed., 1999, sections 3.2 and 4.2; in closed loop 13.4.
+.. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, sections
+   3.2 and 4.2; in closed loop 13.4.
 """
 
 from __future__ import annotations
