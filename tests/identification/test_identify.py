@@ -121,3 +121,25 @@ def test_a_small_resonance_beside_a_lag_leaves_the_dead_time_its_interval():
     y = cr.delayed_ss(ringing, dead_time=0.55, dt=DT).simulate(u)
     found = cr.identify(cr.Record(DT * np.arange(600), u, y + 0.2 * rng.standard_normal(600)))
     assert found.fit.interval[0] <= 0.55 <= found.fit.interval[1]
+
+
+def ringing(strength, seed=8):
+    """Modes at 12 and 7 rad/s beside a lag, behind a dead time of 0.55 s."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 3)
+    modes = ct.tf([144.0], [1, 0.6, 144.0]) + ct.tf([49.0], [1, 0.5, 49.0])
+    y = cr.delayed_ss(LAG + strength * modes, dead_time=0.55, dt=DT).simulate(u)
+    return cr.Record(DT * np.arange(600), u, y + 0.2 * rng.standard_normal(600))
+
+
+def test_lags_that_leave_little_more_widen_the_interval_and_others_do_not():
+    fit = cr.identify(ringing(0.1)).fit
+    assert isinstance(fit, cr.identification.StateSpaceFit)
+    assert fit.lags.residual < 2 * fit.noise_std[0]
+    assert fit.interval[0] <= min(fit.dead_time, fit.lags.interval[0])
+    assert fit.interval[1] >= max(fit.dead_time, fit.lags.interval[1])
+    loud = cr.identify(ringing(0.15)).fit
+    assert isinstance(loud, cr.identification.StateSpaceFit)
+    assert loud.lags.residual > 2 * loud.noise_std[0]
+    # the lags alone place it at 0.24 s, far from the truth
+    assert loud.lags.interval[1] < loud.interval[0] <= 0.55 <= loud.interval[1]

@@ -12,8 +12,12 @@ References
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import FloatArray
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
 
 _FAST = 0.2
 """Part of the steepest slope of a model from which its output counts as moving."""
@@ -21,6 +25,9 @@ _FEWEST = 8
 _SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
 _LONG = 20
+_ALIKE, _MOST = 0.15, 0.9
+"""Steps of 0.0445 that are recorded with two digits are 0.04 and 0.05 (the tacho of a motor): they
+differ by 12 % of their mean; of the steps of a held curve 30 % would be that near to a multiple."""
 
 
 def held_share(output: FloatArray, fitted: FloatArray) -> float:
@@ -28,20 +35,50 @@ def held_share(output: FloatArray, fitted: FloatArray) -> float:
 
     Noise with a deviation of the quantisation step repeats 28 % of them.
     """
-    moves = np.abs(np.diff(fitted))
-    moving = moves >= _FAST * moves.max(initial=0.0)
-    if not moves.any() or moving.sum() < _FEWEST:
+    held, moving = _held(output, fitted)
+    if not moving.any() or moving.sum() < _FEWEST:
         return 0.0
-    return float(np.mean(np.diff(output)[moving] == 0))
+    return float(np.mean(held[moving]))
 
 
 def longest_hold(output: FloatArray, fitted: FloatArray) -> int:
     """Longest time in samples for which an output is held while the model moves."""
+    starts, ends = _runs(_held(output, fitted)[0])
+    return int((ends - starts).max(initial=0))
+
+
+def _held(output: FloatArray, fitted: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Samples (N - 1,) that repeat the one before, and those in which the model moves.
+
+    Rounding repeats a value for as long as the signal moves by less than a step of the converter:
+    only a value that stands while the model moves by more than that is held.
+    """
     moves = np.abs(np.diff(fitted))
-    moving = moves >= _FAST * moves.max(initial=0.0)
-    stands = np.concatenate([[False], (np.diff(output) == 0) & moving, [False]])
-    ends = np.flatnonzero(np.diff(stands.astype(np.int8)))
-    return int((ends[1::2] - ends[::2]).max(initial=0))
+    moving = (moves >= _FAST * moves.max(initial=0.0)) & (moves > 0)
+    held = (np.diff(output) == 0) & moving
+    way = np.concatenate([[0.0], np.cumsum(moves)])
+    starts, ends = _runs(held)
+    rounded = way[ends] - way[starts] <= _converter_step(output)
+    for start, end in zip(starts[rounded], ends[rounded], strict=True):
+        held[start:end] = False
+    return held, moving
+
+
+def _converter_step(output: FloatArray) -> float:
+    """Step of the converter, 0 where none shows; a record of few digits rounds it once more."""
+    gaps = np.diff(np.unique(output))
+    if gaps.size == 0:
+        return 0.0
+    step = float(np.mean(gaps[gaps <= 1.5 * np.median(gaps)]))
+    multiples = gaps / step
+    alike = np.abs(multiples - np.round(multiples)) <= _ALIKE
+    return step if alike.mean() > _MOST else 0.0
+
+
+def _runs(true: BoolArray) -> tuple[IntArray, IntArray]:
+    """First positions of runs of True, and the positions behind them."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
+    return ends[::2], ends[1::2]
 
 
 def samples_at_limit(output: FloatArray) -> int:
@@ -49,9 +86,8 @@ def samples_at_limit(output: FloatArray) -> int:
     same = np.diff(output) == 0
     count = 0
     for limit in (output.max(), output.min()):
-        at = np.concatenate([[False], output == limit, [False]])
-        ends = np.flatnonzero(np.diff(at.astype(np.int8)))
-        runs = ends[1::2] - ends[::2]
+        starts, ends = _runs(output == limit)
+        runs = ends - starts
         inside = int(runs[runs >= _LONG].sum())
         elsewhere = same[(output[1:] != limit)]
         if inside and elsewhere.size > _LONG and np.mean(elsewhere) <= _SELDOM:

@@ -237,10 +237,9 @@ def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow(shared_data):
     low, high = fit.interval
     assert fit.at_noise_level
     assert 31 <= fit.delay <= 42
-    # a structure with an earlier delay, followed to its minimum, is not ruled out
-    assert high - low <= 0.7 * fit.onset
+    assert high - low <= 0.3 * fit.onset
     first, last = cr.identify(data, noise="white").fit.interval
-    assert last - first > high - low
+    assert last - first > 2 * (high - low)
 
 
 def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():

@@ -8,7 +8,6 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.validation.held_output import held_share, longest_hold
 from ctrl_realize.numerics.validation.innovations import feedback_chance, nonlinear_chance
 from ctrl_realize.numerics.validation.parameter_change import parameter_change
 from ctrl_realize.numerics.validation.white_step import white_step
@@ -72,17 +71,6 @@ def test_a_static_nonlinearity_is_found(bent):
     chance, part = nonlinear_chance(y, u, 40)
     assert chance < 1e-5
     assert 0.05 < part < 1
-
-
-TIME = np.arange(300)
-RISE = np.where(TIME > 100, -np.expm1(-(TIME - 100) / 40), 0.0)
-
-
-@pytest.mark.parametrize("period", [2, 5, 12])
-def test_an_output_held_for_a_period_repeats_all_samples_but_one(period):
-    held = RISE[TIME - TIME % period]
-    assert held_share(held, RISE) == pytest.approx((period - 1) / period, abs=0.05)
-    assert longest_hold(held, RISE) == period - 1
 
 
 SAMPLES = 900

@@ -1,0 +1,53 @@
+"""Outputs that repeat themselves while a plant moves, or stop at a limit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ctrl_realize.numerics.validation.held_output import held_share, longest_hold, samples_at_limit
+
+TIME = np.arange(300)
+RISE = np.where(TIME > 100, -np.expm1(-(TIME - 100) / 40), 0.0)
+
+
+@pytest.mark.parametrize("period", [2, 5, 12])
+def test_an_output_held_for_a_period_repeats_all_samples_but_one(period):
+    held = RISE[TIME - TIME % period]
+    assert held_share(held, RISE) == pytest.approx((period - 1) / period, abs=0.05)
+    assert longest_hold(held, RISE) == period - 1
+
+
+def test_rest_is_no_holding():
+    assert held_share(RISE, RISE) == 0
+    assert held_share(np.zeros(300), np.zeros(300)) == 0
+
+
+@pytest.mark.parametrize("digits", [8, 2])
+def test_a_coarse_converter_repeats_values_that_are_not_held(digits):
+    # 20 steps over the rise, as the tacho of a small motor has them, written with a few digits
+    noisy = RISE + 0.01 * np.random.default_rng(0).standard_normal(300)
+    converted = np.round(0.0445 * np.round(noisy / 0.0445), digits)
+    assert np.mean(np.diff(converted)[100:160] == 0) > 0.3
+    assert held_share(converted, RISE) < 0.1
+    assert longest_hold(converted, RISE) < 5
+
+
+def test_a_coarse_converter_that_is_held_too_still_shows_it():
+    held = np.round(RISE[TIME - TIME % 12] / 0.0445) * 0.0445
+    assert held_share(held, RISE) > 0.6
+    assert longest_hold(held, RISE) >= 11
+
+
+def test_an_output_that_is_cut_off_stands_without_noise():
+    noisy = RISE + 0.01 * np.random.default_rng(0).standard_normal(300)
+    assert samples_at_limit(noisy) == 0
+    cut = np.minimum(noisy, 0.6)
+    assert samples_at_limit(cut) == np.count_nonzero(cut == 0.6) - _strays(cut)
+    assert samples_at_limit(np.minimum(RISE, 0.6)) == 0  # nothing in it has noise
+
+
+def _strays(cut):
+    """Samples at the limit before it is reached for good: short runs do not count."""
+    below = np.flatnonzero(cut < 0.6)
+    return int(np.count_nonzero(cut[: below[-1]] == 0.6))
