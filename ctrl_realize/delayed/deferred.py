@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import control as ct
@@ -15,18 +16,19 @@ MAX_STATES = 20_000
 """A is dense, as python-control needs it: 20 000 states are 3 GB."""
 
 
-class DeferredMatrices(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is untyped
     """What is known by a few numbers and a line of past samples; matrices at the first look.
 
-    A class of this kind makes the matrices in `_make_matrices` and the names of its states in
-    `_name_states`; `_without_matrices` says what to do where they would be too large.
+    Abstract, since only a class that knows its own line (a delayed model, a predictor) can make
+    them: without one of the three methods below it cannot be created at all.
     """
 
     _augmented: Matrices | None
     _state_names: dict[str, int] | None
 
-    def _begin(self, states: list[str], nstates: int, dt: float, **names: Any) -> None:
+    def _begin(self, states: list[str] | int, nstates: int, dt: float, **names: Any) -> None:
         """Set up the system without matrices; `states` are those beside the line."""
+        self._locked = False
         # Not StateSpace.__init__, which would need the matrices now.
         ct.NonlinearIOSystem.__init__(
             self, self._next_state, self._output, states=states, dt=dt, **names
@@ -36,21 +38,25 @@ class DeferredMatrices(ct.StateSpace):  # type: ignore[misc]  # control is untyp
         self._state_names = None
         self._augmented = None
 
+    @abstractmethod
     def _make_matrices(self) -> Matrices:
-        raise NotImplementedError
+        """Make A, B, C, D, the line's states last."""
 
+    @abstractmethod
     def _name_states(self) -> list[str]:
-        raise NotImplementedError
+        """Give the names of all states, the line's last."""
 
+    @abstractmethod
     def _without_matrices(self) -> str:
-        raise NotImplementedError
+        """Say what to do instead where the matrices would be too large."""
 
     @property
     def state_index(self) -> dict[str, int]:
         """Names of the states and where they stand; past samples last."""
-        if self._state_names is None:
-            self._state_names = {name: i for i, name in enumerate(self._name_states())}
-        return self._state_names
+        if self._state_names is not None:
+            return self._state_names
+        # not kept: they follow the signals, which python-control may rename
+        return {name: i for i, name in enumerate(self._name_states())}
 
     @state_index.setter
     def state_index(self, names: dict[str, int] | None) -> None:

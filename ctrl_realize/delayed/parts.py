@@ -27,22 +27,14 @@ class CoreAndDelays(DeferredMatrices):
     input_delays: tuple[int, ...]
     output_delays: tuple[int, ...]
 
-    @property
-    def state_index(self) -> dict[str, int]:
-        """Names of the states and where they stand: those of the core, then past inputs."""
-        if self._state_names is not None:
-            return self._state_names
+    def _name_states(self) -> list[str]:
         delays = self.input_delays, self.output_delays
         chain = chain_labels(self.input_labels, self.output_labels, *delays)
         names = dict.fromkeys([*self._core.state_labels, *chain])
         if len(names) < self.nstates:
             # A core that was itself made of core and chain has the names of registers.
             names = dict.fromkeys([*(f"x[{i}]" for i in range(self._core.nstates)), *chain])
-        return {name: i for i, name in enumerate(names)}
-
-    @state_index.setter
-    def state_index(self, names: dict[str, int] | None) -> None:
-        self._state_names = names
+        return list(names)
 
     def _make_matrices(self) -> Matrices:
         core = self._core

@@ -138,28 +138,20 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
             )
         input_names = signal_names(inputs, core.input_labels, "u")
         output_names = signal_names(outputs, core.output_labels, "y")
-        self._locked = False
-        # Not StateSpace.__init__, which would need the augmented matrices now.
-        ct.NonlinearIOSystem.__init__(
-            self,
-            self._next_state,
-            self._output,
+        self._begin(
+            core.nstates,
+            core.nstates + sum(before) + sum(behind),
+            core.dt,
             inputs=input_names,
             outputs=output_names,
-            states=core.nstates,
-            dt=core.dt,
             name=None if name is None else system_name(name),
         )
-        # The chain's states get their names when somebody asks for them.
-        self.nstates = core.nstates + sum(before) + sum(behind)
-        self._state_names = None
         self._core = named(
             core, input_names, output_names, core.state_labels, name=f"{self.name}_core"
         )
         self.input_delays = before
         self.output_delays = behind
         self.fit: ModelFit | None = fit
-        self._augmented = None
         self._schur = None
         self._locked = True
 
