@@ -231,3 +231,14 @@ def test_parquet_files_are_read(tmp_path):
     frame["time_ms"] = pd.Timestamp("2026-03-01") + pd.to_timedelta(T, unit="s")
     frame.to_parquet(tmp_path / "b.parquet")
     check(read_record(tmp_path / "b.parquet", time="time_ms"))
+
+
+def test_complex_signals_and_unequal_lengths_are_refused(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"t": T, "u": U * 1j, "y": Y})
+    np.savez(tmp_path / "a.npz", t=T, u=U * 1j, y=Y)
+    for name in ("a.npz", "a.mat"):
+        with pytest.raises(DataError, match="column 'u' is complex"):
+            read_record(tmp_path / name)
+    np.savez(tmp_path / "a.npz", t=T, u=U[:-1], y=Y)
+    with pytest.raises(DataError, match=r"different lengths: column 'u' 39, column 'y' 40"):
+        read_record(tmp_path / "a.npz")

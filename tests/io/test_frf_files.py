@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.io
 from numpy.testing import assert_allclose
 
 from ctrl_realize.errors import DataError, FileFormatError, OptionError
@@ -87,3 +88,14 @@ def test_what_is_not_clear_is_asked(tmp_path, text, kwargs, error, match):
     file.write_text(text)
     with pytest.raises(error, match=match):
         read_frf(file, **kwargs)
+
+
+def test_complex_arrays_are_read(tmp_path):
+    # the .mat reader once took the imaginary part off without a word
+    for name in ("G", "H", "frf", "response"):
+        np.savez(tmp_path / "a.npz", f=F, **{name: G})
+        check(read_frf(tmp_path / "a.npz"))
+    for packed in (False, True):
+        struct = {"freq": F, "H": G[:, None]}
+        scipy.io.savemat(tmp_path / "a.mat", {"meas": struct}, do_compression=packed)
+        check(read_frf(tmp_path / "a.mat"))

@@ -30,8 +30,8 @@ def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
         return
     import scipy.io
 
-    # mat_dtype: MATLAB stores numbers in the smallest type that holds them
-    content = scipy.io.loadmat(path, struct_as_record=False, mat_dtype=True)
+    # not mat_dtype=True, which takes the imaginary part off complex numbers
+    content = scipy.io.loadmat(path, struct_as_record=False)
     for name, value in content.items():
         if not name.startswith("__"):
             yield from _inside(name, value, _MAX_DEPTH)
@@ -50,7 +50,9 @@ def _inside(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
             single = value.size == 1 and hasattr(entry, "_fieldnames")
             yield from _inside(name if single else f"{name}[{k}]", entry, depth - (not single))
     elif type(value) is np.ndarray and value.dtype.kind in "biufc":
-        yield name, value
+        # MATLAB stores doubles in the smallest type that holds them; 64-bit integers stay
+        small = value.dtype.kind in "biu" and value.dtype.itemsize < 8
+        yield name, value.astype(np.float64) if small else value
 
 
 def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
