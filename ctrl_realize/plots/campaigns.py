@@ -16,11 +16,13 @@ from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.rows import CampaignRow
 from . import style
 from .names import plain
+from .shared_docs import documented
 
 _MOST_NAMES = 24
 _MOST_GROUPS = 8
 
 
+@documented()
 def campaign_plot(
     campaign: Campaign,
     *,
@@ -42,14 +44,8 @@ def campaign_plot(
         Values left out at each end of the mean, see `Campaign.statistics`.
     truth : float, optional
         Known delay in samples, of a simulation.
-    ax : Axes or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the points.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------
@@ -59,10 +55,9 @@ def campaign_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> valve = cr.bench.valve()
     >>> records = [valve.step_record(16.0, seed) for seed in range(4)]
-    >>> cplt = plots.campaign_plot(cr.identify_campaign(records, method="scan"), truth=37.0)
+    >>> cplt = cr.plots.campaign_plot(cr.identify_campaign(records, method="scan"), truth=37.0)
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['trimmed mean 45.00 samples = 35.2 ms', 'truth 37 (simulated)']
     """

@@ -15,6 +15,7 @@ from ..identification.tracking.results import TrackHistory
 from ..identification.validation.bootstrap import Bootstrap
 from ..identification.validation.delay_estimates_result import DelayComparison
 from . import style
+from .shared_docs import documented
 from .style import axis_time_unit
 
 
@@ -53,6 +54,7 @@ def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None
     )  # fmt: skip
 
 
+@documented()
 def delay_comparison_plot(
     check: DelayComparison, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
@@ -61,28 +63,21 @@ def delay_comparison_plot(
     Parameters
     ----------
     check : DelayComparison
-    ax : Axes or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the intervals.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
     >>> rng = np.random.default_rng(0)
     >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
     >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
     >>> check = cr.validation.compare_delay_estimates(record, order=1)
-    >>> cplt = plots.delay_comparison_plot(check)
+    >>> cplt = cr.plots.delay_comparison_plot(check)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time, or bound ◂ [ms]'
     """
@@ -112,6 +107,7 @@ def delay_comparison_plot(
         return style.finished([axes], [lines], loc="above")
 
 
+@documented("sequence of two Axes")
 def bootstrap_plot(
     result: Bootstrap,
     *,
@@ -125,30 +121,23 @@ def bootstrap_plot(
     Parameters
     ----------
     result : Bootstrap
-    ax : sequence of two Axes, or Figure, optional
     samples : int, optional
         Length of the step responses; default: until the model has settled.
-    title : str, optional
     **kwargs
         Line properties of the step response of the data's own model.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> from functools import partial
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> t = 0.01 * np.arange(300)
     >>> u = np.where(t < 0.5, 0.0, 2.0)
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
     >>> one_lag = partial(cr.fit_output_error, structures=[(1, 1)])
     >>> again = cr.validation.bootstrap(record, one_lag, repeats=30)
-    >>> cplt = plots.bootstrap_plot(again)
+    >>> cplt = cr.plots.bootstrap_plot(again)
     >>> [axes.get_xlabel() for axes in cplt.figure.axes]
     ['time [s]', 'dead time [ms]']
     """
@@ -180,6 +169,7 @@ def _settled(result: Bootstrap) -> int:
     return int(np.clip(result.system.delay + lasting, 10, 20_000))
 
 
+@documented("sequence of two Axes")
 def track_plot(
     track: TrackHistory, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
@@ -188,26 +178,19 @@ def track_plot(
     Parameters
     ----------
     track : TrackHistory
-    ax : sequence of two Axes, or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the dead time.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
     >>> u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
     >>> record = cr.Record(0.01 * np.arange(u.size), u, cr.DelayedStateSpace(core, 7).simulate(u))
     >>> tracker = cr.DelayTracker(cr.DelayedStateSpace(core, 4), max_delay=20, forgetting_time=3.0)
-    >>> cplt = plots.track_plot(tracker.track(record))
+    >>> cplt = cr.plots.track_plot(tracker.track(record))
     >>> cplt.figure.axes[0].get_ylabel()
     'dead time [ms]'
     """

@@ -16,6 +16,7 @@ from ..identification.output_error.result import OutputErrorFit
 from ..identification.step.steps import unit_step
 from . import style
 from .names import plain, wrapped
+from .shared_docs import documented
 from .style import axis_time_unit
 
 _RULED_OUT = 10.0
@@ -24,6 +25,7 @@ _MOST_STRUCTURES = 8
 _MOST_RECORDS = 40  # drawn behind their mean
 
 
+@documented("sequence of three Axes")
 def fit_plot(
     fit: OutputErrorFit | DelayedStateSpace,
     *,
@@ -38,14 +40,8 @@ def fit_plot(
     Parameters
     ----------
     fit : OutputErrorFit, or model with one as its `fit`
-    ax : sequence of three Axes, or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the model's response.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------
@@ -56,13 +52,12 @@ def fit_plot(
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> t = 0.01 * np.arange(900)
     >>> u = np.where(t < 1.0, 0.0, 2.0)
     >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
     >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
     >>> sys = cr.fit_output_error(cr.Record(t, u, y + noise), structures=[(1, 1)])
-    >>> cplt = plots.fit_plot(sys)
+    >>> cplt = cr.plots.fit_plot(sys)
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['output', 'residual', '']
     """
@@ -80,6 +75,7 @@ def fit_plot(
         )
 
 
+@documented()
 def dead_time_plot(
     fit: OutputErrorFit | DelayedStateSpace,
     *,
@@ -92,14 +88,8 @@ def dead_time_plot(
     Parameters
     ----------
     fit : OutputErrorFit, or model with one as its `fit`
-    ax : Axes or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the points.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------
@@ -110,13 +100,12 @@ def dead_time_plot(
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> t = 0.01 * np.arange(900)
     >>> u = np.where(t < 1.0, 0.0, 2.0)
     >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
     >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
     >>> sys = cr.fit_output_error(cr.Record(t, u, y + noise), structures=[(1, 1), (2, 2)])
-    >>> cplt = plots.dead_time_plot(sys)
+    >>> cplt = cr.plots.dead_time_plot(sys)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time [ms]'
     """

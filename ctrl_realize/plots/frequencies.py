@@ -17,12 +17,14 @@ from ..numerics.arrays import FloatArray
 from . import style
 from .frf_comparison import FITTED, TRUSTED_COHERENCE, Curve, curves_of
 from .names import plain
+from .shared_docs import documented
 from .style import decibel, frequency_axis, phase_ticks
 
 _FEW_POINTS = 60
 """So few measured points are drawn as dots as well: what lies between them is not known."""
 
 
+@documented("sequence of two Axes, or of three with a coherence,")
 def frf_plot(
     sysdata: Any,
     *,
@@ -43,20 +45,13 @@ def frf_plot(
     sysdata : system or FRF, or sequence of them
         Anything python-control takes for a frequency response, one input and one output:
         `MeasuredFRF` or other frequency response data, discrete or continuous systems.
-    ax : sequence of Axes or Figure, optional
-        Two axes, or three where there is a coherence.
     frequency_hz : array_like, optional
         Frequencies for the models in Hz. Default: the span of the measurements.
     dead_time : float, optional
         Delay in s whose phase is taken out before unwrapping. Default: that of the first model
         that has one.
-    title : str, optional
     **kwargs
         Line properties of all curves.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------
@@ -67,9 +62,8 @@ def frf_plot(
     --------
     >>> import control as ct
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.0289, dt=7.8125e-4)
-    >>> cplt = plots.frf_plot(model)
+    >>> cplt = cr.plots.frf_plot(model)
     >>> [axes.get_ylabel() for axes in cplt.axes[:, 0]]
     ['gain [dB]', 'phase [deg]']
     """
@@ -104,29 +98,24 @@ def frf_plot(
         return style.finished(axes, lines, loc="lower left")
 
 
+@documented("sequence of two Axes")
 def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
     """Draw a fitted frequency response over the measured one.
 
     Parameters
     ----------
     fit : FRFFit
-    ax : sequence of two Axes, or Figure, optional
     **kwargs
         Passed on to `frf_plot`.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> f = np.geomspace(0.1, 20, 80)
     >>> s = 2j * np.pi * f
     >>> frf = cr.MeasuredFRF(2 * np.exp(-0.0289 * s) / (0.08 * s + 1) ** 2, f)
-    >>> cplt = plots.frf_fit_plot(cr.fit_frf(frf, 2, dt=0.001).fit)
+    >>> cplt = cr.plots.frf_fit_plot(cr.fit_frf(frf, 2, dt=0.001).fit)
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['measured', 'fit, order 2']
     """
@@ -137,25 +126,20 @@ def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct
     return frf_plot([measured, fitted], ax=ax, dead_time=fit.dead_time, **kwargs)
 
 
+@documented("sequence of two Axes")
 def truth_plot(truth: ValveTruth, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
     """Draw the frequency response of a simulated valve, without noise.
 
     Parameters
     ----------
     truth : ValveTruth
-    ax : sequence of two Axes, or Figure, optional
     **kwargs
         Passed on to `frf_plot`.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
-    >>> cplt = plots.truth_plot(cr.bench.valve().truth)
+    >>> cplt = cr.plots.truth_plot(cr.bench.valve().truth)
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['gain [dB]', 'phase [deg]']
     """

@@ -17,6 +17,7 @@ from ..frequency.points import check_single_channel, measured_points
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.rational.spectra import unwrapped_phase
 from . import style
+from .shared_docs import documented
 from .style import frequency_axis
 
 TRUSTED_COHERENCE = 0.95
@@ -119,6 +120,7 @@ def _aligned(curves: list[Curve]) -> list[Curve]:
     return moved
 
 
+@documented("sequence of two Axes")
 def comparison_plot(
     comparison: FRFComparison,
     *,
@@ -131,27 +133,19 @@ def comparison_plot(
     Parameters
     ----------
     comparison : FRFComparison
-    ax : sequence of two Axes, or Figure, optional
-    title : str, optional
-        Default: the names of model and measurement, in a new figure.
     **kwargs
         Line properties of both curves.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.03, dt=0.001)
     >>> f = np.geomspace(0.1, 10, 40)
     >>> s = 2j * np.pi * f
     >>> frf = cr.MeasuredFRF(1.02 * np.exp(-0.03 * s) / (0.08 * s + 1), f)
-    >>> cplt = plots.comparison_plot(cr.compare_frf(model, frf))
+    >>> cplt = cr.plots.comparison_plot(cr.compare_frf(model, frf))
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['gain error [dB]', 'phase error [deg]']
     """

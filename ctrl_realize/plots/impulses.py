@@ -18,9 +18,11 @@ from ..identification.realization.mimo import MimoRealization
 from ..numerics.arrays import FloatArray
 from . import style
 from .names import plain
+from .shared_docs import documented
 from .style import axis_time_unit
 
 
+@documented("Axes, array of Axes (outputs x inputs)")
 def impulse_plot(
     impulse: ImpulseResponse,
     systems: DelayedStateSpace | Sequence[DelayedStateSpace] = (),
@@ -39,22 +41,15 @@ def impulse_plot(
     impulse : ImpulseResponse
     systems : DelayedStateSpace or sequence of them, optional
         Models, drawn dashed.
-    ax : Axes, array of Axes (outputs x inputs) or Figure, optional
     until : float, optional
         Last time to show, in s. Default: where the response has died away.
-    title : str, optional
     **kwargs
         Line properties of the measured response.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
-    >>> cplt = plots.impulse_plot(cr.ImpulseResponse([0.0, 0.5, 0.25, 0.125], dt=0.1))
+    >>> cplt = cr.plots.impulse_plot(cr.ImpulseResponse([0.0, 0.5, 0.25, 0.125], dt=0.1))
     >>> cplt.axes[0, 0].get_ylabel()
     'impulse response [1/s]'
     """
@@ -98,6 +93,7 @@ def impulse_plot(
         return style.finished(axes, lines, columns=columns)
 
 
+@documented("array of Axes (outputs x inputs)")
 def mimo_realization_plot(
     fit: MimoRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
@@ -106,24 +102,17 @@ def mimo_realization_plot(
     Parameters
     ----------
     fit : MimoRealization
-    ax : array of Axes (outputs x inputs) or Figure, optional
-    title : str, optional
     **kwargs
         Passed on to `impulse_plot`.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> pulse = np.r_[0.0, 0.8 ** np.arange(80)]
     >>> late = [np.r_[np.zeros(d), pulse][:60] for d in (3, 7)]
     >>> system = cr.identification.realize_mimo(np.array(late)[:, None, :], 1, dt=0.1)
-    >>> cplt = plots.mimo_realization_plot(system.fit)
+    >>> cplt = cr.plots.mimo_realization_plot(system.fit)
     >>> [axes.get_title(loc="right") for axes in cplt.figure.axes]
     ['input 0 to output 0', 'input 0 to output 1']
     """
@@ -136,6 +125,7 @@ def mimo_realization_plot(
     return drawn
 
 
+@documented()
 def impulse_estimate_plot(estimate: ImpulseEstimate, *args: Any, **kwargs: Any) -> ct.ControlPlot:
     """Draw an estimated impulse response in its band of two standard deviations.
 
@@ -145,19 +135,14 @@ def impulse_estimate_plot(estimate: ImpulseEstimate, *args: Any, **kwargs: Any) 
     *args, **kwargs
         As for `impulse_plot`.
 
-    Returns
-    -------
-    control.ControlPlot
-
     Examples
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 2000))
     >>> y = 3.0 * np.roll(u, 5) + 0.1 * noise
     >>> estimate = cr.impulse_from_io(cr.Record(0.01 * np.arange(2000), u, y), 20)
-    >>> cplt = plots.impulse_estimate_plot(estimate)
+    >>> cplt = cr.plots.impulse_estimate_plot(estimate)
     >>> cplt.figure.axes[0].get_ylabel()
     'impulse response [1/s]'
     """

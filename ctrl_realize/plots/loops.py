@@ -19,6 +19,7 @@ from ..design.loops.performance import lasting, loop_time, settled_responses, st
 from ..errors import DataError
 from . import style
 from .names import plain
+from .shared_docs import documented
 from .style import HERTZ, axis_time_unit, decibel
 
 NYQUIST_SPAN = 2.5
@@ -27,6 +28,7 @@ LOWEST_GAIN = -60.0
 """Gain in dB below which nothing is shown."""
 
 
+@documented("sequence of three Axes")
 def margins_plot(
     result: Margins, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
@@ -37,19 +39,12 @@ def margins_plot(
     Parameters
     ----------
     result : Margins
-    ax : sequence of three Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
-    >>> cplt = plots.margins_plot(cr.design.margins(plant, cr.design.pid(plant)))
+    >>> cplt = cr.plots.margins_plot(cr.design.margins(plant, cr.design.pid(plant)))
     >>> [axes.get_title() or axes.get_ylabel() for axes in cplt.figure.axes]
     ['loop gain [dB]', 'loop phase [deg]', 'imaginary part']
     """
@@ -149,6 +144,7 @@ def _nyquist(axes: Any, result: Margins, values: Any) -> Any:
     return lines
 
 
+@documented("sequence of two Axes")
 def closed_loop_plot(
     plant: DelayedStateSpace,
     controllers: Mapping[str, Any],
@@ -167,12 +163,6 @@ def closed_loop_plot(
     span : float, optional
         Time to show in s. Default: a quarter more than all responses take to stay within 2 % of
         where they end.
-    ax : sequence of two Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------
@@ -182,10 +172,9 @@ def closed_loop_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
     >>> loops = {rule: cr.design.pid(plant, rule) for rule in ("simc", "amigo")}
-    >>> cplt = plots.closed_loop_plot(plant, loops)
+    >>> cplt = cr.plots.closed_loop_plot(plant, loops)
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['output, set-point step', 'output, load step']
     """

@@ -20,6 +20,7 @@ from ..numerics.arrays import FloatArray
 from . import style
 from .delays import mark_dead_time
 from .names import plain, wrapped
+from .shared_docs import documented
 from .style import axis_time_unit
 
 _FEW_SAMPLES = 60
@@ -31,6 +32,7 @@ _SHOWN_BEFORE = 0.35
 UNIT_STEP = "unit step response\n[output / input]"
 
 
+@documented("sequence of two Axes")
 def record_plot(
     record: Record, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
@@ -39,21 +41,13 @@ def record_plot(
     Parameters
     ----------
     record : Record
-    ax : sequence of two Axes, or Figure, optional
-    title : str, optional
-        Default: the record's name, in a new figure.
     **kwargs
         Line properties of the outputs.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
-    >>> cplt = plots.record_plot(cr.bench.valve().step_record(16, rng=5))
+    >>> cplt = cr.plots.record_plot(cr.bench.valve().step_record(16, rng=5))
     >>> cplt.axes.shape
     (2, 1)
     """
@@ -72,6 +66,7 @@ def record_plot(
         return style.finished([upper, lower], [measured, driven], legends=several)
 
 
+@documented()
 def step_plot(
     step: Record | StepResponse | Sequence[Record | StepResponse],
     system: DelayedStateSpace | None = None,
@@ -88,21 +83,14 @@ def step_plot(
         Records are cut and scaled by `unit_step`.
     system : DelayedStateSpace, optional
         Model, drawn dashed.
-    ax : Axes or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the measured responses.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> record = cr.bench.valve().step_record(16, rng=5)
-    >>> cplt = plots.step_plot(record, cr.identify(record, method="scan"))
+    >>> cplt = cr.plots.step_plot(record, cr.identify(record, method="scan"))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['measured', 'model']
     """
@@ -118,6 +106,7 @@ def step_plot(
         return style.finished([axes], [lines], loc="lower right" if rising else "upper right")
 
 
+@documented()
 def onset_plot(
     step: Record | StepResponse | Sequence[Record | StepResponse],
     system: DelayedStateSpace | None = None,
@@ -135,24 +124,17 @@ def onset_plot(
         Records are cut and scaled by `unit_step`.
     system : DelayedStateSpace, optional
         Model, whose response, dead time and interval are drawn.
-    ax : Axes or Figure, optional
     span : float, optional
         Time after the step to show, in s. Default: three dead times, and enough to see the
         response rise.
-    title : str, optional
     **kwargs
         Line properties of the measured responses.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> record = cr.bench.valve().step_record(16, rng=5)
-    >>> cplt = plots.onset_plot(record, cr.identify(record, method="scan"))
+    >>> cplt = cr.plots.onset_plot(record, cr.identify(record, method="scan"))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['measured', 'model']
     """

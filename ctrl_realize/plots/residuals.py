@@ -18,9 +18,11 @@ from ..identification.validation.residuals_result import ResidualAnalysis
 from ..numerics.arrays import FloatArray
 from . import style
 from .names import wrapped
+from .shared_docs import documented
 from .style import axis_time_unit
 
 
+@documented("sequence of three Axes")
 def residual_plot(
     check: ResidualAnalysis,
     *,
@@ -37,25 +39,18 @@ def residual_plot(
     check : ResidualAnalysis
     output, input : int, optional
         Channels to show.
-    ax : sequence of three Axes, or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the simulated output.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
     >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.residual_plot(cr.validation.analyse_residuals(plant, record))
+    >>> cplt = cr.plots.residual_plot(cr.validation.analyse_residuals(plant, record))
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
@@ -76,6 +71,7 @@ def residual_plot(
         return style.finished(axes, [above, own, cross], loc="above")
 
 
+@documented()
 def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
     """Draw how a fitted model follows one of its records, and the correlations of what is left.
 
@@ -87,20 +83,15 @@ def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) 
     **kwargs
         Passed on to `residual_plot`.
 
-    Returns
-    -------
-    control.ControlPlot
-
     Examples
     --------
     >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
     >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.state_space_fit_plot(cr.fit_state_space(record, 1).fit)
+    >>> cplt = cr.plots.state_space_fit_plot(cr.fit_state_space(record, 1).fit)
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
@@ -109,6 +100,7 @@ def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) 
     return residual_plot(fit.checks[whole(record, "record", 0, len(fit.checks) - 1)], **kwargs)
 
 
+@documented()
 def prediction_plot(
     prediction: Prediction,
     *,
@@ -124,25 +116,18 @@ def prediction_plot(
     prediction : Prediction
     output : int, optional
         Channel to show.
-    ax : Axes or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the prediction.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
     >>> u, noise = np.random.default_rng(0).standard_normal((2, 300))
     >>> record = cr.Record(0.1 * np.arange(300), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = plots.prediction_plot(cr.validation.predict(plant, record, 10))
+    >>> cplt = cr.plots.prediction_plot(cr.validation.predict(plant, record, 10))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['measured', '10 ahead, fit 86.6 %']
     """

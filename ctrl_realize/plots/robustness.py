@@ -13,9 +13,11 @@ from ..design.loops.delay_robustness import DelayRobustness
 from ..design.loops.robustness import RobustnessCheck, UncertaintyBound
 from ..numerics.arrays import FloatArray
 from . import style
+from .shared_docs import documented
 from .style import HERTZ, axis_time_unit
 
 
+@documented()
 def delay_robustness_plot(
     result: DelayRobustness, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
@@ -24,22 +26,15 @@ def delay_robustness_plot(
     Parameters
     ----------
     result : DelayRobustness
-    ax : Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import control as ct
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
     >>> predictor = cr.design.smith_predictor(plant, ct.tf([2.0, -1.8], [1, -1], 0.01))
     >>> result = cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
-    >>> cplt = plots.delay_robustness_plot(result)
+    >>> cplt = cr.plots.delay_robustness_plot(result)
     >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
     ('dead time of the plant [ms]', 'modulus margin')
     """
@@ -70,6 +65,7 @@ def delay_robustness_plot(
         return style.finished([axes], [lines], loc="lower right")
 
 
+@documented()
 def uncertainty_plot(
     result: UncertaintyBound, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
@@ -78,20 +74,13 @@ def uncertainty_plot(
     Parameters
     ----------
     result : UncertaintyBound
-    ax : Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.03).system(0.001)
     >>> bound = cr.design.uncertainty_bound([1.3 * plant], plant, dead_time_interval=(0.025, 0.035))
-    >>> cplt = plots.uncertainty_plot(bound)
+    >>> cplt = cr.plots.uncertainty_plot(bound)
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['bound', 'spread of the systems', 'uncertain dead time']
     """
@@ -109,6 +98,7 @@ def uncertainty_plot(
         return style.finished([axes], [lines], loc="upper left")
 
 
+@documented()
 def robustness_plot(
     result: RobustnessCheck, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
@@ -117,20 +107,13 @@ def robustness_plot(
     Parameters
     ----------
     result : RobustnessCheck
-    ax : Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.03).system(0.001)
     >>> bound = cr.design.uncertainty_bound([1.3 * plant], plant, dead_time_interval=(0.025, 0.035))
-    >>> cplt = plots.robustness_plot(bound.check(cr.design.pid(plant)))
+    >>> cplt = cr.plots.robustness_plot(bound.check(cr.design.pid(plant)))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['|T|', '1 / uncertainty', 'margin 2.59']
     """

@@ -18,8 +18,10 @@ from ..identification.realization.order_scan import OrderScan
 from ..identification.realization.result import Realization
 from ..numerics.arrays import FloatArray
 from . import style
+from .shared_docs import documented
 
 
+@documented()
 def delay_plot(
     scan: DelayScan | DelayedStateSpace,
     *,
@@ -32,14 +34,8 @@ def delay_plot(
     Parameters
     ----------
     scan : DelayScan, or model with one as its `fit`
-    ax : Axes or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the curve.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------
@@ -50,9 +46,8 @@ def delay_plot(
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]
-    >>> cplt = plots.delay_plot(cr.estimate_delay(pulse, 1, max_delay=60, dt=0.01))
+    >>> cplt = cr.plots.delay_plot(cr.estimate_delay(pulse, 1, max_delay=60, dt=0.01))
     >>> cplt.axes[0, 0].get_xlabel()
     'delay [samples]'
     """
@@ -81,6 +76,7 @@ def delay_plot(
         return style.finished([axes], [lines], loc="over")
 
 
+@documented()
 def singular_value_plot(
     fit: Realization | DelayScan | OrderScan | DelayedStateSpace,
     *,
@@ -96,14 +92,8 @@ def singular_value_plot(
     fit : Realization, DelayScan or OrderScan, or model with one of them as its `fit`
     count : int, optional
         How many to show; an `OrderScan` knows as many as its highest order.
-    ax : Axes or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the values.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------
@@ -114,10 +104,9 @@ def singular_value_plot(
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> k = np.arange(300)
     >>> pulse = np.r_[np.zeros(22), 0.9**k + 0.8**k]     # 21 samples, then two lags
-    >>> cplt = plots.singular_value_plot(cr.realize(pulse, 2, delay=21, dt=0.01), count=5)
+    >>> cplt = cr.plots.singular_value_plot(cr.realize(pulse, 2, delay=21, dt=0.01), count=5)
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['order 2']
     """
@@ -128,6 +117,7 @@ def singular_value_plot(
         return style.finished([axes], [lines])
 
 
+@documented("sequence of two Axes")
 def order_plot(
     scan: OrderScan, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
@@ -136,23 +126,16 @@ def order_plot(
     Parameters
     ----------
     scan : OrderScan
-    ax : sequence of two Axes, or Figure, optional
-    title : str, optional
     **kwargs
         Line properties of the misfit curves.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> k = np.arange(300)
     >>> pulse = np.r_[np.zeros(22), 0.9**k + 0.8**k]     # 21 samples, then two lags
-    >>> cplt = plots.order_plot(cr.scan_orders(pulse, 3, max_delay=40, dt=0.01))
+    >>> cplt = cr.plots.order_plot(cr.scan_orders(pulse, 3, max_delay=40, dt=0.01))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['order 1: 22', 'order 2: 21', 'order 3: 20']
     """

@@ -13,9 +13,11 @@ from ..errors import DataError
 from . import style
 from .delays import mark_dead_time
 from .names import plain
+from .shared_docs import documented
 from .style import axis_time_unit
 
 
+@documented()
 def system_plot(
     system: DelayedStateSpace,
     *,
@@ -34,15 +36,8 @@ def system_plot(
     until : float, optional
         End of the plot in s; default: when the response has settled, as `control.step_response`
         chooses it for the core, after the longest dead time.
-    ax : Axes, optional
-    title : str, optional
-        Default: the system's name, in a new figure.
     **kwargs
         Line properties.
-
-    Returns
-    -------
-    control.ControlPlot
 
     Raises
     ------

@@ -13,6 +13,7 @@ from ..design.models.process_model import ProcessModel
 from ..design.tuning.table import PIDComparison
 from . import style
 from .names import plain
+from .shared_docs import documented
 from .style import axis_time_unit
 
 RINGING = 5.0
@@ -21,6 +22,7 @@ NAME_POINTS = 10
 """Size in points of the names of the rules."""
 
 
+@documented()
 def pid_comparison_plot(
     result: PIDComparison, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
@@ -32,19 +34,12 @@ def pid_comparison_plot(
     Parameters
     ----------
     result : PIDComparison
-    ax : Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
-    >>> cplt = plots.pid_comparison_plot(cr.design.compare_pid(plant, ["simc", "amigo"], ["PI"]))
+    >>> cplt = cr.plots.pid_comparison_plot(cr.design.compare_pid(plant, ["simc", "amigo"], ["PI"]))
     >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
     ('sensitivity peak Ms', 'integrated absolute load error [s]')
     """
@@ -118,6 +113,7 @@ def _name_points(axes: Axes, points: list[tuple[float, float, str, str]]) -> Non
         )  # fmt: skip
 
 
+@documented()
 def hankel_plot(
     result: BalancedReduction, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
@@ -126,21 +122,14 @@ def hankel_plot(
     Parameters
     ----------
     result : BalancedReduction
-    ax : Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import control as ct
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
     >>> lags = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * ct.tf([1], [0.001, 1])
     >>> small = cr.design.reduce(cr.delayed_ss(lags, dead_time=0.03, dt=0.001), 2)
-    >>> cplt = plots.hankel_plot(small.fit)
+    >>> cplt = cr.plots.hankel_plot(small.fit)
     >>> cplt.figure.axes[0].get_ylabel()
     'Hankel singular value'
     """
@@ -156,6 +145,7 @@ def hankel_plot(
         return style.finished([axes], [lines])
 
 
+@documented()
 def process_model_plot(
     model: ProcessModel, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
@@ -164,18 +154,12 @@ def process_model_plot(
     Parameters
     ----------
     model : ProcessModel
-    ax : Axes or Figure, optional
-    title : str, optional
-
-    Returns
-    -------
-    control.ControlPlot
 
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> from ctrl_realize import plots
-    >>> cplt = plots.process_model_plot(cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029))
+    >>> model = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029)
+    >>> cplt = cr.plots.process_model_plot(model)
     >>> cplt.figure.axes[0].get_xlabel()
     'time [s]'
     """

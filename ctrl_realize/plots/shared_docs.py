@@ -1,0 +1,41 @@
+"""What the docstrings of all plots say alike, written once."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from typing import TypeVar
+
+Plot = TypeVar("Plot", bound=Callable[..., object])
+
+_TITLE = """title : str, optional
+    Of a new figure; an empty one for none. Default: the name of what is drawn."""
+_RETURNS = """Returns
+-------
+control.ControlPlot"""
+
+
+def documented(axes: str = "Axes") -> Callable[[Plot], Plot]:
+    """Add `ax`, `title` and the returned plot to the docstring of a function that draws.
+
+    Parameters
+    ----------
+    axes : str
+        What `ax` may be beside a Figure: as many axes as the plot needs.
+    """
+    shared = {"ax": f"ax : {axes} or Figure, optional\n    Default: a new figure.", "title": _TITLE}
+
+    def complete(function: Plot) -> Plot:
+        if function.__doc__ is None:  # python -OO
+            return function
+        arguments = inspect.signature(function).parameters
+        text = inspect.cleandoc(function.__doc__)
+        head, rest = re.split(r"\n\n(?=Raises\n-|Examples\n-)", text, maxsplit=1)
+        head, keywords, looks = head.partition("\n**kwargs")
+        entries = [entry for name, entry in shared.items() if name in arguments]
+        head = "\n".join([head, *entries]) + keywords + looks
+        function.__doc__ = "\n\n".join([head, _RETURNS, rest]) + "\n"
+        return function
+
+    return complete
