@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .control_valve import Valve as Valve
-from .set_up import valve as valve
-from .truth import ValveTruth as ValveTruth
+from .control_valve import Valve
+from .set_up import valve
+from .truth import ValveTruth
 
 __all__ = ["Valve", "ValveTruth", "valve"]
 

@@ -1,12 +1,10 @@
 """What is measured: records, step and impulse responses, frequency responses."""
 
-from .frf import MeasuredFRF as MeasuredFRF
-from .impulse import FilterSpec as FilterSpec
-from .impulse import ImpulseResponse as ImpulseResponse
-from .impulse_estimate import ImpulseEstimate as ImpulseEstimate
-from .record import Record as Record
-from .step import StepEdge as StepEdge
-from .step import StepResponse as StepResponse
+from .frf import MeasuredFRF
+from .impulse import FilterSpec, ImpulseResponse
+from .impulse_estimate import ImpulseEstimate
+from .record import Record
+from .step import StepEdge, StepResponse
 
 __all__ = [
     "FilterSpec",

@@ -1,11 +1,10 @@
 """Files in and out: records, frequency responses, models."""
 
-from .frf import read_frf as read_frf
-from .models import load_model as load_model
-from .models import save_model as save_model
-from .records import read_record as read_record
-from .store import CampaignStore as CampaignStore
-from .stored_fit import FitSummary as FitSummary
+from .frf import read_frf
+from .models import load_model, save_model
+from .records import read_record
+from .store import CampaignStore
+from .stored_fit import FitSummary
 
 __all__ = [
     "CampaignStore",
