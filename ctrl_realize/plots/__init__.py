@@ -8,13 +8,12 @@ from .dispatch import draw
 from .fits import dead_time_plot, fit_plot
 from .frequencies import frf_fit_plot, frf_plot, truth_plot
 from .frf_comparison import comparison_plot
-from .impulses import impulse_estimate_plot, impulse_plot, mimo_realization_plot
 from .loops import closed_loop_plot, margins_plot
 from .records import onset_plot, record_plot, step_plot
 from .residuals import prediction_plot, residual_plot, state_space_fit_plot
+from .responses import impulse_estimate_plot, impulse_plot, mimo_realization_plot, system_plot
 from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
-from .systems import system_plot
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
 
 __all__ = [
