@@ -6,7 +6,7 @@ from typing import Any
 
 from ..delayed import DelayedStateSpace
 from ..errors import UnresolvedWarning, UnsuitableSystemError, warn_caller
-from ..identification.output_error.result import is_firm, sign_is_told
+from ..identification.output_error.words import is_firm, sign_is_told
 from ..results import Flag, ModelFit
 
 GAIN_OPEN = "gain_not_resolved"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeGuard, get_args
+from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 
@@ -21,9 +21,66 @@ _METHODS = {
     "Realization": "approximate realization",
 }
 """The methods behind stored fits, in words."""
+_KEPT = (
+    "delay", "order", "dead_time", "dead_time_interval", "interval", "delay_interval",
+    "total_delay", "total_delay_interval", "gain", "gain_interval", "gain_std_given_structure",
+    "onset", "interval_kind", "residual_std", "sampling",
+)  # fmt: skip
+"""What is kept of every fit that has it."""
 _MAX_ROWS = 200
 
+Value = TypeVar("Value")
 Plain = float | int | str | bool | None | tuple["Plain", ...]
+
+
+def _text(value: Plain) -> str | None:
+    return value if isinstance(value, str) else None
+
+
+def _number(value: Plain) -> float | None:
+    """Take a number of either sign, which stands in a file as text where it is not finite."""
+    if isinstance(value, str):
+        return float(value) if value in ("inf", "-inf", "nan") else None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    # a whole number in a file may be larger than that
+    return float(value) if abs(value) <= sys.float_info.max else None
+
+
+def _count(value: Plain) -> int | None:
+    return value if isinstance(value, int) and not isinstance(value, bool) else None
+
+
+def _time(value: Plain) -> float | None:
+    """Tell a time from whatever else a file may hold in its place."""
+    time = _number(value)
+    return time if time is not None and 0 <= time < math.inf else None
+
+
+def _pair(value: Plain) -> tuple[float, float] | None:
+    match value:
+        case (first, last):
+            low, high = _number(first), _number(last)
+            return None if low is None or high is None else (low, high)
+    return None
+
+
+def _times(value: Plain) -> tuple[float, float] | None:
+    """Take an interval of times, which may be open."""
+    ends = _pair(value)
+    if ends is None or any(-math.inf < end < 0 for end in ends) or not ends[0] <= ends[1]:
+        return None
+    return ends
+
+
+def _closed(value: Plain) -> tuple[float, float] | None:
+    ends = _times(value)
+    return ends if ends is not None and np.isfinite(ends).all() else None
+
+
+def _kept(key: str, read: Callable[[Plain], Value], meaning: str) -> Value:
+    """Make a property of what is kept under a key, where it is what it has to be."""
+    return cast("Value", property(lambda summary: read(summary._value(key)), doc=meaning))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,23 +124,32 @@ class FitSummary(ModelFit):
     def __getitem__(self, key: str) -> Plain:
         return dict(self.values)[key]
 
-    @property
-    def dead_time(self) -> float | None:
-        """Dead time in s, as the fit had it; None if it had none."""
-        return self._time("dead_time")
-
-    @property
-    def dead_time_interval(self) -> tuple[float, float] | None:
-        """Interval of the dead time in s, for the functions of `design`; None if it is open."""
-        match self._value("dead_time_interval"):
-            case (low, high) if _is_time(low) and _is_time(high) and low <= high:
-                return float(low), float(high)
-        return None
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """Interval as the fit had it, in s; None if it had none."""
-        return self._times("interval")
+    dead_time = _kept("dead_time", _time, "Dead time in s; None if the fit had none.")
+    dead_time_interval = _kept(
+        "dead_time_interval", _closed, "Interval of the dead time in s; None if it is open."
+    )
+    interval = _kept("interval", _times, "Interval as the fit had it, in s; None if it had none.")
+    delay = _kept("delay", _time, "Dead time in samples.")
+    delay_interval = _kept("delay_interval", _times, "Interval of the dead time in samples.")
+    total_delay = _kept("total_delay", _number, "Delay at zero frequency in s.")
+    total_delay_interval = _kept(
+        "total_delay_interval", _pair, "95 % interval of the total delay in s."
+    )
+    onset = _kept("onset", _number, "First motion after a step of the input, in s.")
+    order = _kept("order", _count, "States of the core.")
+    gain = _kept("gain", _number, "Gain at zero frequency.")
+    gain_interval = _kept("gain_interval", _pair, "95 % interval of the gain.")
+    gain_std_given_structure = _kept(
+        "gain_std_given_structure",
+        _number,
+        "Standard error of the gain if the chosen structure is the plant's.",
+    )
+    residual_std = _kept(
+        "residual_std", _time, "Standard deviation of what the model leaves of its one output."
+    )
+    sampling = _kept(
+        "sampling", _text, "How the impulse response was sampled that the model was realized from."
+    )
 
     @property
     def interval_kind(self) -> IntervalKind | None:
@@ -98,88 +164,11 @@ class FitSummary(ModelFit):
             return INTERVAL_LABELS["flatness"]
         return super().interval_label
 
-    @property
-    def delay(self) -> float | None:
-        """Dead time in samples."""
-        return self._time("delay")
-
-    @property
-    def delay_interval(self) -> tuple[float, float] | None:
-        """Interval of the dead time in samples."""
-        return self._times("delay_interval")
-
-    @property
-    def total_delay(self) -> float | None:
-        """Delay at zero frequency in s."""
-        return self._number("total_delay")
-
-    @property
-    def total_delay_interval(self) -> tuple[float, float] | None:
-        """95 % interval of the total delay in s."""
-        return self._pair("total_delay_interval")
-
-    @property
-    def onset(self) -> float | None:
-        """First motion after a step of the input, in s; NaN where it was no step."""
-        return self._number("onset")
-
-    @property
-    def order(self) -> int | None:
-        """States of the core."""
-        value = self._value("order")
-        return value if isinstance(value, int) and not isinstance(value, bool) else None
-
-    @property
-    def gain(self) -> float | None:
-        """Gain at zero frequency."""
-        return self._number("gain")
-
-    @property
-    def gain_interval(self) -> tuple[float, float] | None:
-        """95 % interval of the gain."""
-        return self._pair("gain_interval")
-
-    @property
-    def gain_std_given_structure(self) -> float | None:
-        """Standard error of the gain if the chosen structure is the plant's."""
-        return self._number("gain_std_given_structure")
-
-    @property
-    def residual_std(self) -> float | None:
-        """Standard deviation of what the model leaves of its one output."""
-        return self._time("residual_std")
-
-    @property
-    def sampling(self) -> str | None:
-        """How the impulse response was sampled that the model was realized from."""
-        value = self._value("sampling")
-        return value if isinstance(value, str) else None
-
     def _std(self) -> float | None:
-        return self._time("std_given_structure")
+        return _time(self._value("std_given_structure"))
 
     def _value(self, key: str) -> Plain:
         return dict(self.values).get(key)
-
-    def _time(self, key: str) -> float | None:
-        value = self._value(key)
-        return float(value) if _is_time(value) else None
-
-    def _times(self, key: str) -> tuple[float, float] | None:
-        match self._value(key):
-            case (low, high) if _is_end(low) and _is_end(high) and float(low) <= float(high):
-                return float(low), float(high)
-        return None
-
-    def _number(self, key: str) -> float | None:
-        return _as_number(self._value(key))
-
-    def _pair(self, key: str) -> tuple[float, float] | None:
-        match self._value(key):
-            case (first, last):
-                low, high = _as_number(first), _as_number(last)
-                return None if low is None or high is None else (low, high)
-        return None
 
     def _method(self) -> str:
         return _METHODS.get(self.kind, super()._method())
@@ -194,54 +183,17 @@ class FitSummary(ModelFit):
         return list(self.rows)
 
 
-def _is_time(value: Plain) -> TypeGuard[float]:
-    """Tell a time from whatever else a file may hold in its place."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return 0 <= value <= sys.float_info.max  # a whole number in a file may be larger than that
-
-
-def _as_number(value: Plain) -> float | None:
-    """Take a number of either sign, which stands in a file as text where it is not finite."""
-    if isinstance(value, str):
-        return float(value) if value in ("inf", "-inf", "nan") else None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    return float(value) if abs(value) <= sys.float_info.max else None
-
-
-def _is_end(value: Plain) -> TypeGuard[float | str]:
-    """Tell the end of an interval; one that is open stands in a file as text."""
-    return value in ("inf", "-inf") or _is_time(value)
-
-
 def summary_of(fit: ModelFit | None) -> FitSummary | None:
     """Reduce any fit to plain numbers and text."""
     if fit is None or isinstance(fit, FitSummary):
         return fit
-    values: dict[str, Plain] = {
-        "delay": _plain(fit.delay),
-        "order": fit.order,
-        "dead_time": fit.dead_time,
-        "dead_time_interval": fit.dead_time_interval,
-        "std_given_structure": fit._std(),
-        "interval": fit.interval,
-        "delay_interval": fit.delay_interval,
-        "total_delay": fit.total_delay,
-        "total_delay_interval": fit.total_delay_interval,
-        "gain": fit.gain,
-        "gain_interval": fit.gain_interval,
-        "gain_std_given_structure": fit.gain_std_given_structure,
-        "onset": fit.onset,
-        "interval_kind": fit.interval_kind,
-        "residual_std": fit.residual_std,
-        "sampling": fit.sampling,
-    }
+    values = {key: _plain(getattr(fit, key)) for key in _KEPT}
+    values["std_given_structure"] = _plain(fit._std())
     return FitSummary(
         kind=type(fit).__name__,
         title=fit._title(),
         rows=tuple((str(label), str(value)) for label, value in fit._rows()),
-        values=tuple((key, _plain(value)) for key, value in values.items() if value is not None),
+        values=tuple(pair for pair in values.items() if pair[1] is not None),
         flags=fit.flags,
         choices=fit.choices,
     )

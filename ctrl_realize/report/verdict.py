@@ -13,7 +13,7 @@ from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
-from ..identification.output_error.result import gain_in_words, sign_is_told
+from ..identification.output_error.words import gain_in_words, sign_is_told
 from ..identification.realization.delay_scan_result import DelayScan
 from ..plots.delays import estimate_of, interval_of
 from ..results import INTERVAL_LABELS, Flag, ModelFit

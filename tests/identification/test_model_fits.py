@@ -124,7 +124,7 @@ def test_a_result_holds_the_estimate_and_cannot_be_changed():
         (fit.estimate.low, fit.estimate.high),
     )
     assert fit.structures is fit.estimate.structures
-    for values in (fit.time, fit.measured, fit.fitted, fit.poles, fit.profile_delay):
+    for values in (fit.time, fit.measured, fit.fitted, fit.poles, fit.estimate.profile[0]):
         assert not values.flags.writeable
 
 

@@ -12,8 +12,7 @@ from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
 from .model_flags import cancelled_pair, slow_modes, unresolved_gain
-from .result import is_firm
-from .words import ESTIMATE_WORDS, model_words
+from .words import ESTIMATE_WORDS, is_firm, model_words
 
 _SAMPLES_BESIDE_NOTHING = 0.5
 _BEYOND = 20.0  # ranges: no overshoot goes as far

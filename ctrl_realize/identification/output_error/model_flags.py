@@ -10,7 +10,7 @@ from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR, StaticGain
 from ...results import Flag
-from .result import sign_is_told
+from .words import sign_is_told
 
 _GAINS_APART = 0.2  # part of gain or total delay by which structures may differ
 _AS_GOOD = 4.0  # excess of a criterion that chance explains: chi-square, one degree, 95 %

@@ -6,14 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._wording import (
-    in_time,
-    interval_in_time,
-    number_within,
-    numbers_alike,
-    poles_in_words,
-    time_within,
-)
+from ..._wording import in_time, interval_in_time, number_within, poles_in_words, time_within
 from ...data import Record
 from ...numerics.arrays import ComplexArray, FloatArray, locked
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
@@ -23,26 +16,7 @@ from ...numerics.separable.static_gain import INTEGRATOR
 from ...results import Flag, IntervalKind, ModelFit
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
-from .words import ESTIMATE_WORDS
-
-_FIRM = 0.1  # part of a total delay up to which an interval on either side makes it firm
-
-_TOTAL_IN_DOUBT = frozenset(
-    {
-        "not_settled",
-        "integrating",
-        "gain_not_resolved",
-        "cancelled_pair",
-        "structured_misfit",
-        "input_in_residual",
-        "feedback",
-        "not_linear",
-        "time_varying",
-        "output_at_limit",
-        "earlier_input",
-    }
-)
-"""Flags after which not even the total delay is firm."""
+from .words import ESTIMATE_WORDS, gain_in_words, total_in_words
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -243,16 +217,6 @@ class OutputErrorFit(ModelFit):
         return self.estimate.structures
 
     @property
-    def profile_delay(self) -> FloatArray:
-        """Delays of the profile of the chosen structure, in s."""
-        return self.estimate.profile[0]
-
-    @property
-    def profile_deviance(self) -> FloatArray:
-        """Chi-square above the minimum at each of them."""
-        return self.estimate.profile[1]
-
-    @property
     def measured(self) -> FloatArray:
         """Output that was fitted, shape (N,)."""
         return self.data.output
@@ -321,19 +285,6 @@ class OutputErrorFit(ModelFit):
     def _kind(self) -> str:
         return "dead time" if self.better is None else "apparent dead time"
 
-    def _total_in_words(self) -> str:
-        low, high = self.total_delay_interval
-        if high == np.inf:
-            return "not determined: the record is much shorter than the slowest time constant"
-        if np.isnan(high):
-            return f"{in_time(self.total_delay, 5)} (dead time plus lags)"
-        doubted = any(flag.code in _TOTAL_IN_DOUBT for flag in self.flags)
-        if not doubted and is_firm(self.total_delay, self.total_delay_interval):
-            said = time_within(self.total_delay, low, high)
-            return f"{said} (dead time plus lags; well determined, {interval_in_time(low, high)})"
-        said = time_within(self.total_delay, low, high)
-        return f"{said} (dead time plus lags; {interval_in_time(low, high)})"
-
     def _title(self) -> str:
         return f"Output-error fit: {self._kind()} {time_within(self.dead_time, *self.interval)}"
 
@@ -345,7 +296,10 @@ class OutputErrorFit(ModelFit):
             (self._kind(), f"{wait} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
             *([("visible onset", in_time(self.onset, 4))] if self.onset == self.onset else []),
-            ("total delay", self._total_in_words()),
+            (
+                "total delay",
+                total_in_words(self.total_delay, self.total_delay_interval, self.flags),
+            ),
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", poles_in_words(self.poles)),
             ("gain", gain_in_words(self.gain, self.gain_interval)),
@@ -362,28 +316,3 @@ class OutputErrorFit(ModelFit):
         if self.repeatability is not None:
             rows += self.repeatability.rows()
         return rows
-
-
-def is_firm(value: float, interval: tuple[float, float]) -> bool:
-    """Whether an interval reaches a tenth of the estimate to either side at most."""
-    low, high = interval
-    return bool(max(high - value, value - low) <= _FIRM * abs(value))
-
-
-def sign_is_told(interval: tuple[float, float] | None) -> bool:
-    """Whether the interval of a gain, if there is one, leaves its sign no question."""
-    return interval is not None and (interval[0] > 0 or interval[1] < 0)
-
-
-def gain_in_words(gain: float, interval: tuple[float, float]) -> str:
-    """Write a gain with its interval, and say so where it is not resolved."""
-    low, high = interval
-    if np.isfinite(low) != np.isfinite(high):
-        said = f"at least {low:.3g}" if np.isfinite(low) else f"at most {high:.3g}"
-        return f"{said}, the rest is extrapolated (gain of the model: {gain:.4g})"
-    if np.isinf(low):
-        return f"not determined by this record (gain of the model: {gain:.4g})"
-    if np.isnan(low):
-        return f"{gain:.6g}"
-    number, *ends = numbers_alike((gain, low, high), low, high)
-    return f"{number} ({ends[0]} to {ends[1]})"

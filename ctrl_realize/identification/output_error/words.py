@@ -1,10 +1,16 @@
-"""Words for the keys of the output-error estimate, as cards and flags use them."""
+"""What cards, flags and reports say of an output-error fit, and when they may call it firm."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..._wording import in_time, interval_in_time, numbers_alike, time_within
 from ...numerics.output_error.result import RobustKey
 from ...numerics.separable.dispersion import DispersedFlow
 from ...numerics.separable.lag_chains import LagChain
+from ...results import Flag
 
 ESTIMATE_WORDS: dict[RobustKey, str] = {
     "onset": "visible onset",
@@ -15,6 +21,25 @@ ESTIMATE_WORDS: dict[RobustKey, str] = {
     "model_of_record": "best model of the whole record",
 }
 
+_FIRM = 0.1  # part of a total delay up to which an interval on either side makes it firm
+
+_TOTAL_IN_DOUBT = frozenset(
+    {
+        "not_settled",
+        "integrating",
+        "gain_not_resolved",
+        "cancelled_pair",
+        "structured_misfit",
+        "input_in_residual",
+        "feedback",
+        "not_linear",
+        "time_varying",
+        "output_at_limit",
+        "earlier_input",
+    }
+)
+"""Flags after which not even the total delay is firm."""
+
 
 def model_words(model: LagChain | DispersedFlow) -> str:
     """Name a model that is not one of the structures."""
@@ -23,3 +48,41 @@ def model_words(model: LagChain | DispersedFlow) -> str:
     if model.hidden:
         return "diffusion model"
     return f"model of {model.candidate.structure.order} nearly equal lags"
+
+
+def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[Flag]) -> str:
+    """Write a total delay with its interval, and whether it is firm."""
+    low, high = interval
+    if high == np.inf:
+        return "not determined: the record is much shorter than the slowest time constant"
+    if np.isnan(high):
+        return f"{in_time(total, 5)} (dead time plus lags)"
+    doubted = any(flag.code in _TOTAL_IN_DOUBT for flag in flags)
+    firm = "well determined, " if not doubted and is_firm(total, interval) else ""
+    said = f"dead time plus lags; {firm}{interval_in_time(low, high)}"
+    return f"{time_within(total, low, high)} ({said})"
+
+
+def is_firm(value: float, interval: tuple[float, float]) -> bool:
+    """Whether an interval reaches a tenth of the estimate to either side at most."""
+    low, high = interval
+    return bool(max(high - value, value - low) <= _FIRM * abs(value))
+
+
+def sign_is_told(interval: tuple[float, float] | None) -> bool:
+    """Whether the interval of a gain, if there is one, leaves its sign no question."""
+    return interval is not None and (interval[0] > 0 or interval[1] < 0)
+
+
+def gain_in_words(gain: float, interval: tuple[float, float]) -> str:
+    """Write a gain with its interval, and say so where it is not resolved."""
+    low, high = interval
+    if np.isfinite(low) != np.isfinite(high):
+        said = f"at least {low:.3g}" if np.isfinite(low) else f"at most {high:.3g}"
+        return f"{said}, the rest is extrapolated (gain of the model: {gain:.4g})"
+    if np.isinf(low):
+        return f"not determined by this record (gain of the model: {gain:.4g})"
+    if np.isnan(low):
+        return f"{gain:.6g}"
+    number, *ends = numbers_alike((gain, low, high), low, high)
+    return f"{number} ({ends[0]} to {ends[1]})"
