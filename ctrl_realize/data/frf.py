@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from html import escape
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.statistics import circle_quantile
 from .frf_algebra import FRFAlgebra
 from .frf_operands import SAME
-from .record_checks import check_size
+from .record_checks import check_finite, check_size
 
 
 class MeasuredFRF(FRFAlgebra):
@@ -106,10 +107,11 @@ class MeasuredFRF(FRFAlgebra):
                 f"response has shape {values.shape}, frequency_hz has {grid.size} points; "
                 "expected (K,) or (outputs, inputs, K)"
             )
-        _check_finite(grid, "frequency_hz")
-        _check_finite(values, "response")
+        check_finite(grid, "frequency_hz")
+        check_finite(values, "response")
         check_size(grid, "frequency_hz")
-        check_size(_largest_part(values), "response")
+        # not the absolute value, which overflows
+        check_size(np.maximum(np.abs(values.real), np.abs(values.imag)), "response")
         if np.any(grid < 0):
             raise DataError(f"frequency_hz goes down to {grid.min():g} Hz; expected a value >= 0")
         order = np.argsort(grid, kind="stable")
@@ -128,15 +130,13 @@ class MeasuredFRF(FRFAlgebra):
         self.frequency_hz = read_only(grid)
         self.coherence = _beside(coherence, values, order, "coherence")
         self.std = _beside(std, values, order, "std")
-        if self.coherence is not None and (
-            self.coherence.min() < 0 or self.coherence.max() > 1 + 1e-9
-        ):
-            raise DataError(
-                f"coherence runs from {self.coherence.min():g} to {self.coherence.max():g}; "
-                "expected values in 0...1"
-            )
-        if self.std is not None and self.std.min() < 0:
-            raise DataError(f"std goes down to {self.std.min():g}; expected a value >= 0")
+        for what, most in (("coherence", 1 + 1e-9), ("std", np.inf)):
+            array = getattr(self, what)
+            if array is not None and (array.min() < 0 or array.max() > most):
+                raise DataError(
+                    f"{what} runs from {array.min():g} to {array.max():g}; expected values "
+                    + ("in 0...1" if what == "coherence" else ">= 0")
+                )
         self.repeats = None if repeats is None else real(repeats, "repeats", "number above 1")
         if self.repeats is not None and self.repeats <= 1:
             raise OptionError(f"repeats={repeats!r}; a scatter needs more than one")
@@ -152,28 +152,23 @@ class MeasuredFRF(FRFAlgebra):
             as_code(self.frdata[0, 0] if self._single else self.frdata),
             as_code(self.frequency_hz),
         ]
-        for name in ("coherence", "std"):
-            if getattr(self, name) is not None:
-                parts.append(f"{name}={as_code(getattr(self, name))}")
-        for name in ("repeats", "sample_time", "name"):
-            if getattr(self, name) is not None:
-                parts.append(f"{name}={getattr(self, name)!r}")
+        for name in ("coherence", "std", "repeats", "sample_time", "name"):
+            if (value := getattr(self, name)) is not None:
+                parts.append(f"{name}={as_code(value)}")
         parts.append(f"inputs={self.input_labels!r}, outputs={self.output_labels!r}")
         return f"MeasuredFRF({', '.join(parts)})"
 
     def _repr_info_(self, html: bool = False) -> str:
-        line = self._line()
+        line = f"<MeasuredFRF {self.name!r}: {self._points()}>"
         return escape(line) if html else line
 
-    def _line(self) -> str:
-        return (
-            f"<MeasuredFRF {self.name!r}: {self.frequency_hz.size} points, "
-            f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz>"
-        )
+    def _points(self) -> str:
+        low, high = self.frequency_hz[[0, -1]]
+        return f"{self.frequency_hz.size} points, {low:g}...{high:g} Hz"
 
     def __str__(self) -> str:
         # python-control's lists every point.
-        return self._line()
+        return self._repr_info_()
 
     def _repr_html_(self) -> str | None:
         return None
@@ -213,17 +208,7 @@ class MeasuredFRF(FRFAlgebra):
             raise DataError(
                 f"[{key}] selects no channel of {p} outputs and {m} inputs (counted from 0)"
             )
-        return MeasuredFRF(
-            _channels(self.frdata, chosen),
-            self.frequency_hz,
-            coherence=None if self.coherence is None else _channels(self.coherence, chosen),
-            std=None if self.std is None else _channels(self.std, chosen),
-            repeats=self.repeats,
-            sample_time=self.sample_time,
-            name=taken.name,
-            inputs=taken.input_labels,
-            outputs=taken.output_labels,
-        )
+        return self._part(lambda values: _channels(values, chosen), self.frequency_hz, taken)
 
     def circle(self, level: float = 0.95) -> FloatArray:
         r"""Radii of the circles around the points that hold the true response, each with `level`.
@@ -278,20 +263,24 @@ class MeasuredFRF(FRFAlgebra):
 
     def _select(self, keep: np.ndarray[Any, np.dtype[np.bool_]], where: str) -> MeasuredFRF:
         if not keep.any():
-            raise DataError(
-                f"no point of the FRF lies {where}; it has {self.frequency_hz.size} points, "
-                f"{self.frequency_hz[0]:g}...{self.frequency_hz[-1]:g} Hz"
-            )
+            raise DataError(f"no point of the FRF lies {where}; it has {self._points()}")
+        return self._part(lambda values: values[..., keep], self.frequency_hz[keep], self)
+
+    def _part(
+        self, take: Callable[[Any], Any], frequency_hz: FloatArray, named: ct.InputOutputSystem
+    ) -> MeasuredFRF:
+        """Make a response of what `take` leaves of the arrays, named as `named` is."""
+        response = self.frdata[0, 0] if self._single else self.frdata
         return MeasuredFRF(
-            (self.frdata[0, 0] if self._single else self.frdata)[..., keep],
-            self.frequency_hz[keep],
-            coherence=None if self.coherence is None else self.coherence[..., keep],
-            std=None if self.std is None else self.std[..., keep],
+            take(response),
+            frequency_hz,
+            coherence=None if self.coherence is None else take(self.coherence),
+            std=None if self.std is None else take(self.std),
             repeats=self.repeats,
             sample_time=self.sample_time,
-            name=self.name,
-            inputs=self.input_labels,
-            outputs=self.output_labels,
+            name=named.name,
+            inputs=named.input_labels,
+            outputs=named.output_labels,
         )
 
 
@@ -309,19 +298,6 @@ def _beside(
     array = numbers(values, what)
     if array.shape != response.shape:
         raise DataError(f"{what} has shape {array.shape}, response has {response.shape}")
-    _check_finite(array, what)
-    check_size(array.reshape(-1, array.shape[-1]), what)
+    check_finite(array, what)
+    check_size(array, what)
     return read_only(array[..., order])
-
-
-def _largest_part(values: ComplexArray) -> FloatArray:
-    """Return the larger of real and imaginary part, shape (channels, K); an absolute overflows."""
-    largest = np.maximum(np.abs(values.real), np.abs(values.imag))
-    return np.asarray(largest.reshape(-1, values.shape[-1]))
-
-
-def _check_finite(values: np.ndarray[Any, Any], what: str) -> None:
-    bad = ~np.isfinite(values)
-    if bad.any():
-        first = int(np.flatnonzero(bad.reshape(-1, values.shape[-1]).any(axis=0))[0])
-        raise DataError(f"{what} has {int(bad.sum())} non-finite values, the first at {first}")

@@ -79,6 +79,12 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
             return Operand(np.atleast_2d(other).astype(np.complex128)[:, :, None])
         return None
 
+    def _needed(self, other: Any) -> Operand:
+        two = self._other(other)
+        if two is None:
+            raise TypeError(f"{type(other).__name__} is not a system, number or matrix")
+        return two
+
     def _check_same_frequencies(self, other: ct.FrequencyResponseData) -> None:
         one, two = self.omega, np.asarray(other.omega)
         if one.size != two.size or not np.allclose(one, two, rtol=SAME, atol=0):
@@ -196,42 +202,28 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         """Divide by one channel."""
         if other is self and self.issiso():
             return self**0
-        one, two = self._operand(), self._other(other)
-        if two is None:
-            return NotImplemented
+        two = self._other(other)
+        return NotImplemented if two is None else self._quotient(self._operand(), two)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        two = self._other(other)
+        return NotImplemented if two is None else self._quotient(two, self._operand())
+
+    def _quotient(self, one: Operand, two: Operand) -> Any:
         if not two.is_scalar:
             raise DataError(
                 "the denominator of a quotient must have one channel; select it with "
                 "frf[output, input]"
             )
-        return self._quotient(one, two)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        two = self._other(other)
-        if two is None:
-            return NotImplemented
-        if not self.issiso():
-            raise DataError(
-                "the denominator of a quotient must have one channel; select it with "
-                "frf[output, input]"
-            )
-        return self._quotient(two, self._operand())
-
-    def _quotient(self, one: Operand, two: Operand) -> Any:
         with np.errstate(divide="ignore", invalid="ignore"):
             values = one.values / two.values
             variance = (one.spread + power(values) * two.spread) / power(two.values)
         coherence = None
-        if not (one.measured and two.measured):
+        if one.measured != two.measured and (one.measured or one.is_scalar):
             coherence = one.coherence if one.measured else two.coherence
-            if not (one.measured or one.is_scalar):
-                coherence = None
-        if two.hold is None:
-            hold = one.hold
-        else:
-            hold = None
-            if not (one.hold is not None and same_hold(one.hold, two.hold)):
-                warn_of_hold("a quotient", two.hold)
+        hold = one.hold if two.hold is None else None
+        if two.hold is not None and (one.hold is None or not same_hold(one.hold, two.hold)):
+            warn_of_hold("a quotient", two.hold)
         return self._made("a quotient", values, variance, (one, two), hold, coherence)
 
     def __pow__(self, other: Any) -> Any:
@@ -268,9 +260,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
             With the deviation of the closed loop, which ``L / (1 + L)`` would not have: there the
             errors of both L would be taken as independent.
         """
-        one, two = self._operand(), self._other(other)
-        if two is None:
-            raise TypeError(f"{type(other).__name__} is not a system, number or matrix")
+        one, two = self._operand(), self._needed(other)
         H = np.moveaxis(one.values, 2, 0)
         p, m = self.noutputs, self.ninputs
         if two.is_scalar and p == m:
@@ -294,9 +284,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
 
     def append(self, other: Any) -> Any:
         """Put another response beside this one; the paths between them are zero."""
-        one, two = self._operand(), self._other(other)
-        if two is None:
-            raise TypeError(f"{type(other).__name__} is not a system, number or matrix")
+        one, two = self._operand(), self._needed(other)
         hold = one.hold if not two.measured else common_hold(one, two, "a response beside another")
         return self._made(
             "one beside another",

@@ -15,6 +15,7 @@ from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.constants import LARGEST
 from ..numerics.signals.filters import butterworth, butterworth_group_delay
 from ..results import Drawable
+from .record_checks import check_finite
 from .step import StepResponse
 
 Sampling = Literal["step-invariant", "impulse-invariant"]
@@ -183,10 +184,5 @@ class ImpulseResponse(Drawable):
 
 def _finite(values: ArrayLike, what: str) -> FloatArray:
     array = numbers(values, what)
-    bad = ~np.isfinite(array)
-    if bad.any():
-        raise DataError(
-            f"{what} has {int(bad.sum())} non-finite values, the first at index "
-            f"{int(np.flatnonzero(bad.reshape(-1, array.shape[-1]).any(axis=0))[0])}"
-        )
+    check_finite(array, what)
     return array

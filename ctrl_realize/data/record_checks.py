@@ -1,4 +1,4 @@
-"""What a record refuses: text, wrong shapes, values that no instrument shows."""
+"""What data refuse: text, wrong shapes, values that no instrument shows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from .._checks import spelled_out
 from ..errors import DataError, OptionError
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.constants import LARGEST
 from ..numerics.signals.time_axis import UNIFORM_WITHIN, AxisFault
 
@@ -23,15 +23,14 @@ def check_shape(values: FloatArray, what: str, samples: int) -> None:
         raise DataError(f"{what} has {values.shape[-1]} samples, time has {samples}{hint}")
 
 
-def check_finite(values: FloatArray, what: str, *, allow_nan: bool = False) -> None:
-    """Refuse infinities, and NaN unless it stands for a missing sample."""
+def check_finite(values: FloatArray | ComplexArray, what: str, *, allow_nan: bool = False) -> None:
+    """Refuse infinities, and NaN unless it stands for a missing sample; samples run last."""
     bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
     if bad.any():
-        first = int(np.flatnonzero(bad.any(axis=0) if values.ndim == 2 else bad)[0])
         count = int(bad.sum())
         raise DataError(
             f"{what} has {count} non-finite sample{'s' if count > 1 else ''}, "
-            f"the first at index {first}"
+            f"the first at index {_first(bad)}"
         )
 
 
@@ -40,10 +39,15 @@ def check_size(values: FloatArray, what: str) -> None:
     # NaN stands for a missing sample here, and is not larger than anything
     large = np.abs(values) > LARGEST
     if large.any():
-        first = int(np.flatnonzero(large.any(axis=0) if values.ndim == 2 else large)[0])
         raise DataError(
-            f"{what} is larger than {LARGEST:g} at index {first}; check the file and the unit"
+            f"{what} is larger than {LARGEST:g} at index {_first(large)}; check the file and "
+            "the unit"
         )
+
+
+def _first(marked: BoolArray) -> int:
+    """Return the first sample that is marked in any channel."""
+    return int(np.flatnonzero(marked.reshape(-1, marked.shape[-1]).any(axis=0))[0])
 
 
 def labelled(
