@@ -39,17 +39,19 @@ def row(line: Line) -> str:
 def main() -> None:
     """Time what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parts", nargs="*", help="scans, sizes, models (default: all)")
+    parser.add_argument("parts", nargs="*", help="scans, sizes, long, models (default: all)")
     parser.add_argument("--full", action="store_true", help="run baselines of minutes and 2 GB")
     parser.add_argument("--table", type=Path, default=TABLE, help="where to write the table")
     options = parser.parse_args()
-    parts = options.parts or ["scans", "sizes", "models"]
+    parts = options.parts or ["scans", "sizes", "long", "models"]
 
     def lines() -> Iterator[Line]:
         if "scans" in parts:
             yield from scans.lines()
         if "sizes" in parts:
             yield from sizes.lines(full=options.full)
+        if "long" in parts:
+            yield from sizes.long_lines(full=options.full)
         if "models" in parts:
             yield from models.lines()
 

@@ -151,6 +151,19 @@ def test_an_unstable_plant_in_a_loop_is_called_so(fit):
     assert "unstable" not in codes(fit(held_by_a_controller(0.97)))
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_tank_that_fills_after_a_long_rest_is_not_called_unstable(seed):
+    t = 0.01 * np.arange(10_000)
+    after = np.clip(t - 30.5, 0, None)
+    level = 2 * (after - 0.5 * -np.expm1(-after / 0.5))  # a lag of 0.5 s before an integrator
+    noise = 0.02 * np.random.default_rng(seed).standard_normal(t.size)
+    system = cr.identify(cr.Record(t, np.where(t < 30.0, 0.0, 1.0), level + noise))
+    assert "integrating" in codes(system)
+    assert "unstable" not in codes(system)
+    low, high = system.fit.interval
+    assert low <= 0.5 <= high
+
+
 @pytest.mark.parametrize("seed", [3, 5, 22])
 def test_a_gain_is_told_beside_an_output_that_wanders(seed):
     fit = cr.identify(wandering(seed)).fit

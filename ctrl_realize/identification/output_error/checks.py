@@ -62,7 +62,8 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     stepped = bool(np.isfinite(fit.onset))
     loop = () if stepped else feedback_flags(fit.records, fit.delay_interval[1])
     flags += loop
-    flags += unstable_flags(fit.records, fit.delay_interval[1])
+    if not fit.at_noise_level:  # a stable model that leaves only noise is no unstable plant
+        flags += unstable_flags(fit.records, fit.delay_interval[1])
     if len(fit.records) == 1:
         shown = _shown(fit)
         flags += _limit_flags(shown.output)

@@ -212,10 +212,10 @@ def fitted_system(
         analyse_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
     )
     seen = {flag.code: flag for check in checks for flag in check.flags}
-    latest = max(best.inputs) + max(best.outputs)
-    loop = unstable_flags(tuple(complete), latest) if complete else ()
+    loop: tuple[Flag, ...] = ()
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
     if neighbours > COLOURED:
+        loop = unstable_flags(tuple(complete), max(best.inputs) + max(best.outputs))
         longest = max(r.n_samples for r in group)
         slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
         advice = "compare with a lower order on other data"
