@@ -117,8 +117,8 @@ def page(seen: list[Seen]) -> list[str]:
         "RMS: root mean square of the error of the dead time in samples, each error cut at 20; "
         "held: intervals that hold the truth, in percent; width: their median in samples; silent: "
         "records whose interval misses the truth and that no flag doubts; band: measured dead "
-        "times in the band that is believed; met: intervals that meet it. A dash: the rule cannot touch "
-        "these records, or changed none of them.",
+        "times in the band that is believed; met: intervals that meet it. A dash: the rule cannot "
+        "touch these records, or changed none of them.",
         "",
         "| without | lags: RMS, held, width | disturbed: RMS, held, silent | wrong structure: RMS, "
         "held, silent | driven: RMS, held, width | measured: band, met, width | CPU |",
