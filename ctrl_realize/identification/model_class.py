@@ -25,8 +25,8 @@ from ..results import Flag
 from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
 from .output_error.result import OutputErrorFit
-from .state_space_fit.fit import Outcome, from_starts
 from .state_space_fit.result import Timing
+from .state_space_fit.starts import Outcome, from_starts
 from .validation.residuals import analyse_residuals
 
 LAGS = 25

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import control as ct
 import numpy as np
@@ -14,34 +13,16 @@ from ..._checks import whole
 from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.simulation import as_delayed
-from ...errors import DataError, DataWarning, OptionError, OrderError, UnsuitableSystemError
-from ...numerics.arrays import IntArray
+from ...errors import DataError, OptionError, OrderError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
-from ...numerics.state_space.delay_split import split_delays
 from ...numerics.state_space.section_fit import fit_sections
 from ...numerics.state_space.sections import in_sections
-from ...results import Flag
-from ..impulse.from_io import Method, Start, as_group, impulse_from_io
+from ..impulse.from_io import as_group
 from ..long_records import lively_parts
-from ..realization.mimo import delay_matrix, given_delays
-from ..state_space_fit.result import StateSpaceFit
-from .result import fitted_system
-from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, experiments
-
-LEVEL = 0.02
-"""Part of a channel's largest Markov parameter that counts as response, where delays are to be
-found: the search moves them further, and one that is too long costs more than one too short."""
-STARTS: tuple[tuple[Start, Method], ...] = (
-    ("unknown", "auto"),
-    ("rest", "auto"),
-    ("unknown", "okid"),
-    ("rest", "okid"),
-)
-"""Estimates of the impulse response to start from: the next one where the residual of the best
-model so far still follows the input."""
-STILL = 10
-"""Samples that an input stands still at the start of a record for the plant to count as at rest."""
+from .result import StateSpaceFit, fitted_system
+from .search import Candidate, experiments
+from .starts import from_starts
 
 
 @single_threaded
@@ -127,128 +108,6 @@ def fit_state_space(
     system = from_starts(parts, asked, delays, feedthrough).system
     fit = fit_of(system, StateSpaceFit)
     return system.replace(fit=replace(fit, flags=cut + fit.flags)) if cut else system
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a start has come to: criterion, model, and whether all outputs showed a response."""
-
-    bic: float
-    system: DelayedStateSpace
-    seen: bool
-    search: Search
-    best: Candidate
-
-    @property
-    def fit(self) -> StateSpaceFit:
-        """How the model was fitted."""
-        return fit_of(self.system, StateSpaceFit)
-
-
-def from_starts(
-    group: tuple[Record, ...],
-    asked: tuple[int, ...] | None = None,
-    delays: ArrayLike | None = None,
-    feedthrough: bool | None = None,
-    *,
-    most_starts: int = len(STARTS),
-    enough: int = ENOUGH_SAMPLES,
-) -> Outcome:
-    """Fit from one estimate of the impulse response after the other, until nothing is left."""
-    best: Outcome | None = None
-    refused: list[DataError] = []
-    at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
-    starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else list(STARTS)
-    for tried, way in enumerate(starts[:most_starts], start=1):
-        try:
-            found = _from_start(group, way, asked, delays, feedthrough, enough)
-        except DataError as error:
-            refused.append(error)
-            continue
-        if best is None or found.bic < best.bic:
-            best = found
-        # An output that a start does not see gets a second one.
-        clear = best.seen or tried > 1
-        if clear and all(check.independent for check in best.fit.checks):
-            break
-    if best is None:
-        raise refused[0]
-    return best
-
-
-def _from_start(
-    group: tuple[Record, ...],
-    way: tuple[Start, Method],
-    asked: tuple[int, ...] | None,
-    delays: ArrayLike | None,
-    feedthrough: bool | None,
-    enough: int,
-) -> Outcome:
-    """Fit from one estimate of the impulse response."""
-    start, method = way
-    with warnings.catch_warnings():
-        # What the prior has filled in only serves as a start.
-        warnings.simplefilter("ignore", DataWarning)
-        impulse = impulse_from_io(group, method=method, start=start)
-    markov = np.reshape(impulse.markov, (group[0].noutputs, group[0].ninputs, -1))
-    unseen = sum(flag.code == "no_response" for flag in impulse.flags)
-    if unseen == group[0].noutputs:
-        raise DataError(
-            "no output shows a response to the inputs above the noise level; check the columns"
-        )
-    search = Search(group, markov, max(asked or ORDERS), enough)
-    orders = search.orders(asked)
-    found = delay_matrix(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
-    shares = _split(found)
-    fits = search.by_order(orders, shares, feedthrough=feedthrough is not False)
-    best = min(fits, key=lambda c: c.bic)
-    moved = search.improved(best, delays=delays is None, feedthrough=feedthrough is None)
-    if asked is None or len(asked) > 1:
-        moved = search.lowered(moved, orders, delays=delays is None)
-    bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
-    flags = _silence(moved)
-    if len(orders) > 1 and best.order == max(asked or ORDERS):
-        flags += (
-            Flag(
-                "highest_order",
-                f"the highest order tried, {best.order}, is the best: try higher ones",
-            ),
-        )
-    choices = _choices(moved, bic, shares)
-    system = fitted_system(search.finish(moved), group, bic, choices, flags)
-    return Outcome(moved.bic, system, unseen == 0, search, moved)
-
-
-def _silence(best: Candidate) -> tuple[Flag, ...]:
-    """Flag the outputs of which the model explains no more than its parameters would of noise."""
-    found = best.found
-    # What belongs to one output: its C, the initial state, and its row of D.
-    count = 2 * best.order + best.found.model.D.shape[1] * best.feedthrough
-    gain = found.counts * np.log(found.spread / found.variance)
-    return tuple(
-        Flag(
-            "no_response",
-            f"output {a} shows no response to the input above the noise level",
-        )
-        for a in np.flatnonzero(gain < count * np.log(found.counts))
-    )
-
-
-def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str, ...]:
-    choices = []
-    if len(bic) > 1:
-        others = ", ".join(
-            f"{order} ({value - best.bic:+.0f})"
-            for order, value in sorted(bic.items())
-            if order != best.order
-        )
-        choices.append(f"order {best.order} has the smallest BIC; others: {others}")
-    if (best.inputs, best.outputs) != begun:
-        choices.append(
-            f"delays start from the onsets of the responses, {begun[0]} and {begun[1]}, and "
-            "were moved while that lowered BIC"
-        )
-    return tuple(choices)
 
 
 @single_threaded
@@ -343,9 +202,3 @@ def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
                 f"{name} {int(np.argmin(size))} stays below {SMALLEST:g}, where squares "
                 "underflow; choose another unit, or check that it is connected"
             )
-
-
-def _split(delays: IntArray) -> Shares:
-    """Share delays out to inputs and outputs; channels without response follow the others."""
-    outputs, inputs = split_delays(delays, delays >= 0)[0]
-    return tuple(int(d) for d in inputs), tuple(int(d) for d in outputs)

@@ -1,4 +1,4 @@
-"""What a delay tracker can start from."""
+"""What a delay tracker can start from, and take in."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import control as ct
 import numpy as np
 
 from ..._checks import positive, whole
+from ...data import Record
+from ...data.given import check_complete
 from ...delayed import DelayedStateSpace
 from ...delayed.parts import check_entries
-from ...errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ...errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
+from ...numerics.constants import LARGEST
 
 LONGEST = 1e12
 """Samples of memory; beyond, the weights of single samples are lost in rounding."""
@@ -48,8 +51,9 @@ def model_noise(model: ct.StateSpace, given: float | None) -> float:
     return found if found is not None and np.isfinite(found) else 0.0
 
 
-def check_start(core: ct.StateSpace) -> None:
-    """Refuse a model that cannot be followed by simulation."""
+def starting_core(model: ct.StateSpace) -> ct.StateSpace:
+    """Return a model without its delay, where it can be followed by simulation."""
+    core = model.delay_free if isinstance(model, DelayedStateSpace) else model
     if not isinstance(core, ct.StateSpace) or not core.issiso():
         raise UnsuitableSystemError("the initial model must have one input and one output")
     if not core.isdtime(strict=True) or core.dt is True:
@@ -63,3 +67,34 @@ def check_start(core: ct.StateSpace) -> None:
         )
     if not np.any(core.C) and not np.any(core.D):
         raise OptionError("the initial model is zero")
+    return core
+
+
+def check_sample(u: float, y: float, count: int) -> tuple[float, float]:
+    """Return input and output of sample `count` as plausible finite numbers."""
+    try:
+        if np.ndim(u) or np.ndim(y):
+            raise TypeError
+        u, y = float(u), float(y)
+    except (TypeError, ValueError):
+        raise DataError(
+            f"sample {count} is u={u!r}, y={y!r}; expected one number each (for a whole record "
+            "see track)"
+        ) from None
+    if not (np.isfinite(u) and np.isfinite(y)):
+        raise DataError(f"sample {count} is u={u}, y={y}; expected finite numbers")
+    if max(abs(u), abs(y)) > LARGEST:
+        raise DataError(
+            f"sample {count} is u={u:g}, y={y:g}; beyond {LARGEST:g}, where squares overflow, is "
+            "not a plausible measurement"
+        )
+    return u, y
+
+
+def check_record(record: Record, dt: float) -> None:
+    """Refuse a record that a tracker with the sample time `dt` cannot take in."""
+    check_complete(record, "DelayTracker.track")
+    if not record.issiso():
+        raise DataError(f"{record!r} has several channels; expected one input and one output")
+    if not np.isclose(record.dt, dt, rtol=1e-3, atol=0):
+        raise DataError(f"the record has the sample time {record.dt:g} s, the model {dt:g} s")

@@ -19,6 +19,15 @@ CLEAR_GAIN = 3.0
 SHOWN_MOVE = 2.0
 """Largest move of a pole that is put into numbers, as logarithm of the speed ratio."""
 
+LOUD, LOUD_AFTER_MOVES = 3.0, 1.2
+"""Residual over the model's noise from which nothing is told: no model of the plant as it was
+leaves nine times the power. Poles that moved are taken for the plant's only where they leave no
+more than noise: slower poles stand in for a delay beyond the candidates (100 samples with 90 the
+largest leave 1.5 times the noise, or more)."""
+NEGLIGIBLE = 0.005
+"""Residual over what the input explains that is never called loud: data without noise leave what
+the first order in the moves of poles neglects."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearisedBank:
@@ -170,4 +179,16 @@ def _too_far(speeds: FloatArray) -> str:
     return (
         f"a pole has moved by {100 * np.expm1(moved):+.0f} %, too far from the reference "
         "model; the reference model is being updated"
+    )
+
+
+def too_loud(found: Solution, noise: float, limit: float) -> str:
+    """Say that the residual is more than `limit` times the noise of the model."""
+    left = float(np.sqrt(found.variance))
+    if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
+        return ""
+    return (
+        f"the track is lost: the residual, {left:.3g}, is {left / noise:.2g} times the "
+        "noise of the model. The delay may be outside the range of candidates, the plant "
+        "may have changed, or a disturbance may drift; reset() restarts the tracker"
     )

@@ -3,54 +3,34 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
 
 import control as ct
 import numpy as np
 
 from ..._checks import positive
 from ...data import Record
-from ...data.given import check_complete
 from ...delayed import DelayedStateSpace
 from ...errors import DataError, UnsuitableSystemError
-from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.arrays import ComplexArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.constants import LARGEST
-from ...numerics.regression.recursive import DelayBank, RunningResidual
-from ...numerics.state_space.pole_sensitivity import (
-    Core,
-    Direction,
-    moved_core,
-    pole_directions,
-    sensitivity_system,
+from ...numerics.regression.recursive import RunningResidual
+from ...numerics.state_space.pole_sensitivity import Core
+from .banks import Banks
+from .checks import (
+    check_candidates,
+    check_forgetting_time,
+    check_record,
+    check_sample,
+    model_noise,
+    starting_core,
 )
-from .checks import check_candidates, check_forgetting_time, check_start, model_noise
-from .estimate import LinearisedBank, Solution, solve
+from .estimate import LOUD, LOUD_AFTER_MOVES, Solution, solve, too_loud
 from .results import TrackHistory, TrackPoint, track_of
 
 MOMENTS = 50
 """Estimates made in one memory."""
-RUN_IN, SHORT_RUN_IN = 2.0, 0.5
-"""Memories that a renewed bank takes before it is asked; the short one where nothing is told by
-the bank before it, whose poles are far off. Each renewal is a Gauss-Newton step: poles that have
-halved take five or six."""
-MOVED, LEAP = 0.04, 0.5
-"""Relative move of a pole from which the bank is renewed, and the largest that is then made."""
-CLEAR_MOVE = 4.0
-"""Standard deviations that such a move must have."""
 SAMPLES_EACH = 10
 """Samples for each parameter, behind the largest delay, before anything is solved."""
-LOUD, LOUD_AFTER_MOVES = 3.0, 1.2
-"""Residual over the model's noise from which nothing is told: no model of the plant as it was
-leaves nine times the power. Poles that moved are taken for the plant's only where they leave no
-more than noise: slower poles stand in for a delay beyond the candidates (100 samples with 90 the
-largest leave 1.5 times the noise, or more)."""
-PENDING = 0.3
-"""Relative move of a pole that is being made from which nothing is told meanwhile. Up to there the
-interval is wider by as much of the slowest lag: so far may the delay be off."""
-NEGLIGIBLE = 0.005
-"""Residual over what the input explains that is never called loud: data without noise leave what
-the first order in the moves of poles neglects."""
 SHARE_OF_LAG = 20
 """Part of the slowest lag over which the residual's own noise is measured, where nothing else is
 known of it: a wrong model's error hardly changes within it."""
@@ -144,28 +124,32 @@ class DelayTracker:
         noise_std: float | None = None,
         drift_time: float | None = None,
     ) -> None:
-        core = model.delay_free if isinstance(model, DelayedStateSpace) else model
-        check_start(core)
+        core = starting_core(model)
         self._low, self._high = check_candidates(min_delay, max_delay)
         self.dt = float(core.dt)
         self._span = check_forgetting_time(forgetting_time, self.dt, self._high)
-        self._forgetting = float(np.exp(-1.0 / self._span))
         self._stride = max(1, round(self._span / MOMENTS))
         self._noise_std = model_noise(model, noise_std)
         self._keep_of_drift: float | None = None
         if drift_time is not None:
             passed = positive(drift_time, "drift_time", "time constant in s")
             self._keep_of_drift = float(np.exp(-self.dt / passed))
-        self._zeros = np.asarray(core.zeros(), dtype=np.complex128)
         self._dynamics = dynamics
-        self._start = (core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]))
-        self._begin(self._start, core.poles())
+        self._start, self._zeros = _parts(core)
+        self._begin()
 
-    def _begin(self, matrices: Core, poles: ComplexArray) -> None:
+    def _begin(self) -> None:
         """Know nothing but a core."""
-        directions = pole_directions(poles, self.dt) if self._dynamics else []
-        self._now = self._linearised(matrices, directions, np.zeros(len(directions)))
-        self._next: LinearisedBank | None = None
+        poles = np.linalg.eigvals(self._start[0]).astype(np.complex128)
+        self._banks = Banks(
+            self._start,
+            poles,
+            self._zeros,
+            dt=self.dt,
+            candidates=(self._low, self._high),
+            span=self._span,
+            fixed=not self._dynamics,
+        )
         self._count = 0
         self._first = (0.0, 0.0)
         self._before, self._passed = (0.0, 0.0), (0.0, 0.0)
@@ -176,7 +160,7 @@ class DelayTracker:
         # Over one or two samples the noise itself may be correlated, by filters and converters.
         self._lag, self._well_sampled = lag, lag >= 3 * SHARE_OF_LAG
         self._residual = RunningResidual(
-            self._forgetting, max(1, round(min(lag, self._span) / SHARE_OF_LAG))
+            float(np.exp(-1.0 / self._span)), max(1, round(min(lag, self._span) / SHARE_OF_LAG))
         )
         # The last moment at which the sums were solved.
         self._variance = 0.0
@@ -199,22 +183,7 @@ class DelayTracker:
         DataError
             A value that is no number, not finite, or beyond 1e70.
         """
-        try:
-            if np.ndim(u) or np.ndim(y):
-                raise TypeError
-            u, y = float(u), float(y)
-        except (TypeError, ValueError):
-            raise DataError(
-                f"sample {self._count} is u={u!r}, y={y!r}; expected one number each (for a "
-                "whole record see run)"
-            ) from None
-        if not (np.isfinite(u) and np.isfinite(y)):
-            raise DataError(f"sample {self._count} is u={u}, y={y}; expected finite numbers")
-        if max(abs(u), abs(y)) > LARGEST:
-            raise DataError(
-                f"sample {self._count} is u={u:g}, y={y:g}; beyond {LARGEST:g}, where squares "
-                "overflow, is not a plausible measurement"
-            )
+        u, y = check_sample(u, y, self._count)
         if self._count == 0:
             # What was before is rest; large offsets would cost digits.
             self._first = (u, y)
@@ -222,12 +191,10 @@ class DelayTracker:
         moved, seen = u - self._first[0], y - self._first[1]
         if self._keep_of_drift is not None:
             moved, seen = self._high_passed(moved, seen, self._keep_of_drift)
-        self._now.bank.update(moved, seen)
-        if self._next is not None:
-            self._next.bank.update(moved, seen)
-            self._renew(self._next)
+        if self._banks.update(moved, seen, self._count):
+            self._solution = None
         if self._solution is not None:
-            reply = self._now.bank.predict(self._solution.delay, self._solution.theta)
+            reply = self._banks.now.bank.predict(self._solution.delay, self._solution.theta)
             self._residual.add(seen - self._solution.offset - reply)
         if self._count % self._stride == 0:
             self._residual.close_sum()
@@ -255,16 +222,14 @@ class DelayTracker:
             A model of another sample time, or one that a tracker cannot start from.
         """
         if model is not None:
-            core = model.delay_free if isinstance(model, DelayedStateSpace) else model
-            check_start(core)
+            core = starting_core(model)
             if not np.isclose(core.dt, self.dt, rtol=1e-6, atol=0.0):
                 raise UnsuitableSystemError(
                     f"the model has the sample time {core.dt:g} s, the tracker {self.dt:g} s"
                 )
             self._noise_std = model_noise(model, None) or self._noise_std
-            self._zeros = np.asarray(core.zeros(), dtype=np.complex128)
-            self._start = (core.A, core.B[:, 0], core.C[0], float(core.D[0, 0]))
-        self._begin(self._start, np.linalg.eigvals(self._start[0]).astype(np.complex128))
+            self._start, self._zeros = _parts(core)
+        self._begin()
 
     def estimate(self) -> TrackPoint:
         """Tell what the samples so far say; asking changes nothing."""
@@ -274,11 +239,7 @@ class DelayTracker:
     def model(self) -> DelayedStateSpace:
         """Model of the present estimate, which is its `fit`; zeros as in the starting model."""
         found, told = self._latest()
-        core = self._now.core
-        if found is not None and found.gain:
-            made = moved_core(core, self._zeros, self._now.directions, found.moves, self.dt)
-            core = core if made is None else made[0]
-        A, B, C, D = core
+        A, B, C, D = self._banks.core_at(found)
         gain = told.gain_ratio
         return DelayedStateSpace(
             ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt), told.delay, fit=told
@@ -293,13 +254,7 @@ class DelayTracker:
         DataError
             A record with several channels, missing samples, or another sample time.
         """
-        check_complete(record, "DelayTracker.run")
-        if not record.issiso():
-            raise DataError(f"{record!r} has several channels; expected one input and one output")
-        if not np.isclose(record.dt, self.dt, rtol=1e-3, atol=0):
-            raise DataError(
-                f"the record has the sample time {record.dt:g} s, the model {self.dt:g} s"
-            )
+        check_record(record, self.dt)
         course: list[TrackPoint] = []
         for u, y in zip(record.input.ravel(), record.output.ravel(), strict=True):
             self.update(float(u), float(y))
@@ -312,26 +267,11 @@ class DelayTracker:
             )
         return track_of(course, self.dt)
 
-    def _linearised(
-        self, core: Core, directions: list[Direction], moved: FloatArray
-    ) -> LinearisedBank:
-        system = sensitivity_system(*core, directions)
-        bank = DelayBank(*system, self._low, self._high, self._forgetting)
-        return LinearisedBank(bank, core, directions, moved)
-
-    def _renew(self, fresh: LinearisedBank) -> None:
-        """Let a bank that is run in count from its first whole sample, and then take over."""
-        if self._count == fresh.begin:
-            fresh.bank.restart()
-        wait = SHORT_RUN_IN if abs(self._step_made()) > PENDING else RUN_IN
-        if self._count >= fresh.begin + wait * self._span:
-            self._now, self._next, self._solution = fresh, None, None
-
     def _solve(self) -> Solution | None:
         """Solve for what the samples so far say; None while there are too few."""
-        if self._count < self._high + SAMPLES_EACH * self._now.n_parameters:
+        if self._count < self._high + SAMPLES_EACH * self._banks.now.n_parameters:
             return None
-        return solve(self._now, self._variance, self._residual.inflation)
+        return solve(self._banks.now, self._variance, self._residual.inflation)
 
     def _latest(self) -> tuple[Solution | None, TrackPoint]:
         """Return what holds now: what was kept, where no sample has come since."""
@@ -344,29 +284,13 @@ class DelayTracker:
         """Go on from what was found, and start a bank about moved poles where they have moved."""
         self._told = self._tell(found)
         full = self._count >= self._span
-        if found is not None and full and self._told.resolved and not np.any(self._now.moved):
+        if found is not None and full and self._told.resolved and not self._banks.moved:
             self._least = min(self._least, float(np.sqrt(found.variance)))
         self._places.append(self._told.dead_time / self.dt if self._told.resolved else np.nan)
         if found is None:
             return
         self._solution, self._variance = found, found.variance
-        if self._next is None:
-            self._follow_poles(found)
-
-    def _follow_poles(self, found: Solution) -> None:
-        """Start a bank about the moved poles, to take over when it has seen enough."""
-        now = self._now
-        clear = np.abs(found.moves) > np.maximum(MOVED, CLEAR_MOVE * found.move_std)
-        if not np.any(clear) or not found.sees_reply:
-            return
-        step = np.clip(np.where(clear, found.moves, 0.0), -LEAP, LEAP)
-        made = moved_core(now.core, self._zeros, now.directions, step, self.dt)
-        if made is None:
-            return
-        fresh = self._linearised(*made, now.moved + step)
-        wait = fresh.bank.settling()
-        if wait is not None:
-            self._next = replace(fresh, begin=self._count + wait + self._high + 1)
+        self._banks.follow(found, self._count)
 
     def _nothing_yet(self) -> TrackPoint:
         low = self._low
@@ -387,7 +311,7 @@ class DelayTracker:
     def _tell(self, found: Solution | None) -> TrackPoint:
         if found is None:
             return self._nothing_yet()
-        loud, pending = self._too_loud(found), self._pending()
+        loud, pending = self._too_loud(found), self._banks.pending
         return TrackPoint(
             time=(self._count - 1) * self.dt,
             delay=found.delay,
@@ -405,36 +329,13 @@ class DelayTracker:
 
     def _too_loud(self, found: Solution) -> str:
         """Say that the residual is no noise of the model's."""
-        left = float(np.sqrt(found.variance))
-        moved = bool(np.any(self._now.moved))
         noise = self._noise_std or self._least
+        moved = self._banks.moved
         if moved and not np.isfinite(noise) and self._well_sampled:
             noise = self._residual.noise_std
         # What the tracker has seen itself may have been a quiet hour.
         limit = LOUD_AFTER_MOVES if moved and noise != self._least else LOUD
-        if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
-            return ""
-        return (
-            f"the track is lost: the residual, {left:.3g}, is {left / noise:.2g} times the "
-            "noise of the model. The delay may be outside the range of candidates, the plant "
-            "may have changed, or a disturbance may drift; reset() restarts the tracker"
-        )
-
-    def _step_made(self) -> float:
-        """Largest relative move of a pole in the bank that is being run in, 0 without one."""
-        if self._next is None:
-            return 0.0
-        return float(max(self._next.moved - self._now.moved, key=abs))
-
-    def _pending(self) -> str:
-        """Say that a bank about poles far from these is being run in."""
-        step = self._step_made()
-        if abs(step) <= PENDING:
-            return ""
-        return (
-            f"a pole has moved by about {100 * np.expm1(step):+.0f} %; the reference model is "
-            "being updated"
-        )
+        return too_loud(found, noise, limit)
 
     def _with_trail(self, interval: tuple[int, int], place: float) -> tuple[int, int]:
         """Widen an interval by the way that the delay has gone within one memory, and by what a
@@ -445,6 +346,12 @@ class DelayTracker:
         """
         before = self._places[0] if self._places else np.nan
         way = 0.0 if np.isnan(before) else place - before
-        off = abs(self._step_made()) * self._lag
+        off = abs(self._banks.step_made) * self._lag
         low = max(interval[0] + int(np.floor(min(way, 0.0) - off)), self._low)
         return low, min(interval[1] + int(np.ceil(max(way, 0.0) + off)), self._high)
+
+
+def _parts(core: ct.StateSpace) -> tuple[Core, ComplexArray]:
+    """Return the matrices of a core, and its zeros."""
+    matrices = core.A, core.B[:, 0], core.C[0], float(core.D[0, 0])
+    return matrices, np.asarray(core.zeros(), dtype=np.complex128)
