@@ -80,7 +80,11 @@ def _closed(value: Plain) -> tuple[float, float] | None:
 
 def _kept(key: str, read: Callable[[Plain], Value], meaning: str) -> Value:
     """Make a property of what is kept under a key, where it is what it has to be."""
-    return cast("Value", property(lambda summary: read(summary._value(key)), doc=meaning))
+
+    def value(summary: FitSummary) -> Value:
+        return read(summary._value(key))
+
+    return cast("Value", property(value, doc=meaning))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
