@@ -274,3 +274,57 @@ def test_the_manifest_names_command_versions_inputs_and_files(tmp_path, capsys):
     assert "holds other results" in capsys.readouterr().err
     assert main(["identify", files[0], *options, "--overwrite"]) == 0
     assert not {name for name in files_in(out) if name.startswith(("models/", "records"))}
+
+
+def test_a_record_over_which_the_process_died_twice_is_not_tried_for_ever(tmp_path):
+    store = cr.io.CampaignStore(tmp_path)
+    dying = (
+        "import os, signal, sys\n"
+        "import ctrl_realize as cr\n"
+        "with cr.io.CampaignStore(sys.argv[1]).attempt(sys.argv[2]):\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    for _ in range(2):
+        died = subprocess.run([sys.executable, "-c", dying, str(tmp_path), "key"], check=False)
+        assert died.returncode == -signal.SIGKILL
+    with pytest.raises(cr.errors.DataError, match="killed 2 times"), store.attempt("key"):
+        pass
+    with store.attempt("another"):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["tried-key.txt"]
+    store.forget_attempts()
+    with store.attempt("key"):  # a new start
+        assert len(store) == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_goes_away_costs_no_result(csv_files, tmp_path):
+    out = tmp_path / "out"
+    with started("identify", csv_files[0], "-o", str(out), *QUICK) as process:
+        process.stdout.close()  # "| head" has seen enough
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
+    assert {"model.json", "report.html", "figures"} <= {path.name for path in out.iterdir()}
+
+
+def test_signals_are_handled_as_before_after_a_command():
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in numbers]
+    assert main(["identify", str(Path("nowhere.csv")), "-o", "out"]) == 2
+    assert [signal.getsignal(number) for number in numbers] == before
+
+
+def test_the_same_command_replaces_all_of_its_own_results_and_nothing_else(tmp_path):
+    run = Run("command")
+    write(tmp_path, ["model.json", "models/1.json", "models/2.json"], run)
+    (tmp_path / "notes.txt").write_text("keep")
+    write(tmp_path, ["model.json", "models/1.json"], run)  # one record fewer
+    assert files_in(tmp_path) == {"manifest.json", "model.json", "models/1.json", "notes.txt"}
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": "ctrl_realize results"}', "null"])
+def test_results_without_a_readable_manifest_are_those_of_another_run(tmp_path, text):
+    write(tmp_path, ["model.json"], Run("command"))
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(OptionError, match=r"holds other results, such as model\.json"):
+        write(tmp_path, ["model.json"], Run("command"))

@@ -317,3 +317,12 @@ def test_interconnect_and_feedback_with_names_work():
 def test_unusable_arguments_are_refused(make, error, match):
     with pytest.raises(error, match=match):
         make()
+
+
+@pytest.mark.parametrize("delay", [0, 37, 300])
+def test_zeros_are_those_that_were_given(delay):
+    zeros = [0.3 - 0.4j, 0.3 + 0.4j]
+    core = ct.ss(ct.zpk(zeros, [0.2, 0.5, 0.8], 2.0, dt=TS))
+    found = cr.delayed_ss(core, delay).zeros()
+    # far apart from each other: a few digits are lost in the companion form
+    assert_allclose(np.sort_complex(found), zeros, rtol=1e-10)

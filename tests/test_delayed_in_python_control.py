@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import control as ct
 import numpy as np
 import pytest
@@ -152,3 +155,75 @@ def test_the_text_that_can_be_loaded_makes_the_same_again(kind):
     else:
         assert_array_equal(again.A, shown.A)
         assert again.state_labels == shown.state_labels
+
+
+def test_margins_of_a_loop_with_our_controller_are_those_of_its_two_parts():
+    G, pid = plant(100), cr.design.PIDController(0.5, 0.2, dt=TS)
+    joined, apart = cr.design.margins(G * pid), cr.design.margins(G, pid)
+    assert joined.phase_margin == pytest.approx(apart.phase_margin, rel=1e-9)
+    assert joined.gain_margin == pytest.approx(apart.gain_margin, rel=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:stability_margins")
+@pytest.mark.filterwarnings("ignore::scipy.signal.BadCoefficients")
+@pytest.mark.parametrize("asked", POLYNOMIALS)
+def test_polynomials_of_a_short_chain_are_not_warned_of(asked):
+    POLYNOMIALS[asked](plant(5))
+
+
+@pytest.mark.parametrize("kind", SHOWN)
+def test_the_form_of_the_text_is_the_one_that_python_control_was_told(kind):
+    shown = SHOWN[kind]()
+    line = repr(shown)
+    assert "\n" not in line
+    assert "valve" in line
+    shown.repr_format = "info"
+    assert repr(shown) == ct.iosys_repr(shown, format="info") == line
+    assert ct.iosys_repr(shown, format="eval") != line
+    shown.repr_format = "latex"
+    assert repr(shown) == (shown._repr_html_() or line)
+    shown.repr_format = "music"
+    with pytest.raises(ValueError, match="music"):
+        repr(shown)
+    shown.repr_format = None
+    with ct.config.defaults({"iosys.repr_format": "latex"}):
+        assert repr(shown) == (shown._repr_html_() or line)
+
+
+KEEPING = {
+    "as made": lambda S: S,
+    "negated": lambda S: -S,
+    "scaled": lambda S: 2 * S * 0.5,
+    "matrix": lambda S: np.array([[2.0]]) * S * np.array([[2.0]]),
+    "indexed": lambda S: S[0, 0],
+    "copied": copy.deepcopy,
+    "pickled": lambda S: pickle.loads(pickle.dumps(S)),
+    "renamed": lambda S: S.replace(name="other"),
+    "delayed again": lambda S: cr.delayed_ss(S, 0),
+}
+
+
+@pytest.mark.parametrize("operation", KEEPING)
+def test_the_names_of_the_core_s_states_are_kept(operation, tmp_path):
+    S = KEEPING[operation](cr.delayed_ss(NAMED, 2))
+    cr.save_model(tmp_path / "model.json", S)
+    for one in (S, cr.load_model(tmp_path / "model.json")):
+        assert one.state_labels == ["position", "speed", "u[k-1]", "u[k-2]"]
+        assert one.delay_free.state_labels == ["position", "speed"]
+
+
+def test_names_of_states_stay_apart_in_products_and_with_copies():
+    S = cr.delayed_ss(NAMED, 2)
+    integral = ct.ss(1, 1, 1, 0, TS, states=["sum"])
+    assert (S * integral).delay_free.state_labels == ["sum", "position", "speed"]
+    assert (integral * S).delay_free.state_labels == ["position", "speed", "sum"]
+    assert (S * S).delay_free.state_labels == ["x[0]", "x[1]", "x[2]", "x[3]"]
+    twice = cr.delayed_ss(ct.ss(S), 3)
+    assert len(set(twice.state_labels)) == twice.nstates == 7
+    S.set_states(["a", "b", "c", "d"])
+    S.repr_format = "eval"
+    for kept in (S, S.copy(), pickle.loads(pickle.dumps(S)), S.replace(name="b")):
+        assert kept.state_labels == ["a", "b", "c", "d"]
+        assert kept.delay_free.state_labels == ["a", "b"]
+        assert kept.repr_format == "eval"
+    assert S.replace(delay=1).state_labels == ["a", "b", "u[k-1]"]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataWarning
+from ctrl_realize.errors import DataError, DataWarning
 
 HZ = np.array([0.5, 2.0, 8.0])
 OMEGA = 2 * np.pi * HZ
@@ -183,3 +185,89 @@ def test_coherence_and_deviation_go_with_the_channels(frf, key, rows, columns):
         assert_array_equal(getattr(part, name), values[np.ix_(rows, columns, rising)])
     assert_array_equal(part.frequency_hz, [1.0, 2.0, 3.0])
     assert part.repeats == part.between_hz(1.0, 2.0).repeats == 7
+
+
+def test_a_dead_time_is_found_the_same_after_scaling():
+    w = 2 * np.pi * np.geomspace(0.1, 5, 60)
+    true = cr.delayed_ss(ct.tf([1], [0.05, 1]), dead_time=9.45 * DT, dt=DT)
+    frf = cr.MeasuredFRF(true(np.exp(1j * w * DT)), w / (2 * np.pi), sample_time=DT)
+    before = cr.fit_frf(frf, 1).fit.dead_time
+    assert before / DT == pytest.approx(9.45, abs=0.02)
+    # 9.95 where the hold of half a sample was forgotten
+    assert cr.fit_frf(2 * frf, 1).fit.dead_time == pytest.approx(before, rel=1e-6)
+
+
+@pytest.mark.parametrize("operation", [*TWO, "plus number", "inverse"])
+def test_the_warning_stands_where_the_user_wrote_the_operation(operation):
+    frf = {"plus number": lambda a, b: 1 + a, "inverse": lambda a, b: 1 / a}
+    with pytest.warns(DataWarning) as caught:
+        TWO.get(operation, (frf.get(operation),))[0](measured(), measured(SECOND))
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+@pytest.mark.parametrize("factor", [1 - 2.3e-16, 1 + 1e-12])
+def test_frequencies_may_differ_in_their_last_bits(factor):
+    hz = np.geomspace(0.1, 13, 50)
+    model = cr.delayed_ss(ct.tf([1], [0.08, 1]), 37, dt=7.8125e-4)
+    frf = cr.MeasuredFRF(model(np.exp(2j * np.pi * hz * model.dt)), hz)
+    asked = frf.omega * factor
+    assert np.any(asked != frf.omega)
+    assert_array_equal(frf.frequency_response(asked).complex, frf.complex)
+    assert_array_equal((frf * cr.MeasuredFRF(frf.complex, hz * factor)).complex, frf.complex**2)
+    lines = ct.bode_plot([model, frf], omega=asked).lines
+    assert lines.size == 2
+    with pytest.raises(ValueError, match="not all frequencies"):
+        frf.frequency_response(frf.omega * 1.001)
+
+
+@pytest.mark.parametrize(
+    ("operation", "lost", "words"),
+    [
+        *(
+            (name, None, None)
+            for name in ("-H", "3 H", "H * discrete", "delayed * H", "H / system")
+        ),
+        *(
+            (name, "coherence", "no known coherence")
+            for name in ("H + 1", "H - system", "feedback")
+        ),
+        ("1 / H", "sample_time", r"exactly one hold of 0\.01 s"),
+    ],
+)
+def test_what_an_operation_does_not_know_is_left_out_with_a_word_and_all_else_stays(
+    operation, lost, words
+):
+    with pytest.warns(DataWarning, match=words) if words else contextlib.nullcontext():
+        made = ALONE[operation][0](measured())
+    expected = {"coherence": [0.99, 0.9, 0.8], "repeats": 5, "sample_time": DT}
+    if lost:
+        assert getattr(made, lost) is None
+        del expected[lost]
+    for name, value in expected.items():
+        assert_array_equal(getattr(made, name), value, err_msg=name)
+
+
+def test_a_deviation_that_one_side_lacks_is_left_out_with_a_word():
+    with pytest.warns(DataWarning, match="no known standard deviation"):
+        made = bare() * cr.MeasuredFRF(SECOND, HZ)
+    assert made.std is None
+    both = ct.append(bare(), bare(SECOND, 2 * STD))  # beside another one they stay
+    assert_allclose([both.std[0, 0], both.std[1, 1]], [STD, 2 * STD])
+    assert_allclose(both.frdata[1, 1], SECOND)
+
+
+def test_what_does_not_fit_is_refused():
+    for operation, match in (
+        (lambda H: H * cr.MeasuredFRF([1.0, 2.0], [1.0, 2.0]), "different frequencies"),
+        (lambda H: H + cr.MeasuredFRF(PLANT, HZ * 1.001), "different frequencies"),
+        (lambda H: np.ones((2, 2)) * H * np.ones((3, 1)), "as many inputs"),
+        (lambda H: H.feedback(np.ones((2, 2))), "feedback of shape"),
+        (lambda H: H * ct.tf([1], [1, 0.5], True), "dt=True"),
+        (lambda H: 1 / ct.append(H, H), "one channel"),
+        (lambda H: ct.append(H, H) ** 2, "one channel"),
+    ):
+        with pytest.raises(DataError, match=match):
+            operation(bare())
+    for operation in (lambda H: H * "a", lambda H: H - None, lambda H: {} + H):
+        with pytest.raises(TypeError):
+            operation(bare())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import CtrlRealizeError, DataError
+from ctrl_realize.errors import CtrlRealizeError, DataError, OptionError, UnsuitableSystemError
 
 T = 0.1 * np.arange(50)
 U = (T > 1).astype(float)
@@ -56,3 +56,67 @@ COMPLEX = np.array([1.0, 2.0]) + 1j
 def test_complex_numbers_where_real_ones_belong_are_refused_not_cut(use):
     with pytest.raises(CtrlRealizeError):
         use()
+
+
+MEASURED = ct.FrequencyResponseData(np.array([1.0, 0.5, 0.1]), [1.0, 2.0, 3.0])
+
+
+def broken(dt=0.1):
+    """Made by somebody's own computation; python-control lets it pass."""
+    system = ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], dt)
+    system.A = np.array([[np.nan]])
+    return system
+
+
+def broken_fraction():
+    system = ct.tf([1.0], [1.0, -0.5], 0.1)
+    system.num[0][0][:] = np.nan
+    return system
+
+
+def test_a_mask_in_a_nested_list_is_seen_in_every_kind_of_response():
+    response = np.ma.masked_array([1.0, 1e20, 3.0], [False, True, False])
+    for make in (
+        lambda: cr.ImpulseResponse([[masked()]], 0.1),
+        lambda: cr.realize([[masked()]], 1, dt=0.1),
+        lambda: cr.MeasuredFRF([[response]], [1.0, 2.0, 3.0]),
+        lambda: cr.design.predictor_lqr(PLANT, [np.ma.masked_array([1e20], True)], 1.0),
+    ):
+        with pytest.raises(DataError, match="non-finite"):
+            make()
+
+
+def test_a_system_that_is_not_finite_is_refused_in_words():
+    D = cr.design
+    for use in (
+        lambda: D.margins(PLANT, broken()),
+        lambda: D.margins(PLANT, broken_fraction()),
+        lambda: D.margins(PLANT, float("nan")),
+        lambda: D.margins(PLANT, float("inf")),
+        lambda: D.margins(broken(0), 1.0),
+        lambda: D.margins(ct.frd([np.nan, 1.0, 1.0], [1.0, 2.0, 3.0])),
+        lambda: D.margins(MEASURED, broken(0)),
+        lambda: D.delay_robustness(PLANT, broken(), (0.1, 0.5)),
+        lambda: D.smith_predictor(PLANT, broken()),
+        lambda: D.smith_predictor(PLANT, float("nan")),
+        lambda: D.performance(PLANT, broken()),
+        lambda: D.pid(broken()),
+        lambda: D.reduce_fopdt(broken()),
+        lambda: D.reduce_fopdt(broken(0)),
+        lambda: D.to_tf(broken()),
+        lambda: D.to_continuous(broken()),
+        lambda: D.to_discrete(broken(0), 0.1, 0.1),
+        lambda: D.hankel_singular_values(broken()),
+        lambda: cr.delayed_ss(broken(), 3),
+        lambda: cr.DelayedStateSpace(broken(), 3),
+        lambda: cr.DelayTracker(broken(), max_delay=5, forgetting_time=5.0),
+    ):
+        with pytest.raises(UnsuitableSystemError, match="non-finite"):
+            use()
+
+
+def test_a_jitter_that_is_no_number_does_not_let_gaps_pass():
+    gap = np.delete(T, slice(20, 30))
+    for jitter in (float("nan"), float("inf"), -0.1, "a", None):
+        with pytest.raises(OptionError, match="max_jitter"):
+            cr.Record.resampled(gap, gap, gap, max_jitter=jitter)

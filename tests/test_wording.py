@@ -26,3 +26,8 @@ def test_an_estimate_before_its_rounded_interval_is_not_shown():
     # in four and in three digits: 124.9 ms of 125 to 126 ms
     assert time_within(0.12486, 0.12473, 0.12612) == "124.9 ms"
     assert interval_in_time(0.12473, 0.12612) == "124.7 to 126.1 ms"
+
+
+def test_an_interval_without_width_has_four_digits():
+    assert time_within(0.125, 0.125, 0.125) == "125.0 ms"
+    assert interval_in_time(0.125, 0.125) == "125.0 to 125.0 ms"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DelayRangeError
+from ctrl_realize.errors import DelayRangeError, UnsuitableSystemError
 from ctrl_realize.numerics.state_space.line_sums import LineSum
 
 CORES = {
@@ -106,3 +106,21 @@ def test_what_does_not_fit_into_memory_is_refused_with_what_to_do():
     )
     with pytest.raises(DelayRangeError, match="use one output"):
         cr.design.kalman_predictor(late, 1.0, np.eye(2))
+
+
+@pytest.mark.parametrize("name", ["predictor_lqr", "kalman_predictor", "lqg"])
+def test_a_static_plant_has_no_state_to_feed_back(name):
+    plant = cr.delayed_ss(ct.ss([], [], [], [[2.0]], 0.1), 3)
+    weights = (1.0, 1.0, 1.0, 1.0) if name == "lqg" else (1.0, 1.0)
+    with pytest.raises(UnsuitableSystemError, match="static gain with dead time"):
+        getattr(cr.design, name)(plant, *weights)
+    # What the message names works.
+    integral = ct.ss([[1.0]], [[1.0]], [[0.1]], [[0.0]], 0.1)
+    assert cr.design.smith_predictor(plant, integral).check.stable
+    assert cr.design.pid(plant, "optimal", "PI").check.stable
+
+
+def test_an_unstable_core_behind_a_very_long_dead_time_is_refused():
+    plant = cr.delayed_ss(ct.ss([[1.02]], [[1.0]], [[0.1]], [[0.0]], 0.01), 100_000)
+    with pytest.raises(UnsuitableSystemError, match="overflows within the delay of 100000 samples"):
+        cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0)

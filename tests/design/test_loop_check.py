@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 
 import control as ct
@@ -147,3 +148,35 @@ def test_the_loop_of_a_state_feedback_ends_where_brute_force_says():
 
     assert radius(d) < 1
     assert radius(limit) < 1 < radius(limit + 1)
+
+
+def test_the_comparison_still_shows_what_is_unstable():
+    found = cr.design.compare_pid(furnace(), ["simc"], ["PI"])
+    assert list(found.table()["stable"]) == [False]
+    assert "UNSTABLE" in found.controllers[0].report()
+
+
+def test_a_controller_remembers_what_its_loop_does():
+    plant = quick()
+    made = cr.design.pid(plant)
+    found = cr.design.margins(plant, made)
+    for controller in (made, pickle.loads(pickle.dumps(made))):
+        assert controller.check.stable
+        assert controller.check.margins.ms == pytest.approx(found.ms, rel=1e-12)
+        assert f"Ms {found.ms:.3g}" in controller.report()
+    assert made.check.robustness is None
+    assert made.check.stable_within_interval is None
+    assert made.discretised(0.002).check is None  # found of another sample time
+    assert "stable on the design model" in repr(made.check)
+
+
+def test_a_smith_predictor_of_a_loop_that_is_unstable_is_refused():
+    with pytest.raises(UnsuitableSystemError, match="does not stabilize the model"):
+        cr.design.smith_predictor(quick(), cr.design.PIDController(-3.0, 0.08, dt=0.001))
+
+
+def test_a_process_model_is_checked_in_continuous_time():
+    model = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029)
+    made = cr.design.pid(model)
+    exact = cr.design.margins(model.transfer_function(), made, dead_time=0.029)
+    assert made.check.margins.delay_margin == pytest.approx(exact.delay_margin, rel=1e-12)

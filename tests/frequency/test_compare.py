@@ -142,3 +142,14 @@ def test_the_response_of_the_motor_contradicts_the_model_of_its_step(shared_data
     assert verdict.level == "poor"
     assert "measured frequency response contradicts" in verdict.reasons[0]
     assert f"{100 * comparison.rms_relative_error:.3g} %" in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(("scale", "code"), [(1.1, "frf_differs"), (1.5, "frf_disagrees")])
+def test_a_gain_that_is_off_is_told_and_a_contradiction_comes_first(scale, code):
+    flags = cr.compare_frf(MODEL, noisy(exact(scale))).flags
+    assert [flag.code for flag in flags] == [code]
+    verdict = report.verdict_of(MODEL, [cr.results.Flag("delay_at_bound", "try more"), *flags])
+    if code == "frf_disagrees":
+        assert verdict.level == "poor"
+        assert "contradicts" in verdict.judgement
+        assert "contradicts" in verdict.reasons[0]

@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
+from ctrl_realize.errors import DataError, NoStepError
 from tests import rigs
 
 DT = 0.1
@@ -324,3 +325,29 @@ def test_an_input_that_does_not_hold_its_level_is_any_input():
         fit = cr.fit_output_error(driven(u, noise=0.05), **ONE).fit
         assert np.isfinite(fit.onset) == stepped
         assert fit.delay == pytest.approx(5, abs=0.5)
+
+
+def test_wild_samples_move_least_squares_more_than_the_usual_loss():
+    errors = {"huber": [], "least_squares": []}
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        record = lag_record(seed)
+        wild = np.where(rng.random(120) < 0.05, 1.5 * rng.standard_normal(120), 0.0)
+        spoilt = cr.Record(record.time, record.input, record.output + wild)
+        for loss, found in errors.items():
+            found.append(cr.fit_output_error(spoilt, loss=loss, **ONE).fit.dead_time - 0.73)
+    rms = {loss: np.sqrt(np.mean(np.square(found))) for loss, found in errors.items()}
+    assert rms["huber"] < 0.08
+    assert rms["least_squares"] > 1.3 * rms["huber"]
+
+
+def test_steps_that_follow_before_the_first_one_is_seen_are_any_input():
+    for second, stepped in ((100, True), (48, False)):
+        u = 1.0 * (np.arange(200) >= 40) + 1.0 * (np.arange(200) >= second)
+        fit = cr.fit_output_error(driven(u), **ONE).fit
+        assert np.isfinite(fit.onset) == stepped
+        assert fit.delay == pytest.approx(5, abs=0.3)
+    with pytest.raises(NoStepError, match="nothing was recorded after it"):
+        cr.fit_output_error(driven(1.0 * (np.arange(60) >= 59)))
+    with pytest.raises(DataError, match="does not leave its baseline"):
+        cr.fit_output_error(driven(1.0 * (np.arange(60) >= 56)))

@@ -180,3 +180,20 @@ def test_a_level_tank_has_a_slope_that_is_known():
     low, high = system.fit.gain_interval
     assert low <= 0.01 <= high < 0.011
     assert "gain_not_resolved" not in codes(system)
+
+
+def test_analyses_warn_and_a_saved_model_still_says_what_is_not_resolved(unknown, tmp_path):
+    with pytest.warns(UnresolvedWarning, match="the gain and its sign"):
+        cr.design.margins(unknown, 0.01)
+    cr.save_model(tmp_path / "model.json", unknown)
+    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
+        cr.design.pid(cr.load_model(tmp_path / "model.json"))
+
+
+def test_the_gas_furnace_has_the_gain_of_box_and_jenkins(shared_data):
+    record = cr.read_record(shared_data / "gas_furnace" / "record.csv")
+    low, high = cr.identify(record).fit.gain_interval
+    # (0.53 + 0.37 + 0.51) / (1 - 0.57) = 3.28, negative
+    assert low <= -3.28 <= high
+    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
+        cr.design.pid(cr.identify(record, structures=[(2, 1)]))

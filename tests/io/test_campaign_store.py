@@ -7,16 +7,22 @@ import hashlib
 import json
 import os
 import signal
+import stat
 import subprocess
 import sys
 import time
 
+import control as ct
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.io.atomic import replaced_when_complete
+from ctrl_realize.cli.staging import appearing
+from ctrl_realize.errors import OptionError
+from ctrl_realize.io.atomic import replaced_when_complete, write_text
+from ctrl_realize.io.text.csv_files import write_csv
 from tests.rigs import step_record
 
 
@@ -161,3 +167,66 @@ def test_after_a_failure_the_old_file_is_whole_and_the_folder_clean(tmp_path, re
         raise reason
     assert file.read_text() == "old"
     assert names(tmp_path) == ["a.txt"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are those of POSIX")
+def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records, tmp_path):
+    store = cr.io.CampaignStore(tmp_path)
+    first = cr.identify_campaign(records[:1], method="paper", store=store)
+    (path,) = tmp_path.glob("row-*.json")
+    path.unlink()
+    os.mkfifo(path)
+    again = cr.identify_campaign(records[:1], method="paper", store=store)
+    assert again.delays == first.delays
+    assert "will not be replaced" in again.rows[0].warnings[-1]
+    assert path.is_fifo()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+def test_what_is_no_regular_file_is_not_replaced(tmp_path):
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    (tmp_path / "a.txt").write_text("old")
+    model, table = cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.01), 37), pd.DataFrame({"a": [1]})
+    for target in (pipe, link, "/dev/null"):
+        for write in (
+            lambda path: cr.save_model(path, model),
+            lambda path: write_text(path, "text"),
+            lambda path: write_csv(path, table, index=False),
+        ):
+            with pytest.raises(OSError, match="will not be replaced"):
+                write(target)
+    with pytest.raises(OSError, match="will not be replaced"), appearing(tmp_path) as staged:  # noqa: PT012
+        for name in ("a.txt", "pipe"):
+            (staged / name).write_text("new")
+    assert pipe.is_fifo()
+    assert link.is_symlink()
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+    assert names(tmp_path) == ["a.txt", "link", "pipe"]
+    assert (tmp_path / "a.txt").read_text() == "old"  # all or nothing
+
+
+def test_a_link_stays_a_link_and_permissions_stay(tmp_path):
+    plain, link = tmp_path / "plain.txt", tmp_path / "link.txt"
+    plain.write_text("made by the system")
+    write_text(tmp_path / "new.txt", "text")
+    assert stat.S_IMODE((tmp_path / "new.txt").stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
+    plain.chmod(0o640)
+    link.symlink_to("plain.txt")
+    write_text(link, "new")
+    assert link.is_symlink()
+    assert plain.read_text() == "new"
+    assert stat.S_IMODE(plain.stat().st_mode) == 0o640
+
+
+def test_failures_are_not_kept_and_a_file_is_no_store(records, tmp_path):
+    store, later = cr.io.CampaignStore(tmp_path / "store"), tmp_path / "later.csv"
+    missing = functools.partial(cr.read_record, later)
+    broken = cr.identify_campaign([missing, records[0]], method="paper", store=store)
+    assert (len(broken.failed), len(store)) == (1, 1)
+    rows = np.column_stack([records[1].time, records[1].input, records[1].output])
+    np.savetxt(later, rows, delimiter=",", fmt="%.17g", header="t,u,y", comments="")
+    assert cr.identify_campaign([missing, records[0]], method="paper", store=store).failed == ()
+    with pytest.raises(OptionError, match="needs a folder"):
+        cr.io.CampaignStore(later)

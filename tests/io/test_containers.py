@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import pickle
 import struct
 import sys
+import tracemalloc
 import zipfile
 
 import numpy as np
@@ -242,3 +244,52 @@ def test_complex_signals_and_unequal_lengths_are_refused(tmp_path):
     np.savez(tmp_path / "a.npz", t=T, u=U[:-1], y=Y)
     with pytest.raises(DataError, match=r"different lengths: column 'u' 39, column 'y' 40"):
         read_record(tmp_path / "a.npz")
+
+
+def test_a_few_kilobytes_of_parquet_do_not_fill_the_memory(tmp_path):
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    zeros = pa.array(np.zeros(20_000_000))
+    table = pa.table({"time_s": zeros, "u": zeros, "y": zeros})  # 480 MB, less than max_bytes
+    long = {"row_group_size": 2**30, "data_page_size": 2**30, "max_rows_per_page": 2**30}
+    known = inspect.signature(pq.write_table).parameters  # pages of older versions are so anyway
+    chosen = {name: value for name, value in long.items() if name in known}
+    pq.write_table(table, tmp_path / "a", compression="zstd", **chosen)
+    assert (tmp_path / "a").stat().st_size < 10_000
+    with pytest.raises(FileFormatError, match=r"unpacked, is 152\.6 MiB"):
+        read_record(tmp_path / "a")
+
+
+def test_numbers_of_any_parquet_type_are_read(tmp_path):
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    values = np.arange(6) % 3
+    for y in (
+        pa.array(values).cast(pa.decimal128(30, 4)),
+        pa.array(values.astype(np.float16)),
+        pa.array(values, pa.int32()),
+        pa.array(values.astype(str)).dictionary_encode(),
+        pa.array([None, 1, 2, 0, 1, 2], pa.int64()),
+    ):
+        table = pa.table({"time_s": 0.1 * np.arange(6), "u": values, "y": y})
+        pq.write_table(table, tmp_path / "a")
+        record = read_record(tmp_path / "a", missing="keep")
+        assert record.output[1:].tolist() == values[1:].tolist(), y.type
+        assert record.n_missing == y.null_count
+
+
+def test_only_the_wanted_columns_of_a_parquet_file_are_read(tmp_path):
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    long = pa.DictionaryArray.from_arrays(np.zeros(N, dtype=np.int32), ["x" * 1_000_000])
+    columns = {"time_s": T, "u": U, "y": Y, "note": long, "matrix": [[1.0, 2.0]] * N}
+    path = tmp_path / "a.parquet"
+    pq.write_table(pa.table(columns), path, store_schema=False)
+    tracemalloc.start()
+    try:
+        check(read_record(path))
+        with pytest.raises(DataError, match=r"'note', row 0: 'xxx"):
+            read_record(path, output="note")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 5e6  # N texts of a million letters would be 200 MB
+    with pytest.raises(FileFormatError, match=r"column 'matrix' holds list"):
+        read_record(path, output="matrix")

@@ -14,7 +14,10 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize import report
+from ctrl_realize.cli import main
+from ctrl_realize.cli.results import file_name
 from ctrl_realize.io.text.csv_files import write_csv
+from ctrl_realize.plots.names import wrapped
 
 UNITS = [
     "Temp [°C]", "flow [µl/s]", "R [Ω]", "V [m³]", r"back\slash [\1]", r"\g<0> [\u00b0]",
@@ -108,3 +111,34 @@ def test_tags_with_dots_stay_with_the_record_and_are_allowed_in_the_model(method
     assert record.input_labels == ("FIC101.OP",)
     assert record.to_response().input_labels == ["FIC101.OP"]
     assert np.isfinite(ct.dcgain(system))
+
+
+def test_a_dollar_sign_at_the_end_of_a_line_is_no_formula():
+    assert wrapped("a" * 17 + "$ and $b", 18).split("\n")[0] == "a" * 17 + r"\$"
+
+
+def test_the_command_line_takes_units_in_brackets_and_tags_with_dots(tmp_path):
+    t, u, y = step_samples()
+    path = tmp_path / r"Ofen \1 {2} % $3$ [°C].csv"
+    table = pd.DataFrame({"time [s]": t, "FIC101.OP [%]": u, r"TIC101.PV [°C] \u00b0": y})
+    table.to_csv(path, index=False)
+    words = ["identify", str(path), "--input", "1", "--response", "2", "-o", str(tmp_path / "out")]
+    assert main([*words, "--method", "scan", "--order", "1", "--max-delay", "40"]) == 0
+    assert (tmp_path / "out" / "report.html").stat().st_size > 10_000
+    model = cr.load_model(tmp_path / "out" / "model.json")
+    assert model.input_labels == ["FIC101_OP [%]"]
+    assert cr.read_record(path, input=1, output=2).input_labels == ("FIC101.OP [%]",)
+
+
+def test_tags_that_differ_in_a_dot_alone_stay_apart_in_the_model():
+    core = ct.ss(0.5 * np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)), 0.1)
+    system = cr.delayed_ss(core, 1, inputs=["a.b", "a_b"], outputs=["y.1", "y.2"])
+    assert system.input_labels == ["a_b_2", "a_b"]
+    assert system["y_2", "a_b"].issiso()
+    frf = cr.MeasuredFRF(np.ones((2, 2, 3)), [1, 2, 3], name="run.1", inputs=["a.b", "a_b"])
+    assert (frf.name, frf.input_labels) == ("run_1", ["a_b_2", "a_b"])
+
+
+def test_any_name_makes_a_name_of_a_file(tmp_path):
+    for piece in PIECES[:300]:
+        (tmp_path / f"001_{file_name(piece)}.json").write_text("", encoding="utf-8")

@@ -431,3 +431,74 @@ def test_measured_time_stamps_that_are_not_uniform_are_refused_with_the_place(sh
 )
 def test_scaled_time_is_the_double_nearest_to_the_decimal_number(unit, seconds):
     assert to_seconds(np.array([7.0]), unit)[0] == seconds
+
+
+def test_a_header_with_line_breaks_is_one_name(tmp_path):
+    path = tmp_path / "a.csv"
+    text = '"Time\n[s]","Valve\nposition\n[%]","Temp\r\n[°C]"\n'
+    path.write_text(text + "\n".join(",".join(row) for row in rows()), encoding="utf-8", newline="")
+    record = read_record(path, input="Valve position", output=2)
+    is_whole(record)
+    assert record.input_labels == ("Valve position [%]",)
+    assert record.output_labels == ("Temp [°C]",)
+
+
+def test_a_stray_quote_that_swallows_lines_is_told(tmp_path):
+    lines = [",".join([*row, "note"]) for row in rows()]
+    lines[4] = lines[4].replace("note", '"note')
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,u,y,remark\n" + "\n".join(lines) + "\n")
+    with pytest.raises(FileFormatError, match=r"are its quotes|is not a table"):
+        read_record(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "cells", "dt"),
+    [
+        ("time", "min", ["59:58", "59:59", "00:00"], 1.0),
+        ("time", "h", ["23:58", "23:59", "00:00"], 60.0),
+        ("time [mm:ss]", "auto", ["00:59.5", "01:00.0", "01:00.5"], 0.5),
+        ("time [hh:mm]", "auto", ["99:58", "99:59", "100:00"], 60.0),
+        ("time", "min", ["119:59", "120:00", "120:01"], 1.0),
+        ("time", "auto", ["23:59:59.9", "00:00:00.0", "00:00:00.1"], 0.1),
+        ("time", "auto", ["00:05", "00:05", "00:05"], r"line 2.*time_unit='h' or time_unit='min'"),
+        ("time", "auto", ["12:34.5"] * 3, r"line 2.*time_unit='h' or time_unit='min'"),
+        ("time", "min", ["59:58", "59:59", "1:00:00"], "two and three fields"),
+    ],
+)
+def test_a_clock_runs_in_the_unit_that_was_said_or_is_asked_about(
+    tmp_path, header, unit, cells, dt
+):
+    path = tmp_path / "a.csv"
+    path.write_text(f"{header},u,y\n" + "".join(f"{cell},{k},1\n" for k, cell in enumerate(cells)))
+    if isinstance(dt, float):
+        assert read_record(path, time_unit=unit).dt == pytest.approx(dt, rel=1e-12)
+    else:
+        with pytest.raises((OptionError, DataError), match=dt):
+            read_record(path, time_unit=unit)
+
+
+@pytest.mark.parametrize(
+    ("delimiters", "cells", "clear"),
+    [
+        (",", ["1,234", "2,345", "3,456"], False),
+        (",", ["999", "1,001", "1,003"], False),
+        (";\t", ["998", "999", "1,000"], False),
+        (",;", ["1,234", "2,345", "0,456"], True),
+        (",;", ["1,25", "2,345", "3,4"], True),
+        (";", [f"{k + 1},125" for k in range(N)], True),
+    ],
+)
+def test_commas_that_may_divide_thousands_are_asked_about(tmp_path, delimiters, cells, clear):
+    path = tmp_path / "a.csv"
+    for delimiter in delimiters:
+        with path.open("w", newline="") as file:
+            writer = csv.writer(file, delimiter=delimiter)
+            writer.writerows([["time_s", "u", "y"], *([k, k, c] for k, c in enumerate(cells))])
+        if not clear:
+            with pytest.raises(
+                FileFormatError, match=r"may be \d\.\d{3} or \d{4}; give decimal=','"
+            ):
+                read_record(path)
+        read = read_record(path, **({} if clear else {"decimal": ","})).output
+        np.testing.assert_array_equal(read, [float(c.replace(",", ".")) for c in cells])

@@ -16,6 +16,7 @@ from scipy import stats
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import ctrl_realize as cr
+from ctrl_realize.errors import DataError
 from ctrl_realize.numerics.blas_threads import one_blas_thread, single_threaded
 from ctrl_realize.numerics.statistics import circle_quantile, trimmed_statistics, upper_quantile
 
@@ -107,3 +108,9 @@ def test_a_model_is_the_same_with_one_thread_and_with_two():
         two = numbers()
     for a, b in zip(one, two, strict=True):
         assert_array_equal(a, b)
+
+
+def test_an_error_leaves_the_setting_as_it_was(two_threads):
+    with pytest.raises(DataError):
+        cr.impulse_from_io(cr.Record(np.arange(50.0), np.zeros(50), np.arange(50.0)))
+    assert threads() == {2}

@@ -21,6 +21,7 @@ from ctrl_realize.identification.output_error.averaging import (
     widened,
 )
 from ctrl_realize.identification.output_error.repeatability import Repeatability
+from ctrl_realize.report.verdict import campaign_verdict
 from tests import rigs
 
 TS = rigs.TS
@@ -259,3 +260,82 @@ def test_records_of_one_plant_are_not_told_apart():
 def test_what_differs_is_named(name, values, code):
     records = [step(1.0 + i, i, **{name: value}) for i, value in enumerate(values)]
     assert code in told(records)
+
+
+def driven(seed, gain=1.0, lag=1.0, delay=0.5, noise=0.02):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)
+    plant = cr.delayed_ss(
+        cr.design.ProcessModel(gain=gain, lag=lag, dead_time=delay).system(0.05).delay_free,
+        round(delay / 0.05),
+    )
+    y = plant.simulate(u) + noise * rng.standard_normal(u.size)
+    return cr.Record(T, u, y, name=f"driven_{seed}")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "code"),
+    [("gain", 2.0, "no_common_gain"), ("lag", 1.5, "lags_differ")],
+)
+def test_records_of_other_inputs_are_compared_too(name, value, code):
+    same = [driven(seed) for seed in (1, 2)]
+    assert not told(same) & {"gains_differ", "lags_differ", "no_common_gain"}
+    assert code in told([*same[:1], driven(2, **{name: value})])
+
+
+def test_the_gains_of_a_canal_differ_with_the_opening_of_its_gate(shared_data):
+    folder = shared_data / "wis_canal"
+    records = [
+        cr.read_record(folder / f"20210202_step_gate1_2_s{opening}.csv")
+        for opening in (25, 100, 255)
+    ]
+    system = cr.identify(records)
+    assert "gains_differ" in {flag.code for flag in system.fit.flags}
+    assert report.verdict_of(system).level == "poor"
+
+
+def test_table_and_picture_show_every_record_beside_the_model():
+    records = [step(1.0, 0, 1.0, lag=0.8), step(2.0, 1, 0.5), step(4.0, 2, 0.25, lag=1.3)]
+    fit = cr.fit_output_error(records, structures=[(1, 1)]).fit
+    table = fit.repeatability.table()
+    assert list(table.index) == ["step_1", "step_2", "step_4"]
+    # over each other: 0.8 to 1 to 1.3; the common model fits the mean
+    ratio = (table["lags"] / table["lags"]["step_2"]).to_numpy()
+    np.testing.assert_allclose(ratio, [0.8, 1.0, 1.3], rtol=0.03)
+    assert (table["fit_percent"] < 100).all()
+    drawn = cr.plots.fit_plot(fit).figure.axes[0].get_lines()
+    ends = [float(np.mean(line.get_ydata()[-50:])) for line in drawn]
+    for gain in (1.0, 0.5, 0.25, fit.gain):
+        assert min(abs(end - gain) for end in ends) < 0.02
+
+
+CAMPAIGNS = {
+    "one plant": ([step(h, 50 + h) for h in (1, 2, 4)], set(), set()),
+    "gains": (
+        [step(2.0**k, k, 0.5**k) for k in range(3)],
+        {"gains_differ", "no_common_gain"},
+        {"lags_differ"},
+    ),
+    "dead times": (
+        [step(2.0, k, delay=0.5 + 0.1 * k) for k in range(3)],
+        {"records_differ"},
+        {"gains_differ"},
+    ),
+    "lags": ([step(2.0, k, lag=1.0 + 0.3 * k) for k in range(3)], {"lags_differ"}, set()),
+}
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_a_campaign_tells_what_differs_from_record_to_record(name):
+    records, due, not_due = CAMPAIGNS[name]
+    campaign = cr.identify_campaign(records, structures=[(1, 1)])
+    flags = {flag.code for flag in campaign.flags}
+    assert due <= flags
+    assert not flags & not_due if due else not flags
+    if name == "dead times":  # not taken for gains or lags
+        small = [step(1.0 + k, k, delay=0.5 + 0.05 * k) for k in range(3)]
+        assert not told(small) & {"gains_differ", "lags_differ"}
+    if name == "gains":
+        assert due <= {f.code for f in cr.identify_campaign(records, method="scan").flags}
+        assert campaign_verdict(campaign).level == "poor"
+        np.testing.assert_allclose(campaign.table()["gain"], [1.0, 0.5, 0.25], rtol=0.05)

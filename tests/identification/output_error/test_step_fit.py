@@ -304,3 +304,16 @@ def test_coinciding_poles_are_given_apart_by_a_thousandth(times):
     assert gaps.max() < 4e-3
     # the frequency response moves by no more than the poles do
     assert_allclose(response(known_factor(system)), system(S), rtol=2e-3 * times)
+
+
+def test_records_of_other_inputs_are_looked_at_too():
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.choice([-1.0, 1.0], 150), 4)
+    core = cr.design.ProcessModel(1.0, 12.0, 3.0, second_lag=6.0).system(1.0).delay_free
+    y = cr.delayed_ss(core, 3).simulate(u) + 0.01 * rng.standard_normal(u.size)
+    record = cr.Record(np.arange(u.size) * 1.0, u, y)
+    fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
+    assert fit.dead_time > 4
+    assert fit.better is not None
+    assert fit.better.dead_time == pytest.approx(3.0, abs=0.5)
+    assert cr.fit_output_error(record, structures=[(2, 2)]).fit.better is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import UnsuitableSystemError
+from ctrl_realize.errors import OptionError, UnsuitableSystemError
 from tests.rigs import R3, TS, lag, pair
 
 
@@ -221,3 +221,32 @@ def test_a_dead_time_under_a_random_walk_is_followed_behind_a_high_pass(seed):
     assert np.mean(track.resolved[late]) > 0.9
     assert wrong(track, 45) <= 0.1 * np.sum(track.resolved)
     assert abs(passed.estimate().delay - 45) <= 3
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_residual_much_louder_than_the_models_stops_it_from_telling(known):
+    """From 8 s on the output takes in a wave that the input does not explain."""
+    record = operated(cr.delayed_ss(R3, delay=37, dt=TS), seconds=16, seed=0)
+    loud = tracker(dynamics=False, noise_std=0.08 if known else None)
+    wave = 5 * 0.08 * 2**0.5 * np.sin(2 * np.pi * 0.7 * record.time) * (record.time > 8)
+    track = loud.track(cr.Record(record.time, record.input, record.output + wave))
+    assert np.all(track.resolved[(track.time > 4) & (track.time < 8)])
+    last = loud.estimate()
+    assert (last.resolved, last.lost) == (False, True)
+    assert "the track is lost" in last.report()
+    with pytest.raises(OptionError, match="noise_std"):
+        tracker(noise_std=-1.0)
+
+
+def test_intervals_are_in_seconds_and_in_samples():
+    record, _ = worn_valve(seconds=6, last=37.0)
+    bank = tracker(dynamics=False)
+    track = bank.track(record)
+    told = bank.estimate()
+    assert told.interval == tuple(TS * d for d in told.delay_interval)
+    assert told.dead_time_interval == told.interval
+    assert told.interval[0] - TS / 2 <= told.dead_time <= told.interval[1] + TS / 2
+    np.testing.assert_allclose(track.low, TS * track.delay_low)
+    np.testing.assert_allclose(track.high, TS * track.delay_high)
+    # A model that is used for a controller brings its interval along.
+    assert cr.design.pid(bank.model).check.stable_within_interval is not None

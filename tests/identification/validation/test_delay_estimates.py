@@ -154,3 +154,10 @@ def test_only_pairs_that_rule_each_other_out_are_in_conflict():
         assert [set(pair) for pair in common_dead_time(order)[1]] == [{"a", "c"}]
     # the interval of an upper bound begins where nothing is said: only its end counts
     assert common_dead_time([A, seen("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
+
+
+def test_an_estimate_is_rounded_as_its_interval_is():
+    shown = check(
+        [DelayEstimate("a", "FRF", "dead time", 0.0123456, 0.012, 0.013)], dt=0.01
+    ).report()
+    assert "12.3 ms = 1.235 samples (12.0 to" in shown

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.output_error.condensed import condensed
+from ctrl_realize.numerics.output_error.condensed import MOST_LAGS, condensed
 from ctrl_realize.numerics.output_error.step_data import (
     StepData,
     fixed_regressors,
@@ -15,6 +15,7 @@ from ctrl_realize.numerics.output_error.step_data import (
     stop_at,
     window,
 )
+from ctrl_realize.numerics.regression.normal_equations import normal_equations
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.responses import SampledInput
 from ctrl_realize.numerics.separable.varpro import KnownFactor
@@ -240,3 +241,22 @@ def test_slow_noise_is_no_drift(pole):
     assert rest_noise(slow[:500] + 0.5 * np.arange(500), slow, 0.0)[1] == pytest.approx(
         0.5, abs=0.05
     )
+
+
+def test_directions_that_are_not_excited_have_no_row():
+    # two lines: four directions
+    k = np.arange(20_000)
+    u = np.sin(0.3 * k) + np.sin(0.8 * k)
+    y = lfilter(0.9 ** np.arange(LAGS), [1.0], u) + 0.1 * np.random.default_rng(0).standard_normal(
+        k.size
+    )
+    found = condensed([y], [u], FINE, LAGS, huber=False)
+    assert found.data.size == 4
+    sums = normal_equations(u[None], y[None], LAGS)
+    assert_allclose(found.drive.factor.T @ found.drive.factor, sums.gram, atol=1e-6 * sums.rows)
+
+
+@pytest.mark.parametrize(("samples", "lags"), [(500, LAGS), (30_000, MOST_LAGS + 1), (3000, 1)])
+def test_what_cannot_be_condensed_is_left(samples, lags):
+    y, u = record(samples)
+    assert condensed([y], [u], FINE, lags, huber=True) is None

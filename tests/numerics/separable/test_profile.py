@@ -174,3 +174,15 @@ def test_what_is_compared_has_no_slope_and_the_cost_of_the_data_of_now():
     for shape, candidate in on_new_data(moved, found).items():
         state = evaluate(moved, shape, candidate.parameters[None])
         assert candidate.cost == float(state.cost[0])
+
+
+def test_the_unit_of_time_changes_delay_and_lags_and_nothing_else():
+    structure, found = Structure(2, 2), []
+    for unit in (1.0, 1e-3, 60.0):
+        problem, scales = problem_of(unit=unit)
+        bounds = parameter_bounds(structure, scales)
+        first = start(18.0 * unit, 10.0 * unit, 40.0 * unit)
+        near = polish(problem, structure, first[None], bounds, scales.dt)[0][0]
+        x, cost = settle(problem, structure, near, bounds, scales.dt)
+        found.append([x[0] / unit, x[1] + np.log(unit), x[2], cost])
+    assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from ctrl_realize.numerics.signals.edges import Edge, despike, difference_noise, find_edges
+from ctrl_realize.numerics.signals.excitation import lively_start
 from ctrl_realize.numerics.signals.step_sequence import input_moves
 
 
@@ -106,3 +107,32 @@ def test_a_drooping_input_is_followed_by_means_that_grow():
     assert written(index, size)[start] == pytest.approx(
         clean[start:stop].mean(), abs=4 * NOISE / np.sqrt(stop - start)
     )
+
+
+def test_no_more_edges_are_looked_for_than_are_wanted():
+    signal = np.repeat(np.random.default_rng(0).permutation(np.arange(300) % 2), 20).astype(float)
+    whole = find_edges(signal, 3, 0.1)
+    some = find_edges(signal, 3, 0.1, most=12)
+    assert len(whole) > 100
+    assert [edge.index for edge in some] == [edge.index for edge in whole[:13]]
+
+
+def moving(samples: int) -> np.ndarray:
+    return np.random.default_rng(1).choice([-1.0, 1.0], samples)
+
+
+@pytest.mark.parametrize("level", [0.0, 1e6])
+def test_the_part_that_is_fitted_begins_where_the_inputs_move(level):
+    zeros = np.zeros
+    assert lively_start(level + moving(5000)[None], 400) == 0
+    for rest in (450, 1000, 3999):
+        signal = level + np.concatenate([zeros(rest), moving(2000), zeros(3000)])
+        # half of the variance there is: the stretch begins up to half its length before
+        assert rest - 300 <= lively_start(signal[None], 400) <= rest + 100
+    both = np.full((2, 4000), level)
+    both[0, :3000] += moving(3000)
+    both[1, 2000:] += moving(2000)
+    assert 1600 <= lively_start(both, 400) <= 2600
+    short, late = np.r_[zeros(300), moving(100)], np.r_[zeros(999), 1.0]
+    assert lively_start(level + short[None], 400) == 0
+    assert lively_start(level + late[None], 300) == 700

@@ -145,3 +145,47 @@ def test_errors_are_those_that_come(pole):
     spread = np.sqrt(np.mean(np.square(scores), axis=0))
     # 24 records: chi-square leaves 0.72 to 1.28; the colour is estimated along.
     assert np.all((spread > 0.6) & (spread < 1.5))
+
+
+def test_a_delay_that_depends_on_the_direction_is_measured():
+    rng = np.random.default_rng(0)
+    model = response(rng)
+    rising = (np.gradient(model) > 0).astype(int)
+    late = np.array([0.5, -0.5])  # samples; small, the regression being one on the derivative
+    residual = -late[rising] * np.gradient(model) + 0.002 * rng.standard_normal(SAMPLES)
+    found = parameter_change(residual, model, rising)
+    assert found.chance < 1e-6
+    assert found.shifts == pytest.approx(late, abs=0.1)
+
+
+def test_set_points_hide_no_feedback_and_units_change_no_chance():
+    rng = np.random.default_rng(0)
+    u, y = loop(rng, 2.0, 0.0, 0.02 * rng.standard_normal(N))  # the input moves more than noise
+    assert feedback_chance(y, u, 20) < SURE
+    u, y = loop(rng, 0.3, 0.01, 0.05 * rng.standard_normal(N))
+    one = feedback_chance(y, u, 20)
+    assert feedback_chance(1e3 * y + 7, 1e-3 * u - 2, 20) == pytest.approx(one, rel=1e-4)
+
+
+def test_where_nothing_can_be_told_nothing_is_said():
+    rng = np.random.default_rng(0)
+    u = np.sin(0.1 * np.arange(N))  # told by its own past
+    assert feedback_chance(first_order(u) + 0.05 * rng.standard_normal(N), u, 20) == 1.0
+    short = rng.standard_normal(80)
+    assert feedback_chance(short, short, 20) == 1.0
+    assert nonlinear_chance(short, short, 20) == (1.0, 0.0)
+    noise = rng.standard_normal(SAMPLES)
+    assert parameter_change(noise, response(rng), np.zeros(SAMPLES, dtype=int)) is None
+    assert parameter_change(np.zeros(SAMPLES), response(rng), THIRDS) is None
+    u, y = record(0, 0.1, 0.0)
+    assert step(u[:45], y[:45]) is None
+
+
+def test_units_are_carried_through_the_step():
+    u, y = record(3, 0.1, 0.9)
+    one = step(u, y)
+    poles = np.array([-1.2, -4.0], dtype=complex)
+    other = white_step(10 * y, u / 2, DT, DELAY, poles, 20 * NUMERATOR)
+    assert other.gain == pytest.approx(20 * one.gain, rel=1e-6)
+    assert other.delay_error == pytest.approx(one.delay_error, rel=1e-6)
+    assert other.total_error == pytest.approx(one.total_error, rel=1e-6)
