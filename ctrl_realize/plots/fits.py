@@ -50,16 +50,12 @@ def fit_plot(
 
     Examples
     --------
-    >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> t = 0.01 * np.arange(900)
-    >>> u = np.where(t < 1.0, 0.0, 2.0)
-    >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
-    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
-    >>> sys = cr.fit_output_error(cr.Record(t, u, y + noise), structures=[(1, 1)])
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> sys = cr.fit_output_error(record, structures=[(1, 1)])
     >>> cplt = cr.plots.fit_plot(sys)
-    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
-    ['output', 'residual', '']
+    >>> cplt.figure.axes[-1].get_xlabel()
+    'dead time [ms]'
     """
     result = _delay_fit(fit)
     rows = evidence_height(result)
@@ -98,13 +94,9 @@ def dead_time_plot(
 
     Examples
     --------
-    >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> t = 0.01 * np.arange(900)
-    >>> u = np.where(t < 1.0, 0.0, 2.0)
-    >>> y = np.where(t < 1.125, 0.0, 6 * -np.expm1(-(t - 1.125) / 0.4))
-    >>> noise = 0.01 * np.random.default_rng(1).standard_normal(t.size)
-    >>> sys = cr.fit_output_error(cr.Record(t, u, y + noise), structures=[(1, 1), (2, 2)])
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> sys = cr.fit_output_error(record, structures=[(1, 1)])
     >>> cplt = cr.plots.dead_time_plot(sys)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time [ms]'

@@ -44,13 +44,10 @@ def residual_plot(
 
     Examples
     --------
-    >>> import control as ct
-    >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
-    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
-    >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = cr.plots.residual_plot(cr.validation.analyse_residuals(plant, record))
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> model = cr.identify(record, method="scan")
+    >>> cplt = cr.plots.residual_plot(cr.validation.analyse_residuals(model, record))
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
@@ -85,12 +82,8 @@ def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) 
 
     Examples
     --------
-    >>> import control as ct
-    >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
-    >>> u, noise = np.random.default_rng(0).standard_normal((2, 500))
-    >>> record = cr.Record(0.1 * np.arange(500), u, plant.simulate(u) + 0.05 * noise)
+    >>> record = cr.bench.valve().step_record(16, rng=5)
     >>> cplt = cr.plots.state_space_fit_plot(cr.fit_state_space(record, 1).fit)
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
@@ -121,15 +114,12 @@ def prediction_plot(
 
     Examples
     --------
-    >>> import control as ct
-    >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> plant = cr.DelayedStateSpace(ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], 0.1), 5)
-    >>> u, noise = np.random.default_rng(0).standard_normal((2, 300))
-    >>> record = cr.Record(0.1 * np.arange(300), u, plant.simulate(u) + 0.05 * noise)
-    >>> cplt = cr.plots.prediction_plot(cr.validation.predict(plant, record, 10))
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> model = cr.identify(record, method="scan")
+    >>> cplt = cr.plots.prediction_plot(cr.validation.predict(model, record, 10))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
-    ['measured', '10 ahead, fit 86.6 %']
+    ['measured', '10 ahead, fit 99.8 %']
     """
     row = whole(output, "output", 0, prediction.fit_percent.size - 1)
     label = f"{prediction.horizon} ahead, fit {prediction.fit_percent[row]:.1f} %"
