@@ -20,7 +20,7 @@ from ctrl_realize.errors import (
     TimeAxisError,
     UnsuitableSystemError,
 )
-from ctrl_realize.numerics.signals.rise import rise_time
+from ctrl_realize.numerics.signals.onset import rise_time
 from ctrl_realize.numerics.state_space.pole_sensitivity import moved_core, pole_directions
 from tests.fuzz.lane import good_end
 

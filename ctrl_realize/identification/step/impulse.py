@@ -16,7 +16,7 @@ from ...numerics.signals.filters import (
     low_pass,
     settling_samples,
 )
-from ...numerics.signals.rise import rise_time
+from ...numerics.signals.onset import rise_time
 
 BANDWIDTH_TIMES_RISE = 0.35
 """-3 dB bandwidth in Hz times the 10-90 % rise time, for a lag of any order within 5 %."""
