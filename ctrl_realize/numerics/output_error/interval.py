@@ -35,7 +35,7 @@ from ..separable.lag_chains import (
     still_improving,
 )
 from ..separable.profile_ends import profile_limits
-from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, plausible
+from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
 from .result import (
@@ -160,10 +160,10 @@ def _not_ruled_out(
     flows: Sequence[DispersedFlow],
 ) -> _Kept:
     more = max(LEAST_CHARGE - whole.penalty, 0.0)
-    charged = {s: value + more * (s.order + s.zeros) for s, value in whole.criterion.items()}
     level = choice.level + more * choice.parameters
     limit = level + PLAUSIBLE
-    free = plausible(whole.candidates, charged, whole.variance, choice.model, level)
+    values = charged(whole.criterion, whole.penalty)
+    free = plausible(whole.candidates, values, whole.variance, choice.model, level)
     return _Kept(
         profiles_of(whole, free, choice.model.structure),
         [

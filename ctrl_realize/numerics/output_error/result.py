@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain, lag_sum
-from ..separable.profile import delay_profile
+from ..separable.profile import delay_profile, profile_curve, profile_points, with_ends
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import StaticGain, averaged_ends
 from ..separable.structures import Candidate, needless_parameters
@@ -157,9 +157,9 @@ class OutputErrorEstimate:
         return max(low, 0.0), high
 
 
-def profile_of(whole: WindowFit, candidate: Candidate, *, solved: bool = True) -> Profile:
+def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
     """Misfit over the delay of one candidate of a window."""
-    return delay_profile(whole.problem, candidate, whole.variance, whole.scales, solved=solved)
+    return delay_profile(whole.problem, candidate, whole.variance, whole.scales)
 
 
 def profiles_of(
@@ -170,7 +170,10 @@ def profiles_of(
     Between the points of a profile its ends are known to a few parts in a hundred; of the chosen
     structure, and of those that reach as far as any, they are solved for.
     """
-    found = {s: profile_of(whole, whole.candidates[s], solved=False) for s in structures}
+    setting = whole.variance, whole.scales
+    models = {s: whole.candidates[s] for s in structures}
+    points = {s: profile_points(whole.problem, model, *setting) for s, model in models.items()}
+    found = {s: profile_curve(points[s], model, *setting) for s, model in models.items()}
     limits = {s: profile_limits(*profile) for s, profile in found.items()}
     # None are left where a dispersed flow rules out every structure.
     low = min((first for first, _ in limits.values()), default=np.inf)
@@ -178,7 +181,8 @@ def profiles_of(
     for s, (first, last) in limits.items():
         margin = _ROUGHLY * (last - first)
         if s == chosen or first - margin <= low or last + margin >= high:
-            found[s] = profile_of(whole, whole.candidates[s])
+            solved = with_ends(whole.problem, points[s], *setting)
+            found[s] = profile_curve(solved, models[s], *setting)
     return found
 
 

@@ -23,9 +23,14 @@ from .structures import (
     Candidate,
     Scales,
     apart,
+    charged,
+    choose,
     criteria,
+    needless_parameters,
     neighbour_starts,
     parameter_bounds,
+    parameter_charge,
+    plausible,
 )
 from .varpro import Problem, Structure, evaluate
 
@@ -38,6 +43,7 @@ _CLOSE, _OTHERS = 1.0, 2
 _STARTS, _PROMISING = 3, 10.0
 """Starts that are followed beside the best end of a search, and variances that they may be above
 it. With free initial states of records all are: there valleys are many, and flat."""
+_SLACK = 2.0  # variances that may be left to a minimum where steps of Gauss and Newton end
 _ALL = 4  # structures that are few enough for each to matter
 
 
@@ -84,9 +90,26 @@ def converged(
         value = criteria(found, variance, samples)
         if len(found) > _ALL and value[structure] > min(value.values()) + REACH:
             continue
-        near = _near_minimum(problem, structure, scales, found)
-        found[structure] = settled(problem, near, scales) if last else near
-    return found
+        found[structure] = _near_minimum(problem, structure, scales, found)
+    if not last:
+        return found
+    return found | {
+        s: settled(problem, found[s], scales)
+        for s in _that_matter(found, variance, samples)
+        if not found[s].searched
+    }
+
+
+def _that_matter(
+    found: dict[Structure, Candidate], variance: float, samples: float
+) -> list[Structure]:
+    """What may be chosen or not be ruled out, when it has come to its minimum."""
+    if len(found) <= _ALL:
+        return list(found)
+    values = charged(criteria(found, variance, samples), parameter_charge(samples))
+    chosen = choose(values)
+    level = values[chosen] + needless_parameters(chosen)
+    return plausible(found, values, variance, found[chosen], level, _SLACK)
 
 
 def settled(problem: Problem, candidate: Candidate, scales: Scales) -> Candidate:

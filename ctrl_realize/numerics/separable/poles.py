@@ -42,18 +42,21 @@ def poles_from_parameters(theta: FloatArray) -> tuple[ComplexArray, ComplexArray
     start = order % 2
     if start:
         poles[:, 0] = derivative[:, 0, 0] = -np.exp(theta[:, 0])
-    for i in range(start, order, 2):
-        omega, zeta = np.exp(theta[:, i]), np.exp(theta[:, i + 1])
-        square = zeta**2 - 1.0
-        near = np.abs(square) < _GAP**2 / 4
-        square = np.where(near, np.where(square < 0, -1, 1) * _GAP**2 / 4, square)
-        root = np.sqrt(square.astype(np.complex128))
-        for j, sign in ((i, 1.0), (i + 1, -1.0)):
-            # -omega (zeta - root) = -omega / (zeta + root): no cancellation.
-            shape = -1.0 / (zeta + root) if sign > 0 else -(zeta + root)
-            shape = np.where(square > 0, shape, -zeta + sign * root)
-            poles[:, j] = derivative[:, j, i] = omega * shape
-            derivative[:, j, i + 1] = zeta * omega * (-1.0 + sign * zeta / root)
+    first = np.arange(start, order, 2)
+    second = first + 1
+    omega, zeta = np.exp(theta[:, first]), np.exp(theta[:, second])
+    square = zeta**2 - 1.0
+    near = np.abs(square) < _GAP**2 / 4
+    square = np.where(near, np.where(square < 0, -1, 1) * _GAP**2 / 4, square)
+    root = np.sqrt(square.astype(np.complex128))
+    # -omega (zeta - root) = -omega / (zeta + root): no cancellation.
+    slow = omega * np.where(square > 0, -1.0 / (zeta + root), -zeta + root)
+    fast = omega * -(zeta + root)
+    poles[:, first] = derivative[:, first, first] = slow
+    poles[:, second] = derivative[:, second, first] = fast
+    turn = zeta / root
+    derivative[:, first, second] = zeta * omega * (-1.0 + turn)
+    derivative[:, second, second] = zeta * omega * (-1.0 - turn)
     return _separate(poles), derivative
 
 
@@ -77,6 +80,9 @@ def parameters_from_poles(poles: ComplexArray) -> FloatArray:
 def _separate(poles: ComplexArray) -> ComplexArray:
     """Move coinciding poles of different factors apart by the smallest useful amount."""
     order = poles.shape[1]
+    gap = np.abs(poles[:, :, None] - poles[:, None]) < 0.5 * _GAP * np.abs(poles[:, None])
+    if np.count_nonzero(gap) == gap.shape[0] * order:  # every pole with itself
+        return poles
     for j in range(1, order):
         for _ in range(order):
             gap = np.abs(poles[:, :j] - poles[:, j, None]) < 0.5 * _GAP * np.abs(poles[:, j, None])

@@ -18,6 +18,8 @@ References
    (Least-squares problems), doi:10.1007/978-0-387-40065-5.
 .. [3] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
    intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+.. [4] C. T. Kelley, Iterative Methods for Optimization, SIAM 1999, section 2.3 (The chord method is
+   Newton's with a Hessian that is kept), doi:10.1137/1.9781611970920.
 """
 
 from __future__ import annotations
@@ -31,13 +33,17 @@ from .varpro import Bounds, Problem, Structure, evaluate
 _CONVERGED = 1e-14
 """Predicted decrease over the sum of squares at which a fit has converged. What is d variances
 above a minimum is sqrt(d) standard errors from it: with 1000 samples, three millionths of one."""
-_NEAR = 1e-5  # of the sum of squares: predicted decrease at which Newton's steps take over
+_NEAR = 0.05  # variances: predicted decrease at which Newton's steps take over
 _NO_WAY = 0.03  # of the distance to a level, as predicted decrease, at which it is not reached
 _IN_ROUNDING = 1e-11  # of the sum of squares: whether so little is a decrease, rounding decides
 _DAMPING = 1e-4  # of the first step, in squared columns of the Jacobian
 _LONGEST_STEP = 1.0  # of a logarithmic parameter
 _MOST_TURNS = 25
-_NEWTON_TURNS, _MOST_CELLS = 12, 8
+_NEWTON_TURNS, _MOST_CELLS = 40, 8
+_MOST_HESSIANS = 12
+_KEPT = 0.1
+"""Part of the step before that a step with the same Hessian may be: then it converges as it is [4]_,
+and a Hessian costs as much as a handful of gradients."""
 _SMALL = 1e-4  # of a logarithmic parameter, or of a sample: for differences of the gradient
 _FLAT = 1e-12  # of the largest curvature: a direction in which rounding bends
 _GIVEN_UP = 1e6  # by which a step is shortened at most
@@ -125,7 +131,7 @@ def polish(
         growth[down] *= 2.0
         crossed[active] = turn
         pinned[active[kink]] = True
-        enough = _NEAR * cost[active]
+        enough = _NEAR / problem.data.size * cost[active]
         if delay_fixed and level is not None:
             enough = np.maximum(enough, _NO_WAY * np.abs(cost[active] - level))
         elif not delay_fixed:
@@ -188,7 +194,6 @@ def _other_side(delay: FloatArray, way: IntArray, dt: float) -> FloatArray:
 def _snapped(delay: FloatArray, dt: float) -> FloatArray:
     """Take back by how much a delay lies beside a sample to be on a side of it."""
     sample = np.round(delay / dt)
-    # Plus nothing: not the zero that is negative.
     # Plus nothing: no zero is negative.
     return np.where(np.abs(delay / dt - sample) <= 2 * _BESIDE, sample * dt + 0.0, delay)
 
@@ -282,8 +287,9 @@ def solve_level(
     unit[0] = dt
     limits = bounds.low, bounds.high
     others = np.arange(x.size) > 0
+    cost, slope, hessian = _curvature(problem, structure, x, unit, limits)
+    before, made = 0.0, 1
     for _ in range(_NEWTON_TURNS):
-        cost, slope, hessian = _curvature(problem, structure, x, unit, limits)
         free = others & ~((x <= limits[0]) & (slope > 0) | (x >= limits[1]) & (slope < 0))
         curvature = hessian[np.ix_(free, free)]
         try:
@@ -303,10 +309,19 @@ def solve_level(
         if off <= _LEVEL * variance:
             x[0] += away * unit[0]
             return x
+        if 0 < before * _KEPT < off:
+            # The Hessian of before is another one here.
+            if made == _MOST_HESSIANS:
+                return None
+            cost, slope, hessian = _curvature(problem, structure, x, unit, limits)
+            before, made = 0.0, made + 1
+            continue
         step = np.zeros(x.size)
         step[0], step[free] = away, back + along * away
         step /= max(1.0, float(np.abs(step[1:]).max(initial=0.0)) / _LARGEST)
         x = np.clip(x + step * unit, *limits)
+        (cost,), (slope,) = _slopes(problem, structure, x[None], unit)
+        before = off
     return None
 
 
@@ -331,6 +346,7 @@ def _newton(
     low, high = bounds
     damping = 0.0
     cost, slope, hessian = _curvature(problem, structure, x, unit, bounds)
+    before, made = 0.0, 1
     for _ in range(_NEWTON_TURNS):
         free = ~((x <= low) & (slope > 0) | (x >= high) & (slope < 0) | (low >= high))
         step = _newton_step(slope, hessian, free, (low - x) / unit, (high - x) / unit)
@@ -338,14 +354,23 @@ def _newton(
         predicted = -float(slope @ step)
         if predicted <= 2 * _CONVERGED * cost:
             break
-        trial = np.clip(x + step * unit, low, high)
-        moved = _curvature(problem, structure, trial, unit, bounds)
-        if moved[0] < cost or predicted <= _IN_ROUNDING * cost:
-            x, (cost, slope, hessian), damping = trial, moved, 0.0
-        else:
+        lost = 0 < _KEPT**2 * before < predicted
+        if not lost:
+            trial = np.clip(x + step * unit, low, high)
+            (reached,), (turned,) = _slopes(problem, structure, trial[None], unit)
+            if reached < cost or predicted <= _IN_ROUNDING * cost:
+                x, cost, slope, damping, before = trial, float(reached), turned, 0.0, predicted
+                continue
+        if before == 0:
+            # With the Hessian of this place: too long a step.
             damping = max(10 * damping, 1.0)
             if damping > _GIVEN_UP:
                 break
+        elif made == _MOST_HESSIANS:
+            break
+        else:
+            cost, slope, hessian = _curvature(problem, structure, x, unit, bounds)
+            before, made = 0.0, made + 1
     return x, cost, slope
 
 
@@ -388,10 +413,17 @@ def _curvature(
     rows = np.tile(x, (1 + 2 * moving.size, 1))
     ahead, behind = 1 + np.arange(moving.size), 1 + moving.size + np.arange(moving.size)
     rows[ahead, moving], rows[behind, moving] = later[moving], earlier[moving]
-    state = evaluate(problem, structure, rows)
-    slopes = -2 * np.einsum("bmp,bm->bp", state.jacobian, state.residual) * unit
+    cost, slopes = _slopes(problem, structure, rows, unit)
     hessian = np.eye(x.size)
     distance = (later - earlier)[moving] / unit[moving]
     bend = (slopes[ahead] - slopes[behind]) / distance[:, None]
     hessian[np.ix_(moving, moving)] = (bend[:, moving] + bend[:, moving].T) / 2
-    return float(state.cost[0]), slopes[0], hessian
+    return float(cost[0]), slopes[0], hessian
+
+
+def _slopes(
+    problem: Problem, structure: Structure, rows: FloatArray, unit: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Costs (B,) and gradients (B, 1 + n) in parameters over their units."""
+    state = evaluate(problem, structure, rows)
+    return state.cost, -2 * np.einsum("bmp,bm->bp", state.jacobian, state.residual) * unit

@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -37,14 +38,12 @@ _INSIDE = np.array([-0.5, 0.02, 0.4, 1 - _LATE, 1.2])  # of the sample in which 
 _JUMP = 4.0  # pole, in 1/samples, whose response is over within a sample
 _NOTHING = 1e-9  # part of a sensitivity that is rounding
 
+Points: TypeAlias = dict[float, Candidate]
+"""Best models with given delays, by these, in s."""
+
 
 def delay_profile(
-    problem: Problem,
-    candidate: Candidate,
-    variance: float,
-    scales: Scales,
-    *,
-    solved: bool = True,
+    problem: Problem, candidate: Candidate, variance: float, scales: Scales
 ) -> tuple[FloatArray, FloatArray]:
     """Misfit of the best model with each of a range of fixed delays.
 
@@ -58,8 +57,6 @@ def delay_profile(
     scales : Scales
         The profile covers ``scales.earliest`` ... ``scales.latest``, densest where the local
         curvature puts the ends of the interval.
-    solved : bool, optional
-        Whether the ends are solved for, or lie between two points of the profile.
 
     Returns
     -------
@@ -68,16 +65,23 @@ def delay_profile(
     excess : ndarray, shape (G,)
         Cost above the minimum, over the variance: chi-square of one degree of freedom.
     """
+    points = profile_points(problem, candidate, variance, scales)
+    points = with_ends(problem, points, variance, scales)
+    return profile_curve(points, candidate, variance, scales)
+
+
+def profile_points(
+    problem: Problem, candidate: Candidate, variance: float, scales: Scales
+) -> Points:
+    """Best models at delays of a grid, between which the ends of the interval lie."""
     half = _EDGE * delay_error(problem, candidate, variance)
     low, high = scales.earliest, scales.latest
-    fastest = float(np.abs(candidate.poles).max()) * scales.dt
     grid = np.linspace(low, high, _FAR)
     if np.isfinite(half):
         grid = np.concatenate([candidate.delay + half * _NEAR, grid])
-    if fastest > _JUMP:
+    if _jumps(candidate, scales):
         # Nothing changes while the jump stays between the same two samples.
-        sample = np.floor(candidate.delay / scales.dt + _SHORT)
-        grid = np.concatenate([(sample + _INSIDE) * scales.dt, grid])
+        grid = np.concatenate([(_jump_sample(candidate, scales) + _INSIDE) * scales.dt, grid])
     grid = np.unique(np.clip(grid, low, high))
     starts = np.tile(candidate.parameters, (grid.size, 1))
     starts[:, 0] = grid
@@ -95,23 +99,43 @@ def delay_profile(
         float(at): Candidate(structure, x, float(c))
         for at, x, c in zip(grid, fitted, cost, strict=True)
     }
-    points[candidate.delay] = candidate
+    return points | {candidate.delay: candidate}
+
+
+def with_ends(problem: Problem, points: Points, variance: float, scales: Scales) -> Points:
+    """Add the ends of the 95 % interval to the points of a profile."""
+    found = dict(points)
     level = min(point.cost for point in points.values()), variance
     known = {at: (point.cost - level[0]) / variance for at, point in points.items()}
-    for inside, outside in bracket_ends(known) if solved else ():
-        found = _end(problem, (points[inside], points[outside]), level, bounds, scales.dt)
-        points |= {point.delay: point for point in found}
-    if fastest > _JUMP:
+    for inside, outside in bracket_ends(known):
+        pair = points[inside], points[outside]
+        bounds = parameter_bounds(pair[0].structure, scales)
+        found |= {point.delay: point for point in _end(problem, pair, level, bounds, scales.dt)}
+    return found
+
+
+def profile_curve(
+    points: Points, candidate: Candidate, variance: float, scales: Scales
+) -> tuple[FloatArray, FloatArray]:
+    """Delays (G,) and excess (G,) of points, as of `delay_profile`."""
+    if _jumps(candidate, scales):
         # The later the jump begins, the faster it is: up to the sample that sees it done.
-        end = min((sample + 1) * scales.dt, high)
+        end = min((_jump_sample(candidate, scales) + 1) * scales.dt, scales.latest)
         late = end - _LATE * scales.dt
         delays = np.array(sorted(points))
         costs = np.array([points[at].cost for at in delays])
-        near = float(np.interp(late, delays, costs))
-        points[end] = replace(candidate, cost=near)
+        points = points | {end: replace(candidate, cost=float(np.interp(late, delays, costs)))}
     delay = np.array(sorted(points))
     excess = np.array([points[at].cost for at in delay])
     return delay, (excess - excess.min()) / variance
+
+
+def _jumps(candidate: Candidate, scales: Scales) -> bool:
+    return float(np.abs(candidate.poles).max()) * scales.dt > _JUMP
+
+
+def _jump_sample(candidate: Candidate, scales: Scales) -> float:
+    return float(np.floor(candidate.delay / scales.dt + _SHORT))
 
 
 def _end(

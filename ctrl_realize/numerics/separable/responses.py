@@ -34,9 +34,8 @@ from scipy.signal import lfilter
 
 from ..arrays import ComplexArray, FloatArray, IntArray
 
-Modes: TypeAlias = tuple[FloatArray, ComplexArray, ComplexArray]
-"""H (B, m), E (B, m, J) and T (B, m, J)."""
-
+Modes: TypeAlias = tuple[FloatArray, Any, Any]
+"""H (B, m), E (B, m, J) and T (B, m, J), the latter real where they are for all of B."""
 
 _TOGETHER = 1e-9  # samples by which a move and a sample may be apart and be at one time
 _PIECE = 2**16  # samples of a response that are found at a time, which bounds the memory
@@ -122,7 +121,7 @@ class StepSequence:
             for values, samples in zip((static, mode, slope), parts, strict=True):
                 sums = np.add.reduceat(samples, ends - count, axis=0)
                 values[row, column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
-        return static, mode.astype(np.complex128), slope.astype(np.complex128)
+        return static, mode, slope
 
     @cached_property
     def _kinds(self) -> tuple[IntArray, IntArray]:

@@ -38,6 +38,7 @@ lag of half a sample at least, its delay would be known better than to the sampl
 PLAUSIBLE = 10.0
 """A structure is not ruled out while its criterion is within this of the best."""
 
+_ROUGHLY = 0.25  # variances by which an iteration lowers the cost where a search ends
 _ENDS, _SAME_END = 5, 0.02  # of a search that are followed, and parts by which two are one
 
 LEAST_CHARGE = 7.0
@@ -113,9 +114,9 @@ def search(
         starts = neighbour_starts(structure, scales, found)
         if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
             starts += _pattern_starts(structure, scales)
-        parameters, cost = fit_batch(
-            problem, structure, np.array(starts), parameter_bounds(structure, scales)
-        )
+        bounds = parameter_bounds(structure, scales)
+        done = float(np.clip(_ROUGHLY / problem.data.size, 1e-4, 1e-3))
+        parameters, cost = fit_batch(problem, structure, np.array(starts), bounds, tolerance=done)
         order = np.argsort(cost)
         best, ends = order[0], apart(parameters[order[:_ENDS]])
         found[structure] = Candidate(structure, parameters[best], float(cost[best]), ends, True)
@@ -198,16 +199,19 @@ def plausible(
     variance: float,
     chosen: Candidate,
     level: float,
+    slack: float = 0.0,
 ) -> list[Structure]:
     """List what the data cannot rule out.
 
     That is what is within 10 of the best criterion, or of `level`, that of the chosen with its
     simplicity counted; and lags without zeros that fit no worse, up to three of them or one more
-    than were chosen, for noise hides lags, but does not remove them.
+    than were chosen, for noise hides lags, but does not remove them. What costs still go down by
+    is `slack`, in variances.
     """
-    limit = min(*criterion.values(), level) + PLAUSIBLE
-    weighed = level + PLAUSIBLE
-    fits = chosen.cost + PLAUSIBLE * variance
+    reach = PLAUSIBLE + slack
+    limit = min(*criterion.values(), level) + reach
+    weighed = level + reach
+    fits = chosen.cost + reach * variance
     own = chosen.structure
     lags = max(3, own.order + 1 if own.zeros == 0 else 0)
     return [
@@ -218,6 +222,12 @@ def plausible(
         or candidates[s] is chosen
         or (s.zeros == 0 and s.order <= lags and candidates[s].cost <= fits)
     ]
+
+
+def charged(criterion: dict[Structure, float], penalty: float) -> dict[Structure, float]:
+    """Criterion with no less charged for a parameter than where structures are ruled out."""
+    more = max(LEAST_CHARGE - penalty, 0.0)
+    return {s: value + more * (s.order + s.zeros) for s, value in criterion.items()}
 
 
 def needless_parameters(structure: Structure) -> float:

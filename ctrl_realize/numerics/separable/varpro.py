@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,10 +153,10 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     residues, gain, dresidues = partial_fractions(poles, known.numerator, count)
     # Columns of one size: the powers of s differ by many decades.
     size = np.abs(residues).sum(axis=1) + np.abs(gain)
-    basis = (mode @ (residues / size[:, None])).real + static[:, :, None] * (gain / size)[:, None]
+    basis = _real_product(mode, residues / size[:, None]) + static[:, :, None] * (gain / size)[:, None]
     fixed = np.broadcast_to(problem.regressors, (batch, *problem.regressors.shape))
     columns = problem.weighted(np.concatenate([basis, fixed], axis=2))
-    data = np.tile(problem.weighted_data, (batch, 1))
+    data = np.broadcast_to(problem.weighted_data, (batch, problem.data.size))
     own = None
     if problem.segments is not None:
         own = problem.local_terms(free)
@@ -173,13 +174,13 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
 
     derivative = np.empty((batch, problem.data.size, 1 + n))
     amplitudes = np.einsum("bjk,bk->bj", residues, numerator)
-    derivative[:, :, 0] = -(mode @ (amplitudes * poles)[:, :, None]).real[:, :, 0]
+    derivative[:, :, 0] = -_real_product(mode, (amplitudes * poles)[:, :, None])[:, :, 0]
     moved = _moved_amplitudes(poles, amplitudes, dresidues, numerator)[:, :, :n] @ dfree
     stretch = np.zeros_like(moved)
     stretch[:, :n] = amplitudes[:, :n, None] * dfree
     level = np.einsum("bj,bjq->bq", -1.0 / free, dfree).real
     level *= (gain[:, 0] * numerator[:, 0])[:, None]
-    derivative[:, :, 1:] = (mode @ moved + slope @ stretch).real
+    derivative[:, :, 1:] = _real_product(mode, moved) + _real_product(slope, stretch)
     derivative[:, :, 1:] += static[:, :, None] * level[:, None]
     derivative = problem.weighted(derivative)
     if own is not None:
@@ -190,6 +191,13 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
         derivative = own.without(derivative)
     jacobian = derivative - q @ (np.swapaxes(q, 1, 2) @ derivative)
     return Evaluation(residual, jacobian, sensitivity, numerator, linear[:, count:])
+
+
+def _real_product(modes: Any, weights: ComplexArray) -> FloatArray:
+    """Real part of modes (B, m, J) times weights (B, J, k); those of real modes are real."""
+    if np.iscomplexobj(modes):
+        return np.asarray((modes @ weights).real)
+    return np.asarray(modes @ weights.real)
 
 
 def respond(
@@ -311,8 +319,13 @@ def partial_fractions(
     gap[:, np.arange(n), np.arange(n)] = 1.0
     slope = gap.prod(axis=2)
     i = np.arange(count)
-    value = np.polyval(known, poles)
     power = poles[:, :, None] ** (i - 1)
+    if known.size == 1:
+        residues = power * (known[0] / slope)[:, :, None]
+        gain = np.zeros((batch, count))
+        gain[:, 0] = known[0] / np.prod(-poles, axis=1).real
+        return residues, gain, (i - 1) * residues / poles[:, :, None]
+    value = np.polyval(known, poles)
     residues = power * (value / slope)[:, :, None]
     turn = np.polyval(np.polyder(known), poles)
     dresidues = (i - 1) * residues / poles[:, :, None] + power * (turn / slope)[:, :, None]
