@@ -42,8 +42,8 @@ _MOST_TURNS = 25
 _NEWTON_TURNS, _MOST_CELLS = 40, 8
 _MOST_HESSIANS = 12
 _KEPT = 0.1
-"""Part of the step before that a step with the same Hessian may be: then it converges as it is [4]_,
-and a Hessian costs as much as a handful of gradients."""
+"""Part of the step before that a step with the same Hessian may be: then it converges as it is
+[4]_, and a Hessian costs as much as a handful of gradients."""
 _SMALL = 1e-4  # of a logarithmic parameter, or of a sample: for differences of the gradient
 _FLAT = 1e-12  # of the largest curvature: a direction in which rounding bends
 _GIVEN_UP = 1e6  # by which a step is shortened at most

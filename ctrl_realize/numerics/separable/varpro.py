@@ -153,7 +153,9 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     residues, gain, dresidues = partial_fractions(poles, known.numerator, count)
     # Columns of one size: the powers of s differ by many decades.
     size = np.abs(residues).sum(axis=1) + np.abs(gain)
-    basis = _real_product(mode, residues / size[:, None]) + static[:, :, None] * (gain / size)[:, None]
+    basis = (
+        _real_product(mode, residues / size[:, None]) + static[:, :, None] * (gain / size)[:, None]
+    )
     fixed = np.broadcast_to(problem.regressors, (batch, *problem.regressors.shape))
     columns = problem.weighted(np.concatenate([basis, fixed], axis=2))
     data = np.broadcast_to(problem.weighted_data, (batch, problem.data.size))
