@@ -49,7 +49,7 @@ from ..constants import Z_95
 from ..separable.compared_fits import at_delay
 from ..separable.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, needless_parameters
 from ..separable.varpro import KnownFactor, Structure, evaluate
-from ..separable.window import WindowFit, fit_window
+from ..separable.window import WindowFit, among, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
 from .interval import likelihood_fit
@@ -127,8 +127,8 @@ def fit_step_record(
             onset=onset,
             relaxing=data.relaxing,
         )
-    simple = {s: c for s, c in whole.criterion.items() if s in SIMPLE_STRUCTURES}
-    chosen = whole.best_of(simple)
+    whole = among(whole, SIMPLE_STRUCTURES)
+    chosen = whole.best_of({s: whole.criterion[s] for s in SIMPLE_STRUCTURES})
     views = _views(data, chosen, latest, factor, huber)
     return _robust_fit(whole, chosen, views, relaxing=data.relaxing)
 

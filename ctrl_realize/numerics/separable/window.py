@@ -285,6 +285,15 @@ def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
     return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
 
 
+def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
+    """Compare some of the structures with each other alone, at their minima."""
+    few = {s: fit.candidates[s] for s in structures}
+    candidates = fit.candidates | converged(
+        fit.problem, few, fit.scales, fit.variance, fit.independent
+    )
+    return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
+
+
 def _clipped(error: FloatArray, least: float) -> FloatArray:
     """Residuals clipped at 1.345 sigma and scaled up again by the part that was not."""
     limit = _HUBER * max(mad_sigma(error), least)

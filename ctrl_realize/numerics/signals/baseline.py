@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray
 from .edges import difference_noise
-from .noise import correlation_time, is_drift
+from .noise import correlation_time, is_drift, rounding_error
 
 FEW = 5
 """With fewer samples before the step, those after it that are still at rest are added."""
@@ -103,7 +103,9 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
         left = float(np.sum(error**2))
         if left < best:
             best, rate, weights, residual = left, float(tried), found, error
-    variance = best / (edge - 3) * correlation_time(residual)
+    # On one level of a quantiser nothing is left, and rounding bends.
+    noise = max(best / (edge - 3), rounding_error(output) ** 2)
+    variance = noise * correlation_time(residual)
     if float(straight @ straight) - best <= _SIGNIFICANT * variance:
         return None
     return np.asarray(_level_and_decay(rate, np.arange(output.size) / edge) @ weights)

@@ -36,6 +36,16 @@ _DRIFT_ERRORS = 5.0  # a drift that is lost in the noise does no harm
 _FEW = 8  # samples at rest below which the whole record must tell the noise
 
 
+def rounding_error(values: FloatArray) -> float:
+    """Difference of two values that is rounding: what is no larger is none.
+
+    A few units in the last place of the largest, and a billionth of the range: a converter of 24
+    bits, the finest there is, has steps of sixty billionths.
+    """
+    last_place = float(np.spacing(max(np.abs(values.max()), np.abs(values.min()))))
+    return max(1e-9 * float(np.ptp(values)), 4 * last_place)
+
+
 def quantisation_step(values: FloatArray) -> float:
     """Step of the quantiser, 0 where none shows.
 
@@ -43,7 +53,7 @@ def quantisation_step(values: FloatArray) -> float:
     differences are multiples of it.
     """
     gaps = np.diff(np.unique(values))
-    gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)]
+    gaps = gaps[gaps > rounding_error(values)]
     if gaps.size < 4:
         return 0.0
     step = float(gaps.min())

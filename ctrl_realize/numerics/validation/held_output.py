@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray
+from ..signals.noise import rounding_error
 
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
@@ -55,7 +56,7 @@ def _held(output: FloatArray, fitted: FloatArray) -> tuple[BoolArray, BoolArray]
     """
     moves = np.abs(np.diff(fitted))
     moving = (moves >= _FAST * moves.max(initial=0.0)) & (moves > 0)
-    held = (np.diff(output) == 0) & moving
+    held = _repeats(output) & moving
     way = np.concatenate([[0.0], np.cumsum(moves)])
     starts, ends = _runs(held)
     rounded = way[ends] - way[starts] <= _converter_step(output)
@@ -67,6 +68,7 @@ def _held(output: FloatArray, fitted: FloatArray) -> tuple[BoolArray, BoolArray]
 def _converter_step(output: FloatArray) -> float:
     """Step of the converter, 0 where none shows; a record of few digits rounds it once more."""
     gaps = np.diff(np.unique(output))
+    gaps = gaps[gaps > rounding_error(output)]
     if gaps.size == 0:
         return 0.0
     step = float(np.mean(gaps[gaps <= 1.5 * np.median(gaps)]))
@@ -83,13 +85,18 @@ def _runs(true: BoolArray) -> tuple[IntArray, IntArray]:
 
 def samples_at_limit(output: FloatArray) -> int:
     """Count the samples in runs at the highest or lowest value of an output that has noise."""
-    same = np.diff(output) == 0
+    same, nothing = _repeats(output), rounding_error(output)
     count = 0
     for limit in (output.max(), output.min()):
-        starts, ends = _runs(output == limit)
+        starts, ends = _runs(np.abs(output - limit) <= nothing)
         runs = ends - starts
         inside = int(runs[runs >= _LONG].sum())
-        elsewhere = same[(output[1:] != limit)]
+        elsewhere = same[np.abs(output[1:] - limit) > nothing]
         if inside and elsewhere.size > _LONG and np.mean(elsewhere) <= _SELDOM:
             count += inside
     return count
+
+
+def _repeats(output: FloatArray) -> BoolArray:
+    """Samples (N - 1,) that are the one before, but for rounding."""
+    return np.abs(np.diff(output)) <= rounding_error(output)
