@@ -66,6 +66,11 @@ def test_a_step_record_is_answered_alike(plant, noise, seed):
     alike(rigs.step_record(plant, noise=noise, seed=seed, before=150, after=450))
 
 
+def test_a_record_in_steps_of_a_converter_is_answered_alike():
+    record = rigs.step_record(rigs.R2, noise=0.005, seed=2, before=150, after=450)
+    alike(cr.Record(record.time, record.input, np.round(record.output, 1)), (last_digit,))
+
+
 def test_a_record_of_random_levels_is_answered_alike():
     alike(two_lags_of_random_levels())
 

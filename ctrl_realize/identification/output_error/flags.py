@@ -7,6 +7,7 @@ import numpy as np
 from ..._wording import in_time, interval_in_time, time_within
 from ...numerics.arrays import FloatArray
 from ...numerics.output_error.interval import flow_lead
+from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
@@ -66,7 +67,31 @@ def model_flags(
         cancelled_pair(fit),
         _disagreement(dt, fit, firm),
         _inverse(fit),
+        _marginal(fit),
     ]
+
+
+def _marginal(fit: OutputErrorEstimate) -> Flag | None:
+    """Report decisions so close that rounding may turn them."""
+    if not fit.close:
+        return None
+    words: dict[DecisionKey, str] = {
+        "structure": "{} fits as well as the one chosen",
+        "ruled_out": "{} is at the limit of what the data rule out",
+        "adequate": "the residual is at the limit of what counts as noise",
+    }
+    found = [
+        words[one.key].format(
+            one.structure
+            and f"order {one.structure.order}, relative degree {one.structure.relative_degree}"
+        )
+        for one in fit.close
+    ]
+    return Flag(
+        "marginal_decision",
+        f"{'; '.join(found)}: within {CLOSE:g} of the threshold, so that rounding on another "
+        "processor may decide otherwise; compare the models in `structures`",
+    )
 
 
 def _apparent(fit: OutputErrorEstimate) -> Flag | None:

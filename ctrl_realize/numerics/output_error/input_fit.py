@@ -38,6 +38,7 @@ from .better_structure import better_structure
 from .condensed import MOST_LAGS, Condensed, condensed
 from .input_data import SampledData, cut
 from .interval import likelihood_fit
+from .margins import close_to
 from .result import OutputErrorEstimate
 from .selection import chains_of
 
@@ -159,6 +160,7 @@ def fit_sampled(
     elif fit.chain:
         left = correlation_time(whole.window.output - fit.fitted)
         fit = replace(fit, correlation=left, adequate=left <= WHITE)
+    fit = replace(fit, close=fit.close + close_to("adequate", fit.correlation, WHITE))
     # The noise is not known from a rest; correlation is what shows in means over bins.
     fit = replace(fit, normalized_rms=float(np.sqrt(fit.correlation)))
     parts = np.split(fit.fitted, data.edges[1:-1])

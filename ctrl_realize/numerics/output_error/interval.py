@@ -38,6 +38,7 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
+from .margins import CloseDecision, close_choices, close_exclusions
 from .result import (
     DelayInterval,
     OtherModel,
@@ -78,11 +79,12 @@ def likelihood_fit(
     onset: float | None = None,
     relaxing: bool = False,
     better: StructureFit | None = None,
+    near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
     """Take delay and interval from the likelihood.
 
     `onset` is the time of the first motion; without it the structures are believed. `relaxing`
-    and `better` are those of the result.
+    and `better` are those of the result, `near` close decisions that have been made.
     """
     tanks = [chain for chain in chains if not chain.hidden]
     choice = choose_model(whole, tanks, flows)
@@ -117,6 +119,11 @@ def likelihood_fit(
         relaxing=relaxing,
         better=better,
     )
+    close: tuple[CloseDecision, ...] = near
+    if choice.chain is None and choice.flow is None:
+        own_structure = chosen.structure
+        close += close_choices(whole, choice.level, own_structure)
+        close += close_exclusions(whole, _charged_level(whole, choice), own_structure)
     return replace(
         found,
         chain=choice.chain,
@@ -126,6 +133,7 @@ def likelihood_fit(
         open_start=open_start,
         flows=tuple(flow for flow, _ in kept.flows),
         follows_flow=choice.flow is not None,
+        close=close,
     )
 
 
@@ -160,7 +168,7 @@ def _not_ruled_out(
     flows: Sequence[DispersedFlow],
 ) -> _Kept:
     more = max(LEAST_CHARGE - whole.penalty, 0.0)
-    level = choice.level + more * choice.parameters
+    level = _charged_level(whole, choice)
     limit = level + PLAUSIBLE
     values = charged(whole.criterion, whole.penalty)
     free = plausible(whole.candidates, values, whole.variance, choice.model, level)
@@ -173,6 +181,11 @@ def _not_ruled_out(
         ],
         [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit],
     )
+
+
+def _charged_level(whole: WindowFit, choice: Choice) -> float:
+    """Level of the choice where structures are ruled out."""
+    return choice.level + max(LEAST_CHARGE - whole.penalty, 0.0) * choice.parameters
 
 
 def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:

@@ -25,6 +25,7 @@ from ..separable.static_gain import StaticGain, averaged_ends
 from ..separable.structures import Candidate, needless_parameters
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
+from .margins import CloseDecision
 
 _ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
 
@@ -103,7 +104,8 @@ class OutputErrorEstimate:
     ruled out. `std` is that of the chosen structure. `whitened`: coloured noise was made
     white, by what it is at rest. `static` is the gain of the model,
     `alike` those of the other structures that are not ruled out and resolve one, each with its
-    evidence over the model's. `better` is a structure that rules out those that were asked for.
+    evidence over the model's. `better` is a structure that rules out those that were asked for;
+    `close` are decisions that rounding may turn.
     """
 
     delay: float
@@ -134,6 +136,7 @@ class OutputErrorEstimate:
     static: StaticGain | None = None
     alike: tuple[tuple[StaticGain, float], ...] = ()
     better: StructureFit | None = None
+    close: tuple[CloseDecision, ...] = ()
 
     @property
     def gain_ends(self) -> tuple[float, float]:

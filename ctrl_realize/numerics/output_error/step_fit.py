@@ -42,6 +42,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -53,6 +54,7 @@ from ..separable.window import WindowFit, among, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
 from .interval import likelihood_fit
+from .margins import close_to
 from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled, profile_of
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
@@ -105,6 +107,7 @@ def fit_step_record(
         )
     whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
     adequate = _is_noise(data, whole)
+    near = close_to("adequate", whole.normalized_rms, ADEQUATE * data.colour)
     plain = whole
     if adequate and whiten:
         whole = in_coloured_noise(whole, data)
@@ -114,7 +117,9 @@ def fit_step_record(
             plain.best,
             lambda: _fit_until(data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber),
         )
-        return likelihood_fit(whole, adequate=adequate, relaxing=data.relaxing, better=better)
+        return likelihood_fit(
+            whole, adequate=adequate, relaxing=data.relaxing, better=better, near=near
+        )
     if adequate:
         assert data.motion is not None
         onset = data.motion.onset * data.dt
@@ -126,11 +131,13 @@ def fit_step_record(
             flows=flows_of(whole, chains),
             onset=onset,
             relaxing=data.relaxing,
+            near=near,
         )
     whole = among(whole, SIMPLE_STRUCTURES)
     chosen = whole.best_of({s: whole.criterion[s] for s in SIMPLE_STRUCTURES})
     views = _views(data, chosen, latest, factor, huber)
-    return _robust_fit(whole, chosen, views, relaxing=data.relaxing)
+    found = _robust_fit(whole, chosen, views, relaxing=data.relaxing)
+    return replace(found, close=near)
 
 
 def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
+from ctrl_realize.numerics.signals.baseline import relaxation
 from ctrl_realize.numerics.signals.bins import response_bins
 from ctrl_realize.numerics.signals.noise import (
     correlation_time,
@@ -19,6 +20,11 @@ from ctrl_realize.numerics.signals.noise import (
 from ctrl_realize.numerics.signals.noise_model import (
     noise_covariance,
     whitener,
+)
+from ctrl_realize.numerics.validation.held_output import (
+    held_share,
+    longest_hold,
+    samples_at_limit,
 )
 
 
@@ -145,3 +151,31 @@ def test_the_correlation_time_of_a_lag(pole):
     found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))
     # summed over some ten times its length: known to sqrt(20 time / 60 000), 12 % for the slowest
     assert found == pytest.approx((1 + pole) / (1 - pole), rel=0.2)
+
+
+@pytest.mark.parametrize("level", [24.7, 20.9, 1.0])
+def test_a_rest_on_one_level_of_a_quantiser_does_not_bend(level):
+    # what an exponential gains there is rounding
+    output = np.full(300, level)
+    output[60:] += 6
+    assert relaxation(output, 60) is None
+
+
+def with_last_digits(values):
+    sign = np.random.default_rng(0).choice([-1.0, 1.0], values.size)
+    return values * (1 + sign * np.finfo(float).eps)
+
+
+def test_what_repeats_a_sample_does_so_but_for_its_last_digit():
+    k = np.arange(400)
+    fitted = np.minimum(k / 300, 1.0)
+    held = 5 + fitted[k // 10 * 10]
+    again = with_last_digits(held)
+    assert held_share(again, fitted) == held_share(held, fitted) == pytest.approx(0.9, abs=0.01)
+    assert longest_hold(again, fitted) == longest_hold(held, fitted) == 9
+
+
+def test_samples_at_a_limit_are_there_but_for_their_last_digit():
+    output = 20 + np.minimum(np.random.default_rng(1).standard_normal(400), 5.0)
+    output[200:260] = 30.0
+    assert samples_at_limit(with_last_digits(output)) == samples_at_limit(output) == 60
