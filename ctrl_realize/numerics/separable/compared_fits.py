@@ -44,7 +44,7 @@ _STARTS, _PROMISING = 3, 10.0
 """Starts that are followed beside the best end of a search, and variances that they may be above
 it. With free initial states of records all are: there valleys are many, and flat."""
 _SLACK = 2.0  # variances that may be left to a minimum where steps of Gauss and Newton end
-_ALL = 4  # structures that are few enough for each to matter
+_ALL = 6  # structures that are few enough for each to matter: those of up to three poles
 
 
 def on_new_data(
