@@ -170,8 +170,8 @@ def profiles_of(
 ) -> dict[Structure, Profile]:
     """Profiles of structures, solved for their ends where these may be ends of all of them.
 
-    Between the points of a profile its ends are known to a few parts in a hundred; of the chosen
-    structure, and of those that reach as far as any, they are solved for.
+    Between the points of a profile its ends are known to a few parts in a hundred; those of the
+    chosen structure, and those that lie as far out as any, are solved for.
     """
     setting = whole.variance, whole.scales
     models = {s: whole.candidates[s] for s in structures}
@@ -183,8 +183,9 @@ def profiles_of(
     high = max((last for _, last in limits.values()), default=-np.inf)
     for s, (first, last) in limits.items():
         margin = _ROUGHLY * (last - first)
-        if s == chosen or first - margin <= low or last + margin >= high:
-            solved = with_ends(whole.problem, points[s], *setting)
+        ends = s == chosen or first - margin <= low, s == chosen or last + margin >= high
+        if any(ends):
+            solved = with_ends(whole.problem, points[s], *setting, ends)
             found[s] = profile_curve(solved, models[s], *setting)
     return found
 

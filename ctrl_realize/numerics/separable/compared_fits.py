@@ -30,6 +30,7 @@ from .structures import (
     neighbour_starts,
     parameter_bounds,
     parameter_charge,
+    pattern_starts,
     plausible,
 )
 from .varpro import Problem, Structure, evaluate
@@ -153,13 +154,20 @@ def _near_minimum(
 
 
 def at_delay(problem: Problem, candidate: Candidate, scales: Scales, delay: float) -> Candidate:
-    """Best model of the same structure with a given delay."""
-    start = candidate.parameters[None].copy()
-    start[0, 0] = delay
+    """Best model of the same structure with a given delay.
+
+    Far from the optimum other poles are best, and a way there from the optimum may end in
+    a minimum beside it: the patterns of a search are followed as well.
+    """
     structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
-    near = polish(problem, structure, start, bounds, scales.dt, delay_fixed=True)[0][0]
-    fit = settle(problem, structure, near, bounds, scales.dt, delay_fixed=True)
-    return Candidate(structure, *fit)
+    starts = np.array([candidate.parameters, *pattern_starts(structure, scales)])
+    starts[:, 0] = delay
+    fixed, costs = polish(problem, structure, starts, bounds, scales.dt, delay_fixed=True)
+    near = fixed[costs <= costs.min() * (1 + _CLOSE / problem.data.size)]
+    fits = [
+        settle(problem, structure, start, bounds, scales.dt, delay_fixed=True) for start in near
+    ]
+    return Candidate(structure, *min(fits, key=lambda fit: fit[1]))
 
 
 def _with_a_pole_more(

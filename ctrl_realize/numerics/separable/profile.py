@@ -102,12 +102,20 @@ def profile_points(
     return points | {candidate.delay: candidate}
 
 
-def with_ends(problem: Problem, points: Points, variance: float, scales: Scales) -> Points:
-    """Add the ends of the 95 % interval to the points of a profile."""
+def with_ends(
+    problem: Problem,
+    points: Points,
+    variance: float,
+    scales: Scales,
+    which: tuple[bool, bool] = (True, True),
+) -> Points:
+    """Add the ends of the 95 % interval, lower and upper, to the points of a profile."""
     found = dict(points)
     level = min(point.cost for point in points.values()), variance
     known = {at: (point.cost - level[0]) / variance for at, point in points.items()}
     for inside, outside in bracket_ends(known):
+        if not which[int(outside > inside)]:
+            continue
         pair = points[inside], points[outside]
         bounds = parameter_bounds(pair[0].structure, scales)
         found |= {point.delay: point for point in _end(problem, pair, level, bounds, scales.dt)}

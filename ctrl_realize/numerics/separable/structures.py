@@ -113,7 +113,7 @@ def search(
     for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
         starts = neighbour_starts(structure, scales, found)
         if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
-            starts += _pattern_starts(structure, scales)
+            starts += pattern_starts(structure, scales)
         bounds = parameter_bounds(structure, scales)
         done = float(np.clip(_ROUGHLY / problem.data.size, 1e-4, 1e-3))
         parameters, cost = fit_batch(problem, structure, np.array(starts), bounds, tolerance=done)
@@ -235,7 +235,8 @@ def needless_parameters(structure: Structure) -> float:
     return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
 
 
-def _pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
+def pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
+    """Starts of a search from every pattern of poles, at one delay or two."""
     patterns = _pole_patterns(structure.order, scales)
     # With zeros, the optimum without them is a start as well: fewer patterns do.
     delays = (0.4, 1.0) if structure.zeros == 0 else (0.7,)
