@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.compared_fits import converged, on_new_data
+from ctrl_realize.numerics.separable.compared_fits import at_delay, converged, on_new_data
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.polish import polish, settle, solve_level
 from ctrl_realize.numerics.separable.profile import delay_error, delay_profile
@@ -186,3 +186,21 @@ def test_the_unit_of_time_changes_delay_and_lags_and_nothing_else():
         x, cost = settle(problem, structure, near, bounds, scales.dt)
         found.append([x[0] / unit, x[1] + np.log(unit), x[2], cost])
     assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.0])
+def test_no_random_start_beats_the_model_at_a_delay_far_from_the_best(delay):
+    # what creeps as a logarithm is of no finite order: at other delays other poles are best
+    k = np.arange(-50, 150, dtype=float)
+    y = np.log1p(np.clip(k - 2.3, 0, None) / 10) / 3
+    y = y + SIGMA * np.random.default_rng(0).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(50, 1)])
+    scales = step_scales(data, k.size, None)
+    problem = window(data, k.size, KnownFactor()).problem
+    structure = Structure(3, 1)
+    best = search(problem, [structure], scales)[structure]
+    box = parameter_bounds(structure, scales)
+    starts = np.random.default_rng(9).uniform(box.low, box.high, size=(30, 4))
+    starts[:, 0] = delay
+    cost = fit_batch(problem, structure, starts, box, delay_fixed=True, most_iterations=60)[1]
+    assert at_delay(problem, best, scales, delay).cost <= cost.min()
