@@ -2,7 +2,7 @@
 
 What a decision compares has converged (`compared_fits`): two ways to round the same record differ
 in it by much less than `CLOSE`. What was not followed to its minimum differs by hundredths of
-a variance at most.
+a variance at most. What counts as close is our own rule.
 """
 
 from __future__ import annotations
