@@ -189,6 +189,26 @@ def unlike_campaign(seed: int, **what: tuple[float, ...]) -> Codes:
     return codes(cr.identify_campaign(unlike(seed, **what), structures=[(1, 1)]))
 
 
+def at_an_edge(seed: int) -> Codes:
+    """A second lag just so long that one and two lags fit as well, found by bisection."""
+    t, rng = np.maximum(_clock(37.0), 0.0), np.random.default_rng([seed, 25])
+    noise = _noise(seed) * rng.standard_normal(t.size)
+    k = np.arange(t.size)
+
+    def fitted(part: float) -> cr.identification.OutputErrorFit:
+        slow = 0.05
+        fast = part * slow
+        y = 1 - (slow * np.exp(-t / slow) - fast * np.exp(-t / fast)) / (slow - fast)
+        record = cr.Record(k * DT, 1.0 * (k >= BEFORE), y + noise)
+        return cr.fit_output_error(record, structures=[(1, 1), (2, 2)]).fit
+
+    one, two = 0.001, 0.9
+    for _ in range(30):
+        middle = (one + two) / 2
+        one, two = (middle, two) if fitted(middle).order == 1 else (one, middle)
+    return codes(fitted(one))
+
+
 def washed_out(seed: int) -> Codes:
     """A response that dies away again: its gain is nothing."""
     t = np.maximum(_clock(37.0), 0.0)
@@ -327,6 +347,8 @@ CASES: list[FlagCase] = [
          not_due="R1 to R4, coloured noise 0.1 to 2 %", quiet=coloured),
     _fit("structured_misfit", "static friction, noise 0.1 and 0.5 %",
          wrong("static friction", LOW)),
+    _fit("marginal_decision", "a second lag for which BIC of one and of two lags is the same",
+         at_an_edge),
     _fit("estimates_disagree", "slew limit, noise 0.1 and 0.5 %", wrong("slew limit", LOW)),
     _fit("structures_disagree", "R4, noise 2 %: an interval of half the dead time or more",
          lambda s: fit(step_case("white", "R4", 0.02, s).record),

@@ -35,12 +35,17 @@ def close_to(key: DecisionKey, value: float, threshold: float) -> tuple[CloseDec
 
 
 def close_choices(whole: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
-    """List structures with the criterion of the chosen, which is `level`, but for little."""
-    return tuple(
-        CloseDecision("structure", s)
+    """List structures with the criterion of the chosen, which is `level`, but for little.
+
+    And those that might as well have been asked how much noise there is, on which all hangs.
+    """
+    near = [
+        s
         for s, value in whole.criterion.items()
-        if s != chosen and abs(value + needless_parameters(s) - level) <= CLOSE * PLAUSIBLE
-    )
+        if abs(value + needless_parameters(s) - level) <= CLOSE * PLAUSIBLE
+    ]
+    near += [s for s, excess in whole.rivals.items() if excess <= CLOSE * PLAUSIBLE]
+    return tuple(CloseDecision("structure", s) for s in dict.fromkeys(near) if s != chosen)
 
 
 def close_exclusions(

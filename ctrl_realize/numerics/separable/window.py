@@ -17,8 +17,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,7 +31,16 @@ from .compared_fits import converged, on_new_data, settled
 from .local_terms import Segments
 from .responses import HeldInput
 from .static_gain import StaticGain, static_gain
-from .structures import PLAUSIBLE, Candidate, Scales, choose, criteria, parameter_charge, search
+from .structures import (
+    PLAUSIBLE,
+    Candidate,
+    Scales,
+    choose,
+    criteria,
+    needless_parameters,
+    parameter_charge,
+    search,
+)
 from .varpro import Problem, Structure, evaluate, respond
 
 # Standard deviations: 95 % efficiency in Gaussian noise (Holland and Welsch 1977).
@@ -101,7 +110,8 @@ class WindowFit:
     residual does: its own, with that of a coarse `rounding` once more, for neighbours are rounded
     alike, times its `correlation`; where the noise has been made white instead, times `colour`,
     the mean square that is left there in units of it. `misfit` is the root mean square of the
-    residual of the chosen structure, in means over bins, over the noise level given.
+    residual of the chosen structure, in means over bins, over the noise level given. `rivals` are
+    the margins by which structures were chosen, or not, to tell what noise there is.
     """
 
     window: Window
@@ -114,6 +124,7 @@ class WindowFit:
     normalized_rms: float
     rounding: float = 0.0
     colour: float | None = None
+    rivals: Mapping[Structure, float] = field(default_factory=dict)
 
     @property
     def variance(self) -> float:
@@ -190,6 +201,7 @@ def fit_window(
     scales = replace(scales, ringing=_ringing(error[window.start :], scales.dt))
     candidates = search(problem, structures, scales)
     passes = _PASSES if huber else 0
+    rivals: dict[Structure, float] = {}
     for turn in range(passes + 1):
         rest = _left(window, problem, candidates, (sigma, quantum), huber)
         setting = rest.variance, rest.independent
@@ -201,6 +213,8 @@ def fit_window(
             candidates[rest.best.structure] = settled(problem, rest.best, scales)
             del rest
             rest = _left(window, problem, candidates, (sigma, quantum), huber)
+        # Huber's data are those of the structure that was chosen at every turn.
+        rivals = {s: min(v, rivals.get(s, v)) for s, v in rest.rivals.items()}
         if turn == passes or (turn == 1 and not rest.wild):
             break
         problem = window.with_output(rest.values)
@@ -214,7 +228,7 @@ def fit_window(
     rounding = quantum / np.sqrt(12) if is_coarse(sigma, quantum) else 0.0
     return WindowFit(
         window, problem, candidates, criterion, scales, rest.level, rest.correlation, misfit,
-        rounding,
+        rounding, rivals=rivals,
     )  # fmt: skip
 
 
@@ -224,7 +238,8 @@ class _Left:
 
     `values` (N,) are the data that Huber's loss asks for, `wild` tells of outliers; `level` is the
     standard deviation of what is left, `correlation` its correlation time, `lost` the parameters,
-    `independent` the samples that count.
+    `independent` the samples that count; `rivals` tells how much worse other structures are,
+    and for the best by how much it is better.
     """
 
     best: Candidate
@@ -234,6 +249,7 @@ class _Left:
     correlation: float
     lost: int
     independent: float
+    rivals: dict[Structure, float]
 
     @property
     def variance(self) -> float:
@@ -261,7 +277,11 @@ def _left(
         + problem.local_count(s.order)
         for s, c in candidates.items()
     }
-    best = candidates[choose(value)]
+    chosen = choose(value)
+    lowest = value[chosen] + needless_parameters(chosen)
+    rivals = {s: v + needless_parameters(s) - lowest for s, v in value.items() if s != chosen}
+    rivals[chosen] = min(rivals.values(), default=np.inf)
+    best = candidates[chosen]
     error = window.output - window.predict(problem, best)
     kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
     after = kept[window.start :]
@@ -275,7 +295,7 @@ def _left(
     wild = _wild(error)
     kept -= error
     kept += window.output
-    return _Left(best, kept, wild, max(level, floor), correlation, lost, independent)
+    return _Left(best, kept, wild, max(level, floor), correlation, lost, independent, rivals)
 
 
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
