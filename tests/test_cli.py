@@ -216,3 +216,71 @@ def test_the_demo_does_the_paper_from_end_to_end(tmp_path, capsys):
     assert comparison.band_hz[1] > 10
     # The truth is of order 4 with 30 Hz LVDT; the fit knows it to much better than this.
     assert comparison.rms_relative_error < 0.01
+
+
+@pytest.mark.usefixtures("without_figures")
+def test_columns_and_units_can_be_told(valve, folder, first, tmp_path, capsys):
+    record = valve.step_record(16.0, rng=0)
+    table = pd.DataFrame({"ms": 1e3 * record.time, "x": record.output, "i": record.input})
+    table.to_csv(tmp_path / "log.txt", sep=";", decimal=",", index=False)
+    out = tmp_path / "out"
+    words = ["--time", "0", "--time-unit", "ms", "--input", "i", "--response", "x", *FAST]
+    assert main(["identify", str(tmp_path / "log.txt"), "-o", str(out), *words]) == 0
+    assert cr.load_model(out / "model.json").dt == pytest.approx(record.dt, rel=1e-9)
+    capsys.readouterr()
+    frf = cr.read_frf(folder / "frf.csv")
+    columns = {
+        "f": 2 * np.pi * frf.frequency_hz,
+        "magnitude": 20 * np.log10(np.abs(frf.complex)),
+        "phase": np.unwrap(np.angle(frf.complex)),
+    }
+    pd.DataFrame(columns).to_csv(tmp_path / "frf.csv", index=False)
+    model = str(first[0] / "model.json")
+    units = ["--frequency-unit", "rad/s", "--magnitude-unit", "dB", "--phase-unit", "rad"]
+    assert main(["compare", model, str(tmp_path / "frf.csv"), *units]) == 0
+    assert main(["compare", model, str(folder / "frf.csv")]) == 0
+    one, two = capsys.readouterr().out.split("relative error")[1:]
+    assert one.split("\n")[0] == two.split("\n")[0]
+
+
+@pytest.mark.usefixtures("without_figures")
+def test_records_of_different_plants_are_kept_apart_on_request(folder, tmp_path, capsys):
+    slow = cr.bench.valve(dt=2e-3, pre_step_time=0.5, hold=1.0).step_record(16.0, rng=0)
+    files = [str(folder / "step_0.csv"), str(save(slow, tmp_path / "slow.csv"))]
+    assert main(["identify", *files, "-o", str(tmp_path / "one"), *FAST]) == 2
+    assert "--separate" in capsys.readouterr().err
+    assert main(["identify", *files, "-o", str(tmp_path / "out"), "--separate", *FAST]) == 0
+    assert {"step_0/model.json", "slow/model.json"} <= files_in(tmp_path / "out")
+
+
+@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["demo"]])
+def test_help_has_examples_and_exit_codes(command, capsys):
+    assert main([*command, "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "130 interrupted; 143 terminated" in said
+    if command:
+        assert f"ctrl-realize {command[0]} " in said.split("Examples:")[1]
+
+
+@pytest.mark.usefixtures("without_figures")
+def test_names_of_files_reach_terminal_page_table_and_folder_as_names_alone(
+    folder, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    # a bell and a tag, formulas, dots that lead out, and too many bytes for the name of a file
+    hostile = ["\x07<b>$x^{.csv", "=cmd|' calc'!A1.csv", "+1;=2.csv", "...csv"]
+    names = [*hostile, f"{chr(0x20000) * 62}.csv"]
+    for name in names:
+        Path(name).write_bytes((folder / "step_0.csv").read_bytes())
+    assert main(["identify", "--output", "a/out", *FAST, *names]) == 0
+    assert "\x07" not in capsys.readouterr().out
+    page = Path("a/out/report.html").read_text(encoding="utf-8")
+    assert "<b>$x" not in page
+    assert "\x07" not in page
+    rows = pd.read_csv("a/out/records.csv", index_col="record")
+    assert list(rows.index[1:3]) == ["'=cmd|' calc'!A1", "'+1;'=2"]
+    assert rows["delay"].notna().all()
+    assert len(list(Path("a/out/models").iterdir())) == len(names)
+    assert main(["identify", names[0], names[3], "-o", "a/apart", "--separate", *FAST]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {*names, "a"}
+    assert {path.name for path in Path("a").iterdir()} == {"out", "apart"}

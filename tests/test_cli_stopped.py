@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -17,7 +18,7 @@ import pandas as pd
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.cli import main
+from ctrl_realize.cli import identify_command, main
 from ctrl_realize.cli.manifest import Run
 from ctrl_realize.cli.results import write_record_files
 from ctrl_realize.cli.staging import appearing
@@ -90,6 +91,41 @@ def test_a_stopped_campaign_goes_on_where_it_was_with_the_same_files(
         assert main(command) == 0
         assert len(calls) == COUNT - 2
     assert contents(out) == straight
+
+
+def full(*_, **__):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_disk_that_is_full_loses_no_result(files, tmp_path, capsys, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr("ctrl_realize.io.store.write_text", full)
+        records = [cr.read_record(file) for file in files]
+        store = cr.io.CampaignStore(tmp_path / "store")
+        kept = cr.identify_campaign(records, method="scan", order=3, max_delay=80, store=store)
+    assert len(kept.good) == COUNT
+    assert all("No space left" in row.warnings[-1] for row in kept.rows)
+    assert len(store) == 0
+    monkeypatch.setattr("ctrl_realize.cli.results.report.write_campaign", full)
+    main(["identify", *files, "-o", str(tmp_path / "out"), *FAST])
+    assert "the report could not be written (OSError" in capsys.readouterr().err
+    assert {"model.json", "records.csv"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+@pytest.mark.parametrize(("count", "separate"), [(0, False), (0, True), (2, True)])
+def test_an_interruption_leaves_finished_records_alone(
+    files, tmp_path, capsys, monkeypatch, count, separate
+):
+    owner = (identify_command, "identify_record") if separate else (rows, "identify")
+    stop_after(monkeypatch, owner, count)
+    out, more = tmp_path / "a" / "out", ["--separate"] if separate else []
+    assert main(["identify", *files, "-o", str(out), *more, *FAST]) == 130
+    assert capsys.readouterr().err.startswith("ctrl-realize: interrupted; ")
+    if count:
+        assert {path.name for path in out.iterdir()} == {"step_0", "step_1"}
+        assert all((out / name / "report.html").exists() for name in ("step_0", "step_1"))
+    else:
+        assert list(tmp_path.iterdir()) == []
 
 
 QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]

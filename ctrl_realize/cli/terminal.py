@@ -26,8 +26,10 @@ def complain(text: str) -> None:
 
 
 def _write(text: str, *, to_stderr: bool) -> None:
+    # names of records and files stand in most texts, and must not steer the terminal
+    lines = "\n".join(printable(line) for line in text.split("\n"))
     try:
-        typer.echo(text, err=to_stderr)
+        typer.echo(lines, err=to_stderr)
     except BrokenPipeError:
         # what is in the buffer, and all that follows, goes nowhere
         stream = sys.stderr if to_stderr else sys.stdout

@@ -63,3 +63,14 @@ def test_simulated_valve_gives_its_pulse_response_and_its_delay():
     # 37 samples of the valve are 9.25 of these; the scan's class leaves its delay free by a few.
     assert model.delay == pytest.approx(9.25, abs=3)
     assert cr.compare_frf(model, frf).rms_relative_error < 0.01
+
+
+def test_band_that_is_too_narrow_is_said():
+    def codes(f, length):
+        g = cr.impulse_from_frf(cr.MeasuredFRF(analog(f), f), DT, length)
+        return [flag.code for flag in g.flags]
+
+    assert codes(np.linspace(0.2, 4, 60), 80) == ["ends_early"]
+    assert codes(np.linspace(2, 49, 200), 80) == ["starts_late"]
+    assert codes(np.linspace(0.2, 49, 200), 20) == ["unexplained", "cut_off"]
+    assert codes(np.linspace(0.2, 49, 200), 12) == ["unexplained"]

@@ -202,3 +202,34 @@ def test_an_estimate_from_samples_knows_its_hold_and_every_function_reckons_with
     # the same plant at two sample times, and half a sample is 9 degrees in the middle of the band
     assert abs(errors[0]) < 1.0
     assert abs(errors[1]) < 1.0
+
+
+def test_inputs_that_move_together_are_refused():
+    with pytest.raises(ValueError, match="independently"):
+        cr.spectral_frf(two_by_two(5000, together=True))
+    with pytest.raises(ValueError, match="'H1'"):
+        cr.spectral_frf(two_by_two(5000), method="H2")
+    with pytest.raises(ValueError, match="expected one of each with period"):
+        cr.spectral_frf(two_by_two(5000), period=500)
+
+
+def test_player_arm_has_two_inputs_and_two_coherent_outputs(shared_data):
+    table = np.genfromtxt(
+        shared_data / "cd_player_mimo" / "record.csv", delimiter=",", skip_header=1
+    )
+    record = cr.Record(table[:, 0], table[:, 1:3].T, table[:, 3:].T)
+    frf = cr.spectral_frf(record, segment=128)
+    assert frf.frdata.shape[:2] == (2, 2)
+    assert np.median(frf.coherence) > 0.5
+
+
+def test_motor_bench_resonates_at_77_hz_and_is_still_at_53(shared_data):
+    data = np.load(shared_data / "motor_bench_multisine.npz")
+    dt = float(data["dt"])
+    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
+    frf = cr.spectral_frf(record, period=int(data["period"]))
+    assert frf.frequency_hz.tolist() == pytest.approx(list(range(11, 251)))
+    near = frf.between_hz(30, 120)
+    assert near.frequency_hz[np.argmax(np.abs(near.complex))] == pytest.approx(77)
+    assert near.frequency_hz[np.argmin(np.abs(near.complex))] == pytest.approx(53)
+    assert np.all(frf.std < 0.02 * np.abs(frf.complex).max())

@@ -90,3 +90,24 @@ def test_std_of_single_records_counts_slow_noise_where_it_is_strong(hz):
     overall = 0.02 / np.sqrt(1 - 0.9**2)
     expected = np.sqrt(4 / 400) / 2 * max(gain, overall)
     assert np.median(size) == pytest.approx(expected, rel=0.3)
+
+
+def test_coherence_falls_when_repeats_disagree():
+    repeats = [sine_record(3.3, np.exp(1j * angle)) for angle in (0.0, 1.0, -1.0)]
+    frf = cr.stepped_sine_frf([repeats])
+    assert frf.coherence[0] == pytest.approx((1 + 2 * np.cos(1.0)) ** 2 / 9, rel=1e-9)
+
+
+def test_given_frequencies_start_the_fit_or_are_kept():
+    records = [sine_record(3.3, 0.5)]
+    free = cr.stepped_sine_frf(records, frequency_hz=[3.25])
+    kept = cr.stepped_sine_frf(records, frequency_hz=[3.25], free_frequency=False)
+    assert free.frequency_hz[0] == pytest.approx(3.3, rel=1e-9)
+    assert kept.frequency_hz[0] == pytest.approx(3.25, rel=1e-12)
+
+
+def test_drift_is_taken_out_on_request():
+    record = sine_record(0.9, 0.5)
+    drifting = cr.Record(record.time, record.input, record.output + 0.7 * record.time)
+    frf = cr.stepped_sine_frf([drifting], drift=True)
+    assert frf.complex[0] == pytest.approx(0.5, rel=1e-8)

@@ -438,3 +438,11 @@ def test_digits_that_are_no_numbers_name_columns_at_the_command_line(tmp_path, c
     asked = ["identify", str(tmp_path / "a.csv"), "-o", str(tmp_path / "out"), "--time", column]
     assert main(asked) == 2
     assert f"'{column}'" in capsys.readouterr().err
+
+
+def test_values_and_rows_that_are_no_signal_are_refused():
+    with pytest.raises(DataError, match=r"output is larger than 1e\+70 at index 1"):
+        cr.Record([0, 1, 2], [1, 2, 3], [1, 1.7e308, 3])
+    # the ValueError was NumPy's
+    with pytest.raises(DataError, match="time is not an array"):
+        cr.Record([[], [0.0]], [1, 2], [1, 2])

@@ -293,3 +293,54 @@ def test_only_the_wanted_columns_of_a_parquet_file_are_read(tmp_path):
     assert peak < 5e6  # N texts of a million letters would be 200 MB
     with pytest.raises(FileFormatError, match=r"column 'matrix' holds list"):
         read_record(path, output="matrix")
+
+
+def test_structs_of_matlab_are_read_field_by_field(tmp_path):
+    file = tmp_path / "a.mat"
+    simulink = {"time": T, "signals": {"values": Y, "label": "level"}}
+    scipy.io.savemat(file, {"run": {"t": T, "u": U, "y": Y}, "scope": simulink})
+    check(read_record(file, variable="run"))
+    check(read_record(file, time="scope.time", input="run.u", output="scope.signals.values"))
+    with pytest.raises(OptionError, match=r"2 columns that could be time.*'run.t'.*'scope.time'"):
+        read_record(file)
+
+
+@pytest.mark.parametrize(
+    ("header", "match"),
+    [
+        (b"{'descr': '|O', 'fortran_order': False, 'shape': (3,)}", "Python objects"),
+        (b"{'descr': '<f8', 'fortran_order': False, 'shape': (-3,)}", "damaged|cut off"),
+        (b"{'descr': '<f8', 'shape': (3,)}", "damaged"),
+        (b"__import__('os').system('true')", "damaged"),
+        (b"[" * 5000, "damaged"),
+        (b"\xff\xfe\xfd", "damaged"),
+    ],
+)
+def test_npy_headers_that_are_wrong_are_refused(tmp_path, header, match):
+    content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(24)
+    (tmp_path / "a.npy").write_bytes(content)
+    with pytest.raises(FileFormatError, match=match):
+        read_record(tmp_path / "a.npy")
+
+
+def test_times_of_numpy_and_stored_sample_times(tmp_path):
+    stamps = np.datetime64("2026-03-01T00:00") + 250 * np.arange(N).astype("m8[ms]")
+    np.savez(tmp_path / "a.npz", timestamp=stamps, u=U, y=Y)
+    check(read_record(tmp_path / "a.npz"))
+    for constants, match in (({"dt": 0.0}, "dt=0.0"), ({"fs": 0}, "fs=0.0"), ({"Ts": -1}, "Ts=-1")):
+        np.savez(tmp_path / "a.npz", u=U, y=Y, **constants)
+        with pytest.raises(DataError, match=match):
+            read_record(tmp_path / "a.npz")
+
+
+def test_what_cannot_be_opened_says_what_to_do(tmp_path, monkeypatch):
+    with zipfile.ZipFile(tmp_path / "a.xlsx", "w") as archive:
+        archive.writestr("xl/workbook.xml", "<xml/>")
+    (tmp_path / "a.parquet").write_bytes(b"PAR1" + bytes(100))
+    monkeypatch.setitem(sys.modules, "pyarrow", None)  # not installed
+    for name, match in (
+        ("a.parquet", "pip install pyarrow"),
+        ("a.xlsx", r"an Excel workbook .* save the data as CSV"),
+    ):
+        with pytest.raises(FileFormatError, match=match):
+            read_record(tmp_path / name)

@@ -5,7 +5,7 @@ import pytest
 import scipy.io
 from numpy.testing import assert_allclose
 
-from ctrl_realize.errors import DataError, FileFormatError, OptionError
+from ctrl_realize.errors import DataError, DataWarning, FileFormatError, OptionError
 from ctrl_realize.io import read_frf
 
 F = np.array([0.5, 1.0, 2.0, 5.0, 10.0])
@@ -99,3 +99,30 @@ def test_complex_arrays_are_read(tmp_path):
         struct = {"freq": F, "H": G[:, None]}
         scipy.io.savemat(tmp_path / "a.mat", {"meas": struct}, do_compression=packed)
         check(read_frf(tmp_path / "a.mat"))
+
+
+def test_coherence_and_std_come_along_and_a_cut_last_line_does_not(tmp_path):
+    file = tmp_path / "two.parts.csv"
+    coherence, std = np.linspace(1, 0.2, 5), np.linspace(0.01, 0.1, 5)
+    file.write_text(written("f,re,im,coherence,std", F[::-1], G.real, G.imag, coherence, std))
+    frf = read_frf(file)
+    assert_allclose(frf.coherence, coherence[::-1], rtol=0)
+    assert_allclose(frf.std, std[::-1], rtol=0)
+    assert frf.name == "two_parts"
+    assert frf.trusted(0.9).frequency_hz[0] == F[4]
+    file.write_text(written("f,re,im", F, G.real, G.imag) + "20.0,0.")
+    with pytest.warns(DataWarning, match="has 2 of 3 cells"):
+        check(read_frf(file))
+
+
+def test_every_measured_frequency_response_is_read(shared_data):
+    files = list(shared_data.rglob("*frf*.csv"))
+    assert len(files) >= 5
+    for file in files:
+        response = read_frf(file)
+        frequency, magnitude, phase = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
+        assert_allclose(response.frequency_hz, frequency, rtol=0)
+        assert_allclose(np.abs(response.complex), magnitude, rtol=1e-15)
+        turns = (np.angle(response.complex, deg=True) - phase) / 360
+        # angle() and exp() round, and 2160 degrees cost three digits
+        assert_allclose(turns, np.round(turns), atol=1e-13)

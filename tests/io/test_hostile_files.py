@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import os
 import socket
 import struct
 import tracemalloc
 import zlib
 
+import control as ct
 import numpy as np
 import pytest
 
 from ctrl_realize.errors import (
     CtrlRealizeError,
+    DataError,
     FileFormatError,
     MissingFileError,
+    OptionError,
 )
-from ctrl_realize.io import load_model, read_frf, read_record
+from ctrl_realize.io import load_model, read_frf, read_record, save_model
 
 READERS = [read_record, read_frf, load_model]
 JUNK = np.random.default_rng(7).bytes(100_000)
@@ -158,3 +162,57 @@ def test_a_mat_file_of_zeros_is_refused_with_little_memory(tmp_path, kind, packe
         read_record(file)
     assert tracemalloc.get_traced_memory()[1] < 10e6
     tracemalloc.stop()
+
+
+def test_text_that_would_be_cut_wrongly_is_refused(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("t|u|y\n0|-526|410\n0.125|-822|610\n0.25|-339|361\n")
+    for options in ({"comment": "1"}, {"comment": "e"}, {"delimiter": "4"}):
+        with pytest.raises(OptionError, match="would split numbers"):
+            read_record(file, **options)
+    rows = [f"{k},{k},{k}" for k in range(50_000)]
+    rows[49_000] = "49000,49000,oops"
+    file.write_text("t,u,y\n" + "\n".join(rows) + "\n")
+    with pytest.raises(DataError, match="line 49002: 'oops'"):
+        read_record(file)
+
+
+def test_line_ends_in_quotes_and_wide_letters_shift_no_columns(tmp_path):
+    file = tmp_path / "a.csv"
+    text = 't,u,y,note\n0,1,2,"a\nb"\n1,2,3,"c"\n2,3,4,"d,e"\n'
+    for encoding in ("utf-8", "utf-8-sig", "utf-16", "utf-32"):
+        file.write_bytes(text.encode(encoding))
+        assert read_record(file).input.tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_what_is_no_name_of_a_file_is_refused(tmp_path, read):
+    for path in (None, 3, b"a.csv", io.StringIO("t,u,y\n")):
+        with pytest.raises(OptionError, match=f"got a {type(path).__name__}"):
+            read(path)
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises(MissingFileError):
+        read(tmp_path / "a")
+
+
+def test_a_model_is_not_saved_under_a_name_that_no_file_can_have(tmp_path):
+    with pytest.raises(OSError, match="null"):
+        save_model(tmp_path / "a\0b.json", ct.ss(0.9, 1, 1, 0, 0.1))
+
+
+BEGIN = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+
+
+def test_what_is_packed_in_a_mat_file_does_not_fill_the_memory(tmp_path):
+    matrix = struct.pack("<II", 14, 64) + bytes(64)
+    packer = zlib.compressobj()
+    zeros = b"".join([packer.compress(bytes(1 << 20)) for _ in range(100)]) + packer.flush()
+    for packed in (zeros, zlib.compress(matrix + bytes(50 << 20))):
+        file = tmp_path / "a.mat"
+        file.write_bytes(BEGIN + struct.pack("<II", 15, len(packed)) + packed)
+        tracemalloc.start()
+        with pytest.raises(FileFormatError):
+            read_record(file)
+        assert tracemalloc.get_traced_memory()[1] < 10e6
+        tracemalloc.stop()

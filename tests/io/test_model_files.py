@@ -13,9 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import (
-    FileFormatError,
-)
+from ctrl_realize.errors import FileFormatError, OptionError, UnsuitableSystemError
 from ctrl_realize.io import FitSummary, load_model, save_model
 from ctrl_realize.results import Flag, ModelFit
 
@@ -238,3 +236,46 @@ def test_other_files_are_refused(tmp_path, text, match):
     (tmp_path / "a.json").write_text(text, encoding="latin-1")
     with pytest.raises(FileFormatError, match=match):
         load_model(tmp_path / "a.json")
+
+
+def test_a_model_of_any_delay_is_read_up_to_the_limit_that_is_asked_for(tmp_path, model):
+    far = model.replace(delay=900_000)
+    save_model(tmp_path / "a.json", far)
+    assert_array_equal(load_model(tmp_path / "a.json")(1j), far(1j))
+    save_model(tmp_path / "a.json", model.replace(delay=100))
+    with pytest.raises(FileFormatError, match=r"102 states, delays included; .*max_states=50"):
+        load_model(tmp_path / "a.json", max_states=50)
+    assert load_model(tmp_path / "a.json", max_states=102).delay == 100
+    plain = ct.ss([[0.5]], [[1.0]], [[2.0]], [[0.25]], 0.1, name="plain", inputs="a", outputs="b")
+    save_model(tmp_path / "a.json", plain)
+    assert_same(load_model(tmp_path / "a.json"), cr.DelayedStateSpace(plain, 0, name="plain"))
+
+
+def test_what_cannot_be_saved_leaves_the_old_model_and_no_file(file, model):
+    before = file.read_bytes()
+    for what, settings in (
+        (model, {"bad": {1, 2}}),
+        (ct.ss(-1, 1, 1, 0), {}),
+        (ct.ss(0.5, 1, 1, 0, True), {}),
+        (ct.tf([1], [1, 0.5], 0.1), {}),
+        (ct.StateSpace([[0.5]], [[np.inf]], [[1.0]], [[0.0]], 0.1), {}),
+        ("model", {}),
+    ):
+        with pytest.raises((OptionError, UnsuitableSystemError)):
+            save_model(file, what, settings=settings)
+    with pytest.raises(FileNotFoundError):
+        save_model(file.parent / "nowhere" / "a.json", model)
+    assert file.read_bytes() == before
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def test_a_model_that_was_loaded_is_saved_as_it_was_and_keeps_its_interval(tmp_path):
+    system = cr.identify(cr.bench.valve(noise=1e-3).step_record(16, rng=5), structures=[(3, 3)])
+    save_model(tmp_path / "a.json", system)
+    again = load_model(tmp_path / "a.json")
+    assert again.fit.dead_time_interval == system.fit.dead_time_interval
+    pi = cr.design.pid(system)
+    told = [cr.design.delay_robustness(each, pi).report() for each in (system, again)]
+    assert told[0] == told[1]
+    save_model(tmp_path / "b.json", again)
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()

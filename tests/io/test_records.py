@@ -502,3 +502,87 @@ def test_commas_that_may_divide_thousands_are_asked_about(tmp_path, delimiters, 
                 read_record(path)
         read = read_record(path, **({} if clear else {"decimal": ","})).output
         np.testing.assert_array_equal(read, [float(c.replace(",", ".")) for c in cells])
+
+
+def test_nanoseconds_since_1970_keep_their_steps(tmp_path):
+    file = tmp_path / "a.csv"
+    start = 1_774_000_000_123_456_789
+    file.write_text("t_ns,u,y\n" + "".join(f"{start + 78_125 * k},{k},{k}\n" for k in range(50)))
+    np.testing.assert_allclose(read_record(file).time, 78_125e-9 * np.arange(50), rtol=3e-16)
+
+
+CLOCKS = {  # how the column of time is written, and what its sample time is in the unit asked for
+    "ms since 1970": (lambda k: f"{1_770_000_000_000 + 100 * k}", "ms", 0.1, "time_ms"),
+    "us since 1970": (lambda k: f"{1_770_000_000_000_000 + 100_000 * k}", "us", 0.1, "time_us"),
+    "ns since 1970": (lambda k: f"{1_770_000_000 * 10**9 + 10**8 * k}", "ns", 0.1, "time_ns"),
+    "Excel": (lambda k: f"{46085.5 + k / 86400:.9f}", "day", 1.0, "time [days]"),
+    "datenum": (lambda k: f"{739000.25 + k / 86400:.9f}", "day", 1.0, "time [days]"),
+}
+
+
+@pytest.mark.parametrize("kind", CLOCKS)
+def test_a_clock_since_1970_or_in_days_is_not_taken_for_seconds(tmp_path, kind):
+    cell, unit, dt, header = CLOCKS[kind]
+    file = tmp_path / "logger.csv"
+    lines = "\n".join(f"{cell(k)},0,{k}" for k in range(5)) + "\n"
+    file.write_text("time,u,y\n" + lines)
+    with pytest.raises(OptionError, match=f"looks like .*; give time_unit='{unit}'"):
+        read_record(file)
+    assert read_record(file, time_unit=unit).dt == pytest.approx(dt, rel=1e-4)  # nine decimals
+    file.write_text(f"{header},u,y\n" + lines)
+    assert read_record(file).dt == pytest.approx(dt, rel=1e-4)
+
+
+def test_a_clock_of_seconds_may_show_what_a_day_count_shows_but_is_not_coarse(tmp_path):
+    file = tmp_path / "uptime.csv"
+    file.write_text("time,u,y\n" + "".join(f"{46085.5 + k / 1000:.3f},0,{k}\n" for k in range(50)))
+    assert read_record(file).dt == pytest.approx(1e-3)
+    file.write_text("time,u,y\n" + "".join(f"{k // 10},0,{k}\n" for k in range(40)))
+    with pytest.raises(TimeAxisError, match="clock is coarser than the sample time, give dt="):
+        read_record(file)
+    assert read_record(file, dt=0.1).n_samples == 40
+
+
+def test_dates_of_other_kinds_need_their_format(tmp_path):
+    file = tmp_path / "a.csv"
+    rows = [f"03.02.2026 10:00:0{k},{k},{k}" for k in range(4)]
+    file.write_text("\n".join(["date time,u,y", *rows]) + "\n")
+    with pytest.raises(DataError, match=r"line 2: '03\.02\.2026 10:00:00'.*time_format="):
+        read_record(file)
+    with pytest.raises(OptionError, match="time_format='%' is not a time format"):
+        read_record(file, time_format="%")
+    assert_array_equal(read_record(file, time_format="%d.%m.%Y %H:%M:%S").time, np.arange(4.0))
+
+
+LAST = "t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n1.5,1.5,12.5000\n2,-1.5,12.0000"
+BELOW = "9,9,9\n1,2,3\n" + table()
+TEXTS = {  # whole tables that look as if something were cut off or wrong
+    "no end of line": (LAST, {}),
+    "an empty line at the end": (LAST + "\n\n", {}),
+    "numbers as short as others": (LAST.replace("00", ""), {}),
+    "a header further down": (BELOW, {"skip_rows": 2}),
+    "a header that is told": (
+        BELOW,
+        {"skip_rows": 1, "header": True, "time": 0, "input": 1, "output": 2},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_whole_table_is_read_without_a_word(tmp_path, name):
+    text, options = TEXTS[name]
+    (tmp_path / "a.csv").write_text(text)
+    check(read_record(tmp_path / "a.csv", **options))
+
+
+def test_bad_cells_are_named_by_their_line_and_only_where_they_are_used(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("t,u,y,z\n0,0,1,\n1,0,1,NaN\n2,0,1,x\n3,0,1,2\n")
+    assert read_record(file).n_samples == 4
+    file.write_text("# bench\n\nt,u,y\n0,0,1\n\n# restart\n1,0,bad\n2,0,1\n3,0,1\n4,0,1\n")
+    with pytest.raises(DataError, match="line 7: 'bad'"):
+        read_record(file)
+    # decimal commas between commas: nobody can tell
+    file.write_text("t,u,y\n0,0,1,5,2,5\n0,1,1,5,2,5\n0,2,1,5,2,5\n")
+    with pytest.raises(FileFormatError, match=r"line 1 .* has 3 cells, the lines below have 6"):
+        read_record(file)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.hankel.lanczos import leading_eigenpairs
+from ctrl_realize.numerics.hankel.lanczos import largest_magnitude, leading_eigenpairs
 from ctrl_realize.numerics.hankel.matrix import (
     BlockHankel,
     HankelStack,
@@ -14,7 +14,7 @@ from ctrl_realize.numerics.hankel.matrix import (
     hankel_norm_squared,
 )
 from ctrl_realize.numerics.hankel.recurrence import extreme_pairs
-from ctrl_realize.numerics.hankel.svd import leading_triplets
+from ctrl_realize.numerics.hankel.svd import leading_triplets, thin_svd
 from tests.oracles.plants import modal, valve_pulse
 
 
@@ -141,3 +141,72 @@ def test_equal_channels_of_low_rank_are_not_taken_for_one(rank):
     assert not found.complete
     assert_allclose(found.values[:-1], expected[: 3 * rank], rtol=0, atol=1e-12 * expected[0])
     assert found.values[-1] == 0
+
+
+def test_a_power_of_two_scales_every_bit():
+    h = windows(valve_pulse("causal"), 200, 4)
+    plain, scaled = leading_eigenpairs(h, 200, 3), leading_eigenpairs(h * 2.0**-900, 200, 3)
+    assert np.array_equal(plain.vectors, scaled.vectors)
+    assert np.array_equal(plain.values * 2.0**-900, scaled.values)
+
+
+@pytest.mark.parametrize("size", [40, 100, 300])
+def test_beyond_the_numerical_rank_there_are_zeros(size):
+    for rank in (0, 1, 5):
+        A, B, C, _ = modal(np.random.default_rng(rank), max(rank, 1))
+        pulse = np.array([(C @ np.linalg.matrix_power(A, k) @ B)[0, 0] for k in range(2 * size)])
+        pairs = leading_eigenpairs(windows(pulse * (rank > 0), size, 1), size, 8)
+        assert np.count_nonzero(pairs.values[0]) == rank
+        assert np.count_nonzero(np.abs(pairs.vectors[0]).max(axis=1)) == rank
+
+
+@pytest.mark.parametrize("size", [50, 200, 2000])  # dense, dense fallback, ARPACK
+def test_a_pulse_has_one_and_minus_one_many_times(size):
+    pulse = np.zeros(2 * size)
+    pulse[20] = 1.0
+    pairs = leading_eigenpairs(windows(pulse, size, 1), size, 8)
+    # one start vector sees each value once; the rest must not be taken for zero
+    assert_allclose(np.abs(pairs.values[0]), np.ones(8), rtol=1e-13)
+
+
+# So many values of noise do not converge in the steps of one run: the dense fallback, ARPACK.
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "count"), [(800, 199), (1600, 150)])
+def test_noise_that_needs_too_many_steps_is_solved_another_way(size, count):
+    noise = np.random.default_rng(5).standard_normal(2 * size - 1)
+    H = hankel_matrix(noise, size, size)
+    expected = np.sort(np.abs(np.linalg.eigvalsh(H)))[::-1]
+    pairs = leading_eigenpairs(noise[np.newaxis], size, count)
+    assert_allclose(np.abs(pairs.values[0]), expected[:count], rtol=0, atol=1e-9 * expected[0])
+    assert_allclose(H @ pairs.vectors[0].T, pairs.vectors[0].T * pairs.values[0], atol=1e-7)
+    assert pairs.following[0] == pytest.approx(expected[count], rel=0.1)
+    found = leading_triplets(noise[np.newaxis, np.newaxis], size, size, count)
+    assert_allclose(found.values, expected[:count], rtol=0, atol=1e-11 * expected[0])
+    # to the rounding of a product with a matrix of this size
+    assert_allclose(H @ found.V, found.U * found.values, rtol=0, atol=1e-10 * expected[0])
+
+
+def test_norm_to_three_digits():
+    noise = np.random.default_rng(5).standard_normal((3, 399))
+    expected = [np.linalg.norm(hankel_matrix(row, 200, 200), 2) for row in noise]
+    assert_allclose(largest_magnitude(noise, 200), expected, rtol=1e-3)
+
+
+class Stubborn(np.ndarray):
+    """A matrix on which NumPy's divide and conquer does not end, as one in 30 000 does not."""
+
+    def __array_function__(self, function, types, args, keywords):
+        if function is np.linalg.svd:
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return super().__array_function__(function, types, args, keywords)
+
+
+@pytest.mark.parametrize("shape", [(5, 5), (7, 3), (3, 7)])
+@pytest.mark.parametrize("kind", [np.ndarray, Stubborn])
+def test_the_factors_make_the_matrix(shape, kind):
+    matrix = np.random.default_rng(1).standard_normal(shape)
+    U, values, Vt = thin_svd(matrix.view(kind))
+    assert (np.diff(values) <= 0).all()
+    assert_allclose(U @ (values[:, None] * Vt), matrix, atol=1e-13 * values[0])
+    assert_allclose(U.T @ U, np.eye(values.size), atol=1e-13)
+    assert_allclose(Vt @ Vt.T, np.eye(values.size), atol=1e-13)
