@@ -27,10 +27,6 @@ def text_card(
     rows : sequence of (label, value)
     choices, flags : sequence of str, optional
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> from ctrl_realize._shown import text_card
@@ -60,10 +56,6 @@ def html_card(
     ----------
     title, rows, choices, flags
         As for `text_card`.
-
-    Returns
-    -------
-    str
 
     Examples
     --------
@@ -97,14 +89,6 @@ def as_asked(system: Any) -> str:
     What python-control takes where nothing was set, "eval", lists every number. Systems of this
     toolbox show their one line there, and "eval" only where it was set on the system itself.
 
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> import control as ct
@@ -127,14 +111,6 @@ def as_asked(system: Any) -> str:
 
 def as_code(values: Any) -> str:
     """Write an array, or a system of python-control, as code that has all its digits.
-
-    Parameters
-    ----------
-    values : array_like or control.InputOutputSystem
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -98,10 +98,6 @@ def leading_eigenpairs(h: FloatArray, size: int, count: int, *, tol: float = 1e-
     tol : float
         Largest residual, relative to the smallest wanted eigenvalue.
 
-    Returns
-    -------
-    EigenPairs
-
     Notes
     -----
     Deterministic: the start vector is half the first column and half a

@@ -85,10 +85,6 @@ def fit_sines(
     mask : ndarray of 0 and 1, shape (B, N), optional
         Samples to use; all by default.
 
-    Returns
-    -------
-    SineFit
-
     Notes
     -----
     For channels with different noise the common frequency is that of weighted least squares:

@@ -58,10 +58,6 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
     lags : int
     kernel : {"TC", "DC", "SS", "auto"}
         ``"auto"``: TC or SS, whichever has the larger marginal likelihood.
-
-    Returns
-    -------
-    KernelFit
     """
     problem = KernelProblem.of(equations, lags, kernel)
     if kernel == "auto":
