@@ -100,3 +100,8 @@ def test_a_drift_before_the_step_does_not_make_an_integrator_of_a_lamp(shared_da
     assert "integrating" not in flags
     assert 17 < fit.gain < 23  # of the five records one by one: 16 to 23
     assert 0.5 <= fit.delay <= 2.2
+
+
+def test_single_plants_are_in_their_bands(shared_data):
+    names = [name for name in SAMPLES if not name.startswith("heating_system")]
+    assert [name for name in names if not in_band(shared_data, name)] == []

@@ -174,3 +174,11 @@ def test_an_edge_of_a_record_is_that_of_its_samples_at_a_time():
         {**vars(edge), "time": None, "edges": None} for edge in plain
     ]
     assert [edge.time for edge in found] == pytest.approx([15.0, 23.0])
+
+
+def test_measured_records_have_one_step_where_it_is(shared_data):
+    expected = {"dc_motor_tacho/up.csv": (1366, 4.05), "air_duct/45.csv": (480, 4.0)}
+    for name, (index, amplitude) in expected.items():
+        edge = cr.detect_step(cr.read_record(shared_data / name))
+        assert (edge.index, len(edge.edges)) == (index, 1)
+        assert_allclose(edge.amplitude, amplitude, atol=0.01)

@@ -250,3 +250,15 @@ def test_intervals_are_in_seconds_and_in_samples():
     np.testing.assert_allclose(track.high, TS * track.delay_high)
     # A model that is used for a controller brings its interval along.
     assert cr.design.pid(bank.model).check.stable_within_interval is not None
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_the_exchanger_keeps_its_delay_of_zero(shared_data, order):
+    table = np.loadtxt(shared_data / "exchanger" / "record.csv", delimiter=",", skiprows=1)
+    record = cr.Record(*table.T)
+    first = cr.impulse_from_io(record.between(0, 1500), 200)
+    model = cr.realize(first, order, feedthrough=True)
+    track = cr.DelayTracker(model, max_delay=20, forgetting_time=300.0).track(record)
+    # the plant is not linear, and at times a pole of the third order moves too far
+    assert np.mean(track.resolved) > 0.6
+    assert np.all(track.dead_time[track.resolved] <= 1.0)  # s, one sample

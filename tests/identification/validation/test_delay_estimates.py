@@ -161,3 +161,13 @@ def test_an_estimate_is_rounded_as_its_interval_is():
         [DelayEstimate("a", "FRF", "dead time", 0.0123456, 0.012, 0.013)], dt=0.01
     ).report()
     assert "12.3 ms = 1.235 samples (12.0 to" in shown
+
+
+@pytest.mark.parametrize(("plant", "low", "high"), [("hairdryer", 2, 3), ("gas_furnace", 2, 3)])
+def test_measured_plants_under_random_input_are_agreed_on(shared_data, plant, low, high):
+    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
+    record = cr.Record(*table.T)
+    check = cr.validation.compare_delay_estimates(record)
+    assert check.agree
+    assert low * record.dt <= check.common[1] * (1 + 1e-9)
+    assert check.common[0] <= high * record.dt
