@@ -13,9 +13,9 @@ from ..identification.realization.delay_scan_result import DelayScan
 from ..io import save_model
 from ..io.text.csv_files import write_csv
 from ..plots.fits import evidence_height
-from ..report import Column, Page, Row, Sketch, Table, pairs, verdict_of, write_page
-from ..report.provenance import own_version, record_sha256, versions
-from ..report.sketches import save_sketches
+from ..report import Column, Row, Sketch, Table, pairs, verdict_of
+from ..report.build import write_report
+from ..report.provenance import record_sha256
 from ..report.tables import comparison_tables, fit_tables
 from .demo_run import DemoResult, shown
 from .demo_tables import OUTCOME, outcome_rows, simulated_table, table_1_columns, table_1_rows
@@ -31,9 +31,7 @@ def write_demo_files(folder: Path, result: DemoResult) -> list[str]:
     save_model(folder / "model.json", result.fitted, settings=settings, note=note)
     save_model(folder / "model_paper.json", result.printed, settings=settings, note=note)
     _write_tables(folder, result)
-    sketches = demo_sketches(result)
-    save_sketches(folder / "figures", sketches)
-    write_page(folder / "report.html", demo_page(result, sketches))
+    _write_report(folder, result)
     return [
         "report.html",
         "model.json",
@@ -152,19 +150,17 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
     ]
 
 
-def demo_page(result: DemoResult, sketches: list[Sketch]) -> Page:
-    """Put the report together."""
-    verdict = verdict_of(result.fitted, result.comparisons["fitted"].flags)
-    return Page(
+def _write_report(folder: Path, result: DemoResult) -> None:
+    write_report(
+        folder / "report.html",
         title=_TITLE,
         subtitle=(
             "Forty simulated steps and a simulated stepped sine: the method of van Helvoirt et "
             "al. (IFAC 2005) and an output-error fit. The true dead time is "
             f"{1e3 * result.valve.truth.dead_time:.4g} ms = {result.valve.truth.delay:.4g} samples."
         ),
-        verdict=verdict,
-        version=own_version(),
-        figures=[sketch.on_page() for sketch in sketches],
+        verdict=verdict_of(result.fitted, result.comparisons["fitted"].flags),
+        sketches=demo_sketches(result),
         tables=[
             _outcome(result),
             _table_1(result),
@@ -173,13 +169,13 @@ def demo_page(result: DemoResult, sketches: list[Sketch]) -> Page:
             pairs("The paper's settings", _settings()),
             pairs("The simulated valve", [*result.valve.truth._rows(), ("seed", str(result.seed))]),
             _data(result),
-            pairs("Versions", versions()),
         ],
         calls=[
             ("In a terminal", typed_call("demo", ["--output", "demo", "--seed", str(result.seed)])),
             ("In Python", _python(result)),
         ],
         simulated=True,
+        figures=folder / "figures",
     )
 
 

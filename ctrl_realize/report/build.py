@@ -107,7 +107,7 @@ def write_identification(
             f"system is a {type(system).__name__}; expected a model with dead time, as "
             "returned by identify, followed by its record"
         )
-    return _write(
+    return write_report(
         path,
         title=f"Model of {record.name}" if record.name else "Identified model",
         subtitle=_kind(system),
@@ -190,7 +190,7 @@ def write_campaign(
     sketches = campaign_sketches(campaign, truth=truth)
     if frf is not None:
         sketches += frf_sketches([system], frf, comparison)
-    return _write(
+    return write_report(
         path,
         title=title,
         subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
@@ -263,7 +263,7 @@ def write_comparison(
     ...     print(path.read_text().count("<svg "), "figures")
     2 figures
     """
-    return _write(
+    return write_report(
         path,
         title=f"{system.name} and {frf.name}",
         subtitle="model and measured frequency response",
@@ -280,7 +280,7 @@ def write_comparison(
     )
 
 
-def _write(
+def write_report(
     path: str | os.PathLike[str],
     *,
     title: str,
