@@ -78,3 +78,34 @@ def test_a_record_of_random_levels_is_answered_alike():
 @pytest.mark.parametrize("name", ["gas_furnace/record", "heating_system/edge2"])
 def test_a_measured_record_is_answered_alike(shared_data, name):
     alike(measured(shared_data, name))
+
+
+def two_modes_that_do_not_begin_at_rest(seed):
+    rng = np.random.default_rng(seed)
+    plant = cr.delayed_ss(rigs.pair(1.5, 0.05) + rigs.pair(6.0, 0.02), dead_time=0.03, dt=0.01)
+    u = np.repeat(rng.choice([-1.0, 1.0], 120), 5)
+    y = np.ravel(plant.simulate(u)) + 0.02 * rng.standard_normal(u.size)
+    return cr.Record(0.01 * np.arange(400), u[200:], y[200:])
+
+
+def test_states_are_chosen_alike():
+    def states(record):
+        fit = cr.fit_state_space(record).fit
+        flags = sorted(flag.code for flag in fit.flags)
+        return (fit.order, fit.input_delays, fit.feedthrough, flags), fit.noise_std / np.std(
+            record.output
+        )
+
+    record = two_modes_that_do_not_begin_at_rest(8)
+    shape, noise = states(record)
+    assert shape[:2] == (4, (3,))
+    for change in CHANGES:
+        again, other = states(change(record))
+        assert again == shape
+        np.testing.assert_allclose(other, noise, rtol=1e-4)
+
+
+def test_states_that_do_not_begin_at_rest_leave_the_noise():
+    record = two_modes_that_do_not_begin_at_rest(6)
+    # 400 samples tell a standard deviation to 4 %
+    assert cr.fit_state_space(record).fit.noise_std == pytest.approx(0.02, rel=0.12)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import DataError, DataWarning
 from ...numerics.arrays import IntArray
+from ...numerics.output_error.margins import CLOSE
+from ...numerics.separable.structures import PLAUSIBLE
 from ...numerics.state_space.delay_split import split_delays
 from ...results import Flag
 from ..impulse.from_io import Method, Start, impulse_from_io
@@ -119,9 +122,25 @@ def _from_start(
                 f"the highest order tried, {best.order}, is the best: try higher ones",
             ),
         )
+    flags += _marginal(search.as_good(moved, CLOSE * PLAUSIBLE))
     choices = _choices(moved, bic, shares)
     system = fitted_system(search.finish(moved), group, bic, choices, flags)
     return Outcome(moved.bic, system, unseen == 0, search, moved)
+
+
+def _marginal(others: Sequence[Candidate]) -> tuple[Flag, ...]:
+    """Flag a choice so close that rounding may turn it."""
+    if not others:
+        return ()
+    one = others[0]
+    return (
+        Flag(
+            "marginal_decision",
+            f"order {one.order} behind delays of {one.inputs} and {one.outputs} samples "
+            f"{'with' if one.feedthrough else 'without'} direct term is as good as the model "
+            "chosen, so that rounding on another processor may decide otherwise",
+        ),
+    )
 
 
 def _silence(best: Candidate) -> tuple[Flag, ...]:

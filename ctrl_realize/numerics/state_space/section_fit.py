@@ -17,12 +17,14 @@ References
    and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
 .. [3] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
    10.2 (Numerical solution by iterative search methods).
+.. [4] D. P. Bertsekas, Projected Newton methods for optimization problems with simple constraints,
+   SIAM J. Control Optim. 20 (1982) 221-246, doi:10.1137/0320018.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +39,11 @@ _DAMPING = 1e-3
 _ROWS = 4096
 """Samples whose derivatives are formed at once."""
 LARGEST_POLE = 1 - 1e-7
+_AT_EDGE = 1e-9
+_FROM_OUTSIDE = 0.999  # where a pole of a start that is unstable begins
+_DEPENDENT = 1e-10
+"""Part of the largest singular value of responses below which one of them is a sum of others."""
+_ROUNDING = 1e-13
 _EXACT = 1e-12
 """Least residual, as a part of the output: what rounding leaves."""
 
@@ -66,11 +73,15 @@ class SectionFit:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A model, its signals, residuals (zero where nothing was measured), and its misfit."""
+    """A model, its signals from rest, residuals (zero where nothing was measured), and its misfit.
+
+    `initial` (2 q,) are the states in which the experiments begin.
+    """
 
     model: Sections
     moved: tuple[Motion, ...]
     left: tuple[FloatArray, ...]
+    initial: tuple[FloatArray, ...]
     variance: FloatArray
     loss: float
 
@@ -110,34 +121,39 @@ def fit_sections(
         / counts
     )
     floor = _EXACT**2 * spread
-    model = _inside(start, feedthrough)
+    model = _inside(start, _FROM_OUTSIDE)
+    model = model if feedthrough else replace(model, D=np.zeros_like(model.D))
 
     def at(candidate: Sections, weights: FloatArray) -> _Point:
         moved = tuple(motion(candidate, one.v) for one in data)
-        left = tuple(
+        solved = [
             _residual(candidate, m, one, k, weights)
             for m, one, k in zip(moved, data, known, strict=True)
-        )
+        ]
+        left, initial = (tuple(parts) for parts in zip(*solved, strict=True))
         squares = np.sum([(r**2).sum(axis=1) for r in left], axis=0)
         variance = np.maximum(squares / counts, floor)
-        return _Point(candidate, moved, left, variance, float(counts @ np.log(variance)) / 2)
+        return _Point(
+            candidate, moved, left, initial, variance, float(counts @ np.log(variance)) / 2
+        )
 
     here = at(model, 1 / spread)
     mask = model.free(feedthrough=feedthrough, poles=False)
     gram, slope = _normal(here, data, known, 1 / spread, mask)
-    here = at(_stepped(model, mask, _damped(gram, slope, 1e-12)), 1 / spread)
+    there = at(_stepped(model, mask, _damped(gram, slope, 1e-12)), 1 / spread)
+    if there.loss < here.loss:
+        here = there
     mask, damping, done = model.free(feedthrough=feedthrough), _DAMPING, 0
     while done < most:
         weights = 1 / here.variance
-        gram, slope = _normal(here, data, known, weights, mask)
+        gram, slope = _held(here.model, *_normal(here, data, known, weights, mask), mask)
         better = None
         while damping < 1e8:
             candidate = _stepped(here.model, mask, _damped(gram, slope, damping))
-            if np.abs(candidate.poles).max(initial=0.0) <= LARGEST_POLE:
-                there = at(candidate, weights)
-                if there.loss < here.loss:
-                    better = there
-                    break
+            there = at(_inside(candidate, LARGEST_POLE), weights)
+            if there.loss < here.loss:
+                better = there
+                break
             damping *= 5
         if better is None:
             break
@@ -148,15 +164,44 @@ def fit_sections(
     return SectionFit(here.model, here.variance, spread, counts, here.loss, done)
 
 
-def _inside(start: Sections, feedthrough: bool) -> Sections:
-    """Draw unstable poles radially into the unit circle."""
-    a = start.a.copy()
+def _inside(model: Sections, to: float) -> Sections:
+    """Draw poles that are beyond the largest one radially inside."""
+    if np.abs(model.poles).max(initial=0.0) <= LARGEST_POLE:
+        return model
+    a = model.a.copy()
     for row in a:
         largest = float(np.abs(np.roots([1.0, *row])).max())
-        if largest > 0.999:
-            row *= np.array([1.0, 0.999 / largest]) * 0.999 / largest
-    D = start.D if feedthrough else np.zeros_like(start.D)
-    return Sections(a, start.B, start.C, D, start.single)
+        if largest > LARGEST_POLE:
+            row *= np.array([1.0, to / largest]) * to / largest
+    return replace(model, a=a)
+
+
+def _held(
+    model: Sections, gram: FloatArray, slope: FloatArray, mask: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray]:
+    """Take out the directions in which poles at the edge of stability would leave it [4]_."""
+    place = np.cumsum(mask) - 1
+    for i, (a1, a2) in enumerate(model.a):
+        single = model.single and i == len(model.a) - 1
+        poles = np.array([-a1]) if single else np.roots([1.0, a1, a2])
+        for pole in poles[np.abs(poles) > LARGEST_POLE - _AT_EDGE]:
+            # How the modulus of the pole rises: that of a pair with a2, that of a real one as
+            # the polynomial falls there.
+            outward = np.zeros(slope.size)
+            if single:
+                outward[place[2 * i]] = -np.sign(pole.real)
+            elif pole.imag:
+                outward[place[2 * i + 1]] = 1.0
+            else:
+                outward[place[[2 * i, 2 * i + 1]]] = -pole.real, -1.0
+            outward /= np.linalg.norm(outward)
+            if outward @ slope > 0:
+                slope = slope - outward * (outward @ slope)
+                # What bends there stays, so that no rounding of nothing is divided by.
+                bend = outward @ gram @ outward
+                gram = gram - np.outer(outward, outward @ gram)
+                gram = gram + np.outer(bend * outward - gram @ outward, outward)
+    return gram, slope
 
 
 def _stepped(model: Sections, mask: NDArray[np.bool_], step: FloatArray) -> Sections:
@@ -180,29 +225,44 @@ def _linear(model: Sections, moved: Motion, p: int) -> FloatArray:
     return np.concatenate([free, levels], axis=1)
 
 
+def _basis(
+    model: Sections, moved: Motion, known: NDArray[np.bool_], weights: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal columns (p T, k) that span the weighted responses of `_linear`.
+
+    And (columns, k) by which parts of these become initial states and levels. Normal equations
+    would square their condition: of slow poles, whose responses are alike, too little would be
+    left to tell a minimum from what is beside it.
+    """
+    p = known.shape[0]
+    columns = _linear(model, moved, p) * known[:, None]
+    columns *= np.sqrt(weights)[:, None, None]
+    wide = np.swapaxes(columns, 1, 2).reshape(-1, columns.shape[1])
+    size = np.sqrt(np.einsum("tk,tk->k", wide, wide))
+    size = np.where(size > 0, size, 1.0)
+    q, r = np.linalg.qr(wide / size)
+    left, values, right = np.linalg.svd(r)
+    kept = values > _DEPENDENT * values[0]
+    back = right[kept].T / values[kept] / size[:, None]
+    return np.asarray(q @ left[:, kept]), np.asarray(back)
+
+
 def _residual(
     model: Sections,
     moved: Motion,
     one: Experiment,
     known: NDArray[np.bool_],
     weights: FloatArray,
-) -> FloatArray:
-    """What is left of the outputs, with the best initial state and levels."""
-    left = np.where(known, one.y - moved.output(model, one.v), 0.0)
-    columns = _linear(model, moved, one.y.shape[0]) * known[:, None]
-    gram = np.einsum("pit,pjt,p->ij", columns, columns, weights, optimize=True)
-    for _ in range(2):  # once more for the digits that the normal equations have lost
-        right = np.einsum("pit,pt,p->i", columns, left, weights, optimize=True)
-        left = left - np.einsum("pit,i->pt", columns, _least(gram) @ right)
-    return np.asarray(left)
-
-
-def _least(gram: FloatArray) -> FloatArray:
-    """Pseudo-inverse of normal equations, after scaling."""
-    scale = np.sqrt(np.diag(gram))
-    scale[scale == 0] = 1.0
-    inner = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-12, hermitian=True)
-    return np.asarray(inner / np.outer(scale, scale))
+) -> tuple[FloatArray, FloatArray]:
+    """What is left of the outputs with the best initial state and levels, and that state (2 q,)."""
+    root = np.sqrt(weights)[:, None]
+    rest = (np.where(known, one.y - moved.output(model, one.v), 0.0) * root).ravel()
+    basis, back = _basis(model, moved, known, weights)
+    parts = rest @ basis
+    left = rest - basis @ parts
+    left -= basis @ (left @ basis)  # the digits that the first time has lost
+    initial = (back @ parts)[: model.a.size]
+    return np.asarray(left.reshape(known.shape) / root), np.asarray(initial)
 
 
 def _normal(
@@ -214,21 +274,27 @@ def _normal(
 ) -> tuple[FloatArray, FloatArray]:
     """Normal equations of the moving parameters, free of levels and initial states."""
     count = int(mask.sum())
-    gram, slope = np.zeros((count, count)), np.zeros(count)
-    for one, moved, seen, left in zip(data, here.moved, known, here.left, strict=True):
+    gram, slope, size = np.zeros((count, count)), np.zeros(count), np.zeros(count)
+    for one, rest, seen, left, initial in zip(
+        data, here.moved, known, here.left, here.initial, strict=True
+    ):
+        moved = rest.started(here.model, initial)
         p, T = one.y.shape
-        linear = _linear(here.model, moved, p)
-        sums = np.zeros((count + linear.shape[1] + 1,) * 2)
+        linear = _basis(here.model, moved, seen, weights)[0].reshape(p, T, -1)
+        sums = np.zeros((count + linear.shape[2] + 1,) * 2)
         for begin in range(0, T, _ROWS):
             part = slice(begin, begin + _ROWS)
             for a in range(p):
-                slopes = moved.slopes(here.model, one.v, a, part)[mask]
-                rows = np.concatenate([slopes, linear[a, :, part], left[a, None, part]])
+                root = np.sqrt(weights[a])
+                slopes = root * moved.slopes(here.model, one.v, a, part)[mask]
+                rows = np.concatenate([slopes, linear[a, part].T, root * left[a, None, part]])
                 if not seen[a, part].all():
                     rows = rows[:, seen[a, part]]
-                sums += weights[a] * (rows @ rows.T)
-        own, other = sums[:count, count:-1], sums[count:-1, count:-1]
-        inverse = _least(other)
-        gram += sums[:count, :count] - own @ inverse @ own.T
-        slope += sums[:count, -1] - own @ inverse @ sums[count:-1, -1]
+                sums += rows @ rows.T
+        own, other = sums[:count, count:-1], sums[count:-1, -1]
+        gram += sums[:count, :count] - own @ own.T
+        size += np.diag(sums)[:count]
+        slope += sums[:count, -1] - own @ other
+    # A column that levels and initial states explain leaves rounding, of either sign.
+    np.fill_diagonal(gram, np.maximum(np.diag(gram), _ROUNDING * size))
     return gram, slope

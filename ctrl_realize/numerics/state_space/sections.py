@@ -20,7 +20,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +156,13 @@ class Motion:
         direct[output] = v[:, part]
         return np.concatenate([x.reshape(-1, count) for x in (bent, driven, own, direct)])
 
+    def started(self, model: Sections, initial: FloatArray) -> Motion:
+        """Signals of the model when it does not begin at rest, but in a state (2 q,)."""
+        each = initial.reshape(-1, 2)
+        states = self.states + np.einsum("qsrt,qr->qst", self.free, each)
+        bent = [_bent(a1, a2, x) for (a1, a2), x in zip(model.a, states, strict=True)]
+        return replace(self, states=states, bent=np.array(bent).reshape(self.bent.shape))
+
     def starts(self, model: Sections) -> FloatArray:
         """Outputs (p, 2 q, T) for every initial state."""
         p, q, _ = model.C.shape
@@ -174,10 +181,9 @@ def motion(model: Sections, v: FloatArray) -> Motion:
     for (a1, a2), B in zip(model.a, model.B, strict=True):
         mine = _resolvent(a1, a2, v)
         x = np.einsum("srjt,rj->st", mine, B)
-        back = _resolvent(a1, a2, x)[:, 1]  # what enters the second state
         driven.append(mine)
         states.append(x)
-        bent.append(-back[:, ::-1])
+        bent.append(_bent(a1, a2, x))
         # An initial state is a pulse one sample before the record.
         free.append(_resolvent(a1, a2, pulse)[:, :, 1:])
     shape = (0, 2, 2)
@@ -187,6 +193,12 @@ def motion(model: Sections, v: FloatArray) -> Motion:
         np.array(bent).reshape(*((-1,) if bent else (0,)), *shape[1:], T),
         np.array(free).reshape(*((-1,) if free else (0,)), *shape[1:], T),
     )
+
+
+def _bent(a1: float, a2: float, states: FloatArray) -> FloatArray:
+    """Derivatives (2, 2, T) of the states (2, T) of a section in a1 and a2."""
+    back = _resolvent(a1, a2, states)[:, 1]  # what enters the second state
+    return np.asarray(-back[:, ::-1])
 
 
 def _resolvent(a1: float, a2: float, signal: FloatArray) -> FloatArray:

@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.linalg import block_diag
+from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.state_space import responses, sampling
 from ctrl_realize.numerics.state_space.responses import markov, simulate
@@ -148,6 +150,48 @@ def test_exact_data_give_the_plant_back_whatever_level_and_state_they_start_from
     found = fit_sections(data, near(), feedthrough=False).model
     # the squares of what is left end at rounding, 1e-12 of the output
     assert_allclose(markov(*found.matrices(), 40), markov(*PLANT, 40), rtol=0, atol=1e-8)
+
+
+def resonance(pole, samples=200, size=30.0):
+    """Two states that begin far from rest, in white noise."""
+    rng = np.random.default_rng(4)
+    A, C = np.array([[0.0, 1.0], [-(abs(pole) ** 2), 2 * pole.real]]), np.array([[0.5, 1.0]])
+    B, D = np.array([[0.0], [1.0]]), np.zeros((1, 1))
+    v = rng.standard_normal((1, samples))
+    y = simulate(A, B, C, D, v, np.array([size, 0.0])) + rng.standard_normal((1, samples))
+    return Experiment(v, y), (A, B, C, D)
+
+
+def test_the_end_of_a_fit_that_begins_far_from_rest_is_a_minimum():
+    # what the initial state moves by is a part of the slopes; SciPy minimises the same sum
+    data, (A, B, C, D) = resonance(0.97 * np.exp(0.3j))
+    start = in_sections(0.98 * A, B, C, D)
+    found = fit_sections([data], start, feedthrough=False, enough=1e-10, most=100)
+
+    def left(x):
+        plant = np.array([[0.0, 1.0], [-x[0], -x[1]]]), B, x[None, 2:4], D
+        return (data.y - simulate(*plant, data.v, x[4:6]) - x[6]).ravel()
+
+    x = least_squares(left, [0.94, -1.85, 0.5, 1.0, 30.0, 0.0, 0.0], xtol=1e-14, ftol=1e-14).x
+    assert_allclose(found.variance, np.mean(left(x) ** 2), rtol=1e-8)
+    poles = np.roots([1.0, x[1], x[0]])
+    assert_allclose(np.sort_complex(found.model.poles), np.sort_complex(poles), atol=1e-5)
+
+
+def test_a_pole_at_the_edge_of_stability_does_not_keep_the_others_from_their_minimum():
+    # the resonance grows by 1 % in 10 samples: the best stable one does not die away
+    data, (A, B, C, D) = resonance(1.001 * np.exp(0.3j), size=3.0)
+    y = data.y + 4 * simulate(np.array([[0.6]]), B[1:], np.ones((1, 1)), D, data.v, np.zeros(1))
+    found = []
+    for pole in (0.3, 0.7):
+        plant = block_diag(A * [[1.0, 1.0], [0.99, 0.995]], pole)
+        start = in_sections(plant, np.vstack([B, 1.0]), np.column_stack([C, 1.0]), D)
+        found.append(
+            fit_sections([Experiment(data.v, y)], start, feedthrough=False, enough=1e-9, most=60)
+        )
+        assert found[-1].steps < 60
+        assert np.sort(np.abs(found[-1].model.poles))[1:] == pytest.approx(1.0, abs=1e-6)
+    assert found[0].loss == pytest.approx(found[1].loss, abs=1e-6)
 
 
 def test_errors_are_those_that_the_cramer_rao_bound_allows():
