@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.cramer_rao import delay_bound
+from ctrl_realize.numerics.cramer_rao import dead_time_bound
 from ctrl_realize.numerics.separable.varpro import KnownFactor
 from tests import rigs
 
@@ -55,5 +55,5 @@ def bound(plant: ct.TransferFunction, noise: float, *, sensor_known: bool = Fals
         corner = 2 * np.pi * 30.0
         known = KnownFactor(np.array([-corner + 0j]), np.array([corner]))
     gain = np.array([float(np.prod(-poles).real)])
-    error = delay_bound(poles, gain, 37 * rigs.TS, rigs.TS, (BEFORE, AFTER), noise, known=known)
+    error = dead_time_bound(poles, gain, 37 * rigs.TS, rigs.TS, (BEFORE, AFTER), noise, known=known)
     return error / rigs.TS

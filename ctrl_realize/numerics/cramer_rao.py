@@ -1,7 +1,7 @@
 """The Cramer-Rao bound of a dead time in a step experiment.
 
-The bound is the inverse Fisher information [1]_ of delay, poles and linear parameters, of which the
-linear ones are projected out [2]_: what is left of the derivative by the delay is the Schur
+The bound is the inverse Fisher information [1]_ of dead time, poles and linear parameters, of which
+the linear ones are projected out [2]_: what is left of the derivative by the dead time is the Schur
 complement.
 
 References
@@ -18,16 +18,16 @@ import numpy as np
 
 from .arrays import ComplexArray, FloatArray
 from .separable.poles import parameters_from_poles
-from .separable.profile import delay_error
+from .separable.profile import dead_time_error
 from .separable.responses import StepSequence
 from .separable.structures import Candidate
 from .separable.varpro import KnownFactor, Problem, Structure, respond
 
 
-def delay_bound(
+def dead_time_bound(
     poles: ComplexArray,
     numerator: FloatArray,
-    delay: float,
+    dead_time: float,
     dt: float,
     samples: tuple[int, int],
     sigma: float,
@@ -45,7 +45,7 @@ def delay_bound(
         Of the plant, stable.
     numerator : ndarray, shape (m + 1,)
         Of the plant over the monic denominator, lowest power first.
-    delay, dt : float
+    dead_time, dt : float
         Dead time and sample time in s.
     samples : tuple of int
         How many before the step, and from the step on.
@@ -80,8 +80,8 @@ def delay_bound(
     single = np.ones(count, dtype=np.int64)
     drive = StepSequence(time, single, dt, np.zeros(1), np.ones(1))
     factor = known or KnownFactor()
-    parameters = np.concatenate([[delay], parameters_from_poles(poles)])
+    parameters = np.concatenate([[dead_time], parameters_from_poles(poles)])
     model = respond(drive, factor, numerator, parameters)
     structure = Structure(poles.size, poles.size - numerator.size + 1 - superfluous_zeros)
     problem = Problem(model, np.ones(count), drive, np.ones((count, 1)), factor)
-    return delay_error(problem, Candidate(structure, parameters, 0.0), sigma**2)
+    return dead_time_error(problem, Candidate(structure, parameters, 0.0), sigma**2)

@@ -120,7 +120,7 @@ def test_a_fit_is_the_same_after_pickling(system):
 def test_a_result_holds_the_estimate_and_cannot_be_changed():
     fit = cr.fit_output_error(STEP, structures=[(1, 1)]).fit
     assert (fit.dead_time, fit.interval) == (
-        fit.estimate.delay,
+        fit.estimate.dead_time,
         (fit.estimate.low, fit.estimate.high),
     )
     assert fit.structures is fit.estimate.structures

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.cramer_rao import delay_bound
+from ctrl_realize.numerics.cramer_rao import dead_time_bound
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.responses import StepSequence
 from ctrl_realize.numerics.separable.varpro import KnownFactor, respond
@@ -17,7 +17,9 @@ SENSOR = 2 * np.pi * 30.0
 def bound(plant, **kwargs):
     poles = plant.poles().astype(complex)
     gain = np.array([np.prod(-poles).real])
-    return delay_bound(poles, gain, 37 * rigs.TS, rigs.TS, (3840, 1101), 0.01, **kwargs) / rigs.TS
+    return (
+        dead_time_bound(poles, gain, 37 * rigs.TS, rigs.TS, (3840, 1101), 0.01, **kwargs) / rigs.TS
+    )
 
 
 @pytest.mark.parametrize(
@@ -35,7 +37,7 @@ def test_bounds_are_those_computed_independently(plant, kwargs, samples):
 
 @pytest.mark.parametrize(("extra", "deficiency"), [(0, 0), (1, 1), (2, 1)])
 def test_fisher_matrix_loses_one_rank_with_a_superfluous_zero(extra, deficiency):
-    # All parameters (delay, poles, numerator, offset) by central differences of the response:
+    # All parameters (dead time, poles, numerator, offset) by central differences of the response:
     # nothing here knows of the elimination that the fit uses.
     poles = rigs.R3.poles().astype(complex)
     time = rigs.TS * np.arange(-50, 1100)

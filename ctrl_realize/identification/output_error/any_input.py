@@ -49,7 +49,7 @@ def fit_any_input(
     while True:
         found = _fit(tuple(records[i] for i in used), dt, latest, settings)
         own = [found.own_delay(*_signals(record)) for record in records]
-        repeats = _repeatability(own, records, used, found.fit.delay)
+        repeats = _repeatability(own, records, used, found.fit.dead_time)
         apart = {*delay_outliers(repeats, used), *_gain_outliers(own, used)}
         if not apart:
             break

@@ -75,8 +75,8 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             flags += _earlier_input(fit, codes)
         step = _white(fit, shown) if alone and "coloured_residual" in codes else None
         if step is not None:
-            low = max(min(low, step.delay - _TWO_SIDED * step.delay_error), 0.0)
-            high = max(high, step.delay + _TWO_SIDED * step.delay_error)
+            low = max(min(low, step.dead_time - _TWO_SIDED * step.dead_time_error), 0.0)
+            high = max(high, step.dead_time + _TWO_SIDED * step.dead_time_error)
             flags += _white_flags(fit, step)
         # Parts of one step are not several responses.
         if not loop and not (stepped and _moves(shown.drive) < 2):
@@ -119,7 +119,7 @@ def _white(fit: OutputErrorFit, shown: Shown) -> WhiteStep | None:
     step = white_step(shown.output, shown.drive, fit.dt, fit.dead_time, fit.poles, numerator)
     reach = max(fit.total_delay, fit.dead_time)
     # Farther off, one step of a linear approximation is no estimate.
-    return step if step is None or abs(step.delay - fit.dead_time) <= reach else None
+    return step if step is None or abs(step.dead_time - fit.dead_time) <= reach else None
 
 
 def _white_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:

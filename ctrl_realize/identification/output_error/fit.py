@@ -221,7 +221,7 @@ def _fit_mean(
             )
         fit = fit_step_record(data, latest=latest, **settings)
         own = own_regressors(data, fit.poles if fit.relaxing else None)
-        repeats = repeatability(steps, mean, fit.fitted, fit.delay, own)
+        repeats = repeatability(steps, mean, fit.fitted, fit.dead_time, own)
         apart = delay_outliers(repeats, mean.used)
         if not apart:
             break

@@ -103,7 +103,7 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
     return Flag(
         "apparent_dead_time",
         f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was "
-        f"requested and is ruled out by the data: {time_within(fit.delay, fit.low, fit.high)} "
+        f"requested and is ruled out by the data: {time_within(fit.dead_time, fit.low, fit.high)} "
         "is an apparent dead time, which makes up for lags that the model lacks or has too "
         "many of, and its interval holds only if the structure is right; order "
         f"{other.order}, relative degree {other.relative_degree} gives "
@@ -142,7 +142,7 @@ def _misfit(fit: OutputErrorEstimate) -> Flag | None:
 def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None:
     if fit.delay_estimates:
         width = fit.high - fit.low
-        if width <= 0.3 * max(fit.delay, dt):
+        if width <= 0.3 * max(fit.dead_time, dt):
             return None
         apart = [
             f"{ESTIMATE_WORDS[key]} {in_time(delay)}"
@@ -152,7 +152,7 @@ def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None
         words = ", ".join(apart)
         return Flag("estimates_disagree", f"delay estimates far from their median: {words}")
     low, high = profile_limits(*fit.profile)
-    wide = fit.high - fit.low > _FAR_APART * max(fit.delay, dt)
+    wide = fit.high - fit.low > _FAR_APART * max(fit.dead_time, dt)
     if fit.open_start or not wide or fit.high - fit.low <= 2 * (high - low):
         return None
     return Flag(
@@ -164,7 +164,7 @@ def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None
 
 
 def _near(fit: OutputErrorEstimate, delay: float) -> bool:
-    return abs(delay - fit.delay) <= 0.15 * fit.delay
+    return abs(delay - fit.dead_time) <= 0.15 * fit.dead_time
 
 
 def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
@@ -210,7 +210,7 @@ def _dispersed(fit: OutputErrorEstimate) -> Flag | None:
         )
     return Flag(
         "dispersed_flow",
-        f"{kind} after a dead time of {in_time(flow.delay)} fits better than a transfer "
+        f"{kind} after a dead time of {in_time(flow.dead_time)} fits better than a transfer "
         "function with lags: if something flows through the plant, that dead time is the "
         "more likely one",
     )

@@ -29,7 +29,7 @@ def slow_modes(fit: OutputErrorEstimate, length: float) -> Flag | None:
             "the output keeps rising with a constant slope: one pole is taken as an "
             "integrator, and the total delay is that of the other lags",
         )
-    seen = max(length - fit.delay, 0.0)
+    seen = max(length - fit.dead_time, 0.0)
     unseen = _not_died_away(fit.poles, seen)
     if not unseen.size:
         return None
@@ -84,7 +84,7 @@ def _no_sign(fit: OutputErrorEstimate, static: StaticGain, length: float) -> str
 
 def _gain_and_total(fit: OutputErrorEstimate) -> tuple[float, float]:
     own = float(np.real(fit.numerator[0] / np.prod(-fit.poles)))
-    return own, fit.delay + lag_sum(fit.poles, fit.numerator)
+    return own, fit.dead_time + lag_sum(fit.poles, fit.numerator)
 
 
 def _apart(values: FloatArray) -> bool:

@@ -77,7 +77,7 @@ class OutputErrorFit(ModelFit):
     @property
     def dead_time(self) -> float:
         """Transport delay of the model, in s."""
-        return self.estimate.delay
+        return self.estimate.dead_time
 
     @property
     def std_given_structure(self) -> float:

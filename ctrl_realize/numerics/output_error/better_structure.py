@@ -56,7 +56,13 @@ def better_structure(
     static = free.static(best)
     interval = profile_limits(*profile_of(free, best))
     return StructureFit(
-        best.structure, best.delay, static.total, -float(excess), interval, best.poles, static.gain
+        best.structure,
+        best.dead_time,
+        static.total,
+        -float(excess),
+        interval,
+        best.poles,
+        static.gain,
     )
 
 

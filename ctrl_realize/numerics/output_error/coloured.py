@@ -31,7 +31,7 @@ _FEWEST = 100  # samples at rest, and
 _ENOUGH = 100_000  # of a kind, where there are more
 _TIMES = 8  # correlation times, that tell its colour
 _WILD = 5.0  # standard deviations at which samples are cut
-_NEAR = np.arange(-6, 6.5, 0.5)  # samples from the delay of before, where it starts again
+_NEAR = np.arange(-6, 6.5, 0.5)  # samples from the dead time of before, where it starts again
 _ENDS = 4  # of these starts that are followed to the bottom
 _UNLIKE = 3.0
 """Root mean square of the whitened residual, in that of the noise, from which on the response holds
@@ -76,7 +76,7 @@ def _fitted_again(whole: WindowFit, problem: Problem) -> dict[Structure, Candida
     """Fit all structures, from their optima of before and those next to them."""
     found: dict[Structure, Candidate] = {}
     for structure in sorted(whole.candidates, key=lambda s: (s.order, s.zeros)):
-        starts = _delays_near(problem, whole.candidates[structure], whole.scales)
+        starts = _dead_times_near(problem, whole.candidates[structure], whole.scales)
         starts += neighbour_starts(structure, whole.scales, found)
         bounds = parameter_bounds(structure, whole.scales)
         parameters, cost = fit_batch(problem, structure, np.array(starts), bounds)
@@ -88,13 +88,13 @@ def _fitted_again(whole: WindowFit, problem: Problem) -> dict[Structure, Candida
     return found
 
 
-def _delays_near(problem: Problem, old: Candidate, scales: Scales) -> list[FloatArray]:
-    """Parameters of before, and the same at the two best delays around.
+def _dead_times_near(problem: Problem, old: Candidate, scales: Scales) -> list[FloatArray]:
+    """Parameters of before, and the same at the two best dead times around.
 
     Where the noise is smooth the least corner tells: between any two samples is a minimum.
     """
     starts = np.tile(old.parameters, (_NEAR.size, 1))
-    starts[:, 0] = np.clip(old.delay + _NEAR * scales.dt, scales.earliest, scales.latest)
+    starts[:, 0] = np.clip(old.dead_time + _NEAR * scales.dt, scales.earliest, scales.latest)
     cost = evaluate(problem, old.structure, starts).cost
     return [old.parameters, *starts[np.argsort(cost)[:2]]]
 

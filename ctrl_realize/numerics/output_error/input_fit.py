@@ -1,7 +1,7 @@
 """Output-error fit for inputs that are no steps: random, pseudo-random, sweeps, operation.
 
-One record or several of one plant: poles, numerator and delay are common, level, drift and initial
-state are each record's own (see `local_terms`).
+One record or several of one plant: poles, numerator and dead time are common; level, drift and
+initial state are each record's own (see `local_terms`).
 
 Output error [1]_ with linear terms eliminated [2]_. Which samples count and when slow cosines are
 fitted along are our own rules.
@@ -53,8 +53,8 @@ _ONSETS = (1.0, 5.0, 20.0)
 _SMALLEST = 1e-4
 _CONFIDENCE = 0.99
 _UNLIKE = 1.3  # ratio of noise levels from which records are weighted
-_BEYOND = 1.5  # of a first-order model's delay: no model's delay is later
-_SLOW = 10.0  # times delay and lag: periods from there on tell little of the plant
+_BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
+_SLOW = 10.0  # times dead time and lag: periods from there on tell little of the plant
 _SHORTEST = 40.0  # samples in such a period, lest there be as many cosines as samples
 _CALMER = 0.5  # of the variance, colour included, that must be left for them to be fitted along
 _TURNS = 6
@@ -85,7 +85,7 @@ class SampledFit:
         """Shift and scale the common model to fit one record best, seen before or not."""
         one = cut([output], [signal], self.data.dt)
         start = min(max(self.data.starts), output.size // 2)
-        return _own_delay(replace(one, starts=(start,)), self.fit, self.known)
+        return _own_dead_time(replace(one, starts=(start,)), self.fit, self.known)
 
 
 def fit_sampled(
@@ -114,7 +114,7 @@ def fit_sampled(
     -----
     What was before a record is an initial state, which is eliminated with level and drift. What
     was on its way through the dead time is not known: the first samples are left out, as many as
-    one and a half delays of the first-order model that fits best, half the record at most.
+    one and a half dead times of the first-order model that fits best, half the record at most.
     Where the residual is coloured and slow cosines take half of it, they are local terms as well.
     """
     factor = known or KnownFactor()
@@ -124,9 +124,11 @@ def fit_sampled(
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs))
     rough = _first_order(data.problem(factor), n, dt, limit, _seen(data, limit))
     lag = float(-1.0 / rough.poles[0].real)
-    late = int(np.ceil(_BEYOND * rough.delay / dt))
+    late = int(np.ceil(_BEYOND * rough.dead_time / dt))
     data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
-    scales = Scales(max(rough.delay, 0.5 * dt), max(lag, 2 * dt), max(data.counts) * dt, dt, limit)
+    scales = Scales(
+        max(rough.dead_time, 0.5 * dt), max(lag, 2 * dt), max(data.counts) * dt, dt, limit
+    )
     tried = ORDERS if structures is None else tuple(structures)
     whole = _fit(data, factor, tried, scales, huber)
     levels = _noise_levels(data, whole)
@@ -134,7 +136,7 @@ def fit_sampled(
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
         whole = _fit(data, factor, tried, scales, huber)
-    period = _SLOW * (rough.delay + lag)
+    period = _SLOW * (rough.dead_time + lag)
     if whole.correlation > WHITE and period >= _SHORTEST * dt:
         without = replace(data, period=period)
         calm = _fit(without, factor, tried, scales, huber)
@@ -200,7 +202,7 @@ def _condensed(
     """All samples of records of which a stretch was fitted, where their response ends in time."""
     best = stretch.best
     slowest = float(1.0 / np.abs(best.poles.real).min())
-    lags = (_BEYOND * best.delay + _DIED_AWAY * slowest) / data.dt
+    lags = (_BEYOND * best.dead_time + _DIED_AWAY * slowest) / data.dt
     if not lags <= MOST_LAGS:
         return None
     return condensed(
@@ -242,7 +244,7 @@ def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> W
 def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> FloatArray:
     """Model at the samples of the stretch, with its own level, drift and initial state."""
     problem = data.problem(known)
-    parameters = np.concatenate([[fit.delay], parameters_from_poles(fit.poles)])
+    parameters = np.concatenate([[fit.dead_time], parameters_from_poles(fit.poles)])
     model = respond(problem.drive, known, fit.numerator, parameters)
     own = problem.local_terms(poles_from_parameters(parameters[None, 1:])[0])
     rest = (problem.data - model)[None, :, None]
@@ -271,7 +273,7 @@ def _seen(data: SampledData, limit: float) -> list[float]:
     """First lag, in samples, at which the output follows the input; empty where none is seen.
 
     The valleys of an input that moves at every sample are as narrow as the plant is fast, and the
-    delays that are tried otherwise lie too far apart to find one.
+    dead times that are tried otherwise lie too far apart to find one.
     """
     found = []
     for u, y in zip(data.inputs, data.outputs, strict=True):
@@ -285,7 +287,7 @@ def _seen(data: SampledData, limit: float) -> list[float]:
 def _first_order(
     problem: Problem, n: int, dt: float, limit: float, seen: Sequence[float]
 ) -> Candidate:
-    """Best first-order model from a grid of delays and time constants."""
+    """Best first-order model from a grid of dead times and time constants."""
     scales = [
         Scales(min(onset * dt, limit), min(rise, n / 4) * dt, n * dt, dt, limit)
         for rise in _RISES
@@ -293,12 +295,12 @@ def _first_order(
     ]
     tries = [search(problem, [Structure(1, 1)], each)[Structure(1, 1)] for each in scales]
     best = min(tries, key=lambda candidate: candidate.cost)
-    # It has converged, for samples are counted by its delay.
+    # It has converged, for samples are counted by its dead time.
     return settled(problem, replace(best, ends=None), scales[0])
 
 
-def _own_delay(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> OwnResponse:
-    """Gauss-Newton steps for gain and delay, everything else of the model being common."""
+def _own_dead_time(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> OwnResponse:
+    """Gauss-Newton steps for gain and dead time, everything else of the model being common."""
     problem = data.problem(known)
     assert problem.segments is not None
     own = problem.local_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
@@ -306,9 +308,11 @@ def _own_delay(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) 
     lost = problem.local_count(fit.poles.size)
     h = 0.25 * data.dt
 
-    def response(delay: float, stretch: float = 1.0) -> FloatArray:
+    def response(dead_time: float, stretch: float = 1.0) -> FloatArray:
         # The core in a slower time: poles over the stretch, and its gain as before.
-        parameters = np.concatenate([[max(delay, 0.0)], parameters_from_poles(fit.poles / stretch)])
+        parameters = np.concatenate(
+            [[max(dead_time, 0.0)], parameters_from_poles(fit.poles / stretch)]
+        )
         powers = np.arange(fit.numerator.size) - float(fit.poles.size)
         return respond(problem.drive, known, fit.numerator * stretch**powers, parameters)
 
@@ -323,14 +327,14 @@ def _own_delay(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) 
 
     shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
     for _ in range(_TURNS):
-        at = max(fit.delay + shift, h)
+        at = max(fit.dead_time + shift, h)
         slope = (response(at + h) - response(at - h)) / (2 * h)
         solution, errors = regression([response(at), slope])
         gain, gain_error = float(solution[0]), float(errors[0])
         size = gain or 1.0
         move = float(solution[1]) / size
         error = float(errors[1]) / abs(size)
-        shift = at - fit.delay + float(np.clip(move, -20 * data.dt, 20 * data.dt))
+        shift = at - fit.dead_time + float(np.clip(move, -20 * data.dt, 20 * data.dt))
         if abs(move) < 1e-3 * data.dt:
             break
     # Small stretches: the slope of the response by the log of the time constants.
@@ -338,7 +342,7 @@ def _own_delay(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) 
     solution, errors = regression([response(at), slope, turn])
     size = float(solution[0]) or 1.0
     lag = float(np.exp(np.clip(solution[2] / size, -_FARTHEST, _FARTHEST)))
-    forced = own.without(response(fit.delay)[None, :, None])[0, :, 0]
+    forced = own.without(response(fit.dead_time)[None, :, None])[0, :, 0]
     followed = fit_percent(target[None], forced[None])
     return OwnResponse(
         shift,

@@ -1,4 +1,4 @@
-"""Delay and interval where the residual is noise: of all explanations that are not ruled out.
+"""Dead time and interval where the residual is noise: of all explanations that are not ruled out.
 
 Point 2 of the rule in `output_error`.
 
@@ -51,7 +51,7 @@ from .result import (
 from .selection import Choice, choose_model
 
 _UNSEEN = 3.0
-"""How far before the delay a beginning that is open may lie, in times from there to the first
+"""How far before the dead time a beginning that is open may lie, in times from there to the first
 motion. Diffusion behind lags and parallel paths mostly need 1 to 3."""
 
 _LIKE_A_FLOW = 6
@@ -81,7 +81,7 @@ def likelihood_fit(
     better: StructureFit | None = None,
     near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
-    """Take delay and interval from the likelihood.
+    """Take dead time and interval from the likelihood.
 
     `onset` is the time of the first motion; without it the structures are believed. `relaxing`
     and `better` are those of the result, `near` close decisions that have been made.
@@ -97,15 +97,15 @@ def likelihood_fit(
     others = kept.other_models(scales)
     limits = [profile_limits(*profile) for profile in kept.profiles.values()]
     limits += [(other.low, other.high) for other in others]
-    low = min(chosen.delay, *(first for first, _ in limits))
-    high = max(chosen.delay, *(last for _, last in limits))
+    low = min(chosen.dead_time, *(first for first, _ in limits))
+    high = max(chosen.dead_time, *(last for _, last in limits))
     if endless := still_improving(tanks):
         low = scales.earliest
     if like_flow := _like_a_flow(choice, flows):
-        low = min(low, max(chosen.delay - flow_lead(chosen.poles), scales.earliest))
+        low = min(low, max(chosen.dead_time - flow_lead(chosen.poles), scales.earliest))
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start:
-        low, high = _opened(low, high, chosen.delay, onset, scales)
+        low, high = _opened(low, high, chosen.dead_time, onset, scales)
     first, last = profile_limits(*own)
     interval = DelayInterval(low, high, (last - first) / (2 * Z_95))
     found = assembled(
@@ -146,7 +146,7 @@ class _Kept:
     chains: list[LagChain]
 
     def profile_of(self, choice: Choice, scales: Scales) -> Profile:
-        """Misfit over the delay of what was chosen."""
+        """Misfit over the dead time of what was chosen."""
         if choice.chain is not None:
             return chain_profile(choice.chain, scales)
         for flow, profile in self.flows:
@@ -196,12 +196,12 @@ def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:
 
 
 def _opened(
-    low: float, high: float, delay: float, onset: float, scales: Scales
+    low: float, high: float, dead_time: float, onset: float, scales: Scales
 ) -> tuple[float, float]:
     """Widen an interval by what is open where a zero imitates the beginning."""
-    unseen = _UNSEEN * max(onset - delay, scales.dt)
+    unseen = _UNSEEN * max(onset - dead_time, scales.dt)
     return (
-        min(low, max(delay - unseen, scales.earliest)),
+        min(low, max(dead_time - unseen, scales.earliest)),
         max(high, min(onset + scales.dt, scales.latest)),
     )
 

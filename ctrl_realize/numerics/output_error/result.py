@@ -1,4 +1,4 @@
-"""What an output-error fit has found: delay, interval, model, and the table of structures.
+"""What an output-error fit has found: dead time, interval, model, and the table of structures.
 
 Intervals of structures are profile likelihoods [1]_.
 
@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain, lag_sum
-from ..separable.profile import delay_profile, profile_curve, profile_points, with_ends
+from ..separable.profile import dead_time_profile, profile_curve, profile_points, with_ends
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import StaticGain, averaged_ends
 from ..separable.structures import Candidate, needless_parameters
@@ -30,7 +30,7 @@ from .margins import CloseDecision
 _ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
 
 Profile: TypeAlias = tuple[FloatArray, FloatArray]
-"""Delays, and the misfit at each; see `delay_profile`."""
+"""Dead times, and the misfit at each; see `dead_time_profile`."""
 
 RobustKey: TypeAlias = Literal[
     "onset",
@@ -40,11 +40,11 @@ RobustKey: TypeAlias = Literal[
     "model_of_rise",
     "model_of_record",
 ]
-"""Delay estimates where no model is adequate: "early" is 15 % of the excursion, "rise" 63 %."""
+"""Dead time estimates where no model is adequate: "early" is 15 % of the excursion, "rise" 63 %."""
 
 
 class OtherModel(NamedTuple):
-    """Interval of the delay in s under a model that is not in the table of structures."""
+    """Interval of the dead time in s under a model that is not in the table of structures."""
 
     model: LagChain | DispersedFlow
     low: float
@@ -81,7 +81,7 @@ class StructureFit:
 
 
 class DelayInterval(NamedTuple):
-    """95 % interval of a delay, and its standard error if the structure is the plant's; in s."""
+    """95 % interval of a dead time in s, and its standard error if the structure is the plant's."""
 
     low: float
     high: float
@@ -90,16 +90,16 @@ class DelayInterval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class OutputErrorEstimate:
-    """Delay and model of one record; see the rule in `output_error`.
+    """Dead time and model of one record; see the rule in `output_error`.
 
-    ``low <= delay <= high``. `views` are (key, delay) pairs, empty where the model is adequate.
-    The model is exp(-delay s) b(s) / a(s): `numerator` lists b from the lowest power on, `poles`
-    are the roots of the monic a. `misfit` is residual over noise in means over bins. `chain`:
-    the chain of lags that the model is, if it is one; `endless`: chains of lags fit the better the
-    longer they are, so that all of the delay may be lags; `like_flow`: no step tells the chain from
-    a flow that disperses; `open_start`: how smoothly the response begins is open; `relaxing`: the
+    ``low <= dead_time <= high``. `views` are (key, dead time), empty where the model is adequate.
+    The model is exp(-L s) b(s) / a(s), L the dead time: `numerator` lists b from the lowest power
+    on, `poles` are the roots of the monic a. `misfit` is residual over noise in means over bins.
+    `chain`: the chain of lags that the model is, if it is one; `endless`: chains of lags fit the
+    better the longer they are, so that all of it may be lags; `like_flow`: no step tells the chain
+    from a flow that disperses; `open_start`: how smoothly the response begins is open; `relaxing`: the
     plant was moving before the step, and its free response was fitted along. `flows` that disperse
-    are not ruled out; with `follows_flow` the delay is that of the best of them, and the lags
+    are not ruled out; with `follows_flow` the dead time is that of the best of them, and the lags
     behind it follow it. `other_models` are those that are not in the table of structures and not
     ruled out. `std` is that of the chosen structure. `whitened`: coloured noise was made
     white, by what it is at rest. `static` is the gain of the model,
@@ -108,7 +108,7 @@ class OutputErrorEstimate:
     `close` are decisions that rounding may turn.
     """
 
-    delay: float
+    dead_time: float
     low: float
     high: float
     std: float
@@ -161,8 +161,8 @@ class OutputErrorEstimate:
 
 
 def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
-    """Misfit over the delay of one candidate of a window."""
-    return delay_profile(whole.problem, candidate, whole.variance, whole.scales)
+    """Misfit over the dead time of one candidate of a window."""
+    return dead_time_profile(whole.problem, candidate, whole.variance, whole.scales)
 
 
 def profiles_of(
@@ -196,11 +196,11 @@ def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[Struct
     for s, candidate in whole.candidates.items():
         interval = profile_limits(*profiles[s]) if s in profiles else None
         state = evaluate(whole.problem, s, candidate.parameters[None])
-        total = candidate.delay + lag_sum(candidate.poles, state.numerator[0])
+        total = candidate.dead_time + lag_sum(candidate.poles, state.numerator[0])
         excess = whole.criterion[s] - best
         gain = float(np.real(state.numerator[0, 0] / np.prod(-candidate.poles)))
         lines.append(
-            StructureFit(s, candidate.delay, total, excess, interval, candidate.poles, gain)
+            StructureFit(s, candidate.dead_time, total, excess, interval, candidate.poles, gain)
         )
     return tuple(sorted(lines, key=lambda line: line.delta_bic))
 
@@ -219,7 +219,7 @@ def assembled(
 ) -> OutputErrorEstimate:
     """Put a result together.
 
-    `profiles` are those of the table of structures, `profile` that of the delay chosen.
+    `profiles` are those of the table of structures, `profile` that of the dead time chosen.
     """
     state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
@@ -232,7 +232,7 @@ def assembled(
         if s != chosen.structure
     ]
     return OutputErrorEstimate(
-        delay=chosen.delay,
+        dead_time=chosen.dead_time,
         low=interval.low,
         high=interval.high,
         std=interval.std,

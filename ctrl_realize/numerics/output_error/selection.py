@@ -48,7 +48,7 @@ class Choice:
 
     @property
     def parameters(self) -> int:
-        """Free ones beside gain and delay."""
+        """Free ones beside gain and dead time."""
         if self.flow is not None:
             return self.flow.parameters
         own = self.model.structure
@@ -100,7 +100,7 @@ def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> Choice:
 
 def _behind(whole: WindowFit, flow: DispersedFlow) -> Candidate | None:
     """Lags and zeros behind the dead time of a flow that leave no more than it does, if any."""
-    pinned = replace(whole.scales, earliest=flow.delay, latest=flow.delay)
+    pinned = replace(whole.scales, earliest=flow.dead_time, latest=flow.dead_time)
     limit = flow.cost + PLAUSIBLE * whole.variance
     found = search(whole.problem, _BEHIND_A_FLOW, pinned)
     # They need not be worth their number: it is known what they stand for.

@@ -8,18 +8,18 @@ The rule:
    is the model, and what its residual leaves is compared with the noise before the step, or, as
    long as that is not much louder, with what it leaves long after the step. Where it is noise that
    was coloured before the step already, all structures are fitted again with that noise made white.
-2. Where the residual is noise, the delay is that of the model, and its interval spans the
+2. Where the residual is noise, the dead time is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
    four to eight nearly equal lags, modes of diffusion and flows that disperse among them. Where
-   such a flow fits clearly better than any lags, the delay is that of the flow. A zero imitates a
-   smooth beginning: where the best structure has one, the interval reaches to a sample after the
-   first motion, and three times as far before the delay as the first motion comes after it.
+   such a flow fits clearly better than any lags, the dead time is that of the flow. A zero imitates
+   a smooth beginning: where the best structure has one, the interval reaches to a sample after the
+   first motion, and three times as far before the dead time as the first motion comes after it.
 3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
    first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
-   of up to three poles for the first 63 % and for all of it. The delay is their median.
+   of up to three poles for the first 63 % and for all of it. The dead time is their median.
 4. The interval then spans the views and a third-order lag on the first 15 % (more lags, less
-   delay), without the lowest: a fit that goes wrong takes delay for lag.
-5. No delay is later than the first lasting motion of the output.
+   dead time), without the lowest: a fit that goes wrong takes dead time for lag.
+5. No dead time is later than the first lasting motion of the output.
 
 Points 0 to 2 rest on the information criterion [3]_, profile likelihoods [1]_ and what is said of
 several models in [2]_. Points 3 to 5 are our own: views whose errors have different causes
@@ -47,7 +47,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..constants import Z_95
-from ..separable.compared_fits import at_delay
+from ..separable.compared_fits import at_dead_time
 from ..separable.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, needless_parameters
 from ..separable.varpro import KnownFactor, Structure, evaluate
 from ..separable.window import WindowFit, among, fit_window
@@ -87,9 +87,9 @@ def fit_step_record(
         With a motion.
     structures : sequence of Structure, optional
         Default: orders 1 to 5, relative degrees 1 to the order. With structures given, the
-        delay is that of the best of them, adequate or not.
+        dead time is that of the best of them, adequate or not.
     latest : float, optional
-        Largest delay, in s.
+        Largest dead time, in s.
     known : KnownFactor, optional
         Dynamics in cascade that do not belong to the plant.
     huber : bool, optional
@@ -182,12 +182,12 @@ def _robust_fit(
     *,
     relaxing: bool,
 ) -> OutputErrorEstimate:
-    """Take delay and interval from the views (points 3 and 4 of the rule)."""
-    delay = float(np.median([at for _, at in views[:-1]]))
-    delays = np.sort([at for _, at in views])
-    low, high = float(delays[1]), float(delays[-1])
+    """Take dead time and interval from the views (points 3 and 4 of the rule)."""
+    dead_time = float(np.median([at for _, at in views[:-1]]))
+    dead_times = np.sort([at for _, at in views])
+    low, high = float(dead_times[1]), float(dead_times[-1])
     profiles = {chosen.structure: profile_of(whole, chosen)}
-    fixed = at_delay(whole.problem, chosen, whole.scales, delay)
+    fixed = at_dead_time(whole.problem, chosen, whole.scales, dead_time)
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
     return assembled(whole, fixed, False, views, profiles, interval, own, relaxing=relaxing)
@@ -213,7 +213,7 @@ def _fit_until(
 def _views(
     data: StepData, whole: Candidate, latest: float | None, known: KnownFactor, huber: bool
 ) -> tuple[tuple[RobustKey, float], ...]:
-    """Six delay estimates in s whose errors are independent; the sixth only widens the interval."""
+    """Six estimates in s whose errors are independent; the sixth only widens the interval."""
     assert data.motion is not None
     lags = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
     early = _fit_until(data, stop_at(data, 0.15), lags, latest, known, huber)
@@ -221,9 +221,9 @@ def _views(
     onset = data.motion.onset * data.dt
     return (
         ("onset", onset if latest is None else min(onset, latest)),
-        ("one_lag_early", early.candidates[lags[0]].delay),
-        ("two_lags_early", early.candidates[lags[1]].delay),
-        ("model_of_rise", rise.best.delay),
-        ("model_of_record", whole.delay),
-        ("three_lags_early", early.candidates[lags[2]].delay),
+        ("one_lag_early", early.candidates[lags[0]].dead_time),
+        ("two_lags_early", early.candidates[lags[1]].dead_time),
+        ("model_of_rise", rise.best.dead_time),
+        ("model_of_record", whole.dead_time),
+        ("three_lags_early", early.candidates[lags[2]].dead_time),
     )

@@ -153,19 +153,21 @@ def _near_minimum(
     return Candidate(structure, ends[best], float(costs[best]), others, searched=False)
 
 
-def at_delay(problem: Problem, candidate: Candidate, scales: Scales, delay: float) -> Candidate:
-    """Best model of the same structure with a given delay.
+def at_dead_time(
+    problem: Problem, candidate: Candidate, scales: Scales, dead_time: float
+) -> Candidate:
+    """Best model of the same structure with a given dead time.
 
     Far from the optimum other poles are best, and a way there from the optimum may end in
     a minimum beside it: the patterns of a search are followed as well.
     """
     structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
     starts = np.array([candidate.parameters, *pattern_starts(structure, scales)])
-    starts[:, 0] = delay
-    fixed, costs = polish(problem, structure, starts, bounds, scales.dt, delay_fixed=True)
+    starts[:, 0] = dead_time
+    fixed, costs = polish(problem, structure, starts, bounds, scales.dt, dead_time_fixed=True)
     near = fixed[costs <= costs.min() * (1 + _CLOSE / problem.data.size)]
     fits = [
-        settle(problem, structure, start, bounds, scales.dt, delay_fixed=True) for start in near
+        settle(problem, structure, start, bounds, scales.dt, dead_time_fixed=True) for start in near
     ]
     return Candidate(structure, *min(fits, key=lambda fit: fit[1]))
 
@@ -183,4 +185,4 @@ def _with_a_pole_more(
         return []
     rates = np.geomspace(_SLOWEST / scales.length, _FASTEST / scales.rise, _RATES)
     poles = [np.append(smaller.poles, -rate) for rate in rates]
-    return [np.append(smaller.delay, parameters_from_poles(each)) for each in poles]
+    return [np.append(smaller.dead_time, parameters_from_poles(each)) for each in poles]

@@ -79,9 +79,9 @@ _CHARGE = 8.0  # what a flow must be worth in the criterion: a few lags are more
 _SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
 _MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
-_FREE = 4  # delay, gain, mean, spread; a lag is one more
+_FREE = 4  # dead time, gain, mean, spread; a lag is one more
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
-"""Starts: parts of a delay that is too long, and of the whole spread in time."""
+"""Starts: parts of a dead time that is too long, and of the whole spread in time."""
 _FOLLOWED, _EVALUATIONS = 3, 40  # starts that are improved, and how far
 _SAME = 0.1  # variances by which two ends are one
 _HOPELESS = 300.0  # above what is to be beaten, after the first of them
@@ -99,7 +99,7 @@ class DispersedFlow:
     `delta_bic` is it above that of the best lags.
     """
 
-    delay: float
+    dead_time: float
     mean: float
     spread: float
     lag: float
@@ -109,7 +109,7 @@ class DispersedFlow:
 
     @property
     def parameters(self) -> int:
-        """Free ones beside gain and delay."""
+        """Free ones beside gain and dead time."""
         return 3 if self.lag else 2
 
     @property
@@ -133,9 +133,9 @@ def fit_flows(
     problem : Problem
         Of a step record.
     like : Candidate
-        A model with the delay and the spread in time at which the starts are aimed.
+        A model with the dead time and the spread in time at which the starts are aimed.
     scales : Scales
-        Bounds of the delay.
+        Bounds of the dead time.
     variance, penalty : float
         Of the noise, and what the criterion charges for a parameter.
     level : float
@@ -154,7 +154,7 @@ def fit_flows(
     mean, square = time_moments(problem, like)
     if not square > scales.dt**2:
         return []
-    target = like.delay, mean, float(np.sqrt(square))
+    target = like.dead_time, mean, float(np.sqrt(square))
     lagging = _FlowFit(problem, problem.drive, scales, True)
     flows = _followed(lagging, target, variance, penalty, level)
     # Without the lag there are no fewer squares: a parameter is all that can be won.
@@ -194,13 +194,13 @@ def _followed(
 def flow_profile(
     problem: Problem, flow: DispersedFlow, scales: Scales, variance: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Misfit over the delay, as `delay_profile`."""
+    """Misfit over the dead time, as `dead_time_profile`."""
     assert isinstance(problem.drive, StepSequence)
     fit = _FlowFit(problem, problem.drive, scales, flow.lag > 0)
     best = fit.parameters(flow)
     low, high = (float(bound[0]) for bound in fit.bounds)
     found = {float(best[0]): best}
-    error = fit.delay_error(best, variance)
+    error = fit.dead_time_error(best, variance)
     for side in (-1, 1):
         x = best
         for distance in _PROFILE:
@@ -218,14 +218,14 @@ def flow_profile(
         return (costs[at] - least) / variance
 
     solve_ends(excess, {at: (cost - least) / variance for at, cost in costs.items()})
-    delay = np.array(sorted(costs))
-    cost = np.array([costs[at] for at in delay])
-    return delay * scales.rise, (cost - cost.min()) / variance
+    dead_time = np.array(sorted(costs))
+    cost = np.array([costs[at] for at in dead_time])
+    return dead_time * scales.rise, (cost - cost.min()) / variance
 
 
 @dataclass(frozen=True, eq=False)
 class _FlowFit:
-    """Least squares over x = (delay, log mean, log spread, log lag), times in rises.
+    """Least squares over x = (dead time, log mean, log spread, log lag), times in rises.
 
     The last is not there where no lag is tried.
     """
@@ -251,10 +251,10 @@ class _FlowFit:
     def parameters(self, flow: DispersedFlow) -> FloatArray:
         rise = self.scales.rise
         lag = [flow.lag / rise] * self.lagging
-        return np.append(flow.delay / rise, np.log([flow.mean / rise, flow.spread, *lag]))
+        return np.append(flow.dead_time / rise, np.log([flow.mean / rise, flow.spread, *lag]))
 
     def times(self, x: FloatArray) -> tuple[float, float, float, float]:
-        """Delay, mean, spread and lag; all but the spread in s."""
+        """Dead time, mean, spread and lag; all but the spread in s."""
         rise = self.scales.rise
         lag = float(np.exp(x[3])) * rise if self.lagging else 0.0
         return float(x[0]) * rise, float(np.exp(x[1])) * rise, float(np.exp(x[2])), lag
@@ -271,24 +271,24 @@ class _FlowFit:
         residual = self.residual(x)
         return float(residual @ residual)
 
-    def starts(self, delay: float, mean: float, deviation: float) -> Iterator[FloatArray]:
-        """Share mean and variance in time out over delay, flow and lag."""
+    def starts(self, dead_time: float, mean: float, deviation: float) -> Iterator[FloatArray]:
+        """Share mean and variance in time out over dead time, flow and lag."""
         low, high = self.bounds
         rise = self.scales.rise
         for part in _DELAYS:
             for share in _LAGS if self.lagging else (0.0,):
                 lag = share * deviation
-                residence = mean - part * delay - lag
+                residence = mean - part * dead_time - lag
                 if residence > 0:
                     spread = np.sqrt(deviation**2 - lag**2) / residence
                     logs = np.log([residence / rise, spread, *[lag / rise] * self.lagging])
-                    yield np.clip(np.append(part * delay / rise, logs), low, high)
+                    yield np.clip(np.append(part * dead_time / rise, logs), low, high)
 
     def improved(
-        self, start: FloatArray, fixed_delay: bool = False, converged: bool = False
+        self, start: FloatArray, fixed_dead_time: bool = False, converged: bool = False
     ) -> FloatArray:
-        """Follow a start towards its minimum, or down to it, the delay fixed or not."""
-        kept = start[:1] if fixed_delay else start[:0]
+        """Follow a start towards its minimum, or down to it, the dead time fixed or not."""
+        kept = start[:1] if fixed_dead_time else start[:0]
         low, high = (bound[kept.size :] for bound in self.bounds)
         inside = 1e-9 * (high - low)
 
@@ -307,25 +307,25 @@ class _FlowFit:
         )
         return np.concatenate([kept, found.x])
 
-    def delay_error(self, x: FloatArray, variance: float) -> float:
-        """Standard error of the delay, in rises, from the curvature."""
+    def dead_time_error(self, x: FloatArray, variance: float) -> float:
+        """Standard error of the dead time, in rises, from the curvature."""
         here = self.residual(x)
         moved = [self.residual(x + _SMALL * row) - here for row in np.eye(x.size)]
         jacobian = np.stack(moved, axis=1) / _SMALL
         size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-        on_delay = np.linalg.pinv(jacobian / size)[0] / size[0]
-        return float(np.sqrt(variance) * np.linalg.norm(on_delay))
+        on_dead_time = np.linalg.pinv(jacobian / size)[0] / size[0]
+        return float(np.sqrt(variance) * np.linalg.norm(on_dead_time))
 
     def _response(self, x: FloatArray) -> FloatArray:
         """Unit response in means over the bins, by Simpson's rule where they are wide."""
-        delay, *shape = self.times(x)
+        dead_time, *shape = self.times(x)
         drive = self.drive
         wide = drive.width > 1
         span = (drive.width[wide] - 1) * drive.dt
         since = np.concatenate(
             [drive.first, drive.first[wide] + span / 2, drive.first[wide] + span]
         )
-        since -= delay
+        since -= dead_time
         every = sum(
             size * self._step(since - move, *shape)
             for move, size in zip(drive.moves, drive.sizes, strict=True)

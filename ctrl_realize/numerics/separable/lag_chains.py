@@ -4,7 +4,7 @@ A response that many lags have smoothed is imitated by fewer lags and a longer d
 structures end at five poles; the chain goes on, because its rates follow a law. In a row of tanks
 they are nearly equal, as in Strejc's evaluation of step responses: here, spread evenly around one
 rate. Where heat or matter diffuses they grow as (k - c)^2, c between 0 and 1/2 by the boundaries.
-That real lags do not keep to such a law is in the error of the delay: without it, its interval
+That real lags do not keep to such a law is in the error of the dead time: without it, its interval
 would be narrower than anything that is known.
 
 Tanks after [1]_, diffusion after [2]_ (eigenvalues of a slab), steps after [3]_; the spread of the
@@ -37,7 +37,7 @@ SHORTEST, LONGEST = 4, 8
 """Shorter ones have few parameters when they are free; of longer ones rounding shows."""
 
 FREE_IN_A_CHAIN = 2
-"""Parameters beside delay and gain: the lag, and how many; the shape is bounded."""
+"""Parameters beside dead time and gain: the lag, and how many; the shape is bounded."""
 
 _DIFFUSION_CHARGE = 8.0  # two lags far apart look like diffusion, and are more common
 _UNEVEN = 0.15  # by which real lags are taken to stray from the law
@@ -50,11 +50,11 @@ _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
 
 @dataclass(frozen=True, eq=False)
 class LagChain:
-    """Best fit of a chain of lags, with the standard error of its delay in s.
+    """Best fit of a chain of lags, with the standard error of its dead time in s.
 
     `criterion` includes what the kind of chain must be worth. `hidden` is the sum of the lags, in
     s, that the law goes on with beyond those fitted: faster than anything that a record shows,
-    they are in the delay.
+    they are in the dead time.
     """
 
     candidate: Candidate
@@ -95,10 +95,10 @@ def fit_chains(
     ----------
     problem : Problem
     like : Candidate
-        A model whose delay and spread in time (mean and variance of the impulse response) are
+        A model whose dead time and spread in time (mean and variance of the impulse response) are
         where the chains start.
     scales : Scales
-        Bounds of the delay.
+        Bounds of the dead time.
     variance : float
         Of the noise.
     penalty : float
@@ -156,26 +156,26 @@ def still_improving(chains: Sequence[LagChain]) -> bool:
 
 
 def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArray]:
-    """Misfit over the delay, as `delay_profile`; with so few parameters it is a parabola."""
-    delay = chain.candidate.delay
-    # An error may be nothing or infinite where no sample shows anything of the delay.
+    """Misfit over the dead time as of `dead_time_profile`; with few parameters it is a parabola."""
+    dead_time = chain.candidate.dead_time
+    # An error may be nothing or infinite where no sample shows anything of the dead time.
     error = float(
         np.clip(chain.error, 1e-9 * scales.dt, scales.latest - scales.earliest + scales.dt)
     )
-    grid = np.clip(delay + error * np.linspace(-3, 3, 13), scales.earliest, scales.latest)
-    grid = np.unique(np.append(grid, delay))
-    return grid, ((grid - delay) / error) ** 2
+    grid = np.clip(dead_time + error * np.linspace(-3, 3, 13), scales.earliest, scales.latest)
+    grid = np.unique(np.append(grid, dead_time))
+    return grid, ((grid - dead_time) / error) ** 2
 
 
 def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
-    """Ends of the 95 % interval of the delay, what is hidden taken off the lower one."""
-    delay, half = chain.candidate.delay, Z_95 * chain.error
-    low = max(delay - half - chain.hidden, scales.earliest)
-    return low, min(delay + half, scales.latest)
+    """Ends of the 95 % interval of the dead time, what is hidden taken off the lower one."""
+    dead_time, half = chain.candidate.dead_time, Z_95 * chain.error
+    low = max(dead_time - half - chain.hidden, scales.earliest)
+    return low, min(dead_time + half, scales.latest)
 
 
 def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
-    """Delay at zero frequency of b(s)/a(s): sum of its lags less that of its leads, in s."""
+    """Dead time at zero frequency of b(s)/a(s): sum of its lags less that of its leads, in s."""
     lag = float(np.sum(-1.0 / poles).real)
     if numerator.size > 1 and numerator[0] != 0:
         lag -= float(numerator[1] / numerator[0])
@@ -186,7 +186,7 @@ def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     """Mean and variance in time of the impulse response, from the cumulants of poles and zeros."""
     numerator = evaluate(problem, like.structure, like.parameters[None]).numerator[0]
     zeros = np.roots(numerator[::-1])
-    mean = like.delay + lag_sum(like.poles, numerator)
+    mean = like.dead_time + lag_sum(like.poles, numerator)
     return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)
 
 
@@ -212,7 +212,7 @@ def _chain(
 def _fit(
     problem: Problem, order: int, law: _Law, start: FloatArray, scales: Scales
 ) -> tuple[Candidate, FloatArray]:
-    """Levenberg-Marquardt in delay, logarithm of the lag, and shape."""
+    """Levenberg-Marquardt in dead time, logarithm of the lag, and shape."""
     structure = Structure(order, order)
     low = np.array([scales.earliest, -np.inf, law.low])
     high = np.array([scales.latest, np.inf, law.high])
@@ -245,7 +245,7 @@ def _fit(
 def _error(
     problem: Problem, candidate: Candidate, law: _Law, x: FloatArray, variance: float
 ) -> float:
-    """Standard error of the delay: what noise does to it, and what uneven lags do."""
+    """Standard error of the dead time: what noise does to it, and what uneven lags do."""
     order = candidate.structure.order
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
     jacobian = _evaluate(problem, candidate.structure, law, x)[2]
@@ -253,29 +253,29 @@ def _error(
     if size[0] == 0:
         return float("inf")
     size[size == 0] = 1.0
-    on_delay = np.linalg.pinv(jacobian / size)[0] / size[0]
+    on_dead_time = np.linalg.pinv(jacobian / size)[0] / size[0]
     uneven = law.rates(order, x[2]) * np.exp(_SMALL * np.eye(order) - x[1])
     moves = np.stack([_parameters(rates) for rates in uneven], axis=1)
     moves = (moves - candidate.parameters[1:, None]) * (_UNEVEN / _SMALL)
-    by_lags = on_delay @ state.jacobian[0][:, 1:] @ moves
-    return float(np.sqrt(variance * (on_delay @ on_delay) + by_lags @ by_lags))
+    by_lags = on_dead_time @ state.jacobian[0][:, 1:] @ moves
+    return float(np.sqrt(variance * (on_dead_time @ on_dead_time) + by_lags @ by_lags))
 
 
 def _evaluate(
     problem: Problem, structure: Structure, law: _Law, x: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Parameters, residual, and its derivatives by delay, logarithm of the lag, and shape."""
+    """Parameters, residual, and its derivatives by dead time, logarithm of the lag, and shape."""
     order = structure.order
     rates = law.rates(order, x[2]) * np.exp(-x[1])
     parameters = np.append(x[:1], _parameters(rates))
     state = evaluate(problem, structure, parameters[None])
-    by_delay, by_poles = state.jacobian[0][:, :1], state.jacobian[0][:, 1:]
+    by_dead_time, by_poles = state.jacobian[0][:, :1], state.jacobian[0][:, 1:]
     inwards = -_SMALL if x[2] + _SMALL > law.high else _SMALL
     slower = _parameters(rates * np.exp(-_SMALL))
     reshaped = _parameters(law.rates(order, x[2] + inwards) * np.exp(-x[1]))
     moves = [(slower - parameters[1:]) / _SMALL, (reshaped - parameters[1:]) / inwards]
     columns = by_poles @ np.stack(moves, axis=1)
-    return parameters, state.residual[0], np.concatenate([by_delay, columns], axis=1)
+    return parameters, state.residual[0], np.concatenate([by_dead_time, columns], axis=1)
 
 
 def _parameters(rates: FloatArray) -> FloatArray:

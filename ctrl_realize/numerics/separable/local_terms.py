@@ -1,6 +1,6 @@
 """Linear terms that belong to one stretch of the data only: its level, drift and initial state.
 
-Several records of one plant share poles, numerator and delay. What each of them has for itself
+Several records of one plant share poles, numerator and dead time. What each of them has for itself
 enters linearly and touches only its own samples, so it is projected out of them, stretch by
 stretch; a hundred records cost no more than one of the same length.
 

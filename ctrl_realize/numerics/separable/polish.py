@@ -6,9 +6,9 @@ step is a Levenberg-Marquardt step from an orthogonal factorisation (the normal 
 the condition number), its damping follows the ratio of gained to predicted decrease [1]_, and the
 last one is that whose predicted decrease no longer shows in the sum of squares.
 
-The sum of squares has a kink in the delay at every sample, where the response begins with a slope.
-Between two samples it is smooth: a step ends at the next sample and begins anew on its other side,
-and a minimum in a kink is where both sides lead back.
+The sum of squares has a kink in the dead time at every sample, where the response begins with a
+slope. Between two samples it is smooth: a step ends at the next sample and begins anew on its other
+side, and a minimum in a kink is where both sides lead back.
 
 References
 ----------
@@ -48,7 +48,7 @@ _SMALL = 1e-4  # of a logarithmic parameter, or of a sample: for differences of 
 _FLAT = 1e-12  # of the largest curvature: a direction in which rounding bends
 _GIVEN_UP = 1e6  # by which a step is shortened at most
 _LARGEST = 0.5  # step of a logarithmic parameter, by Newton
-_BESIDE = 1e-8  # samples by which a delay lies beside a sample to be on one side of it
+_BESIDE = 1e-8  # samples by which a dead time lies beside a sample to be on one side of it
 _NOTHING = 1e-10  # of the largest column of the Jacobian: a direction of rounding
 _MOST_PINS = 3
 _LEVEL = 1e-6  # variances to which a level is met
@@ -61,7 +61,7 @@ def polish(
     bounds: Bounds,
     dt: float,
     *,
-    delay_fixed: bool = False,
+    dead_time_fixed: bool = False,
     level: float | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Follow every start until it is near its minimum; see `settle` for the rest.
@@ -73,11 +73,11 @@ def polish(
     problem : Problem
     structure : Structure
     starts : ndarray, shape (B, 1 + n)
-        Delay in s and pole parameters.
+        Dead time in s and pole parameters.
     bounds : Bounds
     dt : float
         Sample time in s.
-    delay_fixed : bool, optional
+    dead_time_fixed : bool, optional
         Keep the first column as it is (profile likelihood).
     level : float, optional
         A cost of which is asked only whether a minimum lies below it.
@@ -88,7 +88,7 @@ def polish(
     cost : ndarray, shape (B,)
     """
     x = np.clip(starts, bounds.low, bounds.high)
-    if delay_fixed:
+    if dead_time_fixed:
         x[:, 0] = starts[:, 0]
     else:
         x[:, 0] = _beside(x[:, 0], bounds, dt)
@@ -96,10 +96,10 @@ def polish(
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
     count = len(x)
     damping, growth = np.full(count, _DAMPING), np.full(count, 2.0)
-    # A delay that is held: always, or in a kink from both sides of which the way leads back.
-    pinned = np.full(count, delay_fixed)
+    # A dead time that is held: always, or in a kink from both sides of which the way leads back.
+    pinned = np.full(count, dead_time_fixed)
     crossed = np.zeros(count, dtype=np.bool_)
-    pins = np.where(delay_fixed, _MOST_PINS, 0) * np.ones(count, dtype=np.int64)
+    pins = np.where(dead_time_fixed, _MOST_PINS, 0) * np.ones(count, dtype=np.int64)
     active: IntArray = np.arange(count)
     for _ in range(_MOST_TURNS):
         at = x[active]
@@ -132,9 +132,9 @@ def polish(
         crossed[active] = turn
         pinned[active[kink]] = True
         enough = _NEAR / problem.data.size * cost[active]
-        if delay_fixed and level is not None:
+        if dead_time_fixed and level is not None:
             enough = np.maximum(enough, _NO_WAY * np.abs(cost[active] - level))
-        elif not delay_fixed:
+        elif not dead_time_fixed:
             enough = np.maximum(enough, _NO_WAY * (cost[active] - cost.min()))
         done = ~turn & ~kink & (predicted <= enough)
         # The others have moved since: look at the kink once more.
@@ -144,7 +144,7 @@ def polish(
         active = active[~((done & ~again) | (damping[active] > 1e12))]
         if not active.size:
             break
-    if not delay_fixed:
+    if not dead_time_fixed:
         x[:, 0] = np.clip(_snapped(x[:, 0], dt), bounds.low[0], bounds.high[0])
     return x, cost
 
@@ -152,7 +152,7 @@ def polish(
 def _cell(
     at: FloatArray, bounds: Bounds, dt: float, pinned: NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds of every row, those of its delay the samples beside it."""
+    """Bounds of every row, those of its dead time the samples beside it."""
     low, high = (np.tile(bound, (len(at), 1)) for bound in (bounds.low, bounds.high))
     sample = np.ceil(at[:, 0] / dt)
     low[:, 0] = np.maximum(low[:, 0], (sample - 1 + _BESIDE) * dt)
@@ -162,13 +162,13 @@ def _cell(
     return low, high
 
 
-def _beside(delay: FloatArray, bounds: Bounds, dt: float) -> FloatArray:
-    """Delays (B,) within their bounds that are at no sample."""
-    sample = np.round(delay / dt)
-    at_one = np.abs(delay / dt - sample) < _BESIDE
+def _beside(dead_time: FloatArray, bounds: Bounds, dt: float) -> FloatArray:
+    """Dead times (B,) within their bounds that are at no sample."""
+    sample = np.round(dead_time / dt)
+    at_one = np.abs(dead_time / dt - sample) < _BESIDE
     earlier, later = (sample - _BESIDE) * dt, (sample + _BESIDE) * dt
     moved = np.where(earlier >= bounds.low[0], earlier, np.minimum(later, bounds.high[0]))
-    return np.where(at_one, moved, delay)
+    return np.where(at_one, moved, dead_time)
 
 
 def _leaving(
@@ -179,23 +179,23 @@ def _leaving(
     bounds: Bounds,
     pinned: NDArray[np.bool_],
 ) -> IntArray:
-    """-1 or 1 for rows whose delay is at a sample, with the way down on its other side."""
-    delay, way = at[:, 0], downhill[:, 0]
-    later = (delay >= high[:, 0]) & (way > 0) & (high[:, 0] < bounds.high[0])
-    earlier = (delay <= low[:, 0]) & (way < 0) & (low[:, 0] > bounds.low[0])
+    """-1 or 1 for rows whose dead time is at a sample, with the way down on its other side."""
+    dead_time, way = at[:, 0], downhill[:, 0]
+    later = (dead_time >= high[:, 0]) & (way > 0) & (high[:, 0] < bounds.high[0])
+    earlier = (dead_time <= low[:, 0]) & (way < 0) & (low[:, 0] > bounds.low[0])
     return np.where(pinned, 0, later.astype(np.int64) - earlier.astype(np.int64))
 
 
-def _other_side(delay: FloatArray, way: IntArray, dt: float) -> FloatArray:
-    sample = np.round(delay / dt)
+def _other_side(dead_time: FloatArray, way: IntArray, dt: float) -> FloatArray:
+    sample = np.round(dead_time / dt)
     return np.asarray((sample + way * _BESIDE) * dt)
 
 
-def _snapped(delay: FloatArray, dt: float) -> FloatArray:
-    """Take back by how much a delay lies beside a sample to be on a side of it."""
-    sample = np.round(delay / dt)
+def _snapped(dead_time: FloatArray, dt: float) -> FloatArray:
+    """Take back by how much a dead time lies beside a sample to be on a side of it."""
+    sample = np.round(dead_time / dt)
     # Plus nothing: no zero is negative.
-    return np.where(np.abs(delay / dt - sample) <= 2 * _BESIDE, sample * dt + 0.0, delay)
+    return np.where(np.abs(dead_time / dt - sample) <= 2 * _BESIDE, sample * dt + 0.0, dead_time)
 
 
 def _step(
@@ -234,7 +234,7 @@ def settle(
     bounds: Bounds,
     dt: float,
     *,
-    delay_fixed: bool = False,
+    dead_time_fixed: bool = False,
 ) -> tuple[FloatArray, float]:
     """End one fit (1 + n,) with Newton's steps, which see the curvature of what is left.
 
@@ -243,9 +243,9 @@ def settle(
     which is exact. Returns the parameters and the cost.
     """
     x = start.copy()
-    if not delay_fixed:
+    if not dead_time_fixed:
         x[0] = _beside(x[:1], bounds, dt)[0]
-    held = np.array([delay_fixed])
+    held = np.array([dead_time_fixed])
     for _ in range(_MOST_CELLS):
         low, high = (bound[0] for bound in _cell(x[None], bounds, dt, held))
         x, cost, slope = _newton(problem, structure, x, (low, high), dt)
@@ -260,7 +260,7 @@ def settle(
         else:
             # From both sides of the sample the way leads back to it.
             held[0] = True
-    if not delay_fixed:
+    if not dead_time_fixed:
         x[0] = np.clip(_snapped(x[:1], dt)[0], bounds.low[0], bounds.high[0])
     return x, cost
 
@@ -274,7 +274,7 @@ def solve_level(
     goal: float,
     variance: float,
 ) -> FloatArray | None:
-    """Find the delay at which the minimum over all other parameters is a given cost.
+    """Find the dead time at which the minimum over all other parameters is a given cost.
 
     The end of a profile-likelihood interval, by Newton's steps in all parameters at once [1]_:
     the slopes of the others are zero there, and the cost is `goal`. None where they do not come
@@ -293,7 +293,7 @@ def solve_level(
         free = others & ~((x <= limits[0]) & (slope > 0) | (x >= limits[1]) & (slope < 0))
         curvature = hessian[np.ix_(free, free)]
         try:
-            # How the minimum over the others moves with the delay, and how far away it is.
+            # How the minimum over the others moves with the dead time, and how far away it is.
             along, back = np.linalg.solve(
                 curvature, np.stack([-hessian[free, 0], -slope[free]], axis=1)
             ).T

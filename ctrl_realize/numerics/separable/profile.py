@@ -1,7 +1,7 @@
-"""Profile-likelihood interval of the delay of one structure.
+"""Profile-likelihood interval of the dead time of one structure.
 
 Interval of the profile likelihood as in [1]_, ends by the method of [2]_ (Illinois). A kink of the
-misfit at a sample, where the delay passes it, is why points are laid inside the sample of the
+misfit at a sample, where the dead time passes it, is why points are laid inside the sample of the
 optimum.
 
 References
@@ -39,13 +39,13 @@ _JUMP = 4.0  # pole, in 1/samples, whose response is over within a sample
 _NOTHING = 1e-9  # part of a sensitivity that is rounding
 
 Points: TypeAlias = dict[float, Candidate]
-"""Best models with given delays, by these, in s."""
+"""Best models with given dead times, by these, in s."""
 
 
-def delay_profile(
+def dead_time_profile(
     problem: Problem, candidate: Candidate, variance: float, scales: Scales
 ) -> tuple[FloatArray, FloatArray]:
-    """Misfit of the best model with each of a range of fixed delays.
+    """Misfit of the best model with each of a range of fixed dead times.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def delay_profile(
 
     Returns
     -------
-    delay : ndarray, shape (G,)
+    dead_time : ndarray, shape (G,)
         Sorted, in s; the ends of the 95 % interval are among them.
     excess : ndarray, shape (G,)
         Cost above the minimum, over the variance: chi-square of one degree of freedom.
@@ -73,12 +73,12 @@ def delay_profile(
 def profile_points(
     problem: Problem, candidate: Candidate, variance: float, scales: Scales
 ) -> Points:
-    """Best models at delays of a grid, between which the ends of the interval lie."""
-    half = _EDGE * delay_error(problem, candidate, variance)
+    """Best models at dead times of a grid, between which the ends of the interval lie."""
+    half = _EDGE * dead_time_error(problem, candidate, variance)
     low, high = scales.earliest, scales.latest
     grid = np.linspace(low, high, _FAR)
     if np.isfinite(half):
-        grid = np.concatenate([candidate.delay + half * _NEAR, grid])
+        grid = np.concatenate([candidate.dead_time + half * _NEAR, grid])
     if _jumps(candidate, scales):
         # Nothing changes while the jump stays between the same two samples.
         grid = np.concatenate([(_jump_sample(candidate, scales) + _INSIDE) * scales.dt, grid])
@@ -92,14 +92,14 @@ def profile_points(
         starts,
         bounds,
         scales.dt,
-        delay_fixed=True,
+        dead_time_fixed=True,
         level=candidate.cost + CHI2_95 * variance,
     )
     points = {
         float(at): Candidate(structure, x, float(c))
         for at, x, c in zip(grid, fitted, cost, strict=True)
     }
-    return points | {candidate.delay: candidate}
+    return points | {candidate.dead_time: candidate}
 
 
 def with_ends(
@@ -118,24 +118,24 @@ def with_ends(
             continue
         pair = points[inside], points[outside]
         bounds = parameter_bounds(pair[0].structure, scales)
-        found |= {point.delay: point for point in _end(problem, pair, level, bounds, scales.dt)}
+        found |= {point.dead_time: point for point in _end(problem, pair, level, bounds, scales.dt)}
     return found
 
 
 def profile_curve(
     points: Points, candidate: Candidate, variance: float, scales: Scales
 ) -> tuple[FloatArray, FloatArray]:
-    """Delays (G,) and excess (G,) of points, as of `delay_profile`."""
+    """Dead times (G,) and excess (G,) of points, as of `dead_time_profile`."""
     if _jumps(candidate, scales):
         # The later the jump begins, the faster it is: up to the sample that sees it done.
         end = min((_jump_sample(candidate, scales) + 1) * scales.dt, scales.latest)
         late = end - _LATE * scales.dt
-        delays = np.array(sorted(points))
-        costs = np.array([points[at].cost for at in delays])
-        points = points | {end: replace(candidate, cost=float(np.interp(late, delays, costs)))}
-    delay = np.array(sorted(points))
-    excess = np.array([points[at].cost for at in delay])
-    return delay, (excess - excess.min()) / variance
+        dead_times = np.array(sorted(points))
+        costs = np.array([points[at].cost for at in dead_times])
+        points = points | {end: replace(candidate, cost=float(np.interp(late, dead_times, costs)))}
+    dead_time = np.array(sorted(points))
+    excess = np.array([points[at].cost for at in dead_time])
+    return dead_time, (excess - excess.min()) / variance
 
 
 def _jumps(candidate: Candidate, scales: Scales) -> bool:
@@ -143,7 +143,7 @@ def _jumps(candidate: Candidate, scales: Scales) -> bool:
 
 
 def _jump_sample(candidate: Candidate, scales: Scales) -> float:
-    return float(np.floor(candidate.delay / scales.dt + _SHORT))
+    return float(np.floor(candidate.dead_time / scales.dt + _SHORT))
 
 
 def _end(
@@ -167,15 +167,17 @@ def _end(
     found: list[Candidate] = []
     side = 0
     for _ in range(_MOST_TRIES):
-        first, last = sorted((inside.delay, outside.delay))
+        first, last = sorted((inside.dead_time, outside.dead_time))
         solved = solve_level(problem, structure, point.parameters, bounds, dt, goal, variance)
         if solved is not None and first <= solved[0] <= last:
             return [*found, Candidate(structure, solved, goal)]
         if last - first < _SOLVED * dt:
             break
         starts = np.stack([inside.parameters, outside.parameters])
-        starts[:, 0] = inside.delay + below / (below - above) * (outside.delay - inside.delay)
-        x, cost = polish(problem, structure, starts, bounds, dt, delay_fixed=True)
+        starts[:, 0] = inside.dead_time + below / (below - above) * (
+            outside.dead_time - inside.dead_time
+        )
+        x, cost = polish(problem, structure, starts, bounds, dt, dead_time_fixed=True)
         best = int(np.argmin(cost))
         point = Candidate(structure, x[best], float(cost[best]))
         found.append(point)
@@ -189,8 +191,8 @@ def _end(
     return found
 
 
-def delay_error(problem: Problem, candidate: Candidate, variance: float) -> float:
-    """Standard error of the delay from the local curvature (infinite if there is none), in s."""
+def dead_time_error(problem: Problem, candidate: Candidate, variance: float) -> float:
+    """Standard error of the dead time in s from the local curvature, infinite if there is none."""
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
     jacobian, free = state.jacobian[0], float(state.sensitivity[0, 0])
     size = np.sqrt((jacobian**2).sum(axis=0))
@@ -198,7 +200,7 @@ def delay_error(problem: Problem, candidate: Candidate, variance: float) -> floa
         return float("inf")
     moving = size > _NOTHING * state.sensitivity[0]
     columns: FloatArray = (jacobian / np.where(moving, size, 1.0))[:, moving]
-    # The delay comes last, so that the corner is what the others leave of it.
+    # The dead time comes last, so that the corner is what the others leave of it.
     triangle = np.linalg.qr(columns[:, ::-1])[1]
     corner = float(np.abs(triangle[-1, -1])) * float(size[0])
     return float(np.sqrt(variance)) / corner if corner > _NOTHING * free else float("inf")

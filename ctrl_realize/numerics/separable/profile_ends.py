@@ -23,17 +23,19 @@ _MOST_TRIES = 20
 
 def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
     """Pairs of neighbours, inside and outside, at the lower and upper end, where there are any."""
-    delays = sorted(excess)
-    inside = [i for i, at in enumerate(delays) if excess[at] <= CHI2_95]
+    dead_times = sorted(excess)
+    inside = [i for i, at in enumerate(dead_times) if excess[at] <= CHI2_95]
     first, last = inside[0], inside[-1]
-    found = [(delays[first], delays[first - 1])] if first > 0 else []
-    return found + ([(delays[last], delays[last + 1])] if last < len(delays) - 1 else [])
+    found = [(dead_times[first], dead_times[first - 1])] if first > 0 else []
+    return found + (
+        [(dead_times[last], dead_times[last + 1])] if last < len(dead_times) - 1 else []
+    )
 
 
 def solve_ends(excess_at: Callable[[float], float], excess: Mapping[float, float]) -> None:
-    """Ask for the excess at delays that close in on both ends.
+    """Ask for the excess at dead times that close in on both ends.
 
-    Regula falsi (Illinois) in the root of the excess, which is linear in the delay where the
+    Regula falsi (Illinois) in the root of the excess, which is linear in the dead time where the
     misfit is.
     """
     edge = float(np.sqrt(CHI2_95))
@@ -62,17 +64,17 @@ def root_of(excess: float) -> float:
 
 
 def profile_limits(
-    delay: FloatArray, excess: FloatArray, threshold: float = CHI2_95
+    dead_time: FloatArray, excess: FloatArray, threshold: float = CHI2_95
 ) -> tuple[float, float]:
-    """Ends of the set of delays with an excess below the threshold (default: 95 %)."""
+    """Ends of the set of dead times with an excess below the threshold (default: 95 %)."""
     inside = np.flatnonzero(excess <= threshold)
     first, last = int(inside[0]), int(inside[-1])
     root = np.sqrt(np.maximum(excess, 0.0))
     edge = float(np.sqrt(threshold))
-    low = float(delay[0])
+    low = float(dead_time[0])
     if first > 0:
-        low = float(np.interp(edge, root[[first, first - 1]], delay[[first, first - 1]]))
-    high = float(delay[-1])
-    if last < delay.size - 1:
-        high = float(np.interp(edge, root[[last, last + 1]], delay[[last, last + 1]]))
+        low = float(np.interp(edge, root[[first, first - 1]], dead_time[[first, first - 1]]))
+    high = float(dead_time[-1])
+    if last < dead_time.size - 1:
+        high = float(np.interp(edge, root[[last, last + 1]], dead_time[[last, last + 1]]))
     return low, high

@@ -11,10 +11,10 @@ over the moves that have arrived, t > t_l + tau. Derivatives need dE_j/dp_j in a
     T_j(t) = sum_l d_l (t - t_l - tau) exp(p_j (t - t_l - tau)).
 
 `StepSequence` evaluates their means over bins of samples for a few moves (steps, ramps), many
-delays and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
+dead times and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
 
-Exact for a held input, as sampling is in [1]_; a delay of a fraction of a sample needs nothing of
-its own, since moves have times and not sample numbers.
+Exact for a held input, as sampling is in [1]_; a dead time of a fraction of a sample needs nothing
+of its own, since moves have times and not sample numbers.
 
 References
 ----------
@@ -49,7 +49,7 @@ class HeldInput(Protocol):
         ...
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
-        """Evaluate H, E and T for delays (B,) and poles (B, J)."""
+        """Evaluate H, E and T for dead times (B,) and poles (B, J)."""
         ...
 
 
@@ -131,7 +131,7 @@ class StepSequence:
 
     def _arrived(self, since: FloatArray) -> IntArray:
         """Count the moves that have arrived at delayed times (B, m)."""
-        # With a delay of whole samples rounding must not decide what has arrived.
+        # With a dead time of whole samples rounding must not decide what has arrived.
         return np.searchsorted(self.moves + _TOGETHER * self.dt, since, side="left").astype(
             np.int64
         )

@@ -84,7 +84,7 @@ class StaticGain:
 def static_gain(
     problem: Problem, candidate: Candidate, variance: float, length: float
 ) -> StaticGain:
-    """Propagate the errors of delay, poles and numerator to gain and total delay.
+    """Propagate the errors of dead time, poles and numerator to gain and total delay.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def static_gain(
         return np.array(_told(at[: theta.size], at[theta.size :], length))
 
     moves = steps * np.eye(point.size)
-    # No delay is negative: the slopes at none are those a little later.
+    # No dead time is negative: the slopes at none are those a little later.
     inside = np.concatenate([[max(point[0], steps[0])], point[1:]])
     slopes = np.stack([(response(inside + m) - response(inside - m)) / 2 for m in moves], axis=1)
     gradient = np.stack([(told(point + m) - told(point - m)) / 2 for m in moves], axis=1)

@@ -33,7 +33,7 @@ NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
 
 FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
 """Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
-lag of half a sample at least, its delay would be known better than to the sample."""
+lag of half a sample at least, its dead time would be known better than to the sample."""
 
 PLAUSIBLE = 10.0
 """A structure is not ruled out while its criterion is within this of the best."""
@@ -43,7 +43,7 @@ _ENDS, _SAME_END = 5, 0.02  # of a search that are followed, and parts by which 
 
 LEAST_CHARGE = 7.0
 """Least charge for a parameter where structures are ruled out. Few independent samples charge less,
-and models with two zeros too many, in which a delay has no information, would never be."""
+and models with two zeros too many, in which a dead time has no information, would never be."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Scales:
 
     `onset` is when it starts to move, `rise` the time from there to 63 % of its excursion,
     `length` the time that was recorded after the input moved, `dt` the sample time. `latest`
-    and `earliest` bound the delay; `ringing` is an angular frequency seen in it, or 0.
+    and `earliest` bound the dead time; `ringing` is an angular frequency seen in it, or 0.
     """
 
     onset: float
@@ -79,8 +79,8 @@ class Candidate:
     searched: bool = False
 
     @property
-    def delay(self) -> float:
-        """Delay in s."""
+    def dead_time(self) -> float:
+        """Dead time in s."""
         return float(self.parameters[0])
 
     @property
@@ -97,7 +97,7 @@ def search(
 ) -> dict[Structure, Candidate]:
     """Find the best fit of every structure.
 
-    Each is started from two delays for every one of up to five patterns of poles, and from the
+    Each is started from two dead times for every one of up to five patterns of poles, and from the
     optima of the structures next to it (one zero less, one pole less).
 
     Parameters
@@ -151,7 +151,7 @@ def _worth_a_search(
 
 
 def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
-    """Box for delay and poles: time constants up to (nearly) an integrator.
+    """Box for dead time and poles: time constants up to (nearly) an integrator.
 
     Beside zeros they are half a sample at least: with more freedom such a model imitates a ringing
     that was sampled too coarsely.
@@ -176,7 +176,7 @@ def criteria(
     `variance` is that of the noise, colour included; `samples` how many independent ones there
     are.
     """
-    # Schwarz (1978) with known variance; delay, poles, numerator (zeros + 1) are the parameters.
+    # Schwarz (1978) with known variance; parameters are dead time, poles, numerator (zeros + 1).
     penalty = parameter_charge(samples)
     # A record that stands still has no noise, and nothing to compare.
     variance = max(variance, SMALLEST)
@@ -236,13 +236,13 @@ def needless_parameters(structure: Structure) -> float:
 
 
 def pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
-    """Starts of a search from every pattern of poles, at one delay or two."""
+    """Starts of a search from every pattern of poles, at one dead time or two."""
     patterns = _pole_patterns(structure.order, scales)
     # With zeros, the optimum without them is a start as well: fewer patterns do.
-    delays = (0.4, 1.0) if structure.zeros == 0 else (0.7,)
+    dead_times = (0.4, 1.0) if structure.zeros == 0 else (0.7,)
     return [
         np.concatenate([[part * scales.onset], parameters_from_poles(poles)])
-        for part in delays
+        for part in dead_times
         for poles in patterns
     ]
 
@@ -278,5 +278,5 @@ def neighbour_starts(
         if smaller in found:
             old = found[smaller]
             poles = np.append(old.poles, -10.0 / scales.rise)
-            starts.append(np.concatenate([[old.delay], parameters_from_poles(poles)]))
+            starts.append(np.concatenate([[old.dead_time], parameters_from_poles(poles)]))
     return starts

@@ -5,7 +5,7 @@ The model of one record is
     y(t) = L^-1{ exp(-tau s) b(s) K(s) U(s) / a(s) } + fixed regressors,
 
 with a monic `a` of order n (see `pole_factors`), `b` of degree n - r (r: relative degree) and
-known dynamics K in cascade. Numerator and regressors enter linearly and are eliminated; delay
+known dynamics K in cascade. Numerator and regressors enter linearly and are eliminated; dead time
 and poles are found by Levenberg-Marquardt steps on what is left, with Kaufman's Jacobian [1]_
 (variable projection [2]_, [3]_; damping [4]_),
 for a whole batch of starts in the same array operations.
@@ -223,7 +223,7 @@ def fit_batch(
     starts: FloatArray,
     bounds: Bounds,
     *,
-    delay_fixed: bool = False,
+    dead_time_fixed: bool = False,
     most_iterations: int = 30,
     tolerance: float = 1e-4,
 ) -> tuple[FloatArray, FloatArray]:
@@ -232,8 +232,8 @@ def fit_batch(
     Parameters
     ----------
     starts : ndarray, shape (B, 1 + n)
-        Delay in s and pole parameters.
-    delay_fixed : bool
+        Dead time in s and pole parameters.
+    dead_time_fixed : bool
         Keep the first column as it is (profile likelihood).
     most_iterations : int
         Of all starts together.
@@ -246,7 +246,7 @@ def fit_batch(
     cost : ndarray, shape (B,)
     """
     x = np.clip(starts, bounds.low, bounds.high)
-    if delay_fixed:
+    if dead_time_fixed:
         x[:, 0] = starts[:, 0]
     state = evaluate(problem, structure, x)
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
@@ -255,11 +255,11 @@ def fit_batch(
     active: IntArray = np.arange(x.shape[0])
     for turn in range(most_iterations):
         step, short = _damped_step(
-            x[active], residual[active], jacobian[active], damping[active], bounds, delay_fixed
+            x[active], residual[active], jacobian[active], damping[active], bounds, dead_time_fixed
         )
         trial = x[active] + step
         trial[:, 1:] = np.clip(trial[:, 1:], bounds.low[1:], bounds.high[1:])
-        if not delay_fixed:
+        if not dead_time_fixed:
             trial[:, 0] = np.clip(trial[:, 0], bounds.low[0], bounds.high[0])
         state = evaluate(problem, structure, trial)
         new = state.cost
@@ -272,7 +272,7 @@ def fit_batch(
         damping[down] *= 8.0
         failures[up] = 0
         failures[down] += 1
-        late = turn >= _TURNS_FOR_ALL and not delay_fixed
+        late = turn >= _TURNS_FOR_ALL and not dead_time_fixed
         hopeless = late & (cost[active] > _HOPELESS * cost.min())
         active = active[~(settled | hopeless | (failures[active] >= _MOST_FAILURES))]
         if not active.size:
@@ -286,17 +286,17 @@ def _damped_step(
     jacobian: FloatArray,
     damping: FloatArray,
     bounds: Bounds,
-    delay_fixed: bool,
+    dead_time_fixed: bool,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Levenberg-Marquardt steps in the free directions, and which of them were not cut."""
-    # The delay counts in parts of its range: any unit of time gives the same steps.
+    # The dead time counts in parts of its range: any unit of time gives the same steps.
     unit = np.ones(x.shape[1])
     unit[0] = max(float(bounds.high[0] - bounds.low[0]), 1e-300)
     # A response that shows in rounding alone has a gain, and slopes, whose squares overflow.
     jacobian = np.clip(jacobian * unit, -_STEEPEST, _STEEPEST)
     downhill = np.einsum("bmp,bm->bp", jacobian, residual)
     free = ~((x <= bounds.low) & (downhill < 0) | (x >= bounds.high) & (downhill > 0))
-    if delay_fixed:
+    if dead_time_fixed:
         free[:, 0] = False
     normal = np.swapaxes(jacobian, 1, 2) @ jacobian
     normal = normal * (free[:, :, None] & free[:, None, :])

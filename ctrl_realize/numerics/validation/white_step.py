@@ -1,8 +1,8 @@
 """One step of generalised least squares from an output-error fit.
 
 Output error weighs all errors alike and stays consistent in coloured noise, but far from the
-best: a slow disturbance may move a delay by many of its standard errors. One Gauss-Newton step on
-data that the residual's own autoregression has made white is as good as the maximum of the
+best: a slow disturbance may move a dead time by many of its standard errors. One Gauss-Newton step
+on data that the residual's own autoregression has made white is as good as the maximum of the
 likelihood (one-step estimator: Lehmann and Casella, Theory of Point Estimation, 2nd ed., section
 6.4); where it differs from least squares by more than noise, one of them is wrong (Hausman,
 Econometrica 46 (1978) 1251-1271).
@@ -32,10 +32,10 @@ _LEAST_FREEDOM = 40
 
 @dataclass(frozen=True)
 class WhiteStep:
-    """Delay (s), gain and total delay (s) behind the step, with their standard errors."""
+    """Dead time (s), gain and total delay (s) behind the step, with their standard errors."""
 
-    delay: float
-    delay_error: float
+    dead_time: float
+    dead_time_error: float
     gain: float
     gain_error: float
     total: float
@@ -46,17 +46,17 @@ def white_step(
     measured: FloatArray,
     drive: FloatArray,
     dt: float,
-    delay: float,
+    dead_time: float,
     poles: ComplexArray,
     numerator: FloatArray,
 ) -> WhiteStep | None:
-    """Take one step from exp(-delay s) b(s) / a(s) to the model of generalised least squares.
+    """Take one step from exp(-dead time s) b(s) / a(s) to the model of generalised least squares.
 
     Parameters
     ----------
     measured, drive : ndarray, shape (N,)
         Output, and the input, held from sample to sample.
-    dt, delay : float
+    dt, dead_time : float
         In s.
     poles : ndarray of complex, shape (n,)
         Roots of the monic a, none of them zero.
@@ -71,7 +71,7 @@ def white_step(
     a = np.real(np.poly(poles))[:0:-1]
     n, m = a.size, numerator.size
     scale = float(np.abs(poles).max())
-    states = _states(drive, a, dt, delay, first=float(drive[0]))
+    states = _states(drive, a, dt, dead_time, first=float(drive[0]))
     time = np.linspace(0, 1, drive.size)
     own = np.column_stack([np.ones(time.size), time, _free(a, dt, drive.size)])
     response = states[:, :m] @ numerator
@@ -98,12 +98,12 @@ def white_step(
     covariance = (inverse / np.outer(size, size))[: 1 + n + m, : 1 + n + m]
     gradients = _gradients(a, numerator)
     gain = numerator[0] / a[0]
-    total = delay + (a[1] if n > 1 else 1.0) / a[0]
+    total = dead_time + (a[1] if n > 1 else 1.0) / a[0]
     total -= numerator[1] / numerator[0] if m > 1 else 0.0
     moved = gradients @ step
     errors = np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
     return WhiteStep(
-        delay + float(moved[0]),
+        dead_time + float(moved[0]),
         float(errors[0]),
         float(gain + moved[1]),
         float(errors[1]),
@@ -113,7 +113,7 @@ def white_step(
 
 
 def _gradients(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Derivatives of delay, gain and total delay by (delay, a, b), shape (3, 1 + n + m)."""
+    """Derivatives of dead time, gain and total delay by (dead time, a, b), shape (3, 1 + n + m)."""
     n, m = a.size, b.size
     out = np.zeros((3, 1 + n + m))
     out[0, 0] = out[2, 0] = 1.0
@@ -128,7 +128,7 @@ def _gradients(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _states(
-    drive: FloatArray, a: FloatArray, dt: float, delay: float, *, first: float
+    drive: FloatArray, a: FloatArray, dt: float, dead_time: float, *, first: float
 ) -> FloatArray:
     """Response of s^i / a(s), i = 0 ... n - 1, to a held and delayed input, shape (N, n).
 
@@ -136,8 +136,8 @@ def _states(
     Computer-Controlled Systems, 3rd ed., section 2.3.
     """
     n = a.size
-    whole = int(np.floor(delay / dt))
-    part = delay - whole * dt
+    whole = int(np.floor(dead_time / dt))
+    part = dead_time - whole * dt
     system = np.zeros((n + 1, n + 1))
     system[: n - 1, 1:n] = np.eye(n - 1)
     system[n - 1, :n], system[n - 1, n] = -a, 1.0

@@ -153,13 +153,13 @@ def test_hum_is_found_to_a_small_part_of_a_period_over_the_record():
 
 
 def test_profile_limits_are_where_a_parabola_crosses():
-    delay = np.linspace(-4, 8, 13)
-    low, high = profile_limits(delay, ((delay - 2) / 1.5) ** 2)
+    dead_time = np.linspace(-4, 8, 13)
+    low, high = profile_limits(dead_time, ((dead_time - 2) / 1.5) ** 2)
     # the root of the excess is linear, so that interpolation is exact
     assert_allclose(
         [low, high], [2 - 1.5 * np.sqrt(3.841458820694124), 2 + 1.5 * np.sqrt(3.841458820694124)]
     )
-    assert profile_limits(delay, np.zeros(13)) == (-4, 8)
+    assert profile_limits(dead_time, np.zeros(13)) == (-4, 8)
 
 
 FINE = 0.01

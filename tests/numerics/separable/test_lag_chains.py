@@ -46,14 +46,14 @@ def fitted(problem, penalty: float = 7.0) -> list[LagChain]:
     return fit_chains(data, like, scales, SIGMA**2, penalty)
 
 
-def test_the_chain_of_the_right_length_fits_best_and_has_the_delay(problem):
+def test_the_chain_of_the_right_length_fits_best_and_has_the_dead_time(problem):
     chains = fitted(problem)
     best = min(chains, key=lambda chain: chain.criterion)
     assert best.candidate.structure == Structure(6, 6)
-    assert abs(best.candidate.delay - 20) < 3 * best.error
+    assert abs(best.candidate.dead_time - 20) < 3 * best.error
     assert best.error < 0.5
     rates = -best.candidate.poles.real
-    # As far as the delay is off, the six lags make up for it: 1.5 samples in 72.
+    # As far as the dead time is off, the six lags make up for it: 1.5 samples in 72.
     assert np.mean(1 / rates) == pytest.approx(12.0, rel=0.02)
 
 
@@ -77,8 +77,8 @@ def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
     like = Candidate(Structure(2, 2), parameters[0], float(cost[0]))
     (chain,) = fit_diffusion(problem, like, scales, 1e-8, 7.0)
     beyond = float(np.sum(1 / rates[8:]))
-    # Modes beyond the eighth are a delay but for their spread; 0.05 samples are seen.
-    assert abs(chain.candidate.delay - beyond - 20) < 0.2
+    # Modes beyond the eighth are a dead time but for their spread; 0.05 samples are seen.
+    assert abs(chain.candidate.dead_time - beyond - 20) < 0.2
     # What comes after the forty modes of this plant: 1 / (k - c)^2 sums to 1 / (40.5 - c).
     endless = beyond + (1 - shift) ** 2 / (40.5 - shift) / 0.01
     assert chain.hidden == pytest.approx(endless, rel=0.05)
@@ -147,7 +147,9 @@ def test_a_flow_is_found_behind_its_dead_time():
     flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
     assert flow.lag == 0.0
     # Means over residence times of 48 ms at a noise of 0.05 %: a tenth of a millisecond.
-    assert_allclose([flow.delay, flow.mean, flow.spread], [0.0373, 0.08, 0.6], rtol=0, atol=1.5e-3)
+    assert_allclose(
+        [flow.dead_time, flow.mean, flow.spread], [0.0373, 0.08, 0.6], rtol=0, atol=1.5e-3
+    )
     assert flow.peclet == pytest.approx(2 / 0.36, rel=0.02)
     low, high = profile_limits(*flow_profile(problem, flow, scales, 1e-6))
     assert low < 0.0373 < high

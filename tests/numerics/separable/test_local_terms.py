@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.separable.compared_fits import at_delay
+from ctrl_realize.numerics.separable.compared_fits import at_dead_time
 from ctrl_realize.numerics.separable.local_terms import FixedTerms, LocalTerms, Segments
 from ctrl_realize.numerics.separable.poles import poles_from_parameters
 from ctrl_realize.numerics.separable.responses import SampledInput, SeveralInputs, StepSequence
@@ -98,7 +98,7 @@ def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, 
 ONE, TWO, ZERO = Structure(1, 1), Structure(2, 2), Structure(2, 1)
 SIZE, EDGE, DT = 120, 20, 0.5
 SCALES = Scales(onset=4.0, rise=5.0, length=50.0, dt=DT, latest=6.0)
-TRUTH = np.array([3.7, np.log(0.2)])  # delay and rate, in s and 1/s
+TRUTH = np.array([3.7, np.log(0.2)])  # dead time and rate, in s and 1/s
 
 
 def drive(first, width):
@@ -106,7 +106,7 @@ def drive(first, width):
 
 
 def windows():
-    """One lag behind a delay on a level of 3: on bins, and sample by sample."""
+    """One lag behind a dead time on a level of 3: on bins, and sample by sample."""
     index, single = np.arange(SIZE), np.ones(SIZE, dtype=np.int64)
     every = drive(index.astype(float), single)
     output = 3.0 + respond(every, KnownFactor(), np.array([0.4]), TRUTH)
@@ -167,14 +167,14 @@ def noise(size=1000, seed=0):
     return np.random.default_rng(seed).standard_normal(size)
 
 
-def test_a_model_with_a_given_delay_is_the_best_one_with_it():
+def test_a_model_with_a_given_dead_time_is_the_best_one_with_it():
     window, _ = windows()
     kept = Candidate(ONE, TRUTH, 0.0)
-    moved = at_delay(window.problem, kept, SCALES, 4.7)
+    moved = at_dead_time(window.problem, kept, SCALES, 4.7)
     assert moved.structure == ONE
-    assert moved.delay == 4.7
+    assert moved.dead_time == 4.7
     assert TRUTH[0] == 3.7
-    # less delay, less lag: a second later the response must be faster
+    # less dead time, less lag: a second later the response must be faster
     assert moved.poles[0].real < -0.2
     left = window.predict(window.problem, moved) - window.output
     assert moved.cost == pytest.approx(

@@ -114,7 +114,7 @@ def test_a_search_finds_the_lag_and_its_neighbours_cost_no_more():
     found = search(problem, shapes, scales)
     assert list(found) == [Structure(1, 1), Structure(2, 2), Structure(2, 1)]
     lag = found[Structure(1, 1)]
-    assert lag.delay == pytest.approx(20.0, abs=0.1)
+    assert lag.dead_time == pytest.approx(20.0, abs=0.1)
     assert_allclose(lag.poles, [-1 / 30], rtol=0.01)
     assert found[Structure(2, 1)].cost <= lag.cost * (1 + 1e-9)
     assert found[Structure(2, 1)].cost <= found[Structure(2, 2)].cost * (1 + 1e-9)

@@ -1,4 +1,4 @@
-"""Misfit over a delay that is held, and minima that are found to the bottom."""
+"""Misfit over a dead time that is held, and minima that are found to the bottom."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.compared_fits import at_delay, converged, on_new_data
+from ctrl_realize.numerics.separable.compared_fits import at_dead_time, converged, on_new_data
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.polish import polish, settle, solve_level
-from ctrl_realize.numerics.separable.profile import delay_error, delay_profile
+from ctrl_realize.numerics.separable.profile import dead_time_error, dead_time_profile
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds, search
 from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate, fit_batch
@@ -40,60 +40,62 @@ def found():
     return problem, Candidate(structure, parameters[0], float(cost[0])), scales
 
 
-def test_the_profile_is_the_misfit_of_the_best_lags_at_each_delay(found):
+def test_the_profile_is_the_misfit_of_the_best_lags_at_each_dead_time(found):
     problem, candidate, scales = found
     variance = SIGMA**2
-    delay, excess = delay_profile(problem, candidate, variance, scales)
-    assert np.all(np.diff(delay) >= 0)
-    assert (delay[0], delay[-1]) == (scales.earliest, scales.latest)
-    assert excess[np.flatnonzero(delay == candidate.delay)].min() == pytest.approx(0, abs=1e-6)
+    dead_time, excess = dead_time_profile(problem, candidate, variance, scales)
+    assert np.all(np.diff(dead_time) >= 0)
+    assert (dead_time[0], dead_time[-1]) == (scales.earliest, scales.latest)
+    assert excess[np.flatnonzero(dead_time == candidate.dead_time)].min() == pytest.approx(
+        0, abs=1e-6
+    )
     assert excess.min() == 0
 
     def cost(lags, held):
         theta = np.append(held, lags)[None]
         return evaluate(problem, candidate.structure, theta).cost
 
-    for i in np.flatnonzero(np.abs(delay - candidate.delay) < 3)[::4]:
+    for i in np.flatnonzero(np.abs(dead_time - candidate.dead_time) < 3)[::4]:
         best = least_squares(
             lambda lags, held: np.sqrt(cost(lags, held)),
             candidate.parameters[1:],
-            args=(delay[i],),
+            args=(dead_time[i],),
             x_scale=0.1,
         )
-        least = float(cost(best.x, delay[i])[0])
+        least = float(cost(best.x, dead_time[i])[0])
         # a search without derivatives of a root ends within a hundredth of a chi-square
         assert excess[i] == pytest.approx((least - candidate.cost) / variance, abs=0.02)
 
 
 def test_near_the_optimum_it_is_the_parabola_of_the_standard_error(found):
     problem, candidate, scales = found
-    error = delay_error(problem, candidate, SIGMA**2)
-    low, high = profile_limits(*delay_profile(problem, candidate, SIGMA**2, scales))
+    error = dead_time_error(problem, candidate, SIGMA**2)
+    low, high = profile_limits(*dead_time_profile(problem, candidate, SIGMA**2, scales))
     # the parabola bends a little over two standard errors
     assert (high - low) / (2 * 1.96) == pytest.approx(error, rel=0.05)
     assert low < DEAD < high
     # twice the noise, twice the interval
-    wide = profile_limits(*delay_profile(problem, candidate, 4 * SIGMA**2, scales))
+    wide = profile_limits(*dead_time_profile(problem, candidate, 4 * SIGMA**2, scales))
     assert wide[1] - wide[0] == pytest.approx(2 * (high - low), rel=0.05)
 
 
 LOW_NOISE, SHORT_DEAD = 0.01, 20.3
 
 
-def problem_of(lags=(12.0, 30.0), unit=1.0, seed=3, delay=SHORT_DEAD):
+def problem_of(lags=(12.0, 30.0), unit=1.0, seed=3, dead_time=SHORT_DEAD):
     """Lags behind a dead time, in noise; times in samples of `unit` seconds."""
     k = np.arange(-300, 600, dtype=float)
     rates = 1 / np.array(lags)
     shares = [1 / np.prod(1 - p / np.delete(rates, i)) for i, p in enumerate(rates)]
-    late = np.clip(k - delay, 0, None)
+    late = np.clip(k - dead_time, 0, None)
     y = 1 - np.exp(-np.outer(late, rates)) @ np.array(shares)
     y = y + LOW_NOISE * np.random.default_rng(seed).standard_normal(k.size)
     data = step_data(y, (k >= 0).astype(float), unit, [(300, 1)])
     return window(data, k.size, KnownFactor()).problem, step_scales(data, k.size, None)
 
 
-def start(delay: float, *lags: float) -> np.ndarray:
-    return np.append(delay, parameters_from_poles(-1 / np.array(lags, dtype=complex)))
+def start(dead_time: float, *lags: float) -> np.ndarray:
+    return np.append(dead_time, parameters_from_poles(-1 / np.array(lags, dtype=complex)))
 
 
 def test_all_starts_come_to_one_minimum():
@@ -129,7 +131,7 @@ def test_a_minimum_in_a_kink_is_at_the_sample_and_both_of_its_sides_rise():
     # A first-order response begins with a slope: with little noise many minima are at samples.
     structure, kinks = Structure(1, 1), 0
     for seed in range(20):
-        problem, scales = problem_of((3.0,), seed=seed, delay=20.0)
+        problem, scales = problem_of((3.0,), seed=seed, dead_time=20.0)
         bounds = parameter_bounds(structure, scales)
         near = polish(problem, structure, start(20.0, 3.0)[None], bounds, scales.dt)[0][0]
         x, cost = settle(problem, structure, near, bounds, scales.dt)
@@ -141,7 +143,7 @@ def test_a_minimum_in_a_kink_is_at_the_sample_and_both_of_its_sides_rise():
 
 
 @pytest.mark.parametrize(("order", "degree"), [(2, 2), (2, 1)])
-def test_a_level_is_met_by_the_least_cost_at_that_delay(order, degree):
+def test_a_level_is_met_by_the_least_cost_at_that_dead_time(order, degree):
     problem, scales = problem_of()
     structure = Structure(order, degree)
     bounds = parameter_bounds(structure, scales)
@@ -155,8 +157,8 @@ def test_a_level_is_met_by_the_least_cost_at_that_delay(order, degree):
     assert found[0] < x[0]
     held = found[None].copy()
     held[:, 1:] = x[1:]
-    again, _ = polish(problem, structure, held, bounds, scales.dt, delay_fixed=True)
-    least = settle(problem, structure, again[0], bounds, scales.dt, delay_fixed=True)[1]
+    again, _ = polish(problem, structure, held, bounds, scales.dt, dead_time_fixed=True)
+    least = settle(problem, structure, again[0], bounds, scales.dt, dead_time_fixed=True)[1]
     assert least == pytest.approx(goal, abs=1e-5 * LOW_NOISE**2)
 
 
@@ -176,7 +178,7 @@ def test_what_is_compared_has_no_slope_and_the_cost_of_the_data_of_now():
         assert candidate.cost == float(state.cost[0])
 
 
-def test_the_unit_of_time_changes_delay_and_lags_and_nothing_else():
+def test_the_unit_of_time_changes_dead_time_and_lags_and_nothing_else():
     structure, found = Structure(2, 2), []
     for unit in (1.0, 1e-3, 60.0):
         problem, scales = problem_of(unit=unit)
@@ -188,9 +190,9 @@ def test_the_unit_of_time_changes_delay_and_lags_and_nothing_else():
     assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)
 
 
-@pytest.mark.parametrize("delay", [0.0, 1.0])
-def test_no_random_start_beats_the_model_at_a_delay_far_from_the_best(delay):
-    # what creeps as a logarithm is of no finite order: at other delays other poles are best
+@pytest.mark.parametrize("dead_time", [0.0, 1.0])
+def test_no_random_start_beats_the_model_at_a_dead_time_far_from_the_best(dead_time):
+    # what creeps as a logarithm is of no finite order: at other dead times other poles are best
     k = np.arange(-50, 150, dtype=float)
     y = np.log1p(np.clip(k - 2.3, 0, None) / 10) / 3
     y = y + SIGMA * np.random.default_rng(0).standard_normal(k.size)
@@ -201,6 +203,6 @@ def test_no_random_start_beats_the_model_at_a_delay_far_from_the_best(delay):
     best = search(problem, [structure], scales)[structure]
     box = parameter_bounds(structure, scales)
     starts = np.random.default_rng(9).uniform(box.low, box.high, size=(30, 4))
-    starts[:, 0] = delay
-    cost = fit_batch(problem, structure, starts, box, delay_fixed=True, most_iterations=60)[1]
-    assert at_delay(problem, best, scales, delay).cost <= cost.min()
+    starts[:, 0] = dead_time
+    cost = fit_batch(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
+    assert at_dead_time(problem, best, scales, dead_time).cost <= cost.min()

@@ -62,10 +62,10 @@ def test_the_response_is_the_closed_form_at_any_fraction_of_a_sample():
     poles = rigs.R3.poles().astype(complex)
     time = rigs.TS * np.arange(-50, 900)
     drive = StepSequence(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
-    for delay in (0.0, 36.25, 37.0, 41.9):
-        x = np.concatenate([[delay * rigs.TS], parameters_from_poles(poles)])
+    for dead_time in (0.0, 36.25, 37.0, 41.9):
+        x = np.concatenate([[dead_time * rigs.TS], parameters_from_poles(poles)])
         ours = respond(drive, KnownFactor(), np.array([np.prod(-poles).real]), x)
-        assert_allclose(ours, rigs.exact_step(rigs.R3, time - delay * rigs.TS), atol=1e-12)
+        assert_allclose(ours, rigs.exact_step(rigs.R3, time - dead_time * rigs.TS), atol=1e-12)
 
 
 def test_means_over_bins_are_means_of_samples_also_where_moves_arrive():
@@ -109,8 +109,8 @@ def test_no_random_start_beats_the_few_that_are_tried():
     for seed in range(6):
         rng = np.random.default_rng(seed)
         time = rigs.TS * np.arange(-20, 480)
-        delay = rng.uniform(30, 45)
-        data = rigs.exact_step(rigs.R3, time - delay * rigs.TS)
+        dead_time = rng.uniform(30, 45)
+        data = rigs.exact_step(rigs.R3, time - dead_time * rigs.TS)
         data = data + 0.003 * rng.standard_normal(time.size)
         drive = StepSequence(time, np.ones(500, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
         problem = Problem(data, np.ones(500), drive, np.ones((500, 1)), KnownFactor())
@@ -184,8 +184,8 @@ def test_the_residual_is_that_of_weighted_least_squares():
     data, weight = noisy(), np.linspace(0.5, 2.0, SIZE)
     trials = TRUTH + np.array([[0.0, 0.0], [0.7, 0.2], [-1.0, -0.5]])
     state = evaluate(problem(data, root_weight=weight), ONE, trials)
-    for row, (delay, rate) in enumerate(trials):
-        columns = np.stack([lag(TIME - 2.0 - delay, np.exp(rate)), np.ones(SIZE)], axis=1)
+    for row, (dead_time, rate) in enumerate(trials):
+        columns = np.stack([lag(TIME - 2.0 - dead_time, np.exp(rate)), np.ones(SIZE)], axis=1)
         best = np.linalg.lstsq(columns * weight[:, None], data * weight, rcond=None)[0]
         left = weight * (data - columns @ best)
         assert state.residual[row] == pytest.approx(left, abs=1e-12)
@@ -225,12 +225,12 @@ def fitted(data, start, bounds=BOX, **settings):
     return x[0], cost[0]
 
 
-def test_a_delay_that_is_fixed_is_kept_wherever_it_is():
-    for delay in (1.0, 3.3, 11.0):
-        x, _ = fitted(noisy(), [delay, 0.0], delay_fixed=True, tolerance=1e-12)
-        assert x[0] == delay
+def test_a_dead_time_that_is_fixed_is_kept_wherever_it_is():
+    for dead_time in (1.0, 3.3, 11.0):
+        x, _ = fitted(noisy(), [dead_time, 0.0], dead_time_fixed=True, tolerance=1e-12)
+        assert x[0] == dead_time
         rates = np.clip(x[1] + 1e-2 * np.array([-1, 0, 1]), BOX.low[1], BOX.high[1])
-        trials = np.stack([np.full(3, delay), rates], axis=1)
+        trials = np.stack([np.full(3, dead_time), rates], axis=1)
         slower, at, faster = evaluate(problem(noisy()), ONE, trials).cost
         assert at <= min(slower, faster)
 

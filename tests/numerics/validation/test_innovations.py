@@ -125,7 +125,7 @@ def step(u, y, *, late=0.0, slow=1.0, gain=1.0):
 def test_a_step_from_a_neighbouring_model_leads_to_the_plant():
     u, y = record(0, 0.05, 0.0)
     found = step(u, y, late=0.005, slow=1.01, gain=0.98)
-    assert abs(found.delay - DELAY) < 3 * found.delay_error < 0.01
+    assert abs(found.dead_time - DELAY) < 3 * found.dead_time_error < 0.01
     assert abs(found.gain - 3.0) < 3 * found.gain_error < 0.1
     assert abs(found.total - TOTAL) < 3 * found.total_error < 0.1
 
@@ -137,7 +137,7 @@ def test_errors_are_those_that_come(pole):
         found = step(*record(seed, 0.2, pole))
         scores.append(
             [
-                (found.delay - DELAY) / found.delay_error,
+                (found.dead_time - DELAY) / found.dead_time_error,
                 (found.gain - 3.0) / found.gain_error,
                 (found.total - TOTAL) / found.total_error,
             ]
@@ -187,5 +187,5 @@ def test_units_are_carried_through_the_step():
     poles = np.array([-1.2, -4.0], dtype=complex)
     other = white_step(10 * y, u / 2, DT, DELAY, poles, 20 * NUMERATOR)
     assert other.gain == pytest.approx(20 * one.gain, rel=1e-6)
-    assert other.delay_error == pytest.approx(one.delay_error, rel=1e-6)
+    assert other.dead_time_error == pytest.approx(one.dead_time_error, rel=1e-6)
     assert other.total_error == pytest.approx(one.total_error, rel=1e-6)
