@@ -128,10 +128,11 @@ numpydoc_validation_checks = docstring_rules.CHECKS
 numpydoc_validation_exclude = {docstring_rules.CONSTANTS}
 default_role = "code"
 nitpicky = True
-# Bases that a class shows: python-control's pages are elsewhere, and a build asks no network.
+# Bases that a class shows: Python's and python-control's pages are elsewhere, and a build asks no network.
 nitpick_ignore = [
     ("py:class", "control.statesp.StateSpace"),
     ("py:class", "control.frdata.FrequencyResponseData"),
+    ("py:class", "abc.ABC"),
 ]
 
 # -- look ----------------------------------------------------------------------------------------
