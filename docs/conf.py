@@ -128,7 +128,7 @@ numpydoc_validation_checks = docstring_rules.CHECKS
 numpydoc_validation_exclude = {docstring_rules.CONSTANTS}
 default_role = "code"
 nitpicky = True
-# Bases that a class shows: their pages, Python's among them, are elsewhere; a build asks no network.
+# Bases that a class shows: their pages are elsewhere, Python's too, and a build asks no network.
 nitpick_ignore = [
     ("py:class", "control.statesp.StateSpace"),
     ("py:class", "control.frdata.FrequencyResponseData"),
