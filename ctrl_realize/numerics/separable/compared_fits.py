@@ -33,7 +33,7 @@ from .structures import (
     pattern_starts,
     plausible,
 )
-from .varpro import Problem, Structure, evaluate
+from .varpro import Bounds, Problem, Structure, evaluate
 
 REACH = 3 * PLAUSIBLE
 """Excess of the criterion up to which structures are followed to their minima. Of measured records
@@ -45,6 +45,7 @@ _STARTS, _PROMISING = 3, 10.0
 """Starts that are followed beside the best end of a search, and variances that they may be above
 it. With free initial states of records all are: there valleys are many, and flat."""
 _SLACK = 2.0  # variances that may be left to a minimum where steps of Gauss and Newton end
+_SAME = 1e-12  # of the cost, by which another pairing of poles may differ
 _ALL = 6  # structures that are few enough for each to matter: those of up to three poles
 
 
@@ -122,7 +123,24 @@ def settled(problem: Problem, candidate: Candidate, scales: Scales) -> Candidate
     bounds = parameter_bounds(structure, scales)
     fits = [settle(problem, structure, start, bounds, scales.dt) for start in starts]
     parameters, cost = min(fits, key=lambda fit: fit[1])
-    return Candidate(structure, parameters, cost, searched=False)
+    return _in_order(problem, Candidate(structure, parameters, cost, searched=False), bounds)
+
+
+def _in_order(problem: Problem, candidate: Candidate, bounds: Bounds) -> Candidate:
+    """Pair real poles by their size: which of them a search has paired is chance.
+
+    What begins here, a profile for one, would end elsewhere by another pairing.
+    """
+    x = np.append(candidate.dead_time, parameters_from_poles(candidate.poles))
+    if np.any(x < bounds.low) or np.any(x > bounds.high):
+        return candidate
+    cost = float(evaluate(problem, candidate.structure, x[None]).cost[0])
+    # Poles that coincide are kept apart in another way.
+    return (
+        candidate
+        if cost > candidate.cost * (1 + _SAME)
+        else replace(candidate, parameters=x, cost=cost)
+    )
 
 
 def _near_minimum(

@@ -10,7 +10,12 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.compared_fits import at_dead_time, converged, on_new_data
+from ctrl_realize.numerics.separable.compared_fits import (
+    at_dead_time,
+    converged,
+    on_new_data,
+    settled,
+)
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.polish import polish, settle, solve_level
 from ctrl_realize.numerics.separable.profile import dead_time_error, dead_time_profile
@@ -206,3 +211,23 @@ def test_no_random_start_beats_the_model_at_a_dead_time_far_from_the_best(dead_t
     starts[:, 0] = dead_time
     cost = fit_batch(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
     assert at_dead_time(problem, best, scales, dead_time).cost <= cost.min()
+
+
+def test_three_lags_are_the_same_model_whichever_two_of_them_are_a_pair():
+    k = np.arange(-100, 400, dtype=float)
+    late, lags = np.clip(k - DEAD, 0, None), np.array([4.0, 15.0, 50.0])
+    parts = [lag**2 / np.prod(lag - lags[lags != lag]) for lag in lags]
+    y = 1 - sum(part * np.exp(-late / lag) for part, lag in zip(parts, lags, strict=True))
+    y = y + 1e-4 * np.random.default_rng(5).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(100, 1)])
+    scales = step_scales(data, k.size, None)
+    problem = window(data, k.size, KnownFactor()).problem
+    structure, rates, ends = Structure(3, 3), 1 / lags, []
+    bounds = parameter_bounds(structure, scales)
+    for one in range(3):
+        a, b = np.delete(rates, one)
+        pair = np.log([np.sqrt(a * b), (a + b) / (2 * np.sqrt(a * b))])
+        start = np.array([DEAD, np.log(rates[one]), *pair])
+        near, cost = polish(problem, structure, start[None], bounds, scales.dt)
+        ends.append(settled(problem, Candidate(structure, near[0], float(cost[0])), scales))
+    assert_allclose([end.parameters for end in ends[1:]], [ends[0].parameters] * 2, rtol=1e-5)
