@@ -14,11 +14,13 @@ import platform
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from itertools import chain
 from pathlib import Path
+
+import ctrl_realize as cr
 
 from .answers import CLOSE, Answer, answer, compared, names, shown
 from .records import DATA, changed, measured, simulated
@@ -65,7 +67,7 @@ def arguments() -> argparse.Namespace:
 def main() -> None:
     given = arguments()
     if given.answer:
-        given.answer.write_text(json.dumps(dict(_answers(given))))
+        _answer_all(given)
         return
     with tempfile.TemporaryDirectory() as folder:
         answers = _all_answers(given, given.store or Path(folder))
@@ -75,11 +77,26 @@ def main() -> None:
         given.output.write_text(text)
 
 
-def _answers(given: argparse.Namespace) -> Iterator[tuple[str, Answer]]:
-    known = list(chain(measured(), simulated()))
-    chosen = [(name, record) for name, record in known if (given.records or "") in name]
-    for name, record in chosen[:: given.every]:
-        yield name, answer(changed(record, given.change))
+def _answer_all(given: argparse.Namespace) -> None:
+    """Answer what is not answered yet, a line for every record."""
+    done = _stored(given.answer)
+    with given.answer.open("a", encoding="utf-8") as file:
+        for name, record in _chosen(given):
+            if name not in done:
+                file.write(json.dumps([name, answer(changed(record, given.change))]) + "\n")
+                file.flush()
+
+
+def _chosen(given: argparse.Namespace) -> list[tuple[str, cr.Record]]:
+    known = chain(measured(), simulated())
+    named = [(name, record) for name, record in known if (given.records or "") in name]
+    return named[:: given.every]
+
+
+def _stored(path: Path) -> dict[str, Answer]:
+    if not path.exists():
+        return {}
+    return dict(json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
 
 
 def _all_answers(given: argparse.Namespace, store: Path) -> dict[str, dict[str, Answer]]:
@@ -88,15 +105,14 @@ def _all_answers(given: argparse.Namespace, store: Path) -> dict[str, dict[str, 
     for way in WAYS:
         if given.ways and way is not WAYS[0] and way.name not in given.ways:
             continue
-        path = store / f"{way.name}.json"
-        if not path.exists():
-            command = [sys.executable, "-m", "benchmarks.kernels", "--answer", str(path)]
-            command += ["--change", way.change, "--every", str(given.every)]
-            command += ["--records", given.records or ""]
-            one = dict.fromkeys(THREADS, "1")
-            environment = {**os.environ, **one, **way.environment, "PYTHONWARNINGS": "ignore"}
-            subprocess.run(command, env=environment, check=True)
-        found[way.name] = json.loads(path.read_text())
+        path = store / f"{way.name}.jsonl"
+        command = [sys.executable, "-m", "benchmarks.kernels", "--answer", str(path)]
+        command += ["--change", way.change, "--every", str(given.every)]
+        command += ["--records", given.records or ""]
+        one = dict.fromkeys(THREADS, "1")
+        environment = {**os.environ, **one, **way.environment, "PYTHONWARNINGS": "ignore"}
+        subprocess.run(command, env=environment, check=True)
+        found[way.name] = _stored(path)
         print(f"{way.name}: {len(found[way.name])} records", file=sys.stderr)
     return found
 
@@ -107,20 +123,23 @@ def table(answers: Mapping[str, Mapping[str, Answer]]) -> str:
     found = compared(answers, reference)
     total = len(answers[reference])
     lines = [
-        "| run | records | structure | flags | dead time | interval |",
-        "|---|---|---|---|---|---|",
+        "| run | records | structure | flags | dead time | interval | any | any, and not told |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for way, apart in found.items():
         counts = [
             sum(any(key in what for key in keys) for what in apart.values())
             for keys in (("structure",), ("flags",), ("dead time",), ("low", "high"))
         ]
+        quiet = [name for name in apart if not _told(answers, way, name)]
+        counts += [len(apart), len(quiet)]
         lines.append(f"| {way} | {total} | " + " | ".join(map(str, counts)) + " |")
     lines += [
         "",
         f"How many records are answered otherwise than under the machine's own kernel: "
         f"{'measured and ' if DATA.is_dir() else ''}simulated records, times to {CLOSE:g} of the "
-        f"dead time, or of the sample time where that is longer. Made on {date.today()} by "
+        f"dead time, or of the sample time where that is longer. Told: the flag "
+        f"`marginal_decision` in either answer. Made on {date.today()} by "
         f"`python -m benchmarks.kernels` with Python {platform.python_version()}, {_versions()}.",
         "",
     ]
@@ -132,6 +151,12 @@ def table(answers: Mapping[str, Mapping[str, Answer]]) -> str:
             if name in apart
         ]
     return "\n".join([*lines, ""])
+
+
+def _told(answers: Mapping[str, Mapping[str, Answer]], way: str, name: str) -> bool:
+    """Tell whether either answer says that a decision stands on its edge."""
+    pair = answers[WAYS[0].name][name], answers[way][name]
+    return any("marginal_decision" in one["flags"] for one in pair)
 
 
 def _versions() -> str:
