@@ -446,3 +446,13 @@ def test_values_and_rows_that_are_no_signal_are_refused():
     # the ValueError was NumPy's
     with pytest.raises(DataError, match="time is not an array"):
         cr.Record([[], [0.0]], [1, 2], [1, 2])
+
+
+def test_an_output_that_moves_at_its_last_sample_alone_is_fitted():
+    # responses that come after the record showed in rounding, with slopes of 1e168
+    u, y = np.repeat([0.0, 1e30], [19, 4]), np.zeros(23)
+    u[0], y[-1] = 8.75366413e-130, 2e20
+    with good_end() as models:
+        models.append(cr.identify(cr.Record(1e-6 * np.arange(23), u, y)))
+    low, high = models[0].fit.interval
+    assert 1.9e-6 < low < high <= 4e-6

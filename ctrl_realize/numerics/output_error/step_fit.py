@@ -25,7 +25,7 @@ Points 0 to 2 rest on the information criterion [3]_, profile likelihoods [1]_ a
 several models in [2]_. Points 3 to 5 are our own: views whose errors have different causes
 (threshold, few lags, late misfit), so that their median is wrong only where most of them are; what
 such methods find apart is compared in [4]_. They were measured on simulated and real plants, see
-docs/accuracy.md; docs/ablation_table.md is for what each point buys.
+docs/accuracy.md; `benchmarks.ablation` switches each of them off.
 
 References
 ----------

@@ -50,6 +50,7 @@ _GIVEN_UP = 1e6  # by which a step is shortened at most
 _LARGEST = 0.5  # step of a logarithmic parameter, by Newton
 _BESIDE = 1e-8  # samples by which a dead time lies beside a sample to be on one side of it
 _NOTHING = 1e-10  # of the largest column of the Jacobian: a direction of rounding
+_ENDLESS = 1e12  # samples, or logarithms of rates: no step of a fit is as long
 _MOST_PINS = 3
 _LEVEL = 1e-6  # variances to which a level is met
 
@@ -299,12 +300,16 @@ def solve_level(
             ).T
         except np.linalg.LinAlgError:
             return None
+        if not np.abs([*along, *back]).max(initial=0.0) < _ENDLESS:
+            return None  # the response shows in rounding alone
         lower = cost + 0.5 * float(slope[free] @ back)
         steep = float(slope[0] + hessian[0, free] @ back)
         if steep == 0 or not np.isfinite(steep):
             return None
         bend = float(hessian[0, 0] + hessian[0, free] @ along)
         away = _to_level(steep, bend, goal - lower)
+        if not abs(away) < _ENDLESS:
+            return None
         off = abs(lower - goal) + abs(float(slope[free] @ back))
         if off <= _LEVEL * variance:
             x[0] += away * unit[0]

@@ -2,7 +2,7 @@
 
 The criterion is BIC [1]_, [3]_. A difference of 10 (`PLAUSIBLE`) is where [2]_ speaks of very
 strong evidence. What zeros and poles beyond the third must be worth, and the patterns of poles that
-a search begins from, are our own rules; docs/ablation_table.md is for what they buy.
+a search begins from, are our own rules.
 
 References
 ----------
