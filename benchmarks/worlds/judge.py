@@ -75,7 +75,7 @@ def judged(world: World, seed: int) -> Judged:
     fit = system.fit
     flags = tuple(sorted({flag.code for flag in fit.flags}))
     with np.errstate(all="ignore"):
-        gain = fit.gain if hasattr(fit, "gain") else float(np.ravel(system.delay_free.dcgain())[0])
+        gain = float(np.ravel(system.delay_free.dcgain())[0]) if fit.gain is None else fit.gain
     low, high = fit.interval
     missed = []
     slack = 1e-9 * high
