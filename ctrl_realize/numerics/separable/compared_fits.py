@@ -16,8 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from .newton import settle
 from .poles import parameters_from_poles
-from .polish import polish, settle
+from .polish import polish
 from .structures import (
     PLAUSIBLE,
     Candidate,

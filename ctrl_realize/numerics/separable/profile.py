@@ -21,7 +21,8 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import CHI2_95
-from .polish import polish, solve_level
+from .newton import solve_level
+from .polish import polish
 from .profile_ends import bracket_ends, root_of
 from .structures import Candidate, Scales, parameter_bounds
 from .varpro import Bounds, Problem, evaluate

@@ -16,8 +16,9 @@ from ctrl_realize.numerics.separable.compared_fits import (
     on_new_data,
     settled,
 )
+from ctrl_realize.numerics.separable.newton import settle, solve_level
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.polish import polish, settle, solve_level
+from ctrl_realize.numerics.separable.polish import polish
 from ctrl_realize.numerics.separable.profile import dead_time_error, dead_time_profile
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds, search

@@ -1,0 +1,66 @@
+"""Dead times beside samples: the sum of squares has a kink at each, where the response begins.
+
+Between two samples it is smooth, so that a step ends at the next sample and begins anew on its
+other side, and a minimum in a kink is where both sides lead back. Our own rule.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray, IntArray
+from .varpro import Bounds
+
+BESIDE = 1e-8
+"""Samples by which a dead time lies beside a sample to be on one side of it."""
+
+
+def cell(
+    at: FloatArray, bounds: Bounds, dt: float, pinned: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray]:
+    """Bounds of every row, those of its dead time the samples beside it."""
+    low, high = (np.tile(bound, (len(at), 1)) for bound in (bounds.low, bounds.high))
+    sample = np.ceil(at[:, 0] / dt)
+    low[:, 0] = np.maximum(low[:, 0], (sample - 1 + BESIDE) * dt)
+    high[:, 0] = np.minimum(high[:, 0], (sample - BESIDE) * dt)
+    held = pinned | (low[:, 0] > high[:, 0])
+    low[held, 0] = high[held, 0] = at[held, 0]
+    return low, high
+
+
+def beside_a_sample(dead_time: FloatArray, bounds: Bounds, dt: float) -> FloatArray:
+    """Dead times (B,) within their bounds that are at no sample."""
+    sample = np.round(dead_time / dt)
+    at_one = np.abs(dead_time / dt - sample) < BESIDE
+    earlier, later = (sample - BESIDE) * dt, (sample + BESIDE) * dt
+    moved = np.where(earlier >= bounds.low[0], earlier, np.minimum(later, bounds.high[0]))
+    return np.where(at_one, moved, dead_time)
+
+
+def leaving(
+    at: FloatArray,
+    downhill: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    bounds: Bounds,
+    pinned: NDArray[np.bool_],
+) -> IntArray:
+    """-1 or 1 for rows whose dead time is at a sample, with the way down on its other side."""
+    dead_time, way = at[:, 0], downhill[:, 0]
+    later = (dead_time >= high[:, 0]) & (way > 0) & (high[:, 0] < bounds.high[0])
+    earlier = (dead_time <= low[:, 0]) & (way < 0) & (low[:, 0] > bounds.low[0])
+    return np.where(pinned, 0, later.astype(np.int64) - earlier.astype(np.int64))
+
+
+def other_side(dead_time: FloatArray, way: IntArray, dt: float) -> FloatArray:
+    """Dead times (B,) behind the sample that is reached, -1 (earlier) or 1 (later) of it."""
+    sample = np.round(dead_time / dt)
+    return np.asarray((sample + way * BESIDE) * dt)
+
+
+def snapped(dead_time: FloatArray, dt: float) -> FloatArray:
+    """Take back by how much a dead time lies beside a sample to be on a side of it."""
+    sample = np.round(dead_time / dt)
+    # Plus nothing: no zero is negative.
+    return np.where(np.abs(dead_time / dt - sample) <= 2 * BESIDE, sample * dt + 0.0, dead_time)
