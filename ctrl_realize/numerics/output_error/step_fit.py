@@ -48,7 +48,13 @@ import numpy as np
 
 from ..constants import Z_95
 from ..separable.compared_fits import at_dead_time
-from ..separable.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, needless_parameters
+from ..separable.structures import (
+    ALL_STRUCTURES,
+    SIMPLE_STRUCTURES,
+    Candidate,
+    choose,
+    needless_parameters,
+)
 from ..separable.varpro import KnownFactor, Structure, evaluate
 from ..separable.window import WindowFit, among, fit_window
 from .better_structure import better_structure
@@ -223,7 +229,8 @@ def _views(
         ("onset", onset if latest is None else min(onset, latest)),
         ("one_lag_early", early.candidates[lags[0]].dead_time),
         ("two_lags_early", early.candidates[lags[1]].dead_time),
-        ("model_of_rise", rise.best.dead_time),
+        # by the criterion alone: a rise shows no gain, and none is asked of it
+        ("model_of_rise", rise.candidates[choose(rise.criterion)].dead_time),
         ("model_of_record", whole.dead_time),
         ("three_lags_early", early.candidates[lags[2]].dead_time),
     )
