@@ -250,17 +250,27 @@ def _limit_flags(output: FloatArray) -> list[Flag]:
 
 
 def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
-    """Where a response begins with its step, tell whether an earlier move may be behind it."""
+    """Tell whether a move before the record may be behind the beginning of a response.
+
+    Where it begins with its step; or where what an earlier move does may still have been on its
+    way: the output was moving, and was recorded for less than a total delay before the step, or
+    it responds the wrong way first, and was recorded for less than the dead time.
+    """
     before = float(fit.records[0].time[0])
     rest = _first_move(fit.records[0]) - before
-    moving = "not_at_rest" in codes
-    if "no_delay_resolved" not in codes or not (moving or rest < fit.total_delay):
+    moving, short = "not_at_rest" in codes, rest < fit.total_delay
+    at_once = "no_delay_resolved" in codes
+    inverse = "inverse_response" in codes and rest < fit.interval[1]
+    if not ((at_once and moving) or (short and (at_once or moving)) or inverse):
         return []
-    why = "the output was moving" if moving else f"only {in_time(rest)} was recorded"
+    facts = ["the output starts to move together with the input"] * at_once
+    facts += ["the output responds the wrong way first"] * inverse
+    facts += ["the output was moving before the step"] * moving
+    facts += [f"only {in_time(rest)} was recorded before the step"] * short
     return [
         Flag(
             "earlier_input",
-            f"the output starts to move together with the input, and {why} before the step: "
+            f"{' and '.join(facts)}: "
             "an input change before the record began would explain the response as well, "
             "with any dead time; gain and lags would then be wrong too. Let the plant settle "
             "for longer before the step",
