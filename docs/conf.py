@@ -63,6 +63,7 @@ TABLES = {
     "accuracy": ("docs/accuracy_table.md", "python -m benchmarks.accuracy"),
     "honesty": ("docs/honesty_table.md", "python -m benchmarks.honesty"),
     "worlds": ("docs/worlds_table.md", "python -m benchmarks.worlds"),
+    "kernels": ("docs/kernels_table.md", "python -m benchmarks.kernels"),
     "campaign": (
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",
