@@ -65,13 +65,13 @@ def dead_time_bound(
     Examples
     --------
     >>> import numpy as np
-    >>> from ctrl_realize.numerics.cramer_rao import delay_bound
+    >>> from ctrl_realize.numerics.cramer_rao import dead_time_bound
     >>> pole = -2 * np.pi * np.array([2.0 + 0j])
     >>> gain = np.array([2 * np.pi * 2.0])
-    >>> error = delay_bound(pole, gain, 0.03, 1 / 1280, (1000, 1100), 0.01)
+    >>> error = dead_time_bound(pole, gain, 0.03, 1 / 1280, (1000, 1100), 0.01)
     >>> bool(0.1 < error * 1280 < 0.3)
     True
-    >>> delay_bound(pole, gain, 0.03, 1 / 1280, (1000, 1100), 0.01, superfluous_zeros=1)
+    >>> dead_time_bound(pole, gain, 0.03, 1 / 1280, (1000, 1100), 0.01, superfluous_zeros=1)
     inf
     """
     before, after = samples

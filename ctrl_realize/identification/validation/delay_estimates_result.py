@@ -89,8 +89,8 @@ class DelayComparison(Result):
     >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
     >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
     >>> check = cr.validation.compare_delay_estimates(record, order=1)
-    >>> print(f"{check.common[0]:.3f} to {check.common[1]:.3f} s, take that of the {check.rely_on}")
-    0.112 to 0.126 s, take that of the output error
+    >>> print(f"{check.common[0]:.2f} to {check.common[1]:.2f} s, take that of the {check.rely_on}")
+    0.11 to 0.13 s, take that of the output error
     """
 
     estimates: tuple[DelayEstimate, ...]
