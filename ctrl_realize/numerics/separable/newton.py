@@ -15,9 +15,8 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import FloatArray
+from ..arrays import BoolArray, FloatArray
 from .sample_kinks import beside_a_sample, cell, leaving, other_side, snapped
 from .varpro import Bounds, Problem, Structure, evaluate
 
@@ -190,7 +189,7 @@ def _newton(
 def _newton_step(
     slope: FloatArray,
     hessian: FloatArray,
-    free: NDArray[np.bool_],
+    free: BoolArray,
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:

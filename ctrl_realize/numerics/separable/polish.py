@@ -17,9 +17,8 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from .newton import IN_ROUNDING
 from .sample_kinks import beside_a_sample, cell, leaving, other_side, snapped
 from .varpro import Bounds, Problem, Structure, evaluate
@@ -131,7 +130,7 @@ def polish(
 def _step(
     residual: FloatArray,
     jacobian: FloatArray,
-    free: NDArray[np.bool_],
+    free: BoolArray,
     damping: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Damped step in the free directions, and the decrease of the linear model."""

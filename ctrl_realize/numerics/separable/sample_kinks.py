@@ -7,9 +7,8 @@ other side, and a minimum in a kink is where both sides lead back. Our own rule.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from .varpro import Bounds
 
 BESIDE = 1e-8
@@ -17,7 +16,7 @@ BESIDE = 1e-8
 
 
 def cell(
-    at: FloatArray, bounds: Bounds, dt: float, pinned: NDArray[np.bool_]
+    at: FloatArray, bounds: Bounds, dt: float, pinned: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """Bounds of every row, those of its dead time the samples beside it."""
     low, high = (np.tile(bound, (len(at), 1)) for bound in (bounds.low, bounds.high))
@@ -44,7 +43,7 @@ def leaving(
     low: FloatArray,
     high: FloatArray,
     bounds: Bounds,
-    pinned: NDArray[np.bool_],
+    pinned: BoolArray,
 ) -> IntArray:
     """-1 or 1 for rows whose dead time is at a sample, with the way down on its other side."""
     dead_time, way = at[:, 0], downhill[:, 0]

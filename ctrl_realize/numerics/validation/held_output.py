@@ -12,13 +12,9 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import FloatArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..signals.noise import rounding_error
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 _FAST = 0.2
 """Part of the steepest slope of a model from which its output counts as moving."""
