@@ -9,9 +9,10 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.batch_search import fit_batch
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.structures import parameter_bounds, search
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, fit_batch
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
 
 from . import plants
 

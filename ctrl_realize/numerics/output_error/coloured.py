@@ -18,9 +18,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..separable.batch_search import fit_batch
 from ..separable.compared_fits import converged
 from ..separable.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
-from ..separable.varpro import Problem, Structure, evaluate, fit_batch
+from ..separable.varpro import Problem, Structure, evaluate
 from ..separable.window import WindowFit
 from ..signals.noise import correlation_time, mad_sigma
 from ..signals.noise_model import noise_covariance, whitener

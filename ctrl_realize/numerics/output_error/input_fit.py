@@ -25,12 +25,12 @@ from functools import partial
 import numpy as np
 
 from ..arrays import FloatArray
+from ..separable.batch_search import fit_batch
 from ..separable.compared_fits import converged, settled
 from ..separable.poles import parameters_from_poles, poles_from_parameters
 from ..separable.structures import Candidate, Scales, neighbour_starts, parameter_bounds, search
-from ..separable.varpro import KnownFactor, Problem, Structure, fit_batch, respond
+from ..separable.varpro import KnownFactor, Problem, Structure, respond
 from ..separable.window import Window, WindowFit, extended, fit_window
-from ..signals.correlation import fit_percent
 from ..signals.noise import correlation_time, quantisation_step, winsorised_sigma
 from ..signals.onset import correlation_onset
 from ..validation.own_response import OwnResponse
@@ -39,6 +39,7 @@ from .condensed import MOST_LAGS, Condensed, condensed
 from .input_data import SampledData, cut
 from .interval import likelihood_fit
 from .margins import close_to
+from .own_response import own_response
 from .result import OutputErrorEstimate
 from .selection import chains_of
 
@@ -57,12 +58,9 @@ _BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is lat
 _SLOW = 10.0  # times dead time and lag: periods from there on tell little of the plant
 _SHORTEST = 40.0  # samples in such a period, lest there be as many cosines as samples
 _CALMER = 0.5  # of the variance, colour included, that must be left for them to be fitted along
-_TURNS = 6
 _DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
 _LEAST_LAGS = 30
 _CLEARLY = 4.0  # standard deviations of a chi-square
-_STRETCH = 0.01  # of the time constants, for a slope
-_FARTHEST = 2.0  # logarithm of a stretch that is extrapolated from it
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +83,7 @@ class SampledFit:
         """Shift and scale the common model to fit one record best, seen before or not."""
         one = cut([output], [signal], self.data.dt)
         start = min(max(self.data.starts), output.size // 2)
-        return _own_dead_time(replace(one, starts=(start,)), self.fit, self.known)
+        return own_response(replace(one, starts=(start,)), self.fit, self.known)
 
 
 def fit_sampled(
@@ -297,59 +295,3 @@ def _first_order(
     best = min(tries, key=lambda candidate: candidate.cost)
     # It has converged, for samples are counted by its dead time.
     return settled(problem, replace(best, ends=None), scales[0])
-
-
-def _own_dead_time(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> OwnResponse:
-    """Gauss-Newton steps for gain and dead time, everything else of the model being common."""
-    problem = data.problem(known)
-    assert problem.segments is not None
-    own = problem.local_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
-    target = own.without(problem.data[None, :, None])[0, :, 0]
-    lost = problem.local_count(fit.poles.size)
-    h = 0.25 * data.dt
-
-    def response(dead_time: float, stretch: float = 1.0) -> FloatArray:
-        # The core in a slower time: poles over the stretch, and its gain as before.
-        parameters = np.concatenate(
-            [[max(dead_time, 0.0)], parameters_from_poles(fit.poles / stretch)]
-        )
-        powers = np.arange(fit.numerator.size) - float(fit.poles.size)
-        return respond(problem.drive, known, fit.numerator * stretch**powers, parameters)
-
-    def regression(columns: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-        moved = own.without(np.stack(columns, axis=1)[None])[0]
-        solution = np.linalg.lstsq(moved, target, rcond=None)[0]
-        left = target - moved @ solution
-        freedom = max(left.size - moved.shape[1] - lost, 1)
-        variance = float(left @ left) / freedom * correlation_time(left)
-        spread = np.diag(np.linalg.pinv(moved.T @ moved))
-        return solution, np.sqrt(variance * np.maximum(spread, 0.0))
-
-    shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
-    for _ in range(_TURNS):
-        at = max(fit.dead_time + shift, h)
-        slope = (response(at + h) - response(at - h)) / (2 * h)
-        solution, errors = regression([response(at), slope])
-        gain, gain_error = float(solution[0]), float(errors[0])
-        size = gain or 1.0
-        move = float(solution[1]) / size
-        error = float(errors[1]) / abs(size)
-        shift = at - fit.dead_time + float(np.clip(move, -20 * data.dt, 20 * data.dt))
-        if abs(move) < 1e-3 * data.dt:
-            break
-    # Small stretches: the slope of the response by the log of the time constants.
-    turn = (response(at, 1 + _STRETCH) - response(at, 1 - _STRETCH)) / (2 * _STRETCH)
-    solution, errors = regression([response(at), slope, turn])
-    size = float(solution[0]) or 1.0
-    lag = float(np.exp(np.clip(solution[2] / size, -_FARTHEST, _FARTHEST)))
-    forced = own.without(response(fit.dead_time)[None, :, None])[0, :, 0]
-    followed = fit_percent(target[None], forced[None])
-    return OwnResponse(
-        shift,
-        max(error, 1e-12 * data.dt),
-        gain,
-        max(gain_error, 1e-12),
-        lag,
-        max(float(errors[2]) / abs(size), 1e-12),
-        float(followed[0]),
-    )

@@ -23,8 +23,9 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST
+from .batch_search import fit_batch
 from .poles import parameters_from_poles, poles_from_parameters
-from .varpro import Bounds, Problem, Structure, fit_batch
+from .varpro import Bounds, Problem, Structure
 
 ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
 SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)

@@ -10,6 +10,7 @@ from scipy.special import gammainc
 from scipy.stats import invgauss
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.batch_search import fit_batch
 from ctrl_realize.numerics.separable.dispersion import fit_flows, flow_modes, flow_profile
 from ctrl_realize.numerics.separable.lag_chains import (
     LagChain,
@@ -20,7 +21,7 @@ from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.responses import StepSequence
 from ctrl_realize.numerics.separable.structures import Candidate, Scales, parameter_bounds, search
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure, fit_batch
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure
 
 SIGMA = 1e-3
 

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+from ctrl_realize.numerics.separable.batch_search import fit_batch
 from ctrl_realize.numerics.separable.compared_fits import (
     at_dead_time,
     converged,
@@ -22,7 +23,7 @@ from ctrl_realize.numerics.separable.polish import polish
 from ctrl_realize.numerics.separable.profile import dead_time_error, dead_time_profile
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds, search
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate, fit_batch
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate
 
 SIGMA, DEAD, LAGS = 0.01, 20.3, (12.0, 30.0)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from ctrl_realize.numerics.separable.batch_search import fit_batch
 from ctrl_realize.numerics.separable.local_terms import Segments
 from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
 from ctrl_realize.numerics.separable.responses import SampledInput, StepSequence
@@ -16,7 +17,6 @@ from ctrl_realize.numerics.separable.varpro import (
     Problem,
     Structure,
     evaluate,
-    fit_batch,
     partial_fractions,
     respond,
 )
