@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import base64
 import io
+import os
 import re
 import sys
 from pathlib import Path
@@ -63,6 +64,7 @@ def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
 
 
 def main(paths: list[str]) -> None:
+    os.environ.pop("MPLBACKEND", None)  # another than the notebook's own stores no pictures
     for path in map(Path, paths):
         notebook = nbformat.read(path, as_version=4)
         NotebookClient(
