@@ -13,35 +13,57 @@ from importlib import import_module
 from typing import Any
 from unittest import mock
 
+import numpy as np
+
+from ctrl_realize.numerics.separable.structures import PLAUSIBLE, choose, needless_parameters
+
 Change = Callable[[Any], Any]
 """Of what stands in a module: what stands there while the rule is off."""
 
 NUMERICS = "ctrl_realize.numerics"
 FITS = f"{NUMERICS}.output_error"
 STEP = f"{FITS}.step_fit"
+SEPARABLE = f"{NUMERICS}.separable"
 PUBLIC = "ctrl_realize.identification.output_error"
 
 
 @dataclass(frozen=True)
 class Switch:
-    """A rule and what is put in its place; `of` are the kinds of records that it can touch."""
+    """A rule and what is put in its place.
+
+    `asked` are the functions whose answers tell whether a record is touched by the rule: those
+    that are changed, where none are named. With `called` their being called is enough, where to
+    ask them twice would take long.
+    """
 
     name: str
     changes: dict[str, Change]
-    of: tuple[str, ...] = ("lags", "disturbed", "wrong", "measured")
+    asked: tuple[str, ...] = ()
+    called: bool = False
+
+    @property
+    def probes(self) -> tuple[str, ...]:
+        """Paths of the functions that are asked."""
+        return self.asked or tuple(self.changes)
 
     @contextmanager
     def off(self) -> Iterator[None]:
         """Switch the rule off for a while."""
         with ExitStack() as stack:
             for path, change in self.changes.items():
-                where, _, name = path.partition(":")
-                owner: Any = import_module(where)
-                *inner, last = name.split(".")
-                for part in inner:
-                    owner = getattr(owner, part)
-                stack.enter_context(mock.patch.object(owner, last, change(getattr(owner, last))))
+                owner, name = located(path)
+                stack.enter_context(mock.patch.object(owner, name, change(getattr(owner, name))))
             yield
+
+
+def located(path: str) -> tuple[Any, str]:
+    """Module or class, and the name in it, of ``module:name`` or ``module:Class.name``."""
+    where, _, name = path.partition(":")
+    owner: Any = import_module(where)
+    *inner, last = name.split(".")
+    for part in inner:
+        owner = getattr(owner, part)
+    return owner, last
 
 
 def value(new: Any) -> Change:
@@ -68,6 +90,16 @@ def _without_view(key: str) -> Change:
     return lambda views: lambda *args: tuple(view for view in views(*args) if view[0] != key)
 
 
+def _third_lag_amid(views: Any) -> Any:
+    """Put the sixth view, which only widens, where it does not."""
+
+    def made(*args: Any) -> Any:
+        *others, (key, _) = views(*args)
+        return (*others, (key, sorted(at for _, at in others)[2]))
+
+    return made
+
+
 def _without_drift(make: Any) -> Any:
     def made(*args: Any) -> Any:
         data = make(*args)
@@ -81,33 +113,109 @@ def _least_squares(fit: Any) -> Any:
 
 
 def _best_alone(_: Any) -> Any:
-    return lambda candidates, charged, variance, best, level: [best.structure]
+    return lambda candidates, charged, variance, best, level, slack=0.0: [best.structure]
+
+
+def _by_criterion(_: Any) -> Any:
+    def made(
+        candidates: Any,
+        criterion: Any,
+        variance: float,
+        chosen: Any,
+        level: float,
+        slack: float = 0,
+    ) -> Any:
+        limit = min(*criterion.values(), level) + PLAUSIBLE + slack
+        return [
+            s
+            for s, value in criterion.items()
+            if value <= limit
+            or value + needless_parameters(s) <= level + PLAUSIBLE + slack
+            or candidates[s] is chosen
+        ]
+
+    return made
+
+
+def _alike_noise(levels: Any) -> Any:
+    return lambda *args: np.full_like(found := levels(*args), found[0])
 
 
 VIEWS = ("onset", "one_lag_early", "two_lags_early", "model_of_rise", "model_of_record")
 
+MODES = Switch(
+    "modes beside lags", {"ctrl_realize.identification.methods:with_modes_judged": first}
+)
+"""Of records whose inputs are no steps the other rules are tried without it."""
+
 SWITCHES = (
-    Switch("all rules on", {}, ("lags", "disturbed", "wrong", "measured", "driven")),
-    Switch("Huber's loss", {f"{PUBLIC}.fit:fit_step_record": _least_squares}),
+    Switch("all rules on", {}),
+    Switch("Huber's loss", {f"{PUBLIC}.fit:fit_step_record": _least_squares}, called=True),
     Switch("noise made white", {f"{STEP}:in_coloured_noise": first}),
+    Switch(
+        "residual that is unlike the noise at rest is not made white",
+        {f"{FITS}.coloured:_UNLIKE": value(float("inf"))},
+        (f"{STEP}:in_coloured_noise",),
+    ),
     Switch(
         "structures that are not ruled out (interval of the best alone)",
         {f"{FITS}.interval:plausible": _best_alone},
-        ("lags", "disturbed", "wrong", "measured", "driven"),
+    ),
+    Switch(
+        "lags that fit no worse, and one lag more, are not ruled out",
+        {f"{FITS}.interval:plausible": _by_criterion},
     ),
     Switch(
         "charge for needless parameters",
         {
-            f"{NUMERICS}.separable.structures:needless_parameters": giving(0.0),
+            f"{SEPARABLE}.structures:needless_parameters": giving(0.0),
             f"{FITS}.selection:needless_parameters": giving(0.0),
             f"{STEP}:needless_parameters": giving(0.0),
         },
-        ("lags", "disturbed", "wrong", "measured", "driven"),
+        (f"{STEP}:fit_window", f"{FITS}.input_fit:fit_window"),
+        called=True,
+    ),
+    Switch(
+        "least charge where structures are ruled out",
+        {
+            f"{SEPARABLE}.structures:LEAST_CHARGE": value(0.0),
+            f"{FITS}.interval:LEAST_CHARGE": value(0.0),
+        },
+        (f"{SEPARABLE}.structures:charged", f"{FITS}.interval:charged"),
+    ),
+    Switch(
+        "models whose slow gain is not resolved give way",
+        {
+            f"{SEPARABLE}.window:WindowFit.best_of": lambda _: (
+                lambda self, criterion: self.candidates[choose(criterion)]
+            )
+        },
+    ),
+    Switch(
+        "poles beside zeros are half a sample at least",
+        {f"{SEPARABLE}.structures:SLOWER_WITH_ZEROS": value(40.0)},
+        (f"{STEP}:fit_window", f"{FITS}.input_fit:fit_window"),
+        called=True,
     ),
     Switch("chains of equal lags", {f"{FITS}.selection:fit_chains": giving([])}),
+    Switch(
+        "lags of a chain are uneven",
+        {f"{SEPARABLE}.lag_chains:_UNEVEN": value(0.0)},
+        (f"{FITS}.selection:fit_chains", f"{FITS}.selection:fit_diffusion"),
+    ),
     Switch("chains that still improve", {f"{FITS}.interval:still_improving": giving(False)}),
     Switch("modes of diffusion", {f"{FITS}.selection:fit_diffusion": giving([])}),
+    Switch(
+        "charge for diffusion",
+        {f"{SEPARABLE}.lag_chains:_DIFFUSION_CHARGE": value(0.0)},
+        (f"{FITS}.selection:fit_diffusion",),
+    ),
     Switch("flows that disperse", {f"{FITS}.selection:fit_flows": giving([])}),
+    Switch(
+        "charge for a flow",
+        {f"{SEPARABLE}.dispersion:_CHARGE": value(0.0)},
+        (f"{FITS}.selection:fit_flows",),
+    ),
     Switch("long chains taken for flows", {f"{FITS}.interval:_like_a_flow": giving(False)}),
     Switch(
         "beginning that is open behind a zero",
@@ -119,39 +227,78 @@ SWITCHES = (
         Switch(f"view: {key.replace('_', ' ')}", {f"{STEP}:_views": _without_view(key)})
         for key in VIEWS
     ),
-    Switch("noise that is louder after the step", {f"{STEP}:_LOUDER": value(1.0)}),
+    Switch("view: three lags early", {f"{STEP}:_views": _third_lag_amid}),
+    Switch(
+        "noise that is louder after the step",
+        {f"{STEP}:_LOUDER": value(1.0)},
+        (f"{STEP}:_is_noise",),
+    ),
     Switch(
         "free response before the step",
         {f"{FITS}.step_data:StepData.explanations": _only(lambda way: not way.relaxing)},
     ),
+    Switch("exponential before the step", {f"{FITS}.step_data:relaxation": giving(None)}),
     Switch(
         "drift that ends",
         {f"{FITS}.step_data:StepData.explanations": _only(lambda way: not way.ending)},
     ),
+    Switch(
+        "slope that was nothing",
+        {f"{FITS}.step_data:_BRIEF": value(0.0)},
+        (f"{FITS}.step_data:StepData.explanations",),
+    ),
     Switch("drift", {f"{PUBLIC}.fit:step_data": _without_drift}),
     Switch("hum", {f"{FITS}.step_data:hum_frequencies": giving([])}),
+    Switch("colour of the noise at rest", {f"{FITS}.step_data:colouring": giving(1.0)}),
     Switch(
         "rounding as noise of a coarse converter",
         {f"{FITS}.step_data:StepData.coarse": lambda _: property(lambda _data: False)},
     ),
     Switch(
-        "checks that widen the interval",
-        {
-            f"{PUBLIC}.checks:_held_flags": giving(([], 0.0)),
-            f"{PUBLIC}.checks:_white": giving(None),
-        },
-        ("disturbed", "wrong", "measured", "driven"),
+        "first motion in means",
+        {f"{NUMERICS}.signals.onset:_SMOOTHINGS": value((1,))},
+        (f"{FITS}.step_data:first_motion",),
     ),
     Switch(
-        "modes beside lags",
-        {"ctrl_realize.identification.methods:with_modes_judged": first},
-        ("driven",),
+        "start at the frequency of the residual",
+        {f"{SEPARABLE}.window:_ringing": giving(0.0)},
+        called=True,
     ),
-    Switch("slow cosines", {f"{FITS}.input_fit:_CALMER": value(0.0)}, ("driven",)),
-    Switch("fourth and fifth lag", {f"{FITS}.input_fit:MORE_LAGS": value(())}, ("driven",)),
     Switch(
-        "correlation with the input as a start",
-        {f"{FITS}.input_fit:_seen": giving([])},
-        ("driven",),
+        "search only where one pole more may help",
+        {f"{SEPARABLE}.structures:_worth_a_search": giving(True)},
+    ),
+    Switch(
+        "poles that are tried anywhere",
+        {f"{SEPARABLE}.compared_fits:_with_a_pole_more": giving([])},
+    ),
+    Switch(
+        "points of a profile start from those beside them",
+        {f"{SEPARABLE}.profile:_SWEEPS": value(0)},
+        (f"{SEPARABLE}.profile:polish",),
+        called=True,
+    ),
+    Switch(
+        "output that is held widens the interval",
+        {f"{PUBLIC}.checks:_held_flags": giving(([], 0.0))},
+    ),
+    Switch("step of generalised least squares", {f"{PUBLIC}.checks:_white": giving(None)}),
+    MODES,
+    Switch(
+        "slow cosines",
+        {f"{FITS}.input_fit:_CALMER": value(0.0)},
+        (f"{PUBLIC}.any_input:fit_sampled",),
+        called=True,
+    ),
+    Switch(
+        "fourth and fifth lag",
+        {f"{FITS}.input_fit:MORE_LAGS": value(())},
+        (f"{FITS}.input_fit:extended",),
+        called=True,
+    ),
+    Switch("correlation with the input as a start", {f"{FITS}.input_fit:_seen": giving([])}),
+    Switch(
+        "records weighted by their noise",
+        {f"{FITS}.input_fit:_noise_levels": _alike_noise},
     ),
 )
