@@ -44,7 +44,8 @@ def cases(seeds: int) -> Iterator[Case]:
 
     They were chosen by kind, before any of the results was known: the plants that the model
     describes, in three kinds of noise, for what a rule may cost where it is not needed; and all
-    worlds of the table of worlds but loops (of the driven ones every second), structures that the model does not have, and measured
+    worlds of the table of worlds but loops (of the driven ones every second), structures that the
+    model does not have, and measured
     plants, for what it was made for.
     """
     for seed in range(seeds):

@@ -43,7 +43,7 @@ class Seen:
 
 
 def page(seen: list[Seen], rules: list[str], modes: str) -> list[str]:
-    """Write the table, one rule in a row; those but `modes` are tried without it on driven records."""
+    """Write the table, a rule in a row; all but `modes` are tried without it on driven records."""
     base = {one.name: one for one in seen if one.rule == rules[0]}
     counts = {kind: sum(one.kind == kind for one in base.values()) for kind in KINDS}
     many = ", ".join(f"{counts[kind]} {kind}" for kind in KINDS)

@@ -10,6 +10,14 @@ CHI2_95 = 3.841458820694124
 Z_95 = CHI2_95**0.5
 """Two-sided 95 % point of the normal distribution, 1.96."""
 
+HUBER = 1.345
+"""Standard deviations from which Huber's loss is linear: 95 % efficient in Gaussian noise (Holland
+and Welsch, Comm. Statist. A 6 (1977) 813-827, table 1)."""
+
+LEAST_FREEDOM = 40
+"""Degrees of freedom left by a regression that is tested: Student's point of 1e-4 is then within
+11 % of the normal one, so that a residual that is not quite normal does little."""
+
 LARGEST = 1e70
 """Numbers beyond this are no measurement: the square of a quotient of two inside is a double."""
 

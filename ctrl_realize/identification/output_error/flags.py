@@ -15,7 +15,8 @@ from ...results import Flag
 from .model_flags import cancelled_pair, slow_modes, unresolved_gain
 from .words import ESTIMATE_WORDS, is_firm, model_words
 
-_SAMPLES_BESIDE_NOTHING = 0.5
+# What only flags and words depend on is a choice of presentation.
+_SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it is none
 _BEYOND = 20.0  # ranges: no overshoot goes as far
 _FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
 

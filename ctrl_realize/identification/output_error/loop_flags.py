@@ -17,7 +17,7 @@ RARE = 1e-4
 below 1e-4."""
 REGRESSED = 4000
 """Samples of the long regressions."""
-_LEAST_PAST, _MOST_PAST = 30, 150
+_LEAST_PAST, _MOST_PAST = 30, 150  # inputs in these regressions, whose time goes with the square
 
 
 def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:

@@ -12,6 +12,7 @@ from ...numerics.separable.static_gain import INTEGRATOR, StaticGain
 from ...results import Flag
 from .words import sign_is_told
 
+# Choices of presentation: they decide on flags alone.
 _GAINS_APART = 0.2  # part of gain or total delay by which structures may differ
 _AS_GOOD = 4.0  # excess of a criterion that chance explains: chi-square, one degree, 95 %
 _CANCELLED = 0.05  # of its frequency: distance of a pole from a zero that hides it

@@ -9,6 +9,7 @@ from ...numerics.arrays import FloatArray
 from ...results import Flag
 from .repeatability import Repeatability
 
+# Choices of presentation: they decide on flags alone.
 BY_CHANCE = 0.01  # one false alarm in a hundred groups of records of one plant
 SAME = 0.01  # differences of a hundredth are those of sensors, whatever the noise
 NO_COMMON_GAIN = 0.2

@@ -27,16 +27,17 @@ from ..signals.noise import correlation_time, mad_sigma
 from ..signals.noise_model import noise_covariance, whitener
 from .step_data import StepData, settled_at
 
-_COLOURED = 2.0  # samples at rest that count as one, from which on the noise is coloured
+_COLOURED = 2.0  # samples at rest that count as one, from which on: white noise scatters to 1.5
 _FEWEST = 100  # samples at rest, and
-_ENOUGH = 100_000  # of a kind, where there are more
-_TIMES = 8  # correlation times, that tell its colour
-_WILD = 5.0  # standard deviations at which samples are cut
+_ENOUGH = 100_000  # of a kind, where there are more: time
+_TIMES = 8  # correlation times, that tell its colour. Ablation of all of them: noise made white
+_WILD = 5.0  # standard deviations, beyond which Gaussian noise has none of a million samples: cut
 _NEAR = np.arange(-6, 6.5, 0.5)  # samples from the dead time of before, where it starts again
-_ENDS = 4  # of these starts that are followed to the bottom
+_ENDS = 4  # of these starts that are followed to the bottom: time
 _UNLIKE = 3.0
 """Root mean square of the whitened residual, in that of the noise, from which on the response holds
-something that the noise does not: plain least squares are safer."""
+something that the noise does not: plain least squares are safer. Ablation: unlike residual left
+alone."""
 
 
 def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:

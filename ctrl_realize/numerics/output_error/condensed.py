@@ -36,23 +36,22 @@ from scipy.linalg import eigh
 from scipy.signal import fftconvolve, lfilter
 
 from ..arrays import ComplexArray, FloatArray
+from ..constants import HUBER
 from ..regression.normal_equations import NormalEquations, normal_equations
 from ..separable.responses import Modes, SampledInput
 from ..signals.correlation import autoregression
 from ..signals.excitation import lively_start
 from ..signals.noise import mad_sigma
+from ..signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS
 
 MOST_LAGS = 1000
 """Longest response, in samples, that is condensed: time goes with its square."""
 PER_LAG = 20
-"""Samples for each lag that a record must have."""
-_PIECE = 2**17
-_MOST_NOISE_LAGS = 25
+"""Samples for each lag that a record must have: as for the noise in `noise_model`."""
+_PIECE = 2**17  # samples that are looked at together, to save memory
 _EXCITED = 1e-10  # of the strongest direction of the input; rounding is 1e-15 of it
-# Standard deviations: 95 % efficiency in Gaussian noise (Holland and Welsch 1977).
-_HUBER = 1.345
-_RIDGE = 1e-8
-_TURNS = 5
+_RIDGE = 1e-8  # of the mean square of the input: what it does not excite stays small
+_TURNS = 5  # of Huber's steps at most, the first from least squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +170,7 @@ def _noise_and_pulse(
     error = y[lags - 1 :] - fftconvolve(u, pulse, "valid")
     limit = 3 * mad_sigma(error)
     centred = np.clip(error - np.median(error), -limit, limit)
-    whiten = np.concatenate([[1.0], -autoregression(centred, _MOST_NOISE_LAGS)])
+    whiten = np.concatenate([[1.0], -autoregression(centred, MOST_NOISE_LAGS)])
     y, u = (lfilter(whiten, [1.0], x)[whiten.size - 1 :] for x in (y, u))
     return whiten, _free_pulse(y, u, lags, huber=huber)
 
@@ -209,6 +208,6 @@ def _pieces(
 def _pulled_in(error: FloatArray) -> FloatArray:
     """What moves an output so that its least squares are Huber's."""
     centred = error - np.median(error)
-    limit = _HUBER * mad_sigma(centred)
+    limit = HUBER * mad_sigma(centred)
     inside = float(np.mean(np.abs(centred) <= limit))
     return np.asarray(np.clip(centred, -limit, limit) / max(inside, 0.5) - centred)

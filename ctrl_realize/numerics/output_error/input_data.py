@@ -17,7 +17,8 @@ from ..separable.varpro import KnownFactor, Problem
 from ..signals.excitation import lively_start
 
 MOST_SAMPLES = 4000
-"""Of longer records a stretch is taken: every sample counts, so that time grows with its length."""
+"""Of longer records a stretch is taken: every sample counts, so that time grows with its length.
+Where their response ends in time all samples are fitted afterwards (`condensed`)."""
 
 MOST_IN_ALL = 12000
 """Samples of all records together; beyond that every record is cut to its share."""

@@ -44,23 +44,25 @@ from .result import OutputErrorEstimate
 from .selection import chains_of
 
 WHITE = 3.0
-"""Correlation time of the residual, in samples, up to which a model is taken for right."""
+"""Correlation time of the residual, in samples, up to which a model is taken for right: twice what
+white noise scatters to. It decides on flags alone."""
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 MORE_LAGS = (Structure(4, 4), Structure(5, 5))
-"""Tried as well where three poles are chosen: zeros beside them imitate further lags."""
-_RISES = (2.0, 10.0, 50.0)
+"""Tried as well where three poles are chosen: zeros beside them imitate further lags. Ablation:
+fourth and fifth lag."""
+_RISES = (2.0, 10.0, 50.0)  # samples, of the starts of the first-order fit, and
 _ONSETS = (1.0, 5.0, 20.0)
-_SMALLEST = 1e-4
-_CONFIDENCE = 0.99
-_UNLIKE = 1.3  # ratio of noise levels from which records are weighted
+_SMALLEST = 1e-4  # of the range: noise is not taken to be less
+_CONFIDENCE = 0.99  # of a start; ablation: correlation with the input as a start
+_UNLIKE = 1.3  # ratio of noise levels from which weights shorten errors by more than 2 %
 _BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
 _SLOW = 10.0  # times dead time and lag: periods from there on tell little of the plant
 _SHORTEST = 40.0  # samples in such a period, lest there be as many cosines as samples
-_CALMER = 0.5  # of the variance, colour included, that must be left for them to be fitted along
+_CALMER = 0.5  # to which they must lower the variance, colour included; ablation: slow cosines
 _DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
-_LEAST_LAGS = 30
-_CLEARLY = 4.0  # standard deviations of a chi-square
+_LEAST_LAGS = 30  # of a response that is condensed; fewer cost as much
+_CLEARLY = 4.0  # standard deviations of a chi-square: 3e-5 by chance
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,8 @@ from ..separable.varpro import Structure
 from ..separable.window import WindowFit
 
 _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
-"""Poles from which on there may be more lags than show; the second mode of diffusion is fast."""
+"""Poles from which on there may be more lags than show; the second mode of diffusion is fast: of
+lags that grow fourfold and more one hides beside the first."""
 
 _BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0, -1))
 

@@ -34,10 +34,10 @@ from ..signals.noise import (
 from ..signals.onset import FirstMotion, first_motion
 from ..signals.step_sequence import input_moves
 
-_CONTINUED = 2  # a drift at rest goes on for this many times the rest
-_BINS_RELAXING = 60
+_CONTINUED = 2  # a drift at rest goes on for this many times the rest; ablation: drift that ends
+_BINS_RELAXING = 60  # of a rest in which the output comes to rest, so that lags show in it
 _MANY = 100  # samples at rest in which dither would show more than two levels
-_BRIEF = 0.05  # of the samples that follow the step
+_BRIEF = 0.05  # of the samples that follow the step; ablation: slope that was nothing
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,9 +39,10 @@ from .varpro import Bounds, Problem, Structure, evaluate
 REACH = 3 * PLAUSIBLE
 """Excess of the criterion up to which structures are followed to their minima. Of measured records
 searches ended up to 21 above them; what is not ruled out is within 10, charges aside."""
-_SLOWEST, _FASTEST, _RATES = 0.01, 10.0, 8  # poles that are tried, over length and rise
+_SLOWEST, _FASTEST, _RATES = 0.01, 10.0, 8
+"""Poles that are tried, over length and rise. Ablation: pole tried anywhere."""
 _CLOSE, _OTHERS = 1.0, 2
-"""Variances by which ends differ that are both followed to the bottom, and how many others."""
+"""Variances by which ends differ that are both followed down, and how many others: time."""
 _STARTS, _PROMISING = 3, 10.0
 """Starts that are followed beside the best end of a search, and variances that they may be above
 it. With free initial states of records all are: there valleys are many, and flat."""

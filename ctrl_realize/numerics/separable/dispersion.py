@@ -75,18 +75,20 @@ def flow_modes(
     return values[:, -1].real, values[:, :-1]
 
 
-_CHARGE = 8.0  # what a flow must be worth in the criterion: a few lags are more common
+_CHARGE = 8.0
+"""What a flow must be worth in the criterion: a few lags are more common. Ablation: charge for a
+flow."""
 _SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
 _MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
 _FREE = 4  # dead time, gain, mean, spread; a lag is one more
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 """Starts: parts of a dead time that is too long, and of the whole spread in time."""
-_FOLLOWED, _EVALUATIONS = 3, 40  # starts that are improved, and how far
+_FOLLOWED, _EVALUATIONS = 3, 40  # starts that are improved, and how far: time
 _SAME = 0.1  # variances by which two ends are one
-_HOPELESS = 300.0  # above what is to be beaten, after the first of them
+_HOPELESS = 300.0  # above what is to be beaten, after the first of them: time
 _REACH = 3 * PLAUSIBLE  # excess up to which a flow is followed to its minimum
-_SMALL = 1e-5  # step of the numerical derivatives
+_SMALL = 1e-5  # step of the numerical derivatives, near the root of the rounding
 _PROFILE = np.array([0.7, 1.2, 1.7, 2.3, 3.2])  # standard errors from the optimum
 
 

@@ -29,10 +29,10 @@ from .varpro import Bounds, Problem, evaluate
 
 _EDGE = float(np.sqrt(CHI2_95))
 _SOLVED = 1e-6  # standard errors, and samples, to which an end is solved
-_MOST_TRIES = 12
+_MOST_TRIES = 12  # of regula falsi, each of which halves the bracket or does better
 
-_NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])
-_FAR = 9
+_NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])  # in half intervals, of a parabola
+_FAR = 9  # points all over the range, where it is none
 _SHORT = 0.1  # samples by which the optimum of a jump may lie before the sample that it belongs to
 _LATE = 0.2  # samples before a jump is over; a lag of a twentieth of that fits noise of 1 %
 _INSIDE = np.array([-0.5, 0.02, 0.4, 1 - _LATE, 1.2])  # of the sample in which the optimum lies
@@ -41,7 +41,8 @@ _NOTHING = 1e-9  # part of a sensitivity that is rounding
 _SWEEPS, _HIGH, _SAME = 3, 30.0, 1e-3
 """Rounds in which points start from those beside them: in single starts from the optimum, profiles
 of structures with zeros were up to 6 variances too high near their ends. Points that are `_HIGH`
-variances above the ends of an interval, and neighbours as high, are no part of it."""
+variances above the ends of an interval, and neighbours as high, are no part of it. Ablation:
+profiles swept."""
 
 Points: TypeAlias = dict[float, Candidate]
 """Best models with given dead times, by these, in s."""

@@ -26,12 +26,13 @@ from .structures import Candidate
 from .varpro import Problem, evaluate, partial_fractions, respond
 
 INTEGRATOR = 5e-3
-"""Poles slower than this, times the length of the record, cannot be told from integrators."""
+"""Poles slower than this, times the length of the record, cannot be told from integrators: over it
+they bend by an eighth of that, 0.06 % of the way."""
 
 SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or have the other sign
 
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
-_HALVINGS = 60
+_HALVINGS = 60  # of an interval, until a double has no more digits
 _NOTHING = 1e-13  # part of the largest singular value that is rounding
 
 

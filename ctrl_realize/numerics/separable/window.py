@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import SMALLEST
+from ..constants import HUBER, SMALLEST
 from ..signals.bins import Bins
 from ..signals.noise import correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
@@ -43,10 +43,8 @@ from .structures import (
 )
 from .varpro import Problem, Structure, evaluate, respond
 
-# Standard deviations: 95 % efficiency in Gaussian noise (Holland and Welsch 1977).
-_HUBER = 1.345
-_PASSES = 2
-_LONG = 2**18
+_PASSES = 2  # of modified residuals; see `fit_window`
+_LONG = 2**18  # samples; see `_ringing`
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +314,7 @@ def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
 
 def _clipped(error: FloatArray, least: float) -> FloatArray:
     """Residuals clipped at 1.345 sigma and scaled up again by the part that was not."""
-    limit = _HUBER * max(mad_sigma(error), least)
+    limit = HUBER * max(mad_sigma(error), least)
     left = np.clip(error, -limit, limit)
     inside = float(np.mean(left == error))
     return np.divide(left, max(inside, 0.5), out=left)

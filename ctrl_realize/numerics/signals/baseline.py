@@ -21,7 +21,7 @@ from .noise import correlation_time, is_drift, rounding_error
 FEW = 5
 """With fewer samples before the step, those after it that are still at rest are added."""
 
-MIN_DRIFT_SAMPLES = 50
+MIN_DRIFT_SAMPLES = 50  # from which on a slope is looked for; as `noise` has it
 
 
 def rest_line(
@@ -65,9 +65,10 @@ def _level_from_start(values: FloatArray) -> float:
 
 
 FEWEST = 24
-"""Samples before the step from which a curve can be told from a line."""
-_SIGNIFICANT = 30.0  # chi-square by which an exponential must beat the line
-_RATES = np.geomspace(0.5, 30.0, 24)  # decay over the samples before the step
+"""Samples before the step from which a curve can be told from a line: four for every parameter,
+after a median of five."""
+_SIGNIFICANT = 30.0  # chi-square to beat the line; ablation: exponential before the step
+_RATES = np.geomspace(0.5, 30.0, 24)  # decay over the samples before the step, next ones 20 % apart
 
 
 def relaxation(output: FloatArray, edge: int) -> FloatArray | None:

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 
-_GROWTH = 0.04
-BINS_AT_REST = 12
+_GROWTH = 0.04  # of the distance from the onset; see above
+BINS_AT_REST = 12  # means of the rest: they tell its level and slope, and single samples its noise
 # Few different widths: what depends on the width alone is computed once for each.
 _WIDTHS = np.unique((1.19 ** np.arange(80)).astype(np.int64))
 

@@ -23,7 +23,7 @@ from ..arrays import FloatArray
 REST_TOLERANCE = 0.02
 """The input has left its level when it is off by this part of the step (or 5 sigma of noise)."""
 
-_PIECE = 2**18  # samples that are looked at together
+_PIECE = 2**18  # samples that are looked at together, to save memory
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arrays import FloatArray
 
-_HOPS = 4  # starts in the length of a stretch that are looked at
-_ENOUGH = 0.5  # of the most that any stretch has
+_HOPS = 4  # starts in the length of a stretch that are looked at, to save time
+_ENOUGH = 0.5  # of the most that any stretch has: errors are then 1.4 times as large at most
 _TOGETHER = 2**20  # samples that are looked at together
 
 

@@ -28,8 +28,8 @@ from .bins import Bins
 from .correlation import autoregression
 from .noise import mad_sigma
 
-MOST_LAGS = 25
-_SAMPLES_PER_LAG = 20
+MOST_LAGS = 25  # of the autoregression
+_SAMPLES_PER_LAG = 20  # each coefficient is then known to a fifth: 1 / sqrt(20)
 
 
 def noise_lags(samples: int) -> int:
@@ -62,7 +62,7 @@ def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
     return min(found)
 
 
-_WILD = 4.0  # median absolute deviations at which samples are cut before they tell the colour
+_WILD = 4.0  # standard deviations of which one of 16 000 Gaussian samples is beyond: cut
 _NOTHING = 1e-6  # of a response that has died away
 _JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singular
 

@@ -11,8 +11,8 @@ from scipy.ndimage import median_filter
 from ..arrays import FloatArray, IntArray
 from .edges import difference_noise
 
-MOST_MOVES = 24
-_SEGMENT_GROWTH = 0.5
+MOST_MOVES = 24  # of an exact input: each costs a response
+_SEGMENT_GROWTH = 0.5  # of the distance from the edge, over which a droop is nearly straight
 
 
 def input_moves(

@@ -17,11 +17,12 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..signals.noise import rounding_error
 
 _FAST = 0.2
-"""Part of the steepest slope of a model from which its output counts as moving."""
-_FEWEST = 8
+"""Part of the steepest slope of a model from which its output counts as moving: of one lag, until
+it has made 80 % of its way."""
+_FEWEST = 8  # moving samples of which a part can be told
 _SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
-_LONG = 20
+_LONG = 20  # samples: with a fifth of equal neighbours noise stands for so long by 0.2^19
 _ALIKE, _MOST = 0.15, 0.9
 """Steps of 0.0445 that are recorded with two digits are 0.04 and 0.05 (the tacho of a motor): they
 differ by 12 % of their mean; of the steps of a held curve 30 % would be that near to a multiple."""

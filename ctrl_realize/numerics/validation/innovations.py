@@ -26,24 +26,26 @@ import numpy as np
 from scipy.special import fdtrc
 
 from ..arrays import FloatArray, IntArray
+from ..constants import LEAST_FREEDOM
 from ..signals.noise import mad_sigma
 
 OWN_PAST = 12
-"""Past outputs: with them lags and coloured noise of the usual kinds leave a white residual."""
+"""Past outputs: with them lags and coloured noise of the usual kinds leave a white residual. This
+and the numbers below were set on worlds of `benchmarks.worlds` with and without a loop (see `RARE`
+of the flags)."""
 _AHEAD = 3
 """Samples after the present for which an input is asked about."""
 _OUTPUTS = 8
 """Outputs, the present one among them, that may tell an input."""
 _PIECES = 6
 """Means of the past input whose products are asked about."""
-_LEAST_FREEDOM = 40
 _WILD = 3.0
 """Standard deviations at which innovations are cut: set-points move an input more than noise."""
 _SPARSE = 0.05
 """Ratio of median and standard deviation below which an input rests between its moves."""
 _PREDICTED = 1e-5
 """Part of a signal that is left where its past tells it: a sine or a ramp has no innovations."""
-_RANK = 1e-10
+_RANK = 1e-10  # of the largest singular value: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +148,7 @@ def nonlinear_chance(output: FloatArray, drive: FloatArray, past: int) -> tuple[
 def _past(output: FloatArray, drive: FloatArray, past: int, ahead: int) -> _Past | None:
     before = max(OWN_PAST, past)
     rows = output.size - before - ahead
-    if rows < _LEAST_FREEDOM + 2 * (OWN_PAST + past):
+    if rows < LEAST_FREEDOM + 2 * (OWN_PAST + past):
         return None
     here = np.arange(before, before + rows)
     own = [output[here - i] for i in range(1, OWN_PAST + 1)]
@@ -170,7 +172,7 @@ def _chance(
     alone, first = _squares(beside, target)
     both, rank = _squares(np.column_stack([beside, columns]), target)
     freedom = target.size - rank - taken
-    if rank == first or freedom < _LEAST_FREEDOM or both <= 0:
+    if rank == first or freedom < LEAST_FREEDOM or both <= 0:
         return 1.0, 0.0
     ratio = max((alone - both) / (rank - first) / (both / freedom), 0.0)
     return float(fdtrc(rank - first, freedom, ratio)), (alone - both) / alone

@@ -17,14 +17,14 @@ import numpy as np
 from scipy.special import stdtr
 
 from ..arrays import FloatArray
+from ..constants import LEAST_FREEDOM
 
 OWN_PAST = 30
 """Past outputs. Of six records of a loop about a plant with a pole at +1/s to +2/s (`unstable` in
 `benchmarks.worlds`) t was -13 or less with 30, -5 with 75, -2.5 with 150 and -1.4 with 10."""
-_LEAST_FREEDOM = 40
 _PREDICTED = 1e-6
 """Part of an output that is left where its past tells it: without noise nothing is significant."""
-_RANK = 1e-10
+_RANK = 1e-10  # of the largest singular value: rounding
 
 
 def unstable_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
@@ -51,7 +51,7 @@ def unstable_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
     before = max(OWN_PAST, past)
     rows = output.size - before
     inputs = np.atleast_2d(drive)
-    if rows < OWN_PAST + past * len(inputs) + 2 + _LEAST_FREEDOM:
+    if rows < OWN_PAST + past * len(inputs) + 2 + LEAST_FREEDOM:
         return 1.0
     here = np.arange(before, before + rows)
     own = [output[here - i] for i in range(1, OWN_PAST + 1)]

@@ -22,7 +22,7 @@ from ..arrays import FloatArray
 from ..signals.correlation import fit_percent
 from ..signals.noise import correlation_time
 
-_TURNS = 6
+_TURNS = 6  # of Gauss and Newton at most
 _LARGEST_STRETCH = 0.5  # of the logarithm, in one turn
 _SETTLED = 1e-3  # samples, and part of the lags
 

@@ -23,13 +23,13 @@ from scipy.signal import lfilter
 from scipy.special import fdtrc
 
 from ..arrays import FloatArray, IntArray
+from ..constants import LEAST_FREEDOM
 from ..signals.correlation import autoregression
 
 _MOST_LAGS = 20
 """Of the autoregression that makes the residual white; BIC takes fewer."""
 _LEAST_SHARE = 0.05
 """Part of the motion that a group must have for its dead time to be asked for."""
-_LEAST_FREEDOM = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def parameter_change(
     columns, target, used_up = whitened(np.concatenate(blocks, axis=1), residual)
     common = sum(columns[:, 3 * i : 3 * i + 3] for i in range(used.size))
     freedom = target.size - columns.shape[1] - used_up
-    if freedom < _LEAST_FREEDOM:
+    if freedom < LEAST_FREEDOM:
         return None
     scale = np.linalg.norm(columns, axis=0)
     if not np.all(scale > 0):

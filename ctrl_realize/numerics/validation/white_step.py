@@ -25,9 +25,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..arrays import ComplexArray, FloatArray
+from ..constants import LEAST_FREEDOM
 from .parameter_change import whitened
-
-_LEAST_FREEDOM = 40
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ def white_step(
     size = np.linalg.norm(columns, axis=0)
     white, target, used_up = whitened(columns / np.where(size > 0, size, 1.0), residual)
     freedom = target.size - white.shape[1] - used_up
-    if freedom < _LEAST_FREEDOM or not np.all(size > 0) or scale * dt > np.pi:
+    if freedom < LEAST_FREEDOM or not np.all(size > 0) or scale * dt > np.pi:
         return None
     solution, _, rank, _ = np.linalg.lstsq(white, target, rcond=1e-10)
     if rank < white.shape[1]:
