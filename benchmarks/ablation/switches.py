@@ -153,20 +153,20 @@ SWITCHES = (
     Switch("Huber's loss", {f"{PUBLIC}.fit:fit_step_record": _least_squares}, called=True),
     Switch("noise made white", {f"{STEP}:in_coloured_noise": first}),
     Switch(
-        "residual that is unlike the noise at rest is not made white",
+        "unlike residual left alone",
         {f"{FITS}.coloured:_UNLIKE": value(float("inf"))},
         (f"{STEP}:in_coloured_noise",),
     ),
     Switch(
-        "structures that are not ruled out (interval of the best alone)",
+        "structures not ruled out",
         {f"{FITS}.interval:plausible": _best_alone},
     ),
     Switch(
-        "lags that fit no worse, and one lag more, are not ruled out",
+        "simpler lags not ruled out",
         {f"{FITS}.interval:plausible": _by_criterion},
     ),
     Switch(
-        "charge for needless parameters",
+        "needless parameters",
         {
             f"{SEPARABLE}.structures:needless_parameters": giving(0.0),
             f"{FITS}.selection:needless_parameters": giving(0.0),
@@ -176,7 +176,7 @@ SWITCHES = (
         called=True,
     ),
     Switch(
-        "least charge where structures are ruled out",
+        "least charge",
         {
             f"{SEPARABLE}.structures:LEAST_CHARGE": value(0.0),
             f"{FITS}.interval:LEAST_CHARGE": value(0.0),
@@ -184,7 +184,7 @@ SWITCHES = (
         (f"{SEPARABLE}.structures:charged", f"{FITS}.interval:charged"),
     ),
     Switch(
-        "models whose slow gain is not resolved give way",
+        "resolved gain first",
         {
             f"{SEPARABLE}.window:WindowFit.best_of": lambda _: (
                 lambda self, criterion: self.candidates[choose(criterion)]
@@ -192,14 +192,14 @@ SWITCHES = (
         },
     ),
     Switch(
-        "poles beside zeros are half a sample at least",
+        "slower poles beside zeros",
         {f"{SEPARABLE}.structures:SLOWER_WITH_ZEROS": value(40.0)},
         (f"{STEP}:fit_window", f"{FITS}.input_fit:fit_window"),
         called=True,
     ),
     Switch("chains of equal lags", {f"{FITS}.selection:fit_chains": giving([])}),
     Switch(
-        "lags of a chain are uneven",
+        "uneven lags",
         {f"{SEPARABLE}.lag_chains:_UNEVEN": value(0.0)},
         (f"{FITS}.selection:fit_chains", f"{FITS}.selection:fit_diffusion"),
     ),
@@ -218,7 +218,7 @@ SWITCHES = (
     ),
     Switch("long chains taken for flows", {f"{FITS}.interval:_like_a_flow": giving(False)}),
     Switch(
-        "beginning that is open behind a zero",
+        "open beginning behind a zero",
         {f"{FITS}.interval:_opened": lambda _: lambda low, high, *_rest: (low, high)},
     ),
     Switch("views (the likelihood always)", {f"{STEP}:_is_noise": giving(True)}),
@@ -229,7 +229,7 @@ SWITCHES = (
     ),
     Switch("view: three lags early", {f"{STEP}:_views": _third_lag_amid}),
     Switch(
-        "noise that is louder after the step",
+        "louder noise after the step",
         {f"{STEP}:_LOUDER": value(1.0)},
         (f"{STEP}:_is_noise",),
     ),
@@ -251,7 +251,7 @@ SWITCHES = (
     Switch("hum", {f"{FITS}.step_data:hum_frequencies": giving([])}),
     Switch("colour of the noise at rest", {f"{FITS}.step_data:colouring": giving(1.0)}),
     Switch(
-        "rounding as noise of a coarse converter",
+        "coarse converter",
         {f"{FITS}.step_data:StepData.coarse": lambda _: property(lambda _data: False)},
     ),
     Switch(
@@ -260,26 +260,26 @@ SWITCHES = (
         (f"{FITS}.step_data:first_motion",),
     ),
     Switch(
-        "start at the frequency of the residual",
+        "start at the ringing",
         {f"{SEPARABLE}.window:_ringing": giving(0.0)},
         called=True,
     ),
     Switch(
-        "search only where one pole more may help",
+        "hopeless searches skipped",
         {f"{SEPARABLE}.structures:_worth_a_search": giving(True)},
     ),
     Switch(
-        "poles that are tried anywhere",
+        "pole tried anywhere",
         {f"{SEPARABLE}.compared_fits:_with_a_pole_more": giving([])},
     ),
     Switch(
-        "points of a profile start from those beside them",
+        "profiles swept",
         {f"{SEPARABLE}.profile:_SWEEPS": value(0)},
         (f"{SEPARABLE}.profile:polish",),
         called=True,
     ),
     Switch(
-        "output that is held widens the interval",
+        "held output",
         {f"{PUBLIC}.checks:_held_flags": giving(([], 0.0))},
     ),
     Switch("step of generalised least squares", {f"{PUBLIC}.checks:_white": giving(None)}),
@@ -296,7 +296,7 @@ SWITCHES = (
         (f"{FITS}.input_fit:extended",),
         called=True,
     ),
-    Switch("correlation with the input as a start", {f"{FITS}.input_fit:_seen": giving([])}),
+    Switch("start from the correlation", {f"{FITS}.input_fit:_seen": giving([])}),
     Switch(
         "records weighted by their noise",
         {f"{FITS}.input_fit:_noise_levels": _alike_noise},

@@ -37,8 +37,8 @@ Noise = Literal["auto", "white"]
 
 _LAST = 5  # samples at the end of a record in which a first step says nothing
 
-MOST_ORDER = 8
-FEWEST_SAMPLES = 20
+MOST_ORDER = 8  # that can be asked for: of more, rounding shows in the partial fractions
+FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
 _DWELL = 3  # times the first motion: steps that follow faster hide each other's onset

@@ -20,7 +20,7 @@ from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
 from .result import StructureFit, profile_of
 
-_MOST_ORDER = ALL_STRUCTURES[-1].order
+_MOST_ORDER = ALL_STRUCTURES[-1].order  # nothing richer is tried
 
 
 def better_structure(

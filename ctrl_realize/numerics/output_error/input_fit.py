@@ -48,13 +48,14 @@ WHITE = 3.0
 white noise scatters to. It decides on flags alone."""
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
+"""Every sample counts here, so that orders 4 and 5 would take most of the time."""
 MORE_LAGS = (Structure(4, 4), Structure(5, 5))
 """Tried as well where three poles are chosen: zeros beside them imitate further lags. Ablation:
 fourth and fifth lag."""
 _RISES = (2.0, 10.0, 50.0)  # samples, of the starts of the first-order fit, and
 _ONSETS = (1.0, 5.0, 20.0)
 _SMALLEST = 1e-4  # of the range: noise is not taken to be less
-_CONFIDENCE = 0.99  # of a start; ablation: correlation with the input as a start
+_CONFIDENCE = 0.99  # of a start; ablation: start from the correlation
 _UNLIKE = 1.3  # ratio of noise levels from which weights shorten errors by more than 2 %
 _BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
 _SLOW = 10.0  # times dead time and lag: periods from there on tell little of the plant

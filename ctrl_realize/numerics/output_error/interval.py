@@ -52,12 +52,13 @@ from .selection import Choice, choose_model
 
 _UNSEEN = 3.0
 """How far before the dead time a beginning that is open may lie, in times from there to the first
-motion. Diffusion behind lags and parallel paths mostly need 1 to 3."""
+motion. Diffusion behind lags and parallel paths mostly need 1 to 3. Ablation: open beginning behind
+a zero."""
 
 _LIKE_A_FLOW = 6
 """Lags of a chain from which on a flow that disperses looks the same, unless one was fitted and is
-out of the question."""
-_OUT_OF_QUESTION = 2 * PLAUSIBLE
+out of the question. Ablation: long chains taken for flows."""
+_OUT_OF_QUESTION = 2 * PLAUSIBLE  # in the criterion
 
 
 def flow_lead(poles: ComplexArray) -> float:

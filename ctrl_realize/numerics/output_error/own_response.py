@@ -23,8 +23,8 @@ from ..validation.own_response import OwnResponse
 from .input_data import SampledData
 from .result import OutputErrorEstimate
 
-_TURNS = 6
-_STRETCH = 0.01  # of the time constants, for a slope
+_TURNS = 6  # of Gauss and Newton at most
+_STRETCH = 0.01  # of the time constants, for a slope by central differences: off by 1e-4
 _FARTHEST = 2.0  # logarithm of a stretch that is extrapolated from it
 
 

@@ -33,6 +33,7 @@ _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 lags that grow fourfold and more one hides beside the first."""
 
 _BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0, -1))
+"""Fewer lags cannot follow a flow that is clearly better than lags."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,8 +74,8 @@ _WILD = 3.0  # standard deviations at which residuals are cut where explanations
 
 _LOUDER = 4.0
 """How much louder noise may be after the step than before it: slow noise shows little of itself in
-a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less). Ablation: noise that
-is louder after the step."""
+a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less). Ablation: louder
+noise after the step."""
 _FEWEST_LATE = 8  # bins in the later half of what comes when the response has settled
 
 

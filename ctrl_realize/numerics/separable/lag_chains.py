@@ -39,8 +39,9 @@ SHORTEST, LONGEST = 4, 8
 FREE_IN_A_CHAIN = 2
 """Parameters beside dead time and gain: the lag, and how many; the shape is bounded."""
 
-_DIFFUSION_CHARGE = 8.0  # two lags far apart look like diffusion, and are more common
-_UNEVEN = 0.15  # by which real lags are taken to stray from the law
+_DIFFUSION_CHARGE = 8.0
+"""Two lags far apart look like diffusion, and are more common. Ablation: charge for diffusion."""
+_UNEVEN = 0.15  # by which real lags are taken to stray from the law; ablation: uneven lags
 _ITERATIONS = 60
 _CONVERGED = 1e-13  # gain over the cost at which a fit ends, as rounding allows
 _GIVEN_UP = 1e9  # damping

@@ -25,8 +25,8 @@ IN_ROUNDING = 1e-11
 _CONVERGED = 1e-14
 """Predicted decrease over the sum of squares at which a fit has converged. What is d variances
 above a minimum is sqrt(d) standard errors from it: with 1000 samples, three millionths of one."""
-_TURNS, _MOST_CELLS = 40, 8
-_MOST_HESSIANS = 12
+_TURNS, _MOST_CELLS = 40, 8  # at most: steps in a cell between two samples, and cells
+_MOST_HESSIANS = 12  # in a cell
 _KEPT = 0.1
 """Part of the step before that a step with the same Hessian may be: then it converges as it is
 [1]_, and a Hessian costs as much as a handful of gradients."""

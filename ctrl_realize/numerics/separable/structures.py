@@ -28,11 +28,12 @@ from .poles import parameters_from_poles, poles_from_parameters
 from .varpro import Bounds, Problem, Structure
 
 ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
-SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)
+"""Further lags are those of a chain or a flow: free ones would not be told apart."""
+SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)  # for the views
 NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
 """Charged for every zero, and for every pole beyond the third, when a structure is chosen: needless
-ones lower the sum of squares by so many variances in one record of 70, and of 22. Ablation: charge
-for needless parameters."""
+ones lower the sum of squares by so many variances in one record of 70, and of 22. Ablation:
+needless parameters."""
 
 FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
 """Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a

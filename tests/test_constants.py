@@ -1,0 +1,71 @@
+"""Every tuned constant of the fits says where it comes from; every rule has its switch."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from benchmarks.ablation.switches import SWITCHES
+
+PACKAGE = Path(__file__).parents[1] / "ctrl_realize"
+FOLDERS = (
+    "numerics/output_error",
+    "numerics/separable",
+    "numerics/signals",
+    "numerics/validation",
+    "identification/output_error",
+)
+MODULES = [path for folder in FOLDERS for path in sorted((PACKAGE / folder).glob("*.py"))]
+
+
+def constants(tree: ast.Module) -> list[tuple[int, ast.Assign | ast.AnnAssign]]:
+    """Assignments of numbers to names in capitals, and where they stand in the module."""
+    found = []
+    for i, node in enumerate(tree.body):
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = [
+                n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)
+            ]
+            numbers = [
+                n
+                for n in ast.walk(node.value)
+                if isinstance(n, ast.Constant) and isinstance(n.value, int | float)
+            ]
+            if numbers and all(name.isupper() for name in names):
+                found.append((i, node))
+    return found
+
+
+def test_every_constant_of_the_fits_is_explained():
+    bare = []
+    for path in MODULES:
+        text = path.read_text(encoding="utf-8")
+        tree, lines = ast.parse(text), text.splitlines()
+        for i, node in constants(tree):
+            after = tree.body[i + 1] if i + 1 < len(tree.body) else None
+            told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            near = lines[node.lineno - 2 : node.end_lineno]
+            if not told and not any("#" in line for line in near):
+                bare.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: {lines[node.lineno - 1]}")
+    assert not bare, "\n".join(bare)
+
+
+def test_rules_that_constants_name_are_in_the_table():
+    names = {switch.name for switch in SWITCHES}
+    unknown = []
+    for path in MODULES:
+        text = re.sub(r"\s*\n#?\s*", " ", path.read_text(encoding="utf-8"))
+        for said in re.findall(r"[Aa]blation(?: of all of them)?: ([^.\";]{3,60})", text):
+            if not any(said.startswith(name) for name in names):
+                unknown.append(f"{path.name}: {said}")
+    assert not unknown, unknown
+
+
+@pytest.mark.parametrize("switch", SWITCHES, ids=lambda switch: switch.name)
+def test_a_switch_finds_what_it_switches_off(switch):
+    with switch.off():
+        pass
