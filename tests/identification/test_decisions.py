@@ -75,13 +75,13 @@ def test_structures_that_the_data_do_not_rule_out_widen_the_interval():
 
 def test_zeros_and_lags_that_are_not_there_are_not_chosen():
     chosen = []
-    for seed in range(5):
+    for seed in range(3):
         record = rigs.step_record(
             rigs.R2, noise=0.005, seed=seed, before=100, after=150, dt=6e-3, delay=8
         )
         fit = cr.fit_output_error(record).fit
         chosen.append((fit.order, fit.relative_degree))
-    assert chosen.count((2, 2)) >= 4
+    assert chosen == 3 * [(2, 2)]
 
 
 def test_a_short_record_does_not_lose_its_interval_to_models_that_know_no_delay():
@@ -214,26 +214,22 @@ SPRING = (  # two modes, a zero pair between them, and an actuator
 
 def test_a_plant_with_a_resonance_and_zeros_gets_states_instead_of_lags():
     record = driven(random_levels(1, 500, 3), core=SPRING, delay=4, noise=0.01)
-    modes = cr.identify(record)
+    row = cr.identify_campaign([record], progress=False).rows[0]
+    modes = row.system
     assert modes.fit.lags is not None
     assert modes.fit.interval[0] - 1e-9 <= 0.4 <= modes.fit.interval[1] + 1e-9
     poles = np.log(modes.delay_free.poles().astype(complex)) / DT
     assert np.abs(poles - (-0.5 + 1j * np.sqrt(15.75))).min() < 0.1
-    row = cr.identify_campaign([record], progress=False).rows[0]
-    assert (row.error, row.dead_time, row.interval) == (
-        None,
-        modes.fit.dead_time,
-        modes.fit.interval,
-    )
+    found = (row.error, row.dead_time, row.interval)
+    assert found == (None, modes.fit.dead_time, modes.fit.interval)
     asked = cr.identify(record, order=1)
     assert "input_in_residual" in codes(asked.fit)
     near = cr.identify(record, max_delay=2)
     assert near.fit.dead_time <= 2 * DT * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_lags_under_any_input_stay_lags(seed):
-    record = driven(random_levels(seed, 900, 3), seed, core=rigs.lag(0.4) * rigs.lag(1.1))
+def test_lags_under_any_input_stay_lags():
+    record = driven(random_levels(1, 600, 3), 1, core=rigs.lag(0.4) * rigs.lag(1.1))
     system = cr.identify(record)
     assert system.fit.order == 2
     assert not hasattr(system.fit, "lags")

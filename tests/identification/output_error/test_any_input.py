@@ -29,7 +29,7 @@ def cut_from_operation(kind, plant, seed, n=1200, skip=300):
     return cr.Record(k[skip:] * DT, 4 + u[skip:], 3 + y[skip:], name=kind)
 
 
-@pytest.mark.parametrize(("kind", "plant"), [("prbs", R1), ("prbs", R3), ("chirp", R3)])
+@pytest.mark.parametrize(("kind", "plant"), [("prbs", R1), ("chirp", R3)])
 def test_the_dead_time_is_found_from_operation_with_unknown_start(kind, plant):
     fit = cr.fit_output_error(cut_from_operation(kind, plant, seed=1)).fit
     error = fit.dead_time / DT - DELAY
@@ -41,10 +41,9 @@ def test_the_dead_time_is_found_from_operation_with_unknown_start(kind, plant):
 
 def test_an_output_that_does_not_follow_the_input_gets_no_answer():
     good = cut_from_operation("prbs", R1, seed=0, n=600)
-    for seed in range(3):
-        y = np.random.default_rng(seed).standard_normal(600)
-        with pytest.raises(DataError, match="does not respond to the input"):
-            cr.fit_output_error(cr.Record(good.time, good.input, y))
+    y = np.random.default_rng(0).standard_normal(600)
+    with pytest.raises(DataError, match="does not respond to the input"):
+        cr.fit_output_error(cr.Record(good.time, good.input, y))
 
 
 def bound(plant, u, noise):
@@ -69,7 +68,7 @@ def bound(plant, u, noise):
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_all_samples_of_a_long_record_count(colour):
     rng = np.random.default_rng(2)
-    u = np.repeat(rng.choice([-1.0, 1.0], 3000), 10)
+    u = np.repeat(rng.choice([-1.0, 1.0], 1500), 10)
     clean = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     noise = 0.05 * float(np.std(clean))
     y = clean + lfilter([1.0], [1.0, -colour], noise * rng.standard_normal(u.size))
@@ -96,10 +95,9 @@ def test_a_long_record_of_a_slow_plant_is_cut_and_says_so():
     assert "cut" in [flag.code for flag in fit.flags]
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample(seed):
+def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample():
     # A lag of ten samples behind 150: the valley is as narrow as the lag.
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     plant = cr.DelayedStateSpace(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT), 150)
     u = rng.choice([-1.0, 1.0], 1000)
     y = plant.simulate(u) + 0.05 * rng.standard_normal(1000)
@@ -109,21 +107,15 @@ def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample(see
     assert fit.delay_interval[0] <= 150 <= fit.delay_interval[1]
 
 
-def random_binary(poles, noise, disturbance=0.0, seed=0):
-    """Lags behind 0.8 s under a random binary input; per cent of noise, and a slow sine."""
-    rng = np.random.default_rng(seed)
-    t = 0.05 * np.arange(2000)
-    u = np.repeat(rng.choice([-1.0, 1.0], 100), 20)
-    plant = ct.tf([float(np.prod(poles))], np.poly(-np.asarray(poles)))
-    y = cr.delayed_ss(plant, dead_time=0.8, dt=0.05).simulate(u)
-    y = y + noise * rng.standard_normal(t.size) + disturbance * np.sin(2 * np.pi * t / 60)
-    return cr.Record(t, u, y)
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_slow_disturbance_does_not_move_the_dead_time(seed):
+def test_a_slow_disturbance_does_not_move_the_dead_time():
     # a fifth of the response, over a period of 60 s: the fit was half a second late
-    fit = cr.fit_output_error(random_binary([0.5, 1.25], 0.02, disturbance=0.2, seed=seed)).fit
+    rng = np.random.default_rng(0)
+    t = 0.05 * np.arange(1600)
+    u = np.repeat(rng.choice([-1.0, 1.0], 80), 20)
+    plant = ct.tf([0.625], np.poly([-0.5, -1.25]))
+    y = cr.delayed_ss(plant, dead_time=0.8, dt=0.05).simulate(u)
+    y = y + 0.02 * rng.standard_normal(t.size) + 0.2 * np.sin(2 * np.pi * t / 60)
+    fit = cr.fit_output_error(cr.Record(t, u, y)).fit
     assert fit.interval[0] <= 0.8 <= fit.interval[1]
     assert abs(fit.dead_time - 0.8) < 0.1
 
@@ -194,20 +186,17 @@ def joint_bound(inputs, sigmas, values):
 KINDS = [("prbs", 300, 1.0, 0.02), ("chirp", 400, 0.5, 0.02), ("noise", 250, 2.0, 0.1)]
 
 
-@pytest.mark.parametrize(
-    "values", [(DELAY, 1.0, 2.0), (DELAY, 2.5, 2.0, 5.0, 0.5)], ids=["R1", "R3"]
-)
-def test_error_and_standard_error_are_those_of_the_bound(values):
-    structures = [(1, 1)] if len(values) == 3 else [(3, 3)]
+def test_error_and_standard_error_are_those_of_the_bound():
+    values = (DELAY, 2.5, 2.0, 5.0, 0.5)
     errors, claims, limits = [], [], []
-    for seed in range(4):
+    for seed in range(3):
         made = [
             operation(
                 kind, 10 * seed + i, n, values, sigma=sigma, size=size, level=i, drift=-0.3 * i
             )
             for i, (kind, n, size, sigma) in enumerate(KINDS)
         ]
-        fit = cr.fit_output_error([record for record, _ in made], structures=structures).fit
+        fit = cr.fit_output_error([record for record, _ in made], structures=[(3, 3)]).fit
         limits.append(joint_bound([u for _, u in made], [sigma for *_, sigma in KINDS], values))
         errors.append(fit.delay - DELAY)
         claims.append(fit.std_given_structure / DT)
@@ -216,8 +205,8 @@ def test_error_and_standard_error_are_those_of_the_bound(values):
     # noise levels are known from 250 samples each, and Huber's loss costs 2 %
     assert_allclose(np.array(claims) / limits, 1.0, rtol=0, atol=0.25)
     assert_allclose(np.mean(np.array(claims) / limits), 1.0, rtol=0, atol=0.12)
-    # chi-square of four: 18.5 is exceeded once in 1000
-    assert np.sum((np.array(errors) / limits) ** 2) < 18.5
+    # chi-square of three: 16.3 is exceeded once in 1000
+    assert np.sum((np.array(errors) / limits) ** 2) < 16.3
 
 
 def test_steps_and_random_inputs_go_together():

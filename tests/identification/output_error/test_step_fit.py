@@ -15,6 +15,7 @@ from tests import rigs
 from tests.rigs import lag
 
 TS = rigs.TS
+THREE = {"structures": [(3, 3)]}
 
 
 def codes(fit) -> set[str]:
@@ -30,13 +31,8 @@ def changed(record: cr.Record, output) -> cr.Record:
     return cr.Record(record.time, record.input, output)
 
 
-@pytest.fixture(scope="module")
-def valve() -> cr.DelayedStateSpace:
-    return cr.fit_output_error(rigs.step_record(noise=0.001, delay=36.4))
-
-
-def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(valve):
-    fit = valve.fit
+def test_the_delay_of_a_simulated_valve_is_found_to_a_fraction_of_a_sample(quiet_valve):
+    fit = quiet_valve.fit
     assert fit.structure == (3, 3)
     assert abs(fit.delay - 36.4) < 4 * 0.092  # four times the Cramer-Rao bound at 0.1 %
     assert fit.std_given_structure / TS == pytest.approx(0.092, rel=0.15)
@@ -64,14 +60,13 @@ def test_any_unit_of_time_gives_the_same_answer_in_samples(unit):
 
 def test_an_unknown_sensor_widens_the_interval_and_a_known_one_narrows_it():
     sensor = rigs.lag(30.0)
-    for seed in range(2):
-        record = rigs.step_record(rigs.R4, noise=0.005, seed=seed, before=600, after=1500)
-        blind = cr.fit_output_error(record).fit
-        assert covers(blind, 37)  # the order chosen is 3, which alone would be off by 5.4
-        told = cr.fit_output_error(record, known=sensor, structures=[(3, 3)]).fit
-        assert abs(told.delay - 37) < 3 * told.std_given_structure / TS
-        assert told.std_given_structure < 1.2 * 0.48 * TS  # the Cramer-Rao bound is 0.48 samples
-        assert_allclose(np.sort(told.poles.real), np.sort(rigs.R3.poles().real), rtol=0.1)
+    record = rigs.step_record(rigs.R4, noise=0.005, before=600, after=1500)
+    blind = cr.fit_output_error(record).fit
+    assert covers(blind, 37)  # the order chosen is 3, which alone would be off by 5.4
+    told = cr.fit_output_error(record, known=sensor, **THREE).fit
+    assert abs(told.delay - 37) < 3 * told.std_given_structure / TS
+    assert told.std_given_structure < 1.2 * 0.48 * TS  # the Cramer-Rao bound is 0.48 samples
+    assert_allclose(np.sort(told.poles.real), np.sort(rigs.R3.poles().real), rtol=0.1)
 
 
 def test_known_dynamics_stay_out_of_the_model_unless_asked_for():
@@ -88,10 +83,11 @@ def test_known_dynamics_stay_out_of_the_model_unless_asked_for():
 def test_hum_and_drift_before_the_step_are_fitted_along():
     record = rigs.step_record(noise=0.001)
     hum = 0.005 * 16 * np.sin(2 * np.pi * 50 * record.time + 1)
-    fit = cr.fit_output_error(changed(record, record.output + hum)).fit
+    fit = cr.fit_output_error(changed(record, record.output + hum), **THREE).fit
     assert abs(fit.delay - 37) < 0.5
     assert "hum" in codes(fit)
-    drifting = cr.fit_output_error(changed(record, record.output + 0.02 * 16 * record.time)).fit
+    slope = changed(record, record.output + 0.02 * 16 * record.time)
+    drifting = cr.fit_output_error(slope, **THREE).fit
     assert abs(drifting.delay - 37) < 0.5
     assert "drift" in codes(drifting)
 
@@ -108,14 +104,15 @@ def after_an_earlier_step(rest: float, before: float) -> cr.Record:
 @pytest.mark.parametrize("rest", [2.0, 6.0])
 def test_a_drift_is_told_from_a_plant_that_moves(rest):
     settled = after_an_earlier_step(rest, before=60)
-    fit = cr.fit_output_error(changed(settled, settled.output + 0.02 * settled.time)).fit
+    drifting = changed(settled, settled.output + 0.02 * settled.time)
+    fit = cr.fit_output_error(drifting, structures=[(1, 1), (2, 2), (2, 1), (3, 3)]).fit
     assert "drift" in codes(fit)
     assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0
     assert fit.total_delay == pytest.approx(6.6, rel=0.02)
 
 
 def test_eight_bit_quantisation_is_seen_and_the_interval_covers():
-    clean = rigs.step_record(noise=0.0)
+    clean = rigs.step_record(noise=0.0, before=600, after=1500)
     step = 16 * 1.2 / 128
     fit = cr.fit_output_error(changed(clean, np.round(clean.output / step) * step)).fit
     assert "coarse_quantisation" in codes(fit)
@@ -176,7 +173,7 @@ def test_an_integrating_plant_gets_an_exact_integrator():
 
 @pytest.mark.parametrize("before", [1, 12])
 def test_few_or_no_samples_before_the_step_suffice(before):
-    fit = cr.fit_output_error(rigs.step_record(noise=0.002, before=before)).fit
+    fit = cr.fit_output_error(rigs.step_record(noise=0.002, before=before), **THREE).fit
     assert abs(fit.delay - 37) < 4 * 0.19
     assert ("no_rest" in codes(fit)) == (before < 8)
 
@@ -184,7 +181,7 @@ def test_few_or_no_samples_before_the_step_suffice(before):
 def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_matters():
     k = np.arange(1600)
     flags, widths = [], []
-    for seed in range(4):
+    for seed in range(2):
         white = np.random.default_rng(seed).standard_normal(1800)
         noise = np.zeros(1800)
         for i in range(1, 1800):
@@ -194,9 +191,9 @@ def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_mat
         assert covers(fit, 37)
         flags.append(codes(fit))
         widths.append((fit.interval[1] - fit.interval[0]) / TS)
-    # 84 independent samples; where a parameter is charged no more than their log: 48 and all four
+    # 84 independent samples; where a parameter is charged no more than their log: 48 and both
     assert np.median(widths) < 40
-    assert sum("no_delay_resolved" in found for found in flags) <= 1
+    assert not any("no_delay_resolved" in found for found in flags)
     white = [cr.fit_output_error(rigs.step_record(noise=n, seed=1)).fit for n in (0.005, 0.03)]
     assert ["structures_disagree" in codes(fit) for fit in white] == [False, True]
 
@@ -206,7 +203,7 @@ def test_slow_noise_that_a_short_rest_hides_is_noise_all_the_same():
     plant = cr.delayed_ss(ct.tf([1.5], [1.6, 2.8, 1]), dead_time=1.3, dt=0.05)
     t = 0.05 * np.arange(-100, 1100)
     u = np.where(t < 0, 0.0, 2.0)
-    for seed in range(4):
+    for seed in range(2):
         e = 0.02 * np.random.default_rng(seed).standard_normal(t.size + 500)
         slow = lfilter([1.0], [1.0, -0.95], e)[500:]
         fit = cr.fit_output_error(cr.Record(t, u, plant.simulate(u) + slow)).fit
@@ -218,12 +215,12 @@ def test_a_code_for_missing_samples_is_told_by_its_value():
     record = rigs.step_record(noise=0.005)
     y = record.output.copy()
     y[[700, 2300]] = -9999.0
-    fit = cr.fit_output_error(cr.Record(record.time, record.input, y)).fit
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y), **THREE).fit
     message = next(str(flag) for flag in fit.flags if flag.code == "outliers")
     assert "2 sample(s), the first at index 700, are -9999" in message
     # One wild sample of each kind is no code.
     y[2300] = 8888.0
-    fit = cr.fit_output_error(cr.Record(record.time, record.input, y)).fit
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y), **THREE).fit
     assert not any("missing value" in str(flag) for flag in fit.flags)
 
 
