@@ -44,9 +44,16 @@ ARRAYS = {
 }
 
 
-@pytest.mark.parametrize("arrays", ARRAYS.values(), ids=ARRAYS.keys())
-@pytest.mark.parametrize("kind", ["npz", "packed npz", "mat", "packed mat", "old mat"])
-def test_arrays_are_found_by_their_names(tmp_path, arrays, kind):
+WRITTEN = [(kind, name) for kind in ("npz", "mat") for name in ARRAYS] + [
+    ("packed npz", "columns"),
+    *(("packed mat", name) for name in ("columns", "single precision")),
+    *(("old mat", name) for name in ("columns", "whole numbers", "one matrix, turned")),
+]
+
+
+@pytest.mark.parametrize(("kind", "name"), WRITTEN)
+def test_arrays_are_found_by_their_names(tmp_path, kind, name):
+    arrays = ARRAYS[name]
     file = tmp_path / ("a.mat" if "mat" in kind else "a.npz")
     if "mat" in kind:
         old = kind == "old mat"

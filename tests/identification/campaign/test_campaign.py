@@ -173,7 +173,7 @@ def client():
 
 
 def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(client, tmp_path):
-    sources = [functools.partial(quick, seed, 0.2) for seed in range(16)]
+    sources = [functools.partial(quick, seed, 0.2) for seed in range(8)]
     store = cr.io.CampaignStore(tmp_path)
     pids = list(client.run(os.getpid).values())
 
@@ -187,7 +187,7 @@ def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(client, tmp_path)
     with joblib.parallel_config(backend="dask"):
         spread = cr.identify_campaign(sources, method="paper", n_jobs=-1, store=store)
     killer.join()
-    serial = cr.identify_campaign([functools.partial(quick, s) for s in range(16)], method="paper")
+    serial = cr.identify_campaign([functools.partial(quick, s) for s in range(8)], method="paper")
     assert spread.failed == ()
     assert spread.table().equals(serial.table())
     for a, b in zip(spread.good, serial.good, strict=True):

@@ -78,7 +78,7 @@ def test_another_start_is_tried_where_the_first_leads_nowhere():
     plant = cr.delayed_ss(ct.ss([[0.97]], [[1.0]], [[0.03]], [[0.0]], 0.05), 20)
     y = plant.simulate(np.sin(t**2))
     y = y + 0.01 * y.std() * np.random.default_rng(0).standard_normal(t.size)
-    found = cr.fit_state_space(cr.Record(t, np.sin(t**2), y))
+    found = cr.fit_state_space(cr.Record(t, np.sin(t**2), y), [1, 2])
     assert (found.fit.order, found.delay) == (1, 20)
 
 
