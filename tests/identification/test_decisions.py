@@ -194,14 +194,6 @@ def test_a_record_of_any_input_with_another_delay_is_left_out():
     assert fit.delay == pytest.approx(5, abs=0.1)
 
 
-def test_gains_that_scatter_by_more_than_their_noise_are_an_alarm():
-    gains = (0.9, 1.0, 1.1)
-    alike = [driven(random_levels(k), k) for k in range(3)]
-    apart = [driven(random_levels(k), k, core=g * LAG) for k, g in enumerate(gains)]
-    assert "gains_differ" not in codes(cr.fit_output_error(alike, **ONE).fit)
-    assert "gains_differ" in codes(cr.fit_output_error(apart, **ONE).fit)
-
-
 # --- lags, or modes and zeros
 
 
@@ -226,14 +218,6 @@ def test_a_plant_with_a_resonance_and_zeros_gets_states_instead_of_lags():
     assert "input_in_residual" in codes(asked.fit)
     near = cr.identify(record, max_delay=2)
     assert near.fit.dead_time <= 2 * DT * (1 + 1e-9)
-
-
-def test_lags_under_any_input_stay_lags():
-    record = driven(random_levels(1, 600, 3), 1, core=rigs.lag(0.4) * rigs.lag(1.1))
-    system = cr.identify(record)
-    assert system.fit.order == 2
-    assert not hasattr(system.fit, "lags")
-    assert "input_in_residual" not in codes(system.fit)
 
 
 # --- the impulse response from any input
@@ -325,7 +309,7 @@ def test_an_input_that_does_not_hold_its_level_is_any_input():
 
 def test_wild_samples_move_least_squares_more_than_the_usual_loss():
     errors = {"huber": [], "least_squares": []}
-    for seed in range(8):
+    for seed in range(5):
         rng = np.random.default_rng(seed)
         record = lag_record(seed)
         wild = np.where(rng.random(120) < 0.05, 1.5 * rng.standard_normal(120), 0.0)

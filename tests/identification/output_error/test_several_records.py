@@ -40,7 +40,7 @@ def codes(fit):
 
 @pytest.fixture(scope="module")
 def sixteen():
-    return cr.fit_output_error([record(seed) for seed in range(16)]).fit
+    return cr.fit_output_error([record(seed) for seed in range(16)], structures=[(3, 3)]).fit
 
 
 def test_the_mean_of_sixteen_records_is_four_times_as_exact(sixteen):
@@ -245,7 +245,7 @@ def test_steps_of_different_gain_are_no_plant_without_objection():
 
 
 def test_records_of_one_plant_are_not_told_apart():
-    alarms = [told([step(h, 100 * seed + h) for h in (1, 2, 4)]) for seed in range(8)]
+    alarms = [told([step(h, 100 * seed + h) for h in (1, 2, 4)]) for seed in range(4)]
     assert not set().union(*alarms) & {"gains_differ", "lags_differ", "records_differ"}
 
 
@@ -275,7 +275,7 @@ def driven(seed, gain=1.0, lag=1.0, delay=0.5, noise=0.02):
 
 @pytest.mark.parametrize(
     ("name", "value", "code"),
-    [("gain", 2.0, "no_common_gain"), ("lag", 1.5, "lags_differ")],
+    [("gain", 1.2, "gains_differ"), ("lag", 1.5, "lags_differ")],
 )
 def test_records_of_other_inputs_are_compared_too(name, value, code):
     same = [driven(seed) for seed in (1, 2)]
