@@ -19,7 +19,9 @@ from .data import MeasuredFRF as MeasuredFRF
 from .data import Record as Record
 from .data import StepResponse as StepResponse
 from .delayed import DelayedStateSpace as DelayedStateSpace
+from .delayed import DelaySystem as DelaySystem
 from .delayed import delayed_ss as delayed_ss
+from .delayed import interconnect as interconnect
 from .errors import CtrlRealizeError as CtrlRealizeError
 from .errors import CtrlRealizeWarning as CtrlRealizeWarning
 from .frequency import compare_frf as compare_frf

@@ -68,6 +68,7 @@ TABLES = {
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",
     ),
+    "loops": ("docs/loops_table.md", "python -m benchmarks.loops"),
     "fuzz": ("docs/fuzz_table.md", "python3 tools/fuzz_table.py"),
     "peers": ("docs/peers_table.md", "python -m benchmarks.peers simulated"),
     "peers_measured": ("docs/peers_measured_table.md", "python -m benchmarks.peers measured"),

@@ -114,22 +114,22 @@ def test_series_keeps_and_adds_delays(operation, delay):
     assert_allclose(result(circle()), S(circle()) * other(circle()), rtol=1e-9, atol=1e-14)
 
 
-PLAIN = {
+INSIDE = {
     "S + S": (lambda S: S + S, lambda g, k: 2 * g),
     "S - 1": (lambda S: S - 1, lambda g, k: g - 1),
     "feedback": (lambda S: ct.feedback(S, CONTROLLER), lambda g, k: g / (1 + g * k)),
     "parallel": (lambda S: ct.parallel(S, CONTROLLER), lambda g, k: g + k),
-    "ss": (lambda S: ct.ss(S), lambda g, k: g),
 }
 
 
-@pytest.mark.parametrize("operation", PLAIN)
+@pytest.mark.parametrize("operation", INSIDE)
 @pytest.mark.parametrize("delay", [0, 1, 37])
-def test_what_cannot_keep_the_delay_is_plain_and_right(operation, delay):
+def test_sums_and_loops_keep_the_delay_inside(operation, delay):
     S = valve(delay)
-    function, expected = PLAIN[operation]
+    function, expected = INSIDE[operation]
     result = function(S)
-    assert type(result) is ct.StateSpace
+    assert isinstance(result, cr.DelayedStateSpace if delay == 0 else (cr.DelaySystem, type(S)))
+    assert result.nstates <= ct.ss(S).nstates + max(delay, 3) + CONTROLLER.nstates
     assert_allclose(
         result(circle()), expected(S(circle()), CONTROLLER(circle())), rtol=1e-9, atol=1e-12
     )
@@ -268,7 +268,8 @@ def test_products_of_channels_with_different_delays_stay_right():
     M = np.array([[1.0, 2.0], [0.5, -1.0]])
     z = circle(9, dt=0.1)
     mixed = S * M
-    assert type(mixed) is ct.StateSpace
+    assert isinstance(mixed, cr.DelaySystem)
+    assert mixed.internal_delays == (2, 5)
     assert_allclose(mixed(z), np.einsum("pmk,mn->pnk", S(z), M), rtol=1e-9, atol=1e-12)
     outer = np.array([[1.0, 0.0, 2.0]]) * S
     assert isinstance(outer, cr.DelayedStateSpace)

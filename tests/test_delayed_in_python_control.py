@@ -63,8 +63,6 @@ POLYNOMIALS = {
     "feedback(tf, sys)": lambda S: ct.feedback(FILTER, S),
     "tf(sys)": ct.tf,
     "ss2tf": ct.ss2tf,
-    "margin": ct.margin,
-    "stability_margins": ct.stability_margins,
     "root locus": lambda S: ct.root_locus_map(S, gains=[0.1]),
 }
 

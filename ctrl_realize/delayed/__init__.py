@@ -1,5 +1,7 @@
 """Systems that carry a dead time."""
 
 from .factory import delayed_ss as delayed_ss
+from .inside.system import DelaySystem as DelaySystem
+from .joined import interconnect as interconnect
 from .system import DelayedStateSpace as DelayedStateSpace
 from .system import fit_of as fit_of

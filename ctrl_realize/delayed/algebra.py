@@ -1,4 +1,4 @@
-"""Products that keep the delay; what cannot keep it becomes a plain system."""
+"""Products that keep delays at the ends, on the core alone; all else has delays inside."""
 
 from __future__ import annotations
 
@@ -8,14 +8,21 @@ import control as ct
 import numpy as np
 
 from ..errors import OptionError
+from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from .chains import common
+from .operators import DelayOperators, is_linear
 from .parts import CoreAndDelays, named
 
 _ENDS = ("prefix", "suffix")
 
 
-class DelayedAlgebra(CoreAndDelays):
+class DelayedAlgebra(CoreAndDelays, DelayOperators):
     """Operators on core and delay."""
+
+    def _form(self) -> DelayForm:
+        core = self._core
+        matrices = core.A, core.B, core.C, core.D
+        return delayed_ends(*matrices, self.input_delays, self.output_delays)
 
     def _around(self, core: ct.StateSpace, **changes: Any) -> Self:
         settings: dict[str, Any] = {
@@ -73,12 +80,13 @@ class DelayedAlgebra(CoreAndDelays):
                 delays = (common(self.input_delays) or 0,) * other.shape[1]
                 names = self.input_labels if other.shape[1] == self.ninputs else None
                 return self._around(self._core * other, delay=delays, inputs=names)
-            return self._plain() * other
+            return super().__mul__(other) if is_linear(other) else self._plain() * other
         if isinstance(other, ct.FrequencyResponseData):
             return NotImplemented  # it evaluates this system at its own frequencies
         if not isinstance(other, ct.StateSpace):
             return self._plain() * other
-        return self._series(self, _linear(other))
+        made = self._series(self, _linear(other))
+        return super().__mul__(other) if made is None else made
 
     def __rmul__(self, other: Any) -> Any:
         """Series: first this system, then `other`."""
@@ -96,30 +104,28 @@ class DelayedAlgebra(CoreAndDelays):
                     self._core.A, self._core.B, other @ self._core.C, other @ self._core.D, self.dt
                 )
                 return self._around(core, output_delay=delays, outputs=names)
-            return other * self._plain()
+            return super().__rmul__(other) if is_linear(other) else other * self._plain()
         if not isinstance(other, ct.StateSpace):
             return NotImplemented
-        return self._series(_linear(other), self)
-
-    def append(self, other: Any) -> ct.StateSpace:
-        """Append `other`; a plain system, as python-control makes it."""
-        # python-control's append writes to self.dt.
-        return self._plain().append(other)
+        made = self._series(_linear(other), self)
+        return super().__rmul__(other) if made is None else made
 
     def minreal(self, tol: float = 0.0) -> Self:
         """Minimal realization of the core; the chain stays as it is."""
         return self._around(self._core.minreal(tol))
 
-    def _series(self, second: ct.StateSpace, first: ct.StateSpace) -> ct.StateSpace:
-        """Product second * first, with delays kept where the delays between them are common."""
+    def _series(self, second: ct.StateSpace, first: ct.StateSpace) -> Self | None:
+        """Product second * first where the delays between both are common, None elsewhere."""
+        ends = CoreAndDelays, DelayOperators
+        if any(isinstance(s, ends[1]) and not isinstance(s, ends[0]) for s in (first, second)):
+            return None
         behind = getattr(first, "output_delays", (0,) * first.noutputs)
         before = getattr(second, "input_delays", (0,) * second.ninputs)
-        fits = second.ninputs == first.noutputs
-        between = (
-            common(tuple(a + b for a, b in zip(behind, before, strict=True))) if fits else None
-        )
+        if second.ninputs != first.noutputs:
+            return None
+        between = common(tuple(a + b for a, b in zip(behind, before, strict=True)))
         if between is None:
-            return ct.StateSpace(second) * ct.StateSpace(first)
+            return None
         core = getattr(second, "delay_free", second) * getattr(first, "delay_free", first)
         entry = getattr(first, "input_delays", (0,) * first.ninputs)
         return self._around(
@@ -134,7 +140,7 @@ class DelayedAlgebra(CoreAndDelays):
 
 def _linear(system: ct.StateSpace) -> ct.StateSpace:
     """Take a controller with a class of its own, or joined subsystems, for their matrices."""
-    if type(system) is ct.StateSpace or isinstance(system, CoreAndDelays):
+    if type(system) is ct.StateSpace or isinstance(system, DelayOperators):
         return system
     return ct.StateSpace(system, remove_useless_states=False)
 

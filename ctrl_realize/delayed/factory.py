@@ -13,8 +13,8 @@ from .._checks import positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
 from ..results import ModelFit
-from .parts import check_core
-from .system import MAX_DELAY, DelayedStateSpace
+from .parts import MAX_DELAY, check_core
+from .system import DelayedStateSpace
 
 
 def delayed_ss(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,9 +12,12 @@ import numpy as np
 
 from .._checks import system_names
 from ..errors import ModelWarning, OptionError, UnsuitableSystemError, warn_caller
-from ..numerics.arrays import FloatArray, IntArray, read_only
+from ..numerics.arrays import ComplexArray, FloatArray, IntArray, read_only
 from .chains import Matrices, augment, chain_labels
 from .deferred import DeferredMatrices
+
+MAX_DELAY = 10_000_000
+"""Samples in all delays together; more are a sample time given in another unit."""
 
 HARMLESS = 20
 """Registers whose polynomial is still exact to 1e-6 of the response.
@@ -119,6 +123,22 @@ def named(
     return made
 
 
+def settled_values(
+    values: ComplexArray, points: ComplexArray, *, warn_infinite: bool
+) -> ComplexArray:
+    """Give a response (p, m, K) python-control's value at poles, and real ones on the real axis."""
+    # The Schur form leaves rounding in the imaginary part, and dcgain() would be complex.
+    on_axis = points.imag == 0
+    values[..., on_axis] = values[..., on_axis].real
+    lost = ~np.isfinite(values)
+    if lost.any():
+        if warn_infinite:
+            # The class and words of python-control, whose callers look for them.
+            warnings.warn("singular matrix in frequency response", RuntimeWarning, stacklevel=4)
+        values[lost] = complex(np.inf, np.nan)
+    return values
+
+
 def check_core(core: Any) -> None:
     """Refuse what is not a discrete state-space system with a sample time."""
     if not isinstance(core, ct.StateSpace):
@@ -179,7 +199,8 @@ def _warn_of_a_transfer_function(registers: int) -> None:
     warn_caller(
         f"python-control forms polynomials with {registers} delay registers here; from about "
         "50 on these are numerically meaningless, and so are the results. Instead of "
-        "ct.margin(sys) and ct.stability_margins(sys) use cr.design.margins(sys), instead of "
+        "a root locus use sys.poles() of ct.feedback(k * sys) or cr.design.margins(sys), "
+        "instead of "
         "ct.tf(sys) use sys.to_tf(), and with a transfer function sys * tf, sys + tf, "
         "ct.ss(tf) * sys and ct.feedback(ct.ss(tf), sys)",
         ModelWarning,

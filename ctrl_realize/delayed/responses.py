@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,11 @@ from ..errors import DataError
 from ..numerics.arrays import ComplexArray, FloatArray, later
 from ..numerics.state_space import responses
 from .chains import powers
-from .parts import CoreAndDelays
+from .host_responses import HostResponses
+from .parts import CoreAndDelays, settled_values
 
 
-class DelayedResponses(CoreAndDelays):
+class DelayedResponses(HostResponses, CoreAndDelays):
     """Responses whose cost does not grow with the delay."""
 
     _schur: responses.Schur | None
@@ -39,16 +39,7 @@ class DelayedResponses(CoreAndDelays):
                 out = out * powers(points, self.input_delays)[None, :, :]
             if any(self.output_delays):
                 out = out * powers(points, self.output_delays)[:, None, :]
-        # The Schur form leaves rounding in the imaginary part, and dcgain() would be complex.
-        on_axis = points.imag == 0
-        out[..., on_axis] = out[..., on_axis].real
-        lost = ~np.isfinite(out)
-        if lost.any():
-            if warn_infinite:
-                # The class and words of python-control, whose callers look for them.
-                warnings.warn("singular matrix in frequency response", RuntimeWarning, stacklevel=3)
-            out[lost] = complex(np.inf, np.nan)
-        return out
+        return settled_values(out, points, warn_infinite=warn_infinite)
 
     def markov(self, count: int) -> FloatArray:
         """Compute the unit-pulse response, delay included.
@@ -93,11 +84,20 @@ class DelayedResponses(CoreAndDelays):
                 f"inputs has shape {given.shape}; expected ({self.ninputs}, N)"
                 + (" or (N,)" if self.ninputs == 1 else "")
             )
-        held = np.stack([later(u, d) for u, d in zip(rows, self.input_delays, strict=True)])
+        out = self._simulated(rows)
+        return out[0] if self.issiso() and given.ndim == 1 else out
+
+    def _simulated(self, inputs: FloatArray) -> FloatArray:
+        held = np.stack([later(u, d) for u, d in zip(inputs, self.input_delays, strict=True)])
         core = self._core
         out = responses.simulate(core.A, core.B, core.C, core.D, held)
-        out = np.stack([later(y, q) for y, q in zip(out, self.output_delays, strict=True)])
-        return out[0] if self.issiso() and given.ndim == 1 else out
+        return np.stack([later(y, q) for y, q in zip(out, self.output_delays, strict=True)])
+
+    def _features(self) -> tuple[ComplexArray, float]:
+        poles = self._core.poles()
+        poles = poles[np.abs(poles) > 0.05]
+        wait = float(np.max(self.delay)) * self.dt
+        return np.asarray(np.log(poles) / self.dt, dtype=np.complex128), wait
 
     def _with_delay(self, response: Any, count: int) -> FloatArray:
         core = self._core

@@ -23,22 +23,23 @@ from .algebra import DelayedAlgebra
 from .analysis import DelayedAnalysis
 from .cards import DelayedCards
 from .chains import parse_delays
-from .parts import check_core, named, signal_names
+from .operators import ENDS
+from .parts import MAX_DELAY, check_core, named, signal_names
 from .responses import DelayedResponses
 
 AnyFit = TypeVar("AnyFit", bound=ModelFit)
 
-MAX_DELAY = 10_000_000
-"""Samples in all delays together; more are a sample time given in another unit."""
 
-
-class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, DelayedCards, Drawable):
+class DelayedStateSpace(
+    DelayedResponses, DelayedAnalysis, DelayedAlgebra, DelayedCards, Drawable, kind=ENDS
+):
     """Discrete state-space system with dead time: core(z) z^-d.
 
     It is a `control.StateSpace` with the states ``[core; u[k-1] ... u[k-d]]`` and goes into every
     function of python-control. The delay survives negation, products with numbers, matrices and
     systems, powers, indexing, copies, pickling and renaming; sums, feedback and append give a
-    plain `control.StateSpace`, still right. ``ct.ss(sys)`` strips to a plain one at any time.
+    `DelaySystem` where the delay then stands inside. ``ct.ss(sys)`` strips to a plain one at any
+    time.
 
     Matrices are read-only: core and chain must stay in step.
 
@@ -87,10 +88,11 @@ class DelayedStateSpace(DelayedResponses, DelayedAnalysis, DelayedAlgebra, Delay
     and the plots of frequency responses, `step`, `simulate`, `markov`, poles and products.
     ``cr.design.to_discrete(*cr.design.to_continuous(sys), dt)`` samples such a system more slowly.
 
-    ``tf * sys``, ``tf + sys``, ``ct.feedback(tf, sys)``, ``ct.tf(sys)`` and ``ct.margin(sys)`` are
-    decided by python-control alone: it makes a transfer function of the augmented matrices, which
-    is noise from d = 50 or so on. Beyond 20 samples a `ModelWarning` says so. Write ``sys * tf``,
-    ``sys + tf``, ``ct.feedback(ct.ss(tf), sys)``, ``sys.to_tf()`` and ``cr.design.margins(sys)``.
+    ``tf * sys``, ``tf + sys``, ``ct.feedback(tf, sys)`` and ``ct.tf(sys)`` are decided by
+    python-control alone: it makes a transfer function of the augmented matrices, which is noise
+    from d = 50 or so on. Beyond 20 samples a `ModelWarning` says so. Write ``sys * tf``,
+    ``sys + tf``, ``ct.feedback(ct.ss(tf), sys)`` and ``sys.to_tf()``. ``ct.margin(sys)`` reads the
+    exact response: of one input and output the system unpacks as magnitude, phase and omega.
 
     ``repr(sys)`` is one line. A `repr_format` that is set on the system, or another than "eval" in
     ``ct.config.defaults["iosys.repr_format"]``, is followed; "eval" is core and delay as a call.

@@ -61,6 +61,7 @@ def impulse_plot(
             "the models. To plot the response of a model alone use "
             "control.impulse_response(...).plot()"
         )
+    models: list[DelayedStateSpace]
     models = [systems] if isinstance(systems, DelayedStateSpace) else list(systems)
     for model in models:
         if (model.noutputs, model.ninputs) != (impulse.noutputs, impulse.ninputs):

@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.state_space.responses import frequency_response, schur_form
@@ -44,6 +44,8 @@ def factor(system: Any, dt: float, rate: float = 0.0) -> Factor:
         return _line_factor(system)
     if isinstance(system, ct.TransferFunction):
         return _polynomial_factor(system, dt, rate)
+    if isinstance(system, DelaySystem):
+        return _inside_factor(system)
     if isinstance(system, ct.StateSpace):
         delay = int(system.delay) if isinstance(system, DelayedStateSpace) else 0
         core = system.delay_free if isinstance(system, DelayedStateSpace) else system
@@ -119,6 +121,22 @@ def _state_space_factor(core: ct.StateSpace, dt: float, rate: float, delay: int)
     return Factor(
         response, pole_ratio(poles, dt, rate), delay, hidden, in_s_plane(features, dt), poles
     )
+
+
+def _inside_factor(system: DelaySystem) -> Factor:
+    dt = float(system.dt)
+    features, wait = system.features()
+    shift = 1.0 if dt else 0.0
+
+    def response(w: ComplexArray) -> ComplexArray:
+        return np.asarray(system.horner(w + shift, warn_infinite=False)[0, 0])
+
+    def characteristic(w: ComplexArray) -> ComplexArray:
+        return system.characteristic(w + shift)
+
+    poles = np.exp(features * dt) if dt else features
+    hidden = round(wait / dt) if dt else 0
+    return Factor(response, characteristic, 0, hidden, features, poles)
 
 
 def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> Factor:

@@ -181,20 +181,46 @@ def simulate(
     padded[:, :N] = inputs
     U = padded.reshape(m, blocks, L).transpose(1, 2, 0).reshape(blocks, L * m)
 
-    rows, jump = block_powers(C, A, L)
-    pulses = markov(A, B, C, D, L).transpose(2, 0, 1)  # (L, p, m)
-    inside = np.zeros((L, p, L, m))
-    for lag in range(L):
-        index = np.arange(L - lag)
-        inside[index + lag, :, index, :] = pulses[lag]
-    reach, _ = block_powers(B.T, A.T, L)  # (B^T (A^T)^l) = (A^l B)^T
-    into = reach[::-1].transpose(2, 0, 1).reshape(n, L * m)
-
+    rows, jump, inside, into = block_operators(A, B, C, D, L)
     kicks = U @ into.T
     states = np.empty((blocks, n))
     state = np.zeros(n) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     for b in range(blocks):
         states[b] = state
         state = jump @ state + kicks[b]
-    out = states @ rows.reshape(L * p, n).T + U @ inside.reshape(L * p, L * m).T
+    out = states @ rows.T + U @ inside.T
     return out.reshape(blocks, L, p).transpose(2, 0, 1).reshape(p, -1)[:, :N]
+
+
+def block_operators(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, length: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Matrices that step through `length` samples at once; signals laid out sample by sample.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+    length : int
+        A power of two; of any other length `jump` is too far a step.
+
+    Returns
+    -------
+    rows : ndarray, shape (length * p, n)
+        Outputs from the state at the start.
+    jump : ndarray, shape (n, n)
+        State at the end from that at the start.
+    inside : ndarray, shape (length * p, length * m)
+        Outputs from the inputs.
+    into : ndarray, shape (n, length * m)
+        State at the end from the inputs.
+    """
+    n, m = B.shape
+    p = C.shape[0]
+    rows, jump = block_powers(C, A, length)
+    pulses = np.zeros((2 * length, p, m))  # those of negative lags behind the others
+    pulses[:length] = markov(A, B, C, D, length).transpose(2, 0, 1)
+    lags = np.subtract.outer(np.arange(length), np.arange(length))
+    inside = pulses[lags].transpose(0, 2, 1, 3)
+    reach, _ = block_powers(B.T, A.T, length)  # (B^T (A^T)^l) = (A^l B)^T
+    into = reach[::-1].transpose(2, 0, 1).reshape(n, length * m)
+    return rows.reshape(length * p, n), jump, inside.reshape(length * p, length * m), into

@@ -1,0 +1,1 @@
+"""Closed loops around dead time: core and delays against augmented matrices."""

@@ -1,0 +1,1 @@
+"""Systems whose delays stand inside: in loops and sums."""

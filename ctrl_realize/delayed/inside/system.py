@@ -1,0 +1,248 @@
+r"""Systems with delays inside: in feedback loops, between parts, in one of several paths.
+
+The model is a delay-free core, some of whose outputs return to its inputs through pure delays. It
+is a `control.StateSpace` like a `DelayedStateSpace`, and is what loops and sums of those are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
+
+import control as ct
+import numpy as np
+
+from ..._checks import real, system_name
+from ...errors import DelayRangeError, UnsuitableSystemError
+from ...numerics.arrays import IntArray
+from ...numerics.internal_delays.form import DelayForm
+from ...numerics.internal_delays.recurrence import absorbed
+from ...numerics.internal_delays.response import Response
+from ..chains import Matrices
+from ..operators import INSIDE, DelayOperators, whole_samples
+from ..parts import MAX_DELAY, check_entries, named, signal_names
+from .cards import InsideCards
+from .poles import InsidePoles
+from .responses import InsideResponses
+
+
+class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kind=INSIDE):
+    """Linear system with dead times inside, exact: loops, sums and series of delayed systems.
+
+    A delay-free core whose last q outputs return to its last q inputs through pure delays. It is a
+    `control.StateSpace` and goes into what python-control makes of frequency responses (Bode,
+    Nyquist, Nichols, margins); every interconnection of such systems is one again. Loops around a
+    `DelayedStateSpace` are of this class.
+
+    Parameters
+    ----------
+    core : control.StateSpace
+        With p + q outputs and m + q inputs; discrete with a sample time.
+    internal_delays : sequence of float, optional
+        The q delays, whole samples each.
+    name, inputs, outputs : optional
+        Names of the system, of its m inputs and of its p outputs, as for `control.ss`.
+
+    Attributes
+    ----------
+    core : control.StateSpace
+    internal_delays : tuple of float
+        In samples.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A core that is no state-space system, has no sample time, or fewer signals than delays.
+    DelayRangeError
+        Delays below 0, or that are no whole samples.
+
+    Notes
+    -----
+    With ``w_i(t) = z_i(t - tau_i)`` between the last outputs z and inputs w of the core this is the
+    linear fractional form of [1]_, there called internal delays.
+
+    The matrices A, B, C, D of a discrete system are made when somebody asks for them, up to 20 000
+    states, with the delays as shift registers behind the states of the core. ``sys(z)``, plots of
+    frequency responses, ``sys.step_response``, ``sys.forced_response``, ``sys.dominant_poles`` and
+    every interconnection need none.
+
+    python-control decides alone in ``K * sys`` and ``ct.feedback(K, sys)`` of a transfer function
+    or plain system K: write ``sys * K``, ``ct.ss(K) * sys`` and ``ct.feedback(sys * K)`` or
+    ``cr.interconnect``.
+
+    References
+    ----------
+    .. [1] P. Gahinet and L. F. Shampine, Software for modeling and analysis of linear systems with
+       delays, Proc. American Control Conf. 2004, 5600-5605, section 2,
+       doi:10.23919/ACC.2004.1384746.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.3, dt=0.001)
+    >>> loop = ct.feedback(plant * 0.5)
+    >>> loop
+    <DelaySystem: u -> y, order 1, internal delay 300 samples, dt = 0.001 s>
+    >>> print(round(loop.dcgain(), 6), loop.is_stable())
+    0.333333 True
+    """
+
+    def __init__(
+        self,
+        core: ct.StateSpace,
+        internal_delays: Sequence[float] = (),
+        *,
+        name: str | None = None,
+        inputs: str | Sequence[str] | None = None,
+        outputs: str | Sequence[str] | None = None,
+    ) -> None:
+        dt = _check_core(core)
+        delays = tuple(real(d, "internal_delays", "delays >= 0") for d in internal_delays)
+        _check_delays(delays, core, dt)
+        if dt:
+            delays = tuple(int(d) for d in delays)
+        q = len(delays)
+        input_names = signal_names(inputs, core.input_labels[: core.ninputs - q], "u")
+        output_names = signal_names(outputs, core.output_labels[: core.noutputs - q], "y")
+        self._begin(
+            core.nstates,
+            core.nstates + (int(sum(delays)) if dt else 0),
+            dt,
+            inputs=input_names,
+            outputs=output_names,
+            name=None if name is None else system_name(name),
+        )
+        self._core = named(
+            core,
+            [*input_names, *(f"w[{i}]" for i in range(q))],
+            [*output_names, *(f"z[{i}]" for i in range(q))],
+            core.state_labels,
+            name=f"{self.name}_core",
+        )
+        self.internal_delays = delays
+        self._response: Response | None = None
+        self._locked = True
+
+    @property
+    def core(self) -> ct.StateSpace:
+        """The delay-free core, with the delays' inputs and outputs behind the others."""
+        return self._core
+
+    def _form(self) -> DelayForm:
+        core = self._core
+        return DelayForm(core.A, core.B, core.C, core.D, self.internal_delays)
+
+    def _make_matrices(self) -> Matrices:
+        full = absorbed(self._form(), list(range(len(self.internal_delays))))
+        return full.A, full.B, full.C, full.D
+
+    def _name_states(self) -> list[str]:
+        names = list(self._core.state_labels)
+        if self.dt:
+            for i, delay in enumerate(self.internal_delays):
+                names += [f"z[{i}][k-{k}]" for k in range(1, int(delay) + 1)]
+        return names
+
+    def _without_matrices(self) -> str:
+        return (
+            "sys(z), sys.step_response, sys.forced_response and sys.dominant_poles need no "
+            "matrices; "
+            "a longer sample time has fewer states"
+        )
+
+    def __getitem__(self, key: Any) -> Self:
+        """Choose channels, by number or name."""
+        chosen = _ends_of(self)[key]
+        rows = [self.output_index[name] for name in chosen.output_labels]
+        columns = [self.input_index[name] for name in chosen.input_labels]
+        q = len(self.internal_delays)
+        rows += range(self.noutputs, self.noutputs + q)
+        columns += range(self.ninputs, self.ninputs + q)
+        core = self._core
+        form = DelayForm(
+            core.A, core.B[:, columns], core.C[rows], core.D[np.ix_(rows, columns)],
+            self.internal_delays,
+        )  # fmt: skip
+        made: Self = self._joined(
+            form, self.dt, chosen.input_labels, chosen.output_labels, name=f"{self.name}$indexed"
+        )
+        return made
+
+    def minreal(self, tol: float = 0.0) -> Any:
+        """Return the system itself: its delays are as few as can be seen from its structure."""
+        return self._joined(self._form(), self.dt, self.input_labels, self.output_labels)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        core = self._core
+        names = {
+            "name": self.name,
+            "inputs": self.input_labels,
+            "outputs": self.output_labels,
+        }
+        matrices = core.A, core.B, core.C, core.D, core.dt
+        given = None if self._state_names is None else list(self._state_names)
+        parts = matrices, core.state_labels, self.internal_delays, names, given, self._repr_format
+        return _rebuild, (type(self), *parts)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> DelaySystem:
+        build, parts = self.__reduce__()
+        copy: DelaySystem = build(*parts)
+        return copy
+
+
+def _rebuild(
+    kind: type[DelaySystem],
+    matrices: tuple[Any, ...],
+    states: list[str],
+    delays: tuple[float, ...],
+    names: dict[str, Any],
+    given: Iterable[str] | None,
+    repr_format: str | None,
+) -> DelaySystem:
+    core = ct.StateSpace(*matrices, states=states, remove_useless_states=False)
+    made = kind(core, delays, **names)
+    if given is not None and len(labels := list(given)) == made.nstates:
+        made.set_states(labels)
+    made.repr_format = repr_format
+    return made
+
+
+def _ends_of(system: DelaySystem) -> ct.StateSpace:
+    """Make a gain with the names of a system, which python-control can index."""
+    ends: IntArray = np.zeros((system.noutputs, system.ninputs), dtype=np.int64)
+    names = {"inputs": system.input_labels, "outputs": system.output_labels}
+    return ct.StateSpace([], [], [], ends, system.dt, name=system.name, **names)
+
+
+def _check_core(core: Any) -> float:
+    if not isinstance(core, ct.StateSpace):
+        raise UnsuitableSystemError(
+            f"core is a {type(core).__name__}; expected a control.StateSpace (ct.ss converts)"
+        )
+    if isinstance(core, DelayOperators):
+        raise UnsuitableSystemError(
+            f"core is a {type(core).__name__}, which has delays of its own; expected a plain "
+            "control.StateSpace"
+        )
+    if core.dt is None or core.dt is True or not core.dt > 0:
+        raise UnsuitableSystemError(f"the core's dt is {core.dt!r}; expected a sample time in s")
+    check_entries(core)
+    return float(core.dt)
+
+
+def _check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float) -> None:
+    if len(delays) > min(core.ninputs, core.noutputs):
+        raise UnsuitableSystemError(
+            f"{len(delays)} delays need as many inputs and outputs of the core, which has "
+            f"{core.ninputs} inputs and {core.noutputs} outputs"
+        )
+    if any(delay < 0 for delay in delays):
+        raise DelayRangeError(f"internal_delays={delays}; expected delays >= 0")
+    if dt:
+        whole_samples(delays, dt)
+        if sum(delays) > MAX_DELAY:
+            raise DelayRangeError(
+                f"the delays are {delays} samples; at most {MAX_DELAY} are allowed. Use a longer "
+                "sample time"
+            )

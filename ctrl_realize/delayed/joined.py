@@ -1,0 +1,101 @@
+"""Connect systems with delays by the names of their signals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..errors import UnsuitableSystemError
+from ..numerics.internal_delays import form as forms
+from .inside.system import DelaySystem
+from .operators import common_dt, form_of, plain
+
+
+def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
+    """Connect systems by the names of their signals, with all delays kept.
+
+    `control.interconnect` makes matrices of all states of its systems, and cannot take a dead time
+    in continuous time. This one has the same arguments.
+
+    Parameters
+    ----------
+    systems : sequence of control.StateSpace or control.TransferFunction
+        With names, and labels of their signals; `control.summing_junction` among them.
+    *args, **settings
+        ``connections``, ``inplist``, ``outlist``, ``inputs``, ``outputs``, ``name`` and so on:
+        those of `control.interconnect`, which reads them.
+
+    Returns
+    -------
+    DelaySystem or DelayedStateSpace
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Systems that are not linear, mixed time bases, or an algebraic loop without a solution.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> P = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.3, dt=0.01, name="P",
+    ...                   inputs="u", outputs="y")
+    >>> C = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.5]], 0.01, name="C", inputs="e", outputs="u")
+    >>> loop = cr.interconnect(
+    ...     [P, C, ct.summing_junction(["r", "-y"], "e")], inputs="r", outputs=["y", "u"])
+    >>> loop
+    <DelaySystem: r -> y, u, order 2, internal delay 30 samples, dt = 0.01 s>
+    """
+    dt = _time_base(systems)
+    stand_ins = [_stand_in(system) for system in systems]
+    wired = ct.interconnect(stand_ins, *args, **settings)
+    all_ = form_of(systems[0])
+    for system in systems[1:]:
+        all_ = forms.append(all_, form_of(system))
+    gain, into = np.asarray(wired.connect_map), np.asarray(wired.input_map)
+    # what is seen of the outputs, and of the inputs u = gain y + into r
+    seen = np.asarray(wired.output_map)
+    of_outputs, of_inputs = seen[:, : all_.outputs], seen[:, all_.outputs :]
+    try:
+        loop = forms.closed(all_, gain)
+    except np.linalg.LinAlgError:
+        raise UnsuitableSystemError(
+            "the direct terms of the systems close an algebraic loop that has no solution, or "
+            "many: "
+            "put a delay or a lag into it"
+        ) from None
+    loop = forms.through(loop, of_outputs + of_inputs @ gain, into)
+    total = forms.parallel(loop, forms.static(of_inputs @ into))
+    # a system without delays knows how to make what a form needs
+    maker = DelaySystem(plain(forms.static(np.zeros((1, 1))), dt))
+    return maker._joined(
+        total, dt, list(wired.input_labels), list(wired.output_labels), name=wired.name
+    )
+
+
+def _time_base(systems: Sequence[Any]) -> float:
+    known = [system for system in systems if getattr(system, "dt", None) is not None]
+    if not known:
+        raise UnsuitableSystemError("none of the systems has a time base; give one a dt")
+    dt = float(known[0].dt)
+    for system in known[1:]:
+        dt = common_dt(known[0], system)
+    return dt
+
+
+def _stand_in(system: Any) -> ct.StateSpace:
+    """Make a system without dynamics that has the names of another one."""
+    form = form_of(system)
+    return ct.StateSpace(
+        form.A[:0, :0],
+        np.zeros((0, form.inputs)),
+        np.zeros((form.outputs, 0)),
+        np.zeros((form.outputs, form.inputs)),
+        system.dt,
+        name=system.name,
+        inputs=system.input_labels,
+        outputs=system.output_labels,
+    )

@@ -1,0 +1,1 @@
+"""Linear systems closed through dead times: algebra, responses, poles; discrete and continuous."""

@@ -1,0 +1,240 @@
+r"""A linear system closed through delays, and what interconnections make of it.
+
+A delay-free core with q further inputs w and outputs z, closed by pure delays::
+
+    x'   = A x + B1 u + B2 w          (x[k+1] in discrete time)
+    y    = C1 x + D11 u + D12 w
+    z    = C2 x + D21 u + D22 w
+    w_i(t) = z_i(t - tau_i)
+
+This is the linear fractional form of [1]_, called internal delays there; every interconnection of
+such systems is one again. All of them are made of four steps: systems side by side (`append`),
+gains at the ends (`through`), a static gain from outputs to inputs (`closed`), and the inverse.
+
+References
+----------
+.. [1] P. Gahinet and L. F. Shampine, Software for modeling and analysis of linear systems with
+   delays, Proc. American Control Conf. 2004, 5600-5605, section 2, doi:10.23919/ACC.2004.1384746.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from ..arrays import FloatArray
+
+SINGULAR = 1e-13
+"""Reciprocal condition below which a loop without delay counts as one that has no solution."""
+
+
+@dataclass(frozen=True, eq=False)
+class DelayForm:
+    """Core and delays.
+
+    ``B = [B1 B2]``, ``C = [C1; C2]``, ``D = [[D11 D12], [D21 D22]]``; the last ``len(delays)``
+    inputs and outputs are closed through `delays`, in samples or in s.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    delays: tuple[float, ...] = ()
+
+    @property
+    def states(self) -> int:
+        """States of the core."""
+        return int(self.A.shape[0])
+
+    @property
+    def inputs(self) -> int:
+        """Inputs, the delays' not counted."""
+        return int(self.B.shape[1]) - len(self.delays)
+
+    @property
+    def outputs(self) -> int:
+        """Outputs, the delays' not counted."""
+        return int(self.C.shape[0]) - len(self.delays)
+
+    def channels(self, keep: list[int]) -> DelayForm:
+        """Keep some of the delays, in this order, with their inputs and outputs."""
+        columns = [*range(self.inputs), *(self.inputs + i for i in keep)]
+        rows = [*range(self.outputs), *(self.outputs + i for i in keep)]
+        return DelayForm(
+            self.A,
+            self.B[:, columns],
+            self.C[rows],
+            self.D[np.ix_(rows, columns)],
+            tuple(self.delays[i] for i in keep),
+        )
+
+
+def static(D: FloatArray) -> DelayForm:
+    """Make the form of a gain."""
+    p, m = D.shape
+    return DelayForm(np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), D)
+
+
+def delayed_ends(
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    D: FloatArray,
+    before: tuple[float, ...],
+    behind: tuple[float, ...],
+) -> DelayForm:
+    """Make the form of a system with delays at its inputs and outputs, none where they are 0."""
+    core = DelayForm(A, B, C, D)
+    ends = through(_lines(behind), np.eye(len(behind)), np.eye(len(behind)))
+    return series(ends, series(core, _lines(before)))
+
+
+def _lines(delays: tuple[float, ...]) -> DelayForm:
+    """Parallel pure delays, one for each signal."""
+    count = len(delays)
+    late = [i for i, delay in enumerate(delays) if delay > 0]
+    D = np.zeros((count + len(late), count + len(late)))
+    for j, i in enumerate(late):
+        D[i, count + j] = D[count + j, i] = 1.0
+    for i, delay in enumerate(delays):
+        if delay == 0:
+            D[i, i] = 1.0
+    gain = static(D)
+    return DelayForm(gain.A, gain.B, gain.C, gain.D, tuple(delays[i] for i in late))
+
+
+def append(first: DelayForm, second: DelayForm) -> DelayForm:
+    """Put two systems side by side."""
+    m, p = first.inputs, first.outputs
+    m2, p2 = second.inputs, second.outputs
+    q, q2 = len(first.delays), len(second.delays)
+    B, C, D = (block_diag(getattr(first, k), getattr(second, k)) for k in "BCD")
+    # u of both, then w of both
+    columns = [*range(m), *range(m + q, m + q + m2), *range(m, m + q)]
+    columns += range(m + q + m2, m + q + m2 + q2)
+    rows = [*range(p), *range(p + q, p + q + p2), *range(p, p + q)]
+    rows += range(p + q + p2, p + q + p2 + q2)
+    return DelayForm(
+        block_diag(first.A, second.A),
+        B[:, columns],
+        C[rows],
+        D[np.ix_(rows, columns)],
+        first.delays + second.delays,
+    )
+
+
+def through(form: DelayForm, left: FloatArray, right: FloatArray) -> DelayForm:
+    """Put gains at the ends: left * system * right."""
+    q = len(form.delays)
+    L, R = block_diag(left, np.eye(q)), block_diag(right, np.eye(q))
+    return DelayForm(form.A, form.B @ R, L @ form.C, L @ form.D @ R, form.delays)
+
+
+def closed(form: DelayForm, gain: FloatArray) -> DelayForm:
+    """Close a static gain around a system: u = v + gain y, from v to y.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        I - D11 gain is singular: the loop without delays has no solution, or many.
+    """
+    m, p, q = form.inputs, form.outputs, len(form.delays)
+    D1 = form.D[:p]
+    loop = np.eye(p) - D1[:, :m] @ gain
+    _check_regular(loop)
+    seen = np.linalg.solve(loop, np.hstack([form.C[:p], D1]))
+    back = gain @ seen
+    n = form.states
+    # u = v + back [x; v; w]
+    into = form.B[:, :m]
+    add = form.D[:, :m]
+    B, C, D = form.B + into @ back[:, n:], form.C + add @ back[:, :n], form.D + add @ back[:, n:]
+    C[:p], D[:p] = seen[:, :n], seen[:, n:]
+    return DelayForm(form.A + into @ back[:, :n], B, C, D, (*form.delays,) if q else ())
+
+
+def series(second: DelayForm, first: DelayForm) -> DelayForm:
+    """Make the product second * first: `first` acts first."""
+    both = append(first, second)
+    gain = np.zeros((both.inputs, both.outputs))
+    gain[first.inputs :, : first.outputs] = np.eye(second.inputs)
+    left = np.hstack([np.zeros((second.outputs, first.outputs)), np.eye(second.outputs)])
+    right = np.vstack([np.eye(first.inputs), np.zeros((second.inputs, first.inputs))])
+    return through(closed(both, gain), left, right)
+
+
+def parallel(first: DelayForm, second: DelayForm) -> DelayForm:
+    """Make the sum of two systems."""
+    p, m = first.outputs, first.inputs
+    left, right = np.hstack([np.eye(p)] * 2), np.vstack([np.eye(m)] * 2)
+    return through(append(first, second), left, right)
+
+
+def feedback(forward: DelayForm, back: DelayForm, sign: float) -> DelayForm:
+    """Close `back` around `forward`: u = r + sign * back(y).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The loop without delays has no solution, or many.
+    """
+    both = append(forward, back)
+    gain = np.zeros((both.inputs, both.outputs))
+    gain[: forward.inputs, forward.outputs :] = sign * np.eye(forward.inputs)
+    gain[forward.inputs :, : forward.outputs] = np.eye(forward.outputs)
+    left = np.hstack([np.eye(forward.outputs), np.zeros((forward.outputs, back.outputs))])
+    right = np.vstack([np.eye(forward.inputs), np.zeros((back.inputs, forward.inputs))])
+    return through(closed(both, gain), left, right)
+
+
+def inverse(form: DelayForm) -> DelayForm:
+    """Exchange inputs and outputs.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The direct term that no delay holds back is not invertible: the inverse is not proper.
+    """
+    m, p = form.inputs, form.outputs
+    if m != p:
+        raise np.linalg.LinAlgError
+    direct = form.D[:p, :m]
+    _check_regular(direct)
+    n = form.states
+    # u = direct^-1 (y - C1 x - D12 w)
+    found = np.linalg.solve(direct, np.hstack([-form.C[:p], np.eye(p), -form.D[:p, m:]]))
+    into, add = form.B[:, :m], form.D[p:, :m]
+    A = form.A + into @ found[:, :n]
+    B = np.hstack([into @ found[:, n : n + p], form.B[:, m:] + into @ found[:, n + p :]])
+    C = np.vstack([found[:, :n], form.C[p:] + add @ found[:, :n]])
+    lower = np.hstack([add @ found[:, n : n + p], form.D[p:, m:] + add @ found[:, n + p :]])
+    return DelayForm(A, B, C, np.vstack([found[:, n:], lower]), form.delays)
+
+
+def without_zero_delays(form: DelayForm) -> DelayForm:
+    """Close the channels whose delay is 0.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Their loop has no solution, or many.
+    """
+    at = [i for i, delay in enumerate(form.delays) if delay == 0]
+    if not at:
+        return form
+    rest = [i for i, delay in enumerate(form.delays) if delay > 0]
+    ordered = form.channels([*at, *rest])
+    opened = DelayForm(ordered.A, ordered.B, ordered.C, ordered.D, ordered.delays[len(at) :])
+    m, p = form.inputs, form.outputs
+    gain = np.zeros((opened.inputs, opened.outputs))
+    gain[m:, p:] = np.eye(len(at))
+    left, right = np.eye(p, opened.outputs), np.eye(opened.inputs, m)
+    return through(closed(opened, gain), left, right)
+
+
+def _check_regular(matrix: FloatArray) -> None:
+    if matrix.size and not 1 / np.linalg.cond(matrix) > SINGULAR:
+        raise np.linalg.LinAlgError

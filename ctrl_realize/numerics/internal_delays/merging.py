@@ -1,0 +1,173 @@
+"""Fewer delay channels: delays that meet merge, and those at an end move out of the core.
+
+All rules compare entries as they stand, and so find what the structure of an interconnection leaves
+alike: the same signal twice, a chain of two delays, a channel that nothing reads. They are our own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray
+from .form import DelayForm, without_zero_delays
+
+ALIKE = 4 * np.finfo(np.float64).eps
+"""Relative rounding within which two rows are multiples of one another."""
+
+
+def merged(form: DelayForm) -> DelayForm:
+    """Return the same system with the fewest channels that these rules reach.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A loop through delays of 0 has no solution, or many.
+    """
+    form = without_zero_delays(form)
+    while form.delays:
+        smaller = _without_dead(form) or _without_twins(form) or _with_one_chain(form)
+        if smaller is None:
+            break
+        form = smaller
+    return form
+
+
+def _into(form: DelayForm) -> FloatArray:
+    """What each channel's w drives: columns of [B; D]."""
+    return np.vstack([form.B, form.D])[:, form.inputs :]
+
+
+def _out_of(form: DelayForm) -> FloatArray:
+    """What each channel's z reads: rows of [C D]."""
+    return np.hstack([form.C, form.D])[form.outputs :]
+
+
+def _without_dead(form: DelayForm) -> DelayForm | None:
+    """Drop channels that nothing drives or that drive nothing."""
+    alive = np.any(_into(form) != 0, axis=0) & np.any(_out_of(form) != 0, axis=1)
+    return None if alive.all() else form.channels(np.flatnonzero(alive).tolist())
+
+
+def _without_twins(form: DelayForm) -> DelayForm | None:
+    """Merge two channels of one delay that read, or drive, the same up to a factor."""
+    reads, drives = _out_of(form), _into(form).T
+    p, m = form.outputs, form.inputs
+    for i, delay in enumerate(form.delays):
+        for j in range(i):
+            if form.delays[j] != delay:
+                continue
+            rest = [k for k in range(len(form.delays)) if k != i]
+            factor = _factor(reads[j], reads[i])
+            if factor is not None:
+                # w_i = factor w_j
+                B, D = form.B.copy(), form.D.copy()
+                B[:, m + j] += factor * B[:, m + i]
+                D[:, m + j] += factor * D[:, m + i]
+                return DelayForm(form.A, B, form.C, D, form.delays).channels(rest)
+            factor = _factor(drives[j], drives[i])
+            if factor is not None:
+                # what w_i drives is driven by factor w_j too
+                C, D = form.C.copy(), form.D.copy()
+                C[p + j] += factor * C[p + i]
+                D[p + j] += factor * D[p + i]
+                return DelayForm(form.A, form.B, C, D, form.delays).channels(rest)
+    return None
+
+
+def _factor(one: FloatArray, other: FloatArray) -> float | None:
+    """Find c with other = c * one, None where there is none."""
+    if not np.array_equal(one != 0, other != 0):
+        return None
+    at = int(np.argmax(np.abs(one)))
+    factor = float(other[at] / one[at])
+    close = np.abs(other - factor * one) <= ALIKE * np.abs(other)
+    return factor if close.all() else None
+
+
+def _with_one_chain(form: DelayForm) -> DelayForm | None:
+    """Merge a delay that reads nothing but another one, which nothing else reads."""
+    m, p, n = form.inputs, form.outputs, form.states
+    reads, drives = _out_of(form), _into(form)
+    for i in range(len(form.delays)):
+        (at,) = np.nonzero(reads[i])
+        if at.size != 1 or at[0] < n + m or at[0] == n + m + i:
+            continue
+        j = int(at[0]) - n - m
+        (driven,) = np.nonzero(drives[:, j])
+        if not np.array_equal(driven, [n + p + i]):
+            continue
+        factor = reads[i, at[0]]
+        C, D = form.C.copy(), form.D.copy()
+        C[p + i], D[p + i] = factor * form.C[p + j], factor * form.D[p + j]
+        delays = list(form.delays)
+        delays[i] += delays[j]
+        rest = [k for k in range(len(delays)) if k != j]
+        return DelayForm(form.A, form.B, C, D, tuple(delays)).channels(rest)
+    return None
+
+
+def ends_apart(
+    form: DelayForm,
+) -> tuple[tuple[float, ...], tuple[float, ...], DelayForm]:
+    """Take delays at the inputs and outputs out of a form.
+
+    Returns
+    -------
+    before, behind : tuple of float
+        Delays of the inputs and of the outputs.
+    rest : DelayForm
+        What is left; without channels if all delays stood at the ends.
+    """
+    before, behind = [0.0] * form.inputs, [0.0] * form.outputs
+    keep = list(range(len(form.delays)))
+    B, C, D = form.B.copy(), form.C.copy(), form.D.copy()
+    n, m, p = form.states, form.inputs, form.outputs
+    reads, drives = _out_of(form), _into(form)
+    for i, delay in enumerate(form.delays):
+        (at,) = np.nonzero(reads[i])
+        if at.size == 1 and n <= at[0] < n + m:
+            j = int(at[0]) - n
+            # nothing but this channel may read the input, and not its own output either
+            others = np.count_nonzero(B[:, j]) + np.count_nonzero(D[:, j])
+            if others == 1:
+                before[j] += delay
+                factor = D[p + i, j]
+                D[p + i, j] = 0.0
+                B[:, j], D[:, j] = factor * B[:, m + i], factor * D[:, m + i]
+                B[:, m + i], D[:, m + i] = 0.0, 0.0
+                keep.remove(i)
+                continue
+        (driven,) = np.nonzero(drives[:, i])
+        if driven.size == 1 and n <= driven[0] < n + p:
+            k = int(driven[0]) - n
+            if np.count_nonzero(C[k]) + np.count_nonzero(D[k]) == 1:
+                behind[k] += delay
+                factor = D[k, m + i]
+                D[k, m + i] = 0.0
+                C[k], D[k] = factor * C[p + i], factor * D[p + i]
+                C[p + i], D[p + i] = 0.0, 0.0
+                keep.remove(i)
+    rest = DelayForm(form.A, B, C, D, form.delays).channels(keep)
+    if len(rest.delays) == rest.inputs == rest.outputs == 1 and _passes_once(rest):
+        before[0] += rest.delays[0]
+        rest = without_zero_delays(DelayForm(rest.A, rest.B, rest.C, rest.D, (0.0,)))
+    return tuple(before), tuple(behind), rest
+
+
+def _passes_once(form: DelayForm) -> bool:
+    """Whether all of a single input goes through the single delay, and never twice."""
+    return not (_reaches(form, 0, 0) or _reaches(form, 1, 1))
+
+
+def _reaches(form: DelayForm, column: int, row: int) -> bool:
+    """Whether an input of the core can be seen at an output, by the structure of its entries."""
+    if form.D[row, column] != 0:
+        return True
+    links = form.A != 0
+    reached = form.B[:, column] != 0
+    for _ in range(form.states):
+        further = reached | (links @ reached)
+        if np.array_equal(further, reached):
+            break
+        reached = further
+    return bool(np.any(form.C[row, reached] != 0))

@@ -1,0 +1,93 @@
+"""Discrete systems closed through delays, stepped in time.
+
+What comes out of a delay of d samples is known d samples ahead, so a block as long as the shortest
+delay is computed at once. Short delays become states of the core, the others stay lines of past
+samples: cost and memory do not grow with the square of the delays. The blocks are our own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..state_space.responses import BLOCK, block_operators, simulate
+from .form import DelayForm
+
+SHORT = 16
+"""Samples below which a delay is as fast as states of the core."""
+
+
+def absorbed(form: DelayForm, at: list[int]) -> DelayForm:
+    """Turn some delays into shift registers; states [core; w_i[k+1-d] ...], newest sample first."""
+    n, m, p = form.states, form.inputs, form.outputs
+    rest = [i for i in range(len(form.delays)) if i not in at]
+    split = form.channels([*rest, *at])
+    B, C, D = split.B, split.C, split.D
+    outside_in, outside_out = m + len(rest), p + len(rest)
+    lengths = np.array([int(form.delays[i]) for i in at], dtype=np.int64)
+    ends = np.cumsum(lengths)
+    first, last = ends - lengths, ends - 1
+    count = int(lengths.sum())
+    reads, writes = np.zeros((len(at), count)), np.zeros((count, len(at)))
+    reads[np.arange(len(at)), last] = 1.0
+    writes[first, np.arange(len(at))] = 1.0
+    shift = np.eye(count, k=-1)
+    shift[first] = 0.0
+    B2, D12 = B[:, outside_in:], D[:outside_out, outside_in:]
+    C2, D21, D22 = C[outside_out:], D[outside_out:, :outside_in], D[outside_out:, outside_in:]
+    A = np.block([[form.A, B2 @ reads], [writes @ C2, shift + writes @ D22 @ reads]])
+    return DelayForm(
+        A.reshape(n + count, n + count),
+        np.vstack([B[:, :outside_in], writes @ D21]),
+        np.hstack([C[:outside_out], D12 @ reads]),
+        D[:outside_out, :outside_in].copy(),
+        tuple(form.delays[i] for i in rest),
+    )
+
+
+def recurrence(form: DelayForm, inputs: FloatArray) -> FloatArray:
+    """Compute the response of a discrete system from rest.
+
+    Parameters
+    ----------
+    form : DelayForm
+        Delays in samples, at least 1 each.
+    inputs : ndarray, shape (m, N)
+
+    Returns
+    -------
+    ndarray, shape (p, N)
+    """
+    N = inputs.shape[1]
+    # Longer than the record they hold nothing back that could come out.
+    form = form.channels([i for i, delay in enumerate(form.delays) if delay < N])
+    form = absorbed(form, [i for i, delay in enumerate(form.delays) if delay < SHORT])
+    m, p = form.inputs, form.outputs
+    if not form.delays:
+        return simulate(form.A, form.B, form.C, form.D, inputs)
+    delays = np.array(form.delays, dtype=np.int64)
+    # a power of two, as the block operators need, and no longer than the shortest delay
+    L = min(BLOCK, 1 << (int(delays.min()).bit_length() - 1))
+    rows, jump, inside, into = block_operators(form.A, form.B, form.C, form.D, L)
+    blocks = -(-N // L)
+    given = np.zeros((blocks * L, m))
+    given[:N] = inputs.T
+    out = np.empty((blocks * L, p))
+    longest = int(delays.max())
+    past = np.zeros((longest + blocks * L, delays.size))  # z, from `longest` samples before 0
+    lines = np.arange(delays.size)
+    offsets = np.arange(L)[:, None] + longest - delays
+    # outputs and next state of a block from its state and its inputs, in one product
+    step = np.block([[rows, inside], [jump, into]])
+    n, width = form.states, m + delays.size
+    known = np.zeros(n + L * width)
+    drive = known[n:].reshape(L, width)
+    for start in range(0, blocks * L, L):
+        drive[:, :m] = given[start : start + L]
+        drive[:, m:] = past[start + offsets, lines]
+        found = step @ known
+        seen = found[: L * (p + delays.size)].reshape(L, -1)
+        out[start : start + L] = seen[:, :p]
+        past[start + longest : start + longest + L] = seen[:, p:]
+        known[:n] = found[seen.size :]
+    return np.ascontiguousarray(out[:N].T)

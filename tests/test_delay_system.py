@@ -1,0 +1,330 @@
+"""Laws of systems with delays inside, against augmented matrices and closed forms."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import tracemalloc
+import warnings
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DelayRangeError, OptionError, UnsuitableSystemError
+
+DT = 0.1
+Z = np.exp(1j * np.geomspace(0.05, 0.97 * np.pi / DT, 25) * DT)
+T = DT * np.arange(150)
+LAG = ct.tf([1], [0.8, 1])
+PI = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.4]], DT)
+
+
+def drawn(seed: int, outputs: int, inputs: int, *, direct: bool = True) -> cr.DelayedStateSpace:
+    """A stable system with other delays, 0 to 40, at each input and output."""
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((3, 3))
+    A *= 0.9 / np.abs(np.linalg.eigvals(A)).max()
+    D = 0.2 * rng.standard_normal((outputs, inputs)) * direct
+    core = ct.ss(
+        A, 0.3 * rng.standard_normal((3, inputs)), rng.standard_normal((outputs, 3)), D, DT
+    )
+    before, behind = rng.integers(0, 41, inputs), rng.integers(0, 2, outputs)
+    return cr.delayed_ss(core, before.tolist(), output_delay=behind.tolist())
+
+
+def plain(system: ct.StateSpace, dt: float = DT) -> ct.StateSpace:
+    """The same with the matrices of all registers, in python-control's hands."""
+    return ct.StateSpace(
+        *(np.array(M) for M in (system.A, system.B, system.C, system.D)),
+        dt,
+        remove_useless_states=False,
+    )
+
+
+ALGEBRA = {
+    "series": lambda a, b, f: ct.series(a, b),
+    "parallel": lambda a, b, f: ct.parallel(a, b),
+    "difference": lambda a, b, f: a - b,
+    "feedback": lambda a, b, f: ct.feedback(a, b),
+    "positive feedback": lambda a, b, f: a.feedback(0.3 * b, 1),
+    "feedback of feedback": lambda a, b, f: ct.feedback(ct.feedback(a, b), 0.5 * a),
+    "loop times system": lambda a, b, f: ct.feedback(a, b) * b + a,
+    "append": lambda a, b, f: ct.append(a, ct.feedback(b, a)),
+    "inverse": lambda a, b, f: (2 * f + ct.feedback(a, b)) ** -1,
+    "matrix around": lambda a, b, f: np.diag([2.0, -1.0]) * ct.feedback(a, b) * np.ones((2, 2)),
+    "one channel": lambda a, b, f: ct.feedback(a, b)[0, 1],
+    "quotient": lambda a, b, f: (a + b) * (3 * f + a) ** -1,
+    "linear fractional": lambda a, b, f: ct.append(a, b).lft(0.2 * a),
+}
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("operation", ALGEBRA)
+def test_interconnections_equal_those_of_the_augmented_matrices(operation, seed):
+    a, b = drawn(seed, 2, 2), drawn(seed + 10, 2, 2)
+    unit = ct.ss([], [], [], np.eye(2), DT)
+    ours = ALGEBRA[operation](a, b, cr.DelayedStateSpace(unit))
+    theirs = ALGEBRA[operation](plain(a), plain(b), unit)
+    assert isinstance(ours, cr.DelaySystem)
+    assert_allclose(ours(Z), theirs(Z), rtol=1e-9, atol=1e-11)
+    # the matrices that python-control asks for are those of the same system
+    assert ours.nstates <= theirs.nstates
+    assert_allclose(plain(ours)(Z), theirs(Z), rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_time_responses_equal_those_of_the_augmented_matrices(seed):
+    loop = ct.feedback(drawn(seed, 2, 2), 0.3 * drawn(seed + 10, 2, 2))
+    host = plain(loop)
+    u = np.random.default_rng(seed).standard_normal((2, T.size))
+    limit = {"rtol": 0, "atol": 1e-11}
+    forced = ct.forced_response(host, T, u)
+    assert_allclose(loop.simulate(u), forced.outputs, **limit)
+    assert_allclose(loop.forced_response(T, u).outputs, forced.outputs, **limit)
+    assert_array_equal(loop.forced_response(T, u).inputs, forced.inputs)
+    for name in ("step_response", "impulse_response"):
+        ours, theirs = getattr(loop, name)(T), getattr(ct, name)(host, T)
+        assert_allclose(ours.outputs, theirs.outputs, **limit)
+        assert (ours.ntraces, ours.trace_types) == (theirs.ntraces, theirs.trace_types)
+    assert_allclose(loop.step(T.size), ct.step_response(host, T).outputs, **limit)
+    assert_allclose(DT * loop.impulse_response(T).outputs, loop.markov(T.size), **limit)
+    # what asks for states is left to python-control
+    assert loop.step_response(T, return_states=True).states.shape[0] == loop.nstates
+
+
+@pytest.mark.parametrize("delays", [(0, 3), (1, 40), (17, 200)])
+def test_poles_are_those_of_the_augmented_matrix(delays):
+    a, b = (cr.delayed_ss(LAG, d, dt=DT) for d in delays)
+    loop = ct.feedback(3 * a * PI, b)
+    ours, dense = loop.poles(), np.linalg.eigvals(loop.A)
+    assert ours.size == loop.nstates == dense.size
+    # LAPACK's are right to 1e-10 at the most sensitive pole of 218
+    assert max(np.abs(ours - pole).min() for pole in dense) < 1e-8
+    slowest = loop.dominant_poles(4)
+    assert_allclose(np.abs(slowest), np.sort(np.abs(dense))[::-1][: slowest.size], rtol=1e-9)
+    assert loop.is_stable() == (np.abs(dense).max() < 1)
+
+
+def test_dominant_poles_of_a_long_loop_are_roots_of_its_equation():
+    d, a, k = 5000, 0.99, 0.015
+    loop = ct.feedback(cr.delayed_ss(ct.ss(a, 1, k, 0, DT), d))
+    poles = loop.dominant_poles(6)
+    # (z - a) z^d + k = 0; the derivative is (d + 1) z^d - d a z^(d-1)
+    error = ((poles - a) * poles**d + k) / ((d + 1) * poles**d - d * a * poles ** (d - 1))
+    assert poles.size >= 6
+    assert np.abs(error).max() < 1e-12
+    assert_allclose(loop.dominant_poles(1)[0], poles[0], rtol=1e-12)
+    # k > 1 - a: the loop turns by pi before its gain is below 1
+    assert not loop.is_stable()
+    assert ct.feedback(cr.delayed_ss(ct.ss(a, 1, 0.009, 0, DT), d)).is_stable()
+
+
+def test_zeros_of_a_loop_are_those_of_its_parts():
+    plant = cr.delayed_ss(ct.ss(ct.zpk([0.3], [0.8, 0.9], 0.05, dt=DT)), 25)
+    loop = ct.feedback(plant, cr.delayed_ss(PI, 3))
+    # of the forward path, and the poles of what feeds back, its delay included
+    expected = [0.3, 1.0, 0.0, 0.0, 0.0]
+    assert_allclose(np.sort(loop.zeros().real), np.sort(expected), atol=1e-6)
+    sensitivity = 1 / (1 + plant)
+    assert np.count_nonzero(sensitivity.zeros() == 0) == 25
+    assert_allclose(np.sort(sensitivity.zeros().real)[-2:], [0.8, 0.9], rtol=1e-9)
+
+
+def test_the_inverse_of_the_inverse_is_the_system():
+    S = 1 + cr.delayed_ss(LAG, 17, dt=DT)
+    back = (S**-1) ** -1
+    assert back.internal_delays == S.internal_delays
+    assert_allclose(back(Z), S(Z), rtol=1e-12)
+    assert_allclose((S / S)(Z), 1, rtol=1e-12)
+
+
+MERGING = {
+    "sum of equal delays": (lambda P, Q: P + Q * 3, (), 17),
+    "difference from itself": (lambda P, Q: P - P, (), 17),
+    "series": (lambda P, Q: P * Q, (), 34),
+    "delays that add up in a loop": (lambda P, Q: ct.feedback(P * Q), (34,), None),
+    "delay in both paths": (lambda P, Q: ct.feedback(P, Q), (17, 17), None),
+    "complementary sensitivity": (lambda P, Q: ct.feedback(P), (17,), None),
+    "one plant, used twice": (lambda P, Q: ct.feedback(np.array([[1.0], [1]]) * P, np.ones((1, 2))),
+                              (17,), None),
+    "nothing goes through": (lambda P, Q: 1 + 0 * P, (), 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MERGING)
+def test_delays_that_meet_merge(case):
+    make, inside, ends = MERGING[case]
+    P = cr.delayed_ss(LAG, 17, dt=DT)
+    made = make(P, cr.delayed_ss(ct.tf([2], [0.3, 1]), 17, dt=DT))
+    if inside:
+        assert isinstance(made, cr.DelaySystem)
+        assert made.internal_delays == inside
+    else:
+        assert isinstance(made, cr.DelayedStateSpace)
+        assert made.delay == ends
+
+
+def test_names_go_through_interconnections():
+    P = cr.delayed_ss(LAG, 30, dt=DT, name="P", inputs="u", outputs="y")
+    C = ct.ss(PI, name="C", inputs="e", outputs="u")
+    error = ct.summing_junction(["r", "-y"], "e")
+    ours = cr.interconnect([P, C, error], inputs="r", outputs=["y", "u"], name="loop")
+    theirs = ct.interconnect([P, C, error], inputs="r", outputs=["y", "u"], name="loop")
+    assert isinstance(ours, cr.DelaySystem)
+    assert ours.internal_delays == (30,)
+    assert (ours.name, ours.input_labels, ours.output_labels) == ("loop", ["r"], ["y", "u"])
+    assert_allclose(ours(Z), theirs(Z), rtol=1e-9)
+    assert_allclose(ours["u", "r"](Z), theirs(Z)[1, 0], rtol=1e-9)
+    loop = ct.feedback(P, C)
+    assert (loop.input_labels, loop.output_labels) == (["u"], ["y"])
+    assert ct.append(P, ct.feedback(C * P)).input_labels == ["u[0]", "u[1]"]
+
+
+def test_connect_of_python_control_keeps_the_delays():
+    P, K = cr.delayed_ss(LAG, 30, dt=DT), ct.ss(PI)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # python-control's word on connect
+        loop = ct.connect(ct.append(P, K), [[1, 2], [2, -1]], [2], [1])
+    assert isinstance(loop, cr.DelaySystem)
+    assert_allclose(loop(Z), ct.feedback(P * K, 1)(Z), rtol=1e-10)
+
+
+COPIES = {
+    "copy": lambda s: s.copy(),
+    "copy.copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda s: pickle.loads(pickle.dumps(s)),
+    "text": lambda s: eval(
+        s._repr_eval_(),
+        {"array": np.array, "StateSpace": ct.StateSpace, "DelaySystem": cr.DelaySystem},
+    ),
+}
+
+
+@pytest.mark.parametrize("way", COPIES)
+def test_copies_are_the_same_system(way):
+    loop = cr.interconnect(
+        [cr.delayed_ss(LAG, 30, dt=DT, name="P", inputs="u", outputs="y"),
+         ct.summing_junction(["r", "-y"], "u")], inputs="r", outputs="y", name="loop",
+    )  # fmt: skip
+    again = COPIES[way](loop)
+    assert type(again) is cr.DelaySystem
+    assert_array_equal(again(Z), loop(Z))
+    assert (again.input_labels, again.output_labels) == (["r"], ["y"])
+    assert again.state_labels == loop.state_labels
+    assert "internal delay 30 samples" in repr(again)
+
+
+@pytest.mark.parametrize("d", [5, 37, 300, 1000])
+def test_margins_of_python_control_are_right_at_any_delay(d):
+    L = cr.delayed_ss(LAG, d, dt=DT / d) * 2
+    right = cr.design.margins(L)
+    ours = ct.margin(L)
+    # interpolated by cubic splines through points a tenth of a radian apart
+    assert ours[0] == pytest.approx(right.gain_margin, rel=1e-5)
+    assert ours[1] == pytest.approx(right.phase_margin, rel=1e-5)
+    assert ct.stability_margins(L)[2] == pytest.approx(right.modulus_margin, rel=1e-5)
+
+
+def test_margins_of_a_loop_with_an_inner_loop_are_right():
+    inner = ct.feedback(cr.delayed_ss(LAG, 60, dt=0.01) * 2, 0.1)
+    gain, phase, _, crossover = ct.margin(inner)
+    at = inner(np.exp(1j * crossover * 0.01))
+    # interpolated as above
+    assert abs(at) == pytest.approx(1, rel=1e-5)
+    assert np.degrees(np.angle(-at)) == pytest.approx(phase, rel=1e-5)
+    assert ct.margin(gain * inner)[0] == pytest.approx(1, rel=1e-4)
+    exact = cr.design.margins(inner)
+    assert (exact.gain_margin, exact.phase_margin) == pytest.approx((gain, phase), rel=1e-5)
+    assert exact.stable
+    assert not cr.design.margins(inner, 1.01 * gain).stable
+    assert cr.design.margins(inner, 0.99 * gain).stable
+    # of plain matrices: 62 states
+    augmented = cr.design.margins(plain(inner, 0.01))
+    assert exact.delay_margin == pytest.approx(augmented.delay_margin, rel=1e-9)
+
+
+@pytest.mark.parametrize("d", [37, 300])
+@pytest.mark.parametrize("gain", [0.5, 8.0])
+def test_encirclements_count_the_unstable_poles(d, gain):
+    L = cr.delayed_ss(LAG, d, dt=3 / d) * gain
+    loop = ct.feedback(L)
+    unstable = int(np.sum(np.abs(loop.poles()) > 1))
+    assert ct.nyquist_response(L).count == unstable
+    assert loop.is_stable() == (unstable == 0) == (gain < 1)
+
+
+def test_a_loop_with_an_integrator_has_its_static_gain():
+    L = cr.delayed_ss(ct.tf([1], [1, 0]), 30, dt=0.01) * 0.5
+    assert ct.feedback(L).dcgain() == pytest.approx(1, abs=1e-12)
+    assert ((1 + L) ** -1).dcgain() == pytest.approx(0, abs=1e-12)
+    # 1e-6 of the loop's gain is left of the sensitivity; the parts of its response cancel to that
+    omega = np.array([1e-6])
+    z = np.exp(1j * omega * 0.01)
+    s = (1 + L) ** -1
+    assert_allclose(s(z), 1 / (1 + L(z)), rtol=1e-9)
+
+
+def test_memory_grows_with_the_delay_and_not_with_its_square():
+    plant = cr.delayed_ss(LAG, 10_000, dt=1e-4)
+    ct.feedback(plant).step(5)  # imports and caches are not the system's
+    tracemalloc.start()
+    loop = ct.feedback(0.5 * plant)
+    loop(Z)
+    loop.step(20_000)
+    loop.dominant_poles(3)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3e7  # the matrix alone has 8e8
+
+
+BAD = {
+    "algebraic loop": (lambda: ct.feedback(cr.delayed_ss(PI, 0), -2.5), "algebraic loop"),
+    "algebraic loop by names": (
+        lambda: cr.interconnect(
+            [cr.delayed_ss(PI, 0, name="P", inputs="u", outputs="y"),
+             ct.ss([], [], [], 2.5, DT, name="K", inputs="y", outputs="u")],
+            inplist="P.u", outlist="P.y",
+        ),
+        "algebraic loop",
+    ),
+    "other sample time": (
+        lambda: ct.feedback(cr.delayed_ss(PI, 3), ct.ss(PI.A, PI.B, PI.C, PI.D, 0.2)),
+        "different time bases: dt = 0.1 s and dt = 0.2 s",
+    ),
+    "continuous": (lambda: cr.delayed_ss(PI, 3) + LAG, "time bases.*continuous.*to_discrete"),
+    "no inverse": (lambda: 1 / cr.delayed_ss(LAG, 3, dt=DT), "not proper"),
+    "shapes": (lambda: drawn(0, 2, 2) * drawn(0, 3, 2), r"\(2, 2\) and \(3, 2\)"),
+    "improper": (lambda: cr.delayed_ss(PI, 3) + ct.tf([1, 0], [1], DT), "more zeros than poles"),
+    "not finite": (lambda: cr.delayed_ss(PI, 3) + np.nan, "non-finite"),
+    "no system": (lambda: cr.interconnect([PI, "plant"]), "str"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_connected_is_told(case):
+    make, message = BAD[case]
+    with pytest.raises((UnsuitableSystemError, OptionError), match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("core", "delays", "error", "match"),
+    [
+        (PI, [3], None, None),
+        (PI, [-1], DelayRangeError, ">= 0"),
+        (PI, [2.5], DelayRangeError, "2.5 samples.*whole"),
+        (PI, [1, 2], UnsuitableSystemError, "2 delays"),
+        (PI, [1e9], DelayRangeError, "at most"),
+        (ct.tf(PI), [1], UnsuitableSystemError, "ct.ss converts"),
+    ],
+)
+def test_cores_and_delays_are_checked(core, delays, error, match):
+    if error is None:
+        assert cr.DelaySystem(core, delays).internal_delays == (3,)
+        return
+    with pytest.raises(error, match=match):
+        cr.DelaySystem(core, delays)
