@@ -119,5 +119,6 @@ def as_code(values: Any) -> str:
     >>> print(as_code(np.array([1 / 3])))
     array([0.3333333333333333])
     """
+    # an object of python-control or NumPy; only some of the former write themselves as code
     with np.printoptions(precision=17, floatmode="unique", threshold=sys.maxsize):
         return str(values._repr_eval_() if hasattr(values, "_repr_eval_") else repr(values))

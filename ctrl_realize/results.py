@@ -95,6 +95,22 @@ class Result(Drawable):
       mass  4.2 kg
     """
 
+    if TYPE_CHECKING:
+        # A subclass may have them as fields of a dataclass or as properties.
+        @property
+        def choices(self) -> tuple[str, ...]:
+            """Choices that were made automatically, with reasons."""
+            ...
+
+        @property
+        def flags(self) -> tuple[Flag, ...]:
+            """Warnings about the result."""
+            ...
+
+    else:
+        choices = ()
+        flags = ()
+
     def _title(self) -> str:
         return type(self).__name__
 
@@ -102,12 +118,10 @@ class Result(Drawable):
         raise AssertionError(f"{type(self).__name__} does not list its numbers")
 
     def _choices(self) -> list[str]:
-        choices: tuple[str, ...] = getattr(self, "choices", ())
-        return list(choices)
+        return list(self.choices)
 
     def _notes(self) -> list[str]:
-        flags: tuple[Flag, ...] = getattr(self, "flags", ())
-        return [str(flag) for flag in flags]
+        return [str(flag) for flag in self.flags]
 
     def report(self) -> str:
         """Return the result as plain text, choices and flags included."""
@@ -204,16 +218,6 @@ class ModelFit(Result):
             """What was fitted."""
             ...
 
-        @property
-        def choices(self) -> tuple[str, ...]:
-            """What was chosen, and why."""
-            ...
-
-        @property
-        def flags(self) -> tuple[Flag, ...]:
-            """What one should know before trusting it."""
-            ...
-
     @property
     def dead_time_interval(self) -> tuple[float, float] | None:
         """Interval of the dead time in s, the same as `interval`."""
@@ -274,5 +278,44 @@ class ModelFit(Result):
         return None
 
     def _method(self) -> str:
-        """Say the method in words."""
+        """Name of the method, in words."""
         return "model with dead time"
+
+
+class FractionalDelayFit(ModelFit):
+    """Fit of a dead time in s; `delay` and `delay_interval` are the same in samples.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> fit = cr.identify(cr.bench.valve().step_record(16, rng=5)).fit
+    >>> isinstance(fit, cr.results.FractionalDelayFit), fit.delay == fit.dead_time / fit.dt
+    (True, True)
+    """
+
+    if TYPE_CHECKING:
+
+        @property
+        def dead_time(self) -> float:
+            """Dead time in s."""
+            ...
+
+        @property
+        def interval(self) -> tuple[float, float]:
+            """Interval of the dead time in s."""
+            ...
+
+        @property
+        def dt(self) -> float:
+            """Sample time in s."""
+            ...
+
+    @property
+    def delay(self) -> float:
+        """Dead time in samples, not rounded."""
+        return self.dead_time / self.dt
+
+    @property
+    def delay_interval(self) -> tuple[float, float]:
+        """Interval of the dead time in samples."""
+        return self.interval[0] / self.dt, self.interval[1] / self.dt

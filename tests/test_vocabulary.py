@@ -70,6 +70,9 @@ def public_names() -> dict[str, set[str]]:
                 continue
             for each in attributes_of(value) if inspect.isclass(value) else arguments_of(value):
                 owners[each].add(name)
+    # What a class inherits from a public class is one name, not two.
+    for each in owners.values():
+        each -= {name for name in each if each & PUBLIC_BASES.get(name, set())}
     return owners
 
 
@@ -95,6 +98,11 @@ def arguments_of(value: object) -> list[str]:
         return []
 
 
+PUBLIC_BASES = {
+    kind.__name__: {base.__name__ for base in kind.__mro__[1:]}
+    for kind in vars(cr.design).values()
+    if inspect.isclass(kind)
+}
 OWNERS = public_names()
 HOST = {
     name

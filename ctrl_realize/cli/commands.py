@@ -77,6 +77,7 @@ def stopped_by_signals() -> Iterator[Ending]:
     if threading.current_thread() is not threading.main_thread():
         yield ending  # only the main thread may handle signals
         return
+    # which signals there are depends on the operating system
     known = [getattr(signal, name) for name in _SIGNALS if hasattr(signal, name)]
 
     def stop(number: int, frame: FrameType | None) -> None:

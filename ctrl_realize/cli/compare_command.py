@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -67,14 +67,20 @@ def compare(
       ctrl-realize compare results/model.json frf.csv -o frf --band 0.1 13
     """  # noqa: D301  # \b keeps the lines of the examples apart
     check_files([model, frf])
-    given = {"frequency": frequency_unit, "magnitude": magnitude_unit, "phase": phase_unit}
-    units: dict[str, Any] = {f"{k}_unit": unit for k, unit in given.items() if unit is not None}
-    system, measured = load_model(model), read_frf(frf, **units)
-    options: dict[str, Any] = {"min_coherence": min_coherence, "band_hz": band}
-    if hold is not Hold.auto:
-        options["hold"] = None if hold is Hold.none else hold.value
-    chosen = {key: value for key, value in options.items() if value is not None or key == "hold"}
-    comparison = compare_frf(system, measured, **chosen)
+    system = load_model(model)
+    measured = read_frf(
+        frf,
+        frequency_unit="auto" if frequency_unit is None else frequency_unit,
+        magnitude_unit="auto" if magnitude_unit is None else magnitude_unit,
+        phase_unit="auto" if phase_unit is None else phase_unit,
+    )
+    comparison = compare_frf(
+        system,
+        measured,
+        min_coherence=min_coherence,
+        band_hz=band,
+        hold=None if hold is Hold.none else hold.value,
+    )
     if output is not None:
         words = [str(model), str(frf)]
         if min_coherence is not None:
@@ -83,8 +89,13 @@ def compare(
             words += ["--band", *(f"{edge:.12g}" for edge in band)]
         if hold is not Hold.auto:
             words += ["--hold", hold.value]
-        for name, unit in units.items():
-            words += [f"--{name.replace('_', '-')}", unit]
+        for option, unit in (
+            ("--frequency-unit", frequency_unit),
+            ("--magnitude-unit", magnitude_unit),
+            ("--phase-unit", phase_unit),
+        ):
+            if unit is not None:
+                words += [option, unit]
         run = Run(typed_call("compare", words), (model, frf), overwrite)
         words += ["--output", str(output)]
         with appearing(output, run) as folder:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -17,7 +17,15 @@ from ..identification.campaign.run import identify_campaign
 from ..identification.methods import identify as identify_record
 from ..io import read_frf
 from ..results import ModelFit
-from .inputs import Reading, calls_again, check_files, reading, typed_call, words_again
+from .inputs import (
+    Reading,
+    Settings,
+    calls_again,
+    check_files,
+    reading,
+    typed_call,
+    words_again,
+)
 from .manifest import Run, refuse_other_results
 from .results import campaign_table, write_campaign_files, write_record_files
 from .staging import appearing, kept_rows, refuse_a_file
@@ -99,8 +107,7 @@ def identify(
     """  # noqa: D301  # \b keeps the lines of the examples apart
     given = [*files, *([frf] if frf else [])]
     check_files(given)
-    options = {"order": order, "max_delay": max_delay}
-    settings = {"method": method.value, **{k: v for k, v in options.items() if v is not None}}
+    settings = Settings(method.value, order, max_delay)
     how = reading(
         time=time,
         input=input_column,
@@ -131,18 +138,18 @@ def identify(
 def _one(
     file: Path,
     folder: Path,
-    settings: dict[str, Any],
+    settings: Settings,
     how: Reading,
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
 ) -> bool:
     """Identify one file into a folder; tell whether its report is there."""
     record = how.source(file)()
-    system = identify_record(record, **settings)
+    system = identify_record(record, method=settings.method, **settings.options)
     comparison = None if frf is None else compare_frf(system, frf)
     reported = write_record_files(
         folder, system, record, file,
-        frf=frf, comparison=comparison, settings=settings, calls=calls,
+        frf=frf, comparison=comparison, settings=settings.given, calls=calls,
     )  # fmt: skip
     say(printable(f"{file}: {record!r}"))
     say(fit_of(system, ModelFit).report())
@@ -160,7 +167,7 @@ def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None
 def _many(
     files: list[Path],
     output: Path,
-    settings: dict[str, Any],
+    settings: Settings,
     how: Reading,
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
@@ -170,13 +177,15 @@ def _many(
     n_jobs = jobs if jobs is not None else -1 if len(files) >= _MANY else 1
     sources = [how.source(file) for file in files]
     with kept_rows(output) as store:
-        campaign = identify_campaign(sources, n_jobs=n_jobs, store=store, **settings)
+        campaign = identify_campaign(
+            sources, n_jobs=n_jobs, method=settings.method, store=store, **settings.options
+        )
         _refuse_useless(campaign)
         comparison = None if frf is None else compare_frf(campaign.system, frf)
         with appearing(output, run) as folder:
             reported = write_campaign_files(
                 folder, campaign, files,
-                frf=frf, comparison=comparison, settings=settings, calls=calls,
+                frf=frf, comparison=comparison, settings=settings.given, calls=calls,
             )  # fmt: skip
     say(campaign_table(campaign))
     say()
@@ -206,7 +215,7 @@ def _refuse_useless(campaign: Campaign) -> None:
 def _each_alone(
     files: list[Path],
     output: Path,
-    settings: dict[str, Any],
+    settings: Settings,
     how: Reading,
     frf: MeasuredFRF | None,
     words: list[str],

@@ -3,26 +3,65 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from ..data import Record
 from ..errors import MissingFileError, OptionError
+from ..identification.methods import IdentifyOptions, Method
 from ..io import read_record
+
+
+class ReadOptions(TypedDict, total=False):
+    """Arguments of `read_record` that the command line offers."""
+
+    time: str | int
+    input: str | int
+    output: str | int
+    dt: float
+    time_unit: str
+    delimiter: str
+    decimal: str
+    skip_rows: int
+    resample: bool
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How to read records: the keywords of `read_record` that were asked for."""
+    """How to read records: the arguments of `read_record` that were given."""
 
-    keywords: dict[str, Any]
+    keywords: ReadOptions
 
     def source(self, path: Path) -> partial[Record]:
-        """Return a function that reads one file; it travels to other processes."""
+        """Return a function that reads one file; it can be sent to other processes."""
         return partial(read_record, path, **self.keywords)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to identify: the arguments of `identify` that the command line offers."""
+
+    method: Method
+    order: int | None = None
+    max_delay: int | None = None
+
+    @property
+    def options(self) -> IdentifyOptions:
+        """What was given beside the method."""
+        options: IdentifyOptions = {}
+        if self.order is not None:
+            options["order"] = self.order
+        if self.max_delay is not None:
+            options["max_delay"] = self.max_delay
+        return options
+
+    @property
+    def given(self) -> dict[str, object]:
+        """Names and values of what was given, for files and reports."""
+        return {"method": self.method, **self.options}
 
 
 def reading(
@@ -37,19 +76,27 @@ def reading(
     skip_rows: int,
     resample: bool,
 ) -> Reading:
-    """Turn options into keywords of `read_record`; what was not given stays at its default."""
-    given: dict[str, Any] = {
-        "time": selector(time),
-        "input": selector(input),
-        "output": selector(output),
-        "dt": dt,
-        "time_unit": time_unit,
-        "delimiter": {"tab": "\t", r"\t": "\t"}.get(delimiter or "", delimiter),
-        "decimal": decimal,
-        "skip_rows": skip_rows or None,
-        "resample": resample or None,
-    }
-    return Reading({key: value for key, value in given.items() if value is not None})
+    """Convert options to arguments of `read_record`; what was not given keeps its default."""
+    keywords: ReadOptions = {}
+    if (column := selector(time)) is not None:
+        keywords["time"] = column
+    if (column := selector(input)) is not None:
+        keywords["input"] = column
+    if (column := selector(output)) is not None:
+        keywords["output"] = column
+    if dt is not None:
+        keywords["dt"] = dt
+    if time_unit is not None:
+        keywords["time_unit"] = time_unit
+    if delimiter is not None:
+        keywords["delimiter"] = {"tab": "\t", r"\t": "\t"}.get(delimiter, delimiter)
+    if decimal is not None:
+        keywords["decimal"] = decimal
+    if skip_rows:
+        keywords["skip_rows"] = skip_rows
+    if resample:
+        keywords["resample"] = True
+    return Reading(keywords)
 
 
 def selector(text: str | None) -> str | int | None:
@@ -81,21 +128,21 @@ def typed_call(command: str, words: Sequence[str]) -> str:
     return shlex.join(["ctrl-realize", command, *words])
 
 
-def python_keywords(keywords: dict[str, Any]) -> str:
+def python_keywords(keywords: Mapping[str, object]) -> str:
     """Write keyword arguments as Python text."""
     return "".join(f", {name}={value!r}" for name, value in keywords.items())
 
 
 def words_again(
     files: list[Path],
-    settings: dict[str, Any],
+    settings: Settings,
     how: Reading,
     frf: Path | None,
     separate: bool,
 ) -> list[str]:
     """Write down the command line that does the same again, apart from the folder."""
     words = [*map(str, files)]
-    for name, value in settings.items():
+    for name, value in settings.given.items():
         words += [f"--{name.replace('_', '-')}", str(value)]
     if frf is not None:
         words += ["--frf", str(frf)]
@@ -112,11 +159,11 @@ def words_again(
 
 
 def calls_again(
-    files: list[Path], settings: dict[str, Any], how: Reading, words: list[str]
+    files: list[Path], settings: Settings, how: Reading, words: list[str]
 ) -> list[tuple[str, str]]:
     """Write down how to do it again, in a terminal and in Python."""
     keywords = python_keywords(how.keywords)
-    chosen = python_keywords(settings)
+    chosen = python_keywords(settings.given)
     if len(files) == 1:
         python = (
             "import ctrl_realize as cr\n"

@@ -104,8 +104,10 @@ class StepResponse(Drawable):
     record: Record | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        for what in ("time", "output", "input", "pre_step"):
-            object.__setattr__(self, what, read_only(getattr(self, what)))
+        object.__setattr__(self, "time", read_only(self.time))
+        object.__setattr__(self, "output", read_only(self.output))
+        object.__setattr__(self, "input", read_only(self.input))
+        object.__setattr__(self, "pre_step", read_only(self.pre_step))
 
     @property
     def n_samples(self) -> int:

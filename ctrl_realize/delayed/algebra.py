@@ -115,26 +115,24 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
         return self._around(self._core.minreal(tol))
 
     def _series(self, second: ct.StateSpace, first: ct.StateSpace) -> Self | None:
-        """Product second * first where the delays between both are common, None elsewhere."""
+        """Product second * first if the delays between them are common; otherwise None."""
         ends = CoreAndDelays, DelayOperators
         if any(isinstance(s, ends[1]) and not isinstance(s, ends[0]) for s in (first, second)):
             return None
-        behind = getattr(first, "output_delays", (0,) * first.noutputs)
-        before = getattr(second, "input_delays", (0,) * second.ninputs)
         if second.ninputs != first.noutputs:
             return None
+        first_core, entry, behind = _core_and_delays(first)
+        second_core, before, after = _core_and_delays(second)
         between = common(tuple(a + b for a, b in zip(behind, before, strict=True)))
         if between is None:
             return None
-        core = getattr(second, "delay_free", second) * getattr(first, "delay_free", first)
-        entry = getattr(first, "input_delays", (0,) * first.ninputs)
         return self._around(
-            core,
+            second_core * first_core,
             delay=tuple(d + between for d in entry),
-            output_delay=getattr(second, "output_delays", (0,) * second.noutputs),
+            output_delay=after,
             inputs=first.input_labels,
             outputs=second.output_labels,
-            states=[*_core_states(first), *_core_states(second)],
+            states=[*first_core.state_labels, *second_core.state_labels],
         )
 
 
@@ -145,8 +143,13 @@ def _linear(system: ct.StateSpace) -> ct.StateSpace:
     return ct.StateSpace(system, remove_useless_states=False)
 
 
-def _core_states(system: ct.StateSpace) -> list[str]:
-    return list(getattr(system, "delay_free", system).state_labels)
+def _core_and_delays(
+    system: ct.StateSpace,
+) -> tuple[ct.StateSpace, tuple[int, ...], tuple[int, ...]]:
+    """Return core, input delays and output delays; a plain system has none."""
+    if isinstance(system, CoreAndDelays):
+        return system.delay_free, system.input_delays, system.output_delays
+    return system, (0,) * system.ninputs, (0,) * system.noutputs
 
 
 def _is_scalar(value: Any) -> bool:

@@ -55,9 +55,10 @@ class DelayedCards(CoreAndDelays):
 
     def __str__(self) -> str:
         lines = [self._line(), "", "core:"]
-        for letter in "ABCD":
+        core = self._core
+        for letter, matrix in (("A", core.A), ("B", core.B), ("C", core.C), ("D", core.D)):
             lines.append(f"{letter} =")
-            lines += [f"    {row}" for row in str(getattr(self._core, letter)).splitlines()]
+            lines += [f"    {row}" for row in str(matrix).splitlines()]
         return "\n".join([*lines, f"times {self._shift()}"])
 
     def _repr_html_(self) -> str:

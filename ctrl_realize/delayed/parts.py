@@ -172,7 +172,8 @@ def check_entries(system: Any) -> None:
     else:
         entries = [np.asarray(system)]
     if not all(np.all(np.isfinite(part)) for part in entries):
-        name = f"the system {system.name!r}" if hasattr(system, "name") else f"the gain {system}"
+        is_system = isinstance(system, ct.InputOutputSystem)
+        name = f"the system {system.name!r}" if is_system else f"the gain {system}"
         raise UnsuitableSystemError(f"{name} has non-finite entries; expected finite numbers")
 
 

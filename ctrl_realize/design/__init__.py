@@ -18,9 +18,9 @@ from .models.conversions import ContinuousModel, to_continuous, to_discrete, to_
 from .models.process_model import ProcessModel
 from .models.reduction import reduce_fopdt, reduce_sopdt
 from .predictors.estimator import KalmanPredictor, kalman_predictor
-from .predictors.lqg import lqg
+from .predictors.lqg import LQGController, lqg
 from .predictors.regulator import PredictorLQR, predictor_lqr
-from .predictors.smith import smith_predictor
+from .predictors.smith import SmithPredictor, smith_predictor
 from .tuning.controller import PIDController
 from .tuning.pid import pid
 from .tuning.table import PIDComparison, compare_pid
@@ -31,6 +31,7 @@ __all__ = [
     "DelayLineController",
     "DelayRobustness",
     "KalmanPredictor",
+    "LQGController",
     "LoopCheck",
     "Margins",
     "PIDComparison",
@@ -39,6 +40,7 @@ __all__ = [
     "PredictorLQR",
     "ProcessModel",
     "RobustnessCheck",
+    "SmithPredictor",
     "UncertaintyBound",
     "compare_pid",
     "delay_robustness",

@@ -43,8 +43,6 @@ class DelayLineController(DeferredMatrices):
         Sample time in s.
     name : str
     inputs, outputs : str
-    notes : dict
-        What the designing function wants to keep with the controller: read-only attributes.
     pulses : tuple of ndarray, optional
         ``(A_p, B_p, C_p)`` where column i of ``[E; h]`` is ``C_p A_p^(i-1) B_p`` for all but the
         last, as predictions give: long lines are then evaluated in closed form.
@@ -84,7 +82,6 @@ class DelayLineController(DeferredMatrices):
         name: str,
         inputs: str = "e",
         outputs: str = "u",
-        notes: dict[str, Any] | None = None,
         pulses: Pulses | None = None,
     ) -> None:
         n, d = E.shape
@@ -102,7 +99,6 @@ class DelayLineController(DeferredMatrices):
         self._taps = LineSum(np.vstack([E, h]), pulses)
         self.line_length = d
         self.inner_poles: ComplexArray = np.diag(self._form[0]).copy()
-        self.notes: dict[str, Any] = dict(notes or {})
         self._locked = True
 
     def _make_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -129,12 +125,6 @@ class DelayLineController(DeferredMatrices):
             "cr.design.to_discrete(*cr.design.to_continuous(plant), dt=...) samples the plant "
             "more slowly, for a controller with a shorter line"
         )
-
-    def __getattr__(self, attribute: str) -> Any:
-        notes = self.__dict__.get("notes", {})
-        if attribute in notes:
-            return notes[attribute]
-        raise AttributeError(f"{type(self).__name__} has no attribute {attribute!r}")
 
     def __mul__(self, other: Any) -> Any:
         """Series: first `other`, then the controller. A plant with dead time keeps it."""
@@ -168,11 +158,7 @@ class DelayLineController(DeferredMatrices):
             ),
             ("sample time", in_time(self.dt, 6)),
         ]
-        check = self.notes.get("check")
-        if check is not None:
-            rows += check.rows()
-        flags = [str(flag) for flag in getattr(check, "flags", ())]
-        return f"Controller {self.name} with a delay line", rows, flags
+        return f"Controller {self.name} with a delay line", rows, []
 
     def report(self) -> str:
         """Tell what the controller is made of, and what its loop does, as plain text."""
@@ -187,19 +173,18 @@ class DelayLineController(DeferredMatrices):
         return None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (
-            _rebuild,
-            (
-                type(self),
-                self._parts,
-                self.dt,
-                self.name,
-                self.input_labels[0],
-                self.output_labels[0],
-                self.notes,
-                self._pulses,
-            ),
-        )
+        settings = {
+            "name": self.name,
+            "inputs": self.input_labels[0],
+            "outputs": self.output_labels[0],
+            "pulses": self._pulses,
+            **self._design(),
+        }
+        return _rebuild, (type(self), self._parts, self.dt, settings)
+
+    def _design(self) -> dict[str, Any]:
+        """Further arguments of a subclass, which say what it was designed from."""
+        return {}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> DelayLineController:
         build, arguments = self.__reduce__()
@@ -246,12 +231,7 @@ def _rebuild(
     kind: type[DelayLineController],
     parts: tuple[FloatArray, ...],
     dt: float,
-    name: str,
-    inputs: str,
-    outputs: str,
-    notes: dict[str, Any],
-    pulses: Pulses | None,
+    settings: dict[str, Any],
 ) -> DelayLineController:
     A, B, C, D, E, h = parts
-    labels = {"inputs": inputs, "outputs": outputs}
-    return kind(A, B, C, D, E, h, dt, name=name, notes=notes, pulses=pulses, **labels)
+    return kind(A, B, C, D, E, h, dt, **settings)

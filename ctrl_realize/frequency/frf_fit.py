@@ -11,7 +11,7 @@ import numpy as np
 from .._checks import numbers
 from .._wording import in_time, interval_in_time, time_within
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..results import Flag, IntervalKind, ModelFit
+from ..results import Flag, FractionalDelayFit, IntervalKind
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +43,7 @@ class FRFStructure:
 
 
 @dataclass(frozen=True, eq=False)
-class FRFFit(ModelFit):
+class FRFFit(FractionalDelayFit):
     r"""A transfer function with dead time, fitted to a frequency response.
 
     ``response(omega) == core(1j * omega) * exp(-1j * omega * dead_time)`` minimises
@@ -121,16 +121,6 @@ class FRFFit(ModelFit):
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()
     records = ()
-
-    @property
-    def delay(self) -> float:
-        """Dead time in samples of the model, not rounded."""
-        return self.dead_time / self.dt
-
-    @property
-    def delay_interval(self) -> tuple[float, float]:
-        """Interval of the dead time in samples of the model."""
-        return self.interval[0] / self.dt, self.interval[1] / self.dt
 
     @property
     def interval_kind(self) -> IntervalKind:

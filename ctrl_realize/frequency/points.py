@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 
 from .._checks import band, one_of
+from ..data import MeasuredFRF
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.constants import SMALLEST
@@ -153,16 +154,17 @@ def measured_points(frf: Any) -> MeasuredPoints:
         )
     check_single_channel(frf, "frf")
     order = np.argsort(frf.omega, kind="stable")
+    measured = isinstance(frf, MeasuredFRF)
     coherence, std = (
         None if beside is None else np.reshape(beside, -1)[order]
-        for beside in (getattr(frf, "coherence", None), getattr(frf, "std", None))
+        for beside in ((frf.coherence, frf.std) if measured else (None, None))
     )
     return MeasuredPoints(
         np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi),
         np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order],
         coherence,
         std,
-        getattr(frf, "repeats", None),
+        frf.repeats if measured else None,
     )
 
 
@@ -181,7 +183,7 @@ SAME = 1e-6
 
 def sampled_every(frf: Any) -> float | None:
     """Sample time of the records that a response was estimated from, in s; None if not known."""
-    return getattr(frf, "sample_time", None)
+    return frf.sample_time if isinstance(frf, MeasuredFRF) else None
 
 
 def held_every(frf: Any, hold: str | None, dt: float | None) -> float | None:

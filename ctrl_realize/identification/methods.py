@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 import control as ct
 import numpy as np
@@ -30,6 +30,22 @@ from .step.steps import unit_step
 Method = Literal["output_error", "scan", "paper"]
 
 METHODS: tuple[str, ...] = ("output_error", "scan", "paper")
+
+
+class IdentifyOptions(TypedDict, total=False):
+    """Arguments of `identify` beside record and method, as `identify_campaign` takes them."""
+
+    order: int | None
+    max_delay: int | None
+    known: ct.LTI | None
+    loss: Literal["huber", "least_squares"]
+    noise: Literal["auto", "white"]
+    structures: Sequence[tuple[int, int]] | None
+    include_known: bool
+    cutoff_hz: float | Literal["auto"] | None
+    samples: int | None
+    feedthrough: bool | None
+
 
 SCANNED_ORDERS = range(1, 6)
 """Orders that the scan chooses from; above 5 the realization models noise, or the delay."""

@@ -37,7 +37,7 @@ def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
         status = path.stat()
     except (OSError, ValueError) as error:
         # ValueError: a NUL character in the name
-        reason = getattr(error, "strerror", None) or str(error)
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise MissingFileError(f"{os.fspath(path)!r} cannot be read: {reason}") from error
     if stat.S_ISDIR(status.st_mode):
         raise FileFormatError(f"{path} is a folder; expected a file")

@@ -143,7 +143,9 @@ def model_to_text(
     """Lay out a model as the text that `save_model` writes."""
     model = system
     if not isinstance(system, DelayedStateSpace):
-        model = DelayedStateSpace(system, name=getattr(system, "name", None))
+        # what is no system at all is refused by DelayedStateSpace
+        name = system.name if isinstance(system, ct.InputOutputSystem) else None
+        model = DelayedStateSpace(system, name=name)
     content = {
         "format": FORMAT,
         "schema": SCHEMA,
@@ -195,7 +197,10 @@ def _model_content(model: DelayedStateSpace) -> dict[str, Any]:
         "dt": float(core.dt),
         "input_delays": list(model.input_delays),
         "output_delays": list(model.output_delays),
-        **{letter: np.asarray(getattr(core, letter)).tolist() for letter in "ABCD"},
+        "A": np.asarray(core.A).tolist(),
+        "B": np.asarray(core.B).tolist(),
+        "C": np.asarray(core.C).tolist(),
+        "D": np.asarray(core.D).tolist(),
     }
 
 

@@ -191,6 +191,7 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     """Reduce any fit to plain numbers and text."""
     if fit is None or isinstance(fit, FitSummary):
         return fit
+    # all are attributes of a ModelFit; the list is also that of the keys in the file
     values = {key: _plain(getattr(fit, key)) for key in _KEPT}
     values["std_given_structure"] = _plain(fit._std())
     return FitSummary(

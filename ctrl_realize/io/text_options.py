@@ -22,9 +22,13 @@ class TextOptions:
     skip_rows: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("delimiter", "decimal", "encoding"):
-            if not isinstance(getattr(self, name), str):
-                raise OptionError(f"{name}={getattr(self, name)!r} must be text, such as 'auto'")
+        for name, value in (
+            ("delimiter", self.delimiter),
+            ("decimal", self.decimal),
+            ("encoding", self.encoding),
+        ):
+            if not isinstance(value, str):
+                raise OptionError(f"{name}={value!r}; expected text, such as 'auto'")
         if self.delimiter != "auto" and (len(self.delimiter) != 1 or self.delimiter in "\r\n\"'"):
             raise OptionError(f"delimiter={self.delimiter!r} must be one character or 'auto'")
         if self.decimal not in ("auto", ".", ","):
@@ -33,9 +37,9 @@ class TextOptions:
             isinstance(self.comment, str) and len(self.comment) == 1
         ):
             raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")
-        for name in ("delimiter", "comment"):
-            if str(getattr(self, name)) in _IN_NUMBERS[name]:
-                raise OptionError(f"{name}={getattr(self, name)!r} would split numbers")
+        for name, mark in (("delimiter", self.delimiter), ("comment", self.comment)):
+            if str(mark) in _IN_NUMBERS[name]:
+                raise OptionError(f"{name}={mark!r} would split numbers")
         if self.header not in (True, False, "auto"):
             raise OptionError(f"header={self.header!r} must be True, False or 'auto'")
         whole(self.skip_rows, "skip_rows", 0)

@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from .._checks import numbers
+from ..delayed import DelayedStateSpace
 from ..errors import DataError, UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..frequency.points import check_single_channel, measured_points
@@ -62,7 +63,9 @@ def curves_of(
         raise DataError("no frequency response to plot")
     data = [item for item in items if isinstance(item, ct.FrequencyResponseData)]
     grid = _grid(items, data) if frequency_hz is None else numbers(frequency_hz, "frequency_hz")
-    delays = [float(np.max(item.dead_time)) for item in items if hasattr(item, "dead_time")]
+    delays = [
+        float(np.max(item.dead_time)) for item in items if isinstance(item, DelayedStateSpace)
+    ]
     delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
     curves = [_curve(item, grid, delay) for item in items]
     nameless = [curve for curve in curves if re.fullmatch(r"sys\[\d+\]", curve.label)]

@@ -15,7 +15,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from .. import plots
-from ..data import Record, StepResponse
+from ..data import MeasuredFRF, Record, StepResponse
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, NoStepError
 from ..frequency.comparison import FRFComparison
@@ -207,7 +207,7 @@ def frf_sketches(
                 (6.2, 4.8),
             )
         ]
-    tall = 5.4 if getattr(frf, "coherence", None) is not None else 4.8
+    tall = 5.4 if isinstance(frf, MeasuredFRF) and frf.coherence is not None else 4.8
     sketches = [
         Sketch(
             "frf",

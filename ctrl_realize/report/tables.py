@@ -42,7 +42,10 @@ def model_table(system: DelayedStateSpace) -> Table:
     core = system.delay_free
     rows = [
         ("x[k+1] = A x[k] + B u[k-d]", f"d = {system.delay}, dt = {system.dt!r} s"),
-        *((name, _matrix(getattr(core, name))) for name in "ABCD"),
+        ("A", _matrix(core.A)),
+        ("B", _matrix(core.B)),
+        ("C", _matrix(core.C)),
+        ("D", _matrix(core.D)),
     ]
     return pairs("State-space matrices of the model without its delay", rows, mono=True)
 

@@ -202,7 +202,7 @@ def _gain(system: DelayedStateSpace) -> str:
 
 def _sign_is_told(system: DelayedStateSpace) -> bool:
     flagged = any(_code(flag) == _GAIN_OPEN for flag in _flags_of(system))
-    return not flagged or sign_is_told(getattr(system.fit, "gain_interval", None))
+    return not flagged or sign_is_told(None if system.fit is None else system.fit.gain_interval)
 
 
 def _gain_with_interval(system: DelayedStateSpace) -> str:
@@ -258,8 +258,8 @@ def _reasons(flags: Sequence[Any]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_sentence(str(flag)) for flag in ordered))
 
 
-def _code(flag: Any) -> str:
-    return str(getattr(flag, "code", ""))
+def _code(flag: Flag | str) -> str:
+    return flag.code if isinstance(flag, Flag) else ""
 
 
 def _sentence(text: str) -> str:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..._checks import numbers
 from ...delayed import DelayedStateSpace
 from ...errors import DataError, OptionError
+from ...identification.campaign.campaign import Campaign
 from ...numerics.arrays import ComplexArray, FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...results import Result
@@ -207,7 +208,8 @@ def uncertainty_bound(
     """
     models = _models(systems)
     if nominal is None:
-        nominal = getattr(systems, "system", None) or (models[0] if models else None)
+        first = models[0] if models else None
+        nominal = systems.system if isinstance(systems, Campaign) else first
     if nominal is None:
         raise OptionError(
             "expected systems or a nominal system, got neither; give nominal and dead_time_interval"
@@ -302,9 +304,8 @@ def robust_stability(uncertainty: UncertaintyBound, controller: Any) -> Robustne
 
 
 def _models(systems: Any) -> list[Any]:
-    good = getattr(systems, "good", None)
-    if good is not None:
-        return [row.system for row in good]
+    if isinstance(systems, Campaign):
+        return [row.system for row in systems.good]
     if isinstance(systems, ct.StateSpace) or not isinstance(systems, Iterable):
         raise OptionError(
             f"systems is a {type(systems).__name__}; expected a Campaign or a list of systems"

@@ -144,7 +144,7 @@ def _both_forms(
 ) -> tuple[ContinuousModel | None, DelayedStateSpace]:
     if isinstance(system, ContinuousModel):
         return system, to_discrete(system)
-    if getattr(system, "dt", None) == 0 or getattr(system, "dt", 0) is None:
+    if isinstance(system, ct.LTI) and (system.dt is None or system.dt == 0):
         core = proper_ss(system, "a reduction")
         wait = 0.0 if dead_time is None else dead_time
         speeds = np.abs(core.poles())

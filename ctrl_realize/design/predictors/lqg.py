@@ -14,13 +14,54 @@ from ...delayed.deferred import MAX_STATES
 from ...errors import DelayRangeError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ..delay_line import DelayLineController
-from ..loops.loop_check import loop_check, refuse_poles, refuse_unstable, warn_of
+from ..loops.loop_check import LoopCheck, loop_check, refuse_poles, refuse_unstable, warn_of
 from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system
-from .estimator import kalman_predictor
-from .regulator import TOO_LONG, regulator
+from .checked import CheckedController
+from .estimator import KalmanPredictor, kalman_predictor
+from .regulator import TOO_LONG, PredictorLQR, regulator
 from .riccati import has_states
+
+
+class LQGController(CheckedController):
+    """LQG controller of one input and one output, made by `lqg`.
+
+    Attributes
+    ----------
+    model : DelayedStateSpace
+        Plant model.
+    regulator : PredictorLQR
+    estimator : KalmanPredictor
+    check : LoopCheck or None
+        Check of the closed loop with the plant.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.ss([[1.02]], [[1.0]], [[0.1]], [[0.0]], 0.01), 10)
+    >>> controller = cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0)
+    >>> controller.model.delay, controller.check.stable
+    (10, True)
+    """
+
+    def __init__(
+        self,
+        *arguments: Any,
+        regulator: PredictorLQR,
+        estimator: KalmanPredictor,
+        **settings: Any,
+    ) -> None:
+        self.regulator = regulator
+        self.estimator = estimator
+        super().__init__(*arguments, **settings)
+
+    def _design(self) -> dict[str, Any]:
+        return {
+            **super()._design(),
+            "regulator": self.regulator,
+            "estimator": self.estimator,
+        }
 
 
 @single_threaded
@@ -53,9 +94,8 @@ def lqg(
     -------
     control.StateSpace
         From error to plant input, for negative feedback: ``margins(system, lqg(...))``. For one
-        input and output it is a `DelayLineController`, whose ``.regulator`` and ``.estimator``
-        are its parts, and whose ``.check``, a `LoopCheck`, tells what the loop does on `system`
-        and over its interval of dead times; for several a plain system.
+        input and output an `LQGController`, whose `check` is a `LoopCheck` of the closed loop
+        with `system` itself, also over its interval of dead times; for several a plain system.
 
     Raises
     ------
@@ -119,10 +159,9 @@ def lqg(
         # u[k] is formed from the state alone, and acts at once.
         inner = inner - into @ K
 
-    def made(**more: Any) -> DelayLineController:
-        notes = {"model": plant, "regulator": law, "estimator": estimator, **more}
+    def made(check: LoopCheck | None = None) -> LQGController:
         # Negative feedback: the controller sees e = -y.
-        return DelayLineController(
+        return LQGController(
             inner,
             -L,
             -K[:, :n],
@@ -133,7 +172,10 @@ def lqg(
             name=name,
             inputs="e",
             outputs=plant.input_labels[0],
-            notes=notes,
+            check=check,
+            model=plant,
+            regulator=law,
+            estimator=estimator,
             pulses=(
                 np.asarray(core.A, np.float64),
                 np.asarray(core.B, np.float64),
@@ -144,7 +186,7 @@ def lqg(
     check = loop_check(plant, made())
     refuse_unstable(check, "the controller", TOO_LONG)
     warn_of(check, "larger R and RN make it slower and more robust")
-    return made(check=check)
+    return made(check)
 
 
 def _several_channels(

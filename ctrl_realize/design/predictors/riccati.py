@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import control as ct
 import numpy as np
@@ -38,10 +38,24 @@ def has_states(core: ct.StateSpace, purpose: str) -> None:
         )
 
 
+class RiccatiSolution(NamedTuple):
+    """Gain, cost matrix and closed-loop poles of a linear-quadratic problem."""
+
+    gain: FloatArray
+    cost: FloatArray
+    poles: ComplexArray
+
+
 def riccati(
     solver: Any, A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, weights: str
-) -> tuple[FloatArray, FloatArray, ComplexArray]:
-    """Return gain, cost and closed-loop poles of `control.dlqr`, or say why there are none."""
+) -> RiccatiSolution:
+    """Solve by `control.dlqr`.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        There is no stabilizing solution.
+    """
     try:
         gain, cost, poles = solver(A, B, Q, R)
     # Slycot, where it is there, has errors of its own, all of them ArithmeticErrors.
@@ -51,7 +65,7 @@ def riccati(
             f"{weights} ({error}); an unstable or integrating mode may be uncontrollable, "
             "unobservable or unweighted"
         ) from error
-    return (
+    return RiccatiSolution(
         np.atleast_2d(np.asarray(gain, dtype=np.float64)),
         np.atleast_2d(np.asarray(cost, dtype=np.float64)),
         np.asarray(poles, dtype=np.complex128),

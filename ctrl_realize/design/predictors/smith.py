@@ -13,13 +13,61 @@ from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.state_space import responses
 from ...numerics.state_space.balancing import Part, split_modes
-from ..delay_line import DelayLineController
-from ..loops.loop_check import loop_check, refuse_unstable, warn_of
+from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
 from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system, same_rate
+from .checked import CheckedController
 from .predictor_filter import predictor_filter, removed_part
 
 ON_CIRCLE = 1e-9
+
+
+class SmithPredictor(CheckedController):
+    """Smith predictor, made by `smith_predictor`.
+
+    Attributes
+    ----------
+    model : DelayedStateSpace
+        Plant model inside the predictor.
+    primary : DelayedStateSpace
+        Controller of the delay-free core.
+    filter_time : float or None
+        Time constant of the prediction-error filter in s.
+    removed_poles : ndarray
+        Poles taken out of the predictor.
+    check : LoopCheck or None
+        Check of the closed loop with the plant.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([2.0, -1.8], [1, -1], 0.01))
+    >>> predictor.model.delay, predictor.check.stable
+    (10, True)
+    """
+
+    def __init__(
+        self,
+        *arguments: Any,
+        primary: DelayedStateSpace,
+        filter_time: float | None,
+        removed_poles: FloatArray,
+        **settings: Any,
+    ) -> None:
+        self.primary = primary
+        self.filter_time = filter_time
+        self.removed_poles = removed_poles
+        super().__init__(*arguments, **settings)
+
+    def _design(self) -> dict[str, Any]:
+        return {
+            **super()._design(),
+            "primary": self.primary,
+            "filter_time": self.filter_time,
+            "removed_poles": self.removed_poles,
+        }
 
 
 def smith_predictor(
@@ -29,7 +77,7 @@ def smith_predictor(
     filter_time: float | None = None,
     remove_slow: bool | None = None,
     name: str = "smith",
-) -> DelayLineController:
+) -> SmithPredictor:
     """Make a Smith predictor of a controller that was designed for the delay-free core.
 
     The result C_s is used like any controller, ``loop = system * C_s`` with negative feedback.
@@ -55,11 +103,9 @@ def smith_predictor(
 
     Returns
     -------
-    DelayLineController
-        A `control.StateSpace` from error to plant input. Its attributes tell what it is made of:
-        ``model``, ``primary``, ``filter_time``, ``removed_poles``, ``check``, a `LoopCheck` of
-        the loop on `system` itself, and ``robustness``, its `DelayRobustness` at the ends of the
-        identified interval of the dead time (None if the system does not carry one).
+    SmithPredictor
+        A `control.StateSpace` from error to plant input. Its `check` is a `LoopCheck` of the
+        closed loop with `system` itself.
 
     Raises
     ------
@@ -136,21 +182,19 @@ def smith_predictor(
     A, B, C, D, E, h, pulses = _assemble(
         plant, primary, removed, kept, _filter(seconds, plant, slow, integrating)
     )
-    notes = {
-        "model": plant,
-        "primary": DelayedStateSpace(primary, 0, name=primary.name),
-        "filter_time": seconds,
-        "removed_poles": drop,
-    }
 
-    def made(**more: Any) -> DelayLineController:
-        return DelayLineController(
+    def made(check: LoopCheck | None = None) -> SmithPredictor:
+        return SmithPredictor(
             *(A, B, C, D, E, h, float(plant.dt)),
             name=name,
             inputs="e",
             outputs=plant.input_labels[0],
-            notes={**notes, **more},
             pulses=pulses,
+            check=check,
+            model=plant,
+            primary=DelayedStateSpace(primary, 0, name=primary.name),
+            filter_time=seconds,
+            removed_poles=drop,
         )
 
     check = loop_check(plant, made())
@@ -161,7 +205,7 @@ def smith_predictor(
         "stabilizes system.delay_free (design.margins(system.delay_free, controller))",
     )
     warn_of(check, "give a longer filter_time or a slower controller", stacklevel=3)
-    return made(check=check, robustness=check.robustness)
+    return made(check)
 
 
 def _refuse_unstable(poles: FloatArray) -> None:

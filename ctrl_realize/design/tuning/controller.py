@@ -150,8 +150,14 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
 
     def _settings(self) -> dict[str, Any]:
         """All that makes this controller, beside its four parameters."""
-        names = ("dt", "method", "rule", "model", "name", "check")
-        return {name: getattr(self, name) for name in names}
+        return {
+            "dt": self.dt,
+            "method": self.method,
+            "rule": self.rule,
+            "model": self.model,
+            "name": self.name,
+            "check": self.check,
+        }
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, ((self.kp, self.ti, self.td, self.tf), self._settings())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -136,15 +136,10 @@ def pid(
     >>> cr.design.pid(cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029))
     <PIDController 'PI_simc': kp = 1.379, ti = 0.08 s, continuous>
     """
-    options: dict[str, Any] = {
-        "closed_loop_time": closed_loop_time,
-        "max_sensitivity": max_sensitivity,
-        "derivative_filter": derivative_filter,
-        "reduction": reduction,
-        "method": method,
-        "dt": dt,
-    }
-    made, plant = tuned(system, rule, kind, **options, name=name)
+    options = TuningOptions(
+        closed_loop_time, max_sensitivity, derivative_filter, reduction, method, dt, name
+    )
+    made, plant = tuned(system, rule, kind, options)
     check = closed_on(system, plant, made)
     if not check.stable:
         works = _one_that_works(system, rule, kind, options)
@@ -153,43 +148,46 @@ def pid(
     return made.checked(check)
 
 
+@dataclass(frozen=True)
+class TuningOptions:
+    """Arguments of `pid` beside system, rule and kind."""
+
+    closed_loop_time: float | None = None
+    max_sensitivity: float = 1.4
+    derivative_filter: float = 10.0
+    reduction: str = "optimal"
+    method: str = "tustin"
+    dt: float | None = None
+    name: str | None = None
+
+
 def tuned(
-    system: Any,
-    rule: str = "simc",
-    kind: str = "PI",
-    *,
-    closed_loop_time: float | None = None,
-    max_sensitivity: float = 1.4,
-    derivative_filter: float = 10.0,
-    reduction: str = "optimal",
-    method: str = "tustin",
-    dt: float | None = None,
-    name: str | None = None,
+    system: Any, rule: str, kind: str, options: TuningOptions
 ) -> tuple[PIDController, DelayedStateSpace]:
-    """Follow a rule, see `pid`, without a look at the loop; returns the plant it was for too."""
+    """Tune by a rule without checking the loop; return the controller and its plant."""
     rule = one_of(rule, "rule", RULES)
     kind = one_of(kind, "kind", KINDS)
-    method = one_of(method, "method", DISCRETIZATIONS)
+    method = one_of(options.method, "method", DISCRETIZATIONS)
     known = kinds_of(rule)
     if kind not in known:
         raise OptionError(f"rule={rule!r} has no {kind}; available: {', '.join(known)}")
-    ratio = real(derivative_filter, "derivative_filter", "td / tf")
+    ratio = real(options.derivative_filter, "derivative_filter", "td / tf")
     if not 1 <= ratio <= 100:
         raise OptionError(f"derivative_filter={ratio:g}; expected td / tf in 1...100")
     target = None
-    if closed_loop_time is not None:
+    if options.closed_loop_time is not None:
         if rule not in ("simc", "lambda", "imc"):
             raise OptionError(
                 f"closed_loop_time is an argument of simc, lambda and imc, not of {rule!r}"
             )
-        target = positive(closed_loop_time, "closed_loop_time", "time in s")
-    limit = real(max_sensitivity, "max_sensitivity", "Ms")
+        target = positive(options.closed_loop_time, "closed_loop_time", "time in s")
+    limit = real(options.max_sensitivity, "max_sensitivity", "Ms")
     if not 1.01 <= limit <= 10:
         raise OptionError(f"max_sensitivity={limit:g}; expected Ms in 1.01...10")
-    plant, step = reference_plant(system, dt)
+    plant, step = reference_plant(system, options.dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
-        model = _model(system, plant, rule, kind, reduction, step)
+        model = _model(system, plant, rule, kind, options.reduction, step)
         kp, ti, td = MODEL_RULES[rule][0](model, kind, target)
     elif rule == "optimal":
         total = _total_time(system, plant)
@@ -199,7 +197,15 @@ def tuned(
     else:
         kp, ti, td = _ultimate(plant, kind)
     made = PIDController(
-        kp, ti, td, td / ratio, dt=step, method=method, rule=rule, model=model, name=name
+        kp,
+        ti,
+        td,
+        td / ratio,
+        dt=step,
+        method=method,
+        rule=rule,
+        model=model,
+        name=options.name,
     )
     return made, plant
 
@@ -211,7 +217,7 @@ def closed_on(system: Any, plant: DelayedStateSpace, controller: PIDController) 
     return loop_check(plant, controller)
 
 
-def _one_that_works(system: Any, rule: str, kind: str, options: dict[str, Any]) -> str:
+def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
     """Say which rule gives a loop that is stable and not on the verge of being unstable."""
     tries = [
         (name, form, reduction)
@@ -220,13 +226,13 @@ def _one_that_works(system: Any, rule: str, kind: str, options: dict[str, Any]) 
         for reduction in REDUCTIONS
         if name in MODEL_RULES
     ]
-    tried = (rule, kind, options["reduction"])
-    for name, form, reduction in [*tries, ("optimal", "PI", options["reduction"])]:
+    tried = (rule, kind, options.reduction)
+    for name, form, reduction in [*tries, ("optimal", "PI", options.reduction)]:
         if form not in kinds_of(name) or (name, form, reduction) == tried:
             continue
-        changed = {**options, "closed_loop_time": None, "reduction": reduction}
+        changed = replace(options, closed_loop_time=None, reduction=reduction)
         try:
-            made, plant = tuned(system, name, form, **changed)
+            made, plant = tuned(system, name, form, changed)
         except ValueError:
             continue
         found = closed_on(system, plant, made).margins

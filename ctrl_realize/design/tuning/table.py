@@ -16,7 +16,7 @@ from ..loops.margin_result import Margins
 from ..loops.performance import Performance, measured, plant_time, settled_responses
 from ..models.process_model import ProcessModel
 from .controller import PIDController
-from .pid import KINDS, RULES, reference_plant, tuned
+from .pid import KINDS, RULES, TuningOptions, reference_plant, tuned
 from .rules import kinds_of
 
 if TYPE_CHECKING:
@@ -182,7 +182,8 @@ def compare_pid(
     """
     tried = [one_of(rule, "rule", RULES) for rule in rules or RULES]
     kinds = [one_of(kind, "kind", KINDS) for kind in kinds]
-    plant, _ = reference_plant(system, options.get("dt"))
+    settings = TuningOptions(**options)
+    plant, _ = reference_plant(system, settings.dt)
     total = _span(system, plant)
     made: list[tuple[PIDController, Margins, Performance]] = []
     refused: list[tuple[str, str, str]] = []
@@ -191,7 +192,7 @@ def compare_pid(
             if kind not in kinds_of(rule):
                 continue
             try:
-                controller, _ = tuned(system, rule, kind, **options)
+                controller, _ = tuned(system, rule, kind, settings)
             except ValueError as error:
                 # A rule without an answer for this plant is a row of the result, not its end.
                 refused.append((rule, kind, str(error)))

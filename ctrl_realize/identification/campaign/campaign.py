@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ...results import Flag, Result
-from ..methods import Method, fit_records, identify
+from ..methods import IdentifyOptions, Method, fit_records, identify
 from ..realization.delay_scan_result import DelayScan
 from ..realization.realize import realize
 from .flags import campaign_flags
@@ -61,7 +61,7 @@ class Campaign(Result):
     rows: tuple[CampaignRow, ...]
     sources: tuple[RecordSource, ...] = field(repr=False)
     method: Method
-    options: dict[str, Any]
+    options: IdentifyOptions
 
     @cached_property
     def good(self) -> tuple[CampaignRow, ...]:

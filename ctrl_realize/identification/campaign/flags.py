@@ -32,7 +32,8 @@ def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[F
 
 def _different_gains(rows: Rows) -> list[Flag]:
     """Test whether one gain holds for all records, by chi-square where their errors are known."""
-    gains, errors = (np.array([getattr(row, k) for row in rows]) for k in ("gain", "gain_std"))
+    gains = np.array([row.gain for row in rows])
+    errors = np.array([row.gain_std for row in rows])
     known = np.isfinite(gains)
     gains, errors = gains[known], errors[known]
     if gains.size < 2 or not np.median(gains):
@@ -69,12 +70,13 @@ def _different_gains(rows: Rows) -> list[Flag]:
 def _different_times(rows: Rows) -> list[Flag]:
     """Test dead times, and dead times with lags, by chi-square about their weighted means."""
     flags = []
-    for code, what, name, ends in (
-        ("records_differ", "dead time", "dead_time", "interval"),
-        ("lags_differ", "total delay (dead time plus lags)", "total_delay", "total_delay_interval"),
+    dead_times = [(row.dead_time, *row.interval) for row in rows]
+    totals = [(row.total_delay, *row.total_delay_interval) for row in rows]
+    for code, what, times in (
+        ("records_differ", "dead time", dead_times),
+        ("lags_differ", "total delay (dead time plus lags)", totals),
     ):
-        values = np.array([getattr(row, name) for row in rows])
-        low, high = np.array([getattr(row, ends) for row in rows]).reshape(-1, 2).T
+        values, low, high = np.array(times).reshape(-1, 3).T
         with np.errstate(invalid="ignore"):
             errors = (high - low) / (2 * Z_95)
         # The flat set of a scan claims no level, and is no standard error.

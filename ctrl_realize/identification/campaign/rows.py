@@ -20,7 +20,7 @@ from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import CtrlRealizeError, DataError
 from ...results import Flag, ModelFit
-from ..methods import Method, identify
+from ..methods import IdentifyOptions, Method, identify
 from ..realization.delay_scan_result import DelayScan
 from ..step.steps import detect_step
 from .packed_model import PackedModel
@@ -143,7 +143,7 @@ def identify_row(
     source: RecordSource,
     position: int,
     method: Method,
-    options: dict[str, Any],
+    options: IdentifyOptions,
     store: RowStore | None,
 ) -> CampaignRow:
     """Identify one record; what stops it becomes the row's error."""
@@ -188,7 +188,7 @@ def read_source(source: RecordSource) -> Record:
     return record
 
 
-def fingerprint(record: Record, method: str, options: dict[str, Any]) -> str:
+def fingerprint(record: Record, method: str, options: IdentifyOptions) -> str:
     """SHA-256 of a record's samples, of what is done with them, and by which versions."""
     digest = hashlib.sha256(repr(sorted(versions().items())).encode())
     for values in (record.time, record.input, record.output):
@@ -215,7 +215,8 @@ def _own_version() -> str:
 def _exact(value: Any) -> str:
     """Write a setting with all digits; python-control shows eight, or a system's name alone."""
     if isinstance(value, ct.StateSpace):
-        return repr([getattr(value, letter).tolist() for letter in "ABCD"] + [value.dt])
+        matrices = [M.tolist() for M in (value.A, value.B, value.C, value.D)]
+        return repr([*matrices, value.dt])
     if isinstance(value, ct.TransferFunction):
         sides = (value.num, value.den)
         return repr([[[p.tolist() for p in row] for row in side] for side in sides] + [value.dt])
@@ -258,8 +259,11 @@ def _gain(system: DelayedStateSpace) -> float:
 
 def source_name(source: RecordSource, position: int) -> str:
     """Name a record before it is read: by the first argument of the function that reads it."""
-    arguments = getattr(source, "args", ())
-    known = source.name if isinstance(source, Record) else str(arguments[0]) if arguments else ""
+    known = ""
+    if isinstance(source, Record):
+        known = source.name
+    elif isinstance(source, functools.partial) and source.args:
+        known = str(source.args[0])
     return spelled_out(known) or f"record {position}"
 
 

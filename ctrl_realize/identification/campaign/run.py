@@ -5,12 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator
 from inspect import signature
-from typing import Any
+from typing import Unpack
 
 from ..._checks import one_of
 from ...data import Record
 from ...errors import DataError, OptionError
-from ..methods import METHODS, Method, identify
+from ..methods import METHODS, IdentifyOptions, Method, identify
 from .campaign import Campaign
 from .rows import CampaignRow, RecordSource, RowStore
 from .workers import identified
@@ -23,7 +23,7 @@ def identify_campaign(
     method: Method = "output_error",
     progress: bool | None = None,
     store: RowStore | None = None,
-    **options: Any,
+    **options: Unpack[IdentifyOptions],
 ) -> Campaign:
     """Identify every record of a campaign; a bad record does not stop the others.
 
@@ -90,7 +90,7 @@ def identify_campaign(
     return Campaign(in_order, tuple(sources), method, options)
 
 
-def _check_options(options: dict[str, Any]) -> None:
+def _check_options(options: IdentifyOptions) -> None:
     known = set(signature(identify).parameters) - {"record", "method"}
     strange = sorted(set(options) - known)
     if strange:

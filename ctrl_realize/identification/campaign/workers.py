@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..methods import Method
+from ..methods import IdentifyOptions, Method
 from .rows import CampaignRow, RecordSource, RowStore, identify_row, source_name
 
 
@@ -23,7 +23,7 @@ def identified(
     sources: Sequence[RecordSource],
     n_jobs: int,
     method: Method,
-    options: dict[str, Any],
+    options: IdentifyOptions,
     store: RowStore | None,
 ) -> Iterator[tuple[int, CampaignRow]]:
     """Identify records with joblib; give position and row of each as it is finished."""
@@ -67,7 +67,7 @@ def _marked(
     source: RecordSource,
     position: int,
     method: Method,
-    options: dict[str, Any],
+    options: IdentifyOptions,
     store: RowStore | None,
 ) -> tuple[int, CampaignRow]:
     """Identify a record; a mark tells that it is under way."""

@@ -158,11 +158,12 @@ def compared(
     delay : float
         Dead time of the common model, in s.
     """
-    shifts, errors = (np.array([getattr(one, k) for one in own]) for k in ("shift", "error"))
-    gains, gain_errors, lags, lag_errors, followed = (
-        np.array([getattr(one, name) for one in own], dtype=np.float64)
-        for name in ("gain", "gain_error", "lag", "lag_error", "followed")
-    )
+    shifts = np.array([one.shift for one in own])
+    errors = np.array([one.error for one in own])
+    gains = np.array([one.gain for one in own], dtype=np.float64)
+    gain_errors = np.array([one.gain_error for one in own], dtype=np.float64)
+    lags = np.array([one.lag for one in own], dtype=np.float64)
+    lag_errors = np.array([one.lag_error for one in own], dtype=np.float64)
     kept = np.array(used)
     chi_square, p_value = homogeneity(shifts[kept], errors[kept])
     trend, trend_error = _trend(np.abs(amplitudes[kept]), shifts[kept], errors[kept])
@@ -175,7 +176,7 @@ def compared(
         gain_errors=gain_errors,
         lags=lags,
         lag_errors=lag_errors,
-        fit_percent=followed,
+        fit_percent=np.array([one.followed for one in own], dtype=np.float64),
         chi_square=chi_square,
         p_value=p_value,
         gain_test=homogeneity(gains[kept], gain_errors[kept]),

@@ -13,14 +13,14 @@ from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR
-from ...results import Flag, IntervalKind, ModelFit
+from ...results import Flag, FractionalDelayFit, IntervalKind
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
 from .words import ESTIMATE_WORDS, gain_in_words, total_in_words
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OutputErrorFit(ModelFit):
+class OutputErrorFit(FractionalDelayFit):
     """Dead time and model from an output-error fit of raw records.
 
     ``interval[0] <= dead_time <= interval[1]`` and
@@ -239,16 +239,6 @@ class OutputErrorFit(ModelFit):
         model lacks in it.
         """
         return self.estimate.better
-
-    @property
-    def delay(self) -> float:
-        """Dead time in samples, not rounded."""
-        return self.dead_time / self.dt
-
-    @property
-    def delay_interval(self) -> tuple[float, float]:
-        """Interval of the dead time in samples."""
-        return self.interval[0] / self.dt, self.interval[1] / self.dt
 
     @property
     def interval_kind(self) -> IntervalKind:

@@ -19,7 +19,14 @@ from ...numerics.signals.edges import difference_noise
 from ...numerics.state_space.delay_split import split_delays
 from ...results import Flag, ModelFit
 from .impulses import as_impulse, channels
-from .mimo_cores import Assembly, aligned_core, cores_by_columns, cores_by_rows, misfit
+from .mimo_cores import (
+    Assembly,
+    RealizationOptions,
+    aligned_core,
+    cores_by_columns,
+    cores_by_rows,
+    misfit,
+)
 from .realize import HANKEL
 
 Structure = Literal["auto", "common", "rows", "columns"]
@@ -262,7 +269,7 @@ def realize_mimo(
     splits = split_delays(found, known)
     if choice == "auto" and not np.any(known & (found != np.add.outer(*splits[0]))):
         choice = "common"
-    options = {"samples": samples, "feedthrough": feedthrough, "hankel": hankel}
+    options = RealizationOptions(samples, feedthrough, hankel)
     models: dict[str, Assembly] = {}
     if choice in ("common", "auto"):
         candidates = [aligned_core(data, count, *split, options) for split in splits]

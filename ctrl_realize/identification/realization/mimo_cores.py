@@ -20,6 +20,25 @@ from .impulses import channels, check_samples
 from .realize import realize
 
 
+@dataclass(frozen=True)
+class RealizationOptions:
+    """Arguments of `realize` that are the same for all channels."""
+
+    samples: int | None
+    feedthrough: bool | None
+    hankel: str
+
+    def realize(self, impulse: ImpulseResponse, order: int) -> DelayedStateSpace:
+        """Realize with these options."""
+        return realize(
+            impulse,
+            order,
+            samples=self.samples,
+            feedthrough=self.feedthrough,
+            hankel=self.hankel,
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Assembly:
     """Core of all channels, with the delays outside it and the orders of what it is made of."""
@@ -66,22 +85,22 @@ def _aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
 
 
 def _realized(
-    data: ImpulseResponse, markov: FloatArray, order: int, options: dict[str, Any]
+    data: ImpulseResponse, markov: FloatArray, order: int, options: RealizationOptions
 ) -> tuple[Matrices, tuple[Flag, ...]]:
     """Realize aligned data with at most `order` states."""
     moved: ImpulseResponse = ImpulseResponse(markov, data.dt, filter=data.filter, name=data.name)
-    padded = options["hankel"] == "padded"
-    samples = check_samples(moved, options["samples"], order, 0, padded=padded, what="delays")
+    padded = options.hankel == "padded"
+    samples = check_samples(moved, options.samples, order, 0, padded=padded, what="delays")
     try:
-        system = realize(moved, order, **options)
+        system = options.realize(moved, order)
     except OrderError:
         found = realize_at(markov, 0, samples, order, padded=padded).singular_values[:order]
         rank = int(np.count_nonzero(found))
         if rank == 0:
             p, m, _ = markov.shape
-            direct = np.zeros((p, m)) if options["feedthrough"] is False else markov[:, :, 0]
+            direct = np.zeros((p, m)) if options.feedthrough is False else markov[:, :, 0]
             return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), direct), ()
-        system = realize(moved, rank, **options)
+        system = options.realize(moved, rank)
     core = system.delay_free
     return (core.A, core.B, core.C, core.D), fit_of(system, Realization).flags
 
@@ -91,7 +110,7 @@ def aligned_core(
     order: int,
     outputs: IntArray,
     inputs: IntArray,
-    options: dict[str, Any],
+    options: RealizationOptions,
 ) -> Assembly:
     """Align all channels by delays of inputs and outputs, and realize them with one A."""
     moved = _aligned(channels(data), np.add.outer(outputs, inputs))
@@ -104,7 +123,7 @@ def cores_by_rows(
     data: ImpulseResponse,
     order: int,
     found: IntArray,
-    options: dict[str, Any],
+    options: RealizationOptions,
 ) -> Assembly:
     """Realize every output by itself, behind tapped input lines."""
     markov = channels(data)
@@ -124,7 +143,7 @@ def cores_by_columns(
     data: ImpulseResponse,
     order: int,
     found: IntArray,
-    options: dict[str, Any],
+    options: RealizationOptions,
 ) -> Assembly:
     """Realize every input by itself, in front of tapped output lines."""
     markov = channels(data)
@@ -152,7 +171,7 @@ def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
 
 
 def _each_alone(
-    data: ImpulseResponse, aligned: list[FloatArray], order: int, options: dict[str, Any]
+    data: ImpulseResponse, aligned: list[FloatArray], order: int, options: RealizationOptions
 ) -> tuple[list[Matrices], tuple[Flag, ...]]:
     """Realize rows or columns of the channels, and keep one flag of each kind."""
     realized = [_realized(data, part, order, options) for part in aligned]

@@ -91,4 +91,5 @@ def cross_validate(
 
 
 def _name(system: Any) -> str:
+    # of the caller: a system of python-control has a name, another model may have none
     return str(getattr(system, "name", None) or "model")

@@ -41,6 +41,7 @@ def _inside(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
     """Give the arrays inside what SciPy's reader returns."""
     if depth == 0:
         raise ValueError(f"more than {_MAX_DEPTH} levels of structs")
+    # SciPy marks a struct by this attribute alone; the class of it is private
     fields = getattr(value, "_fieldnames", None)
     if fields is not None:
         for field in fields:
@@ -67,7 +68,8 @@ def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple
         for field in fields:
             inner = value[field]
             if (
-                getattr(inner, "dtype", None) == h5py.ref_dtype
+                isinstance(inner, h5py.Dataset)
+                and inner.dtype == h5py.ref_dtype
                 and "MATLAB_class" not in inner.attrs
             ):
                 # a struct array holds, for each field, references to the values of its entries
