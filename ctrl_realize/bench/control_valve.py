@@ -307,7 +307,7 @@ class Valve:
         return dt * np.arange(_SINE_SAMPLES, dtype=np.float64)
 
     def _with_friction(self, held: FloatArray, dead_time: float) -> FloatArray:
-        """Simulate with slew limit and play between actuator and LVDT, on a finer grid."""
+        """Simulate with slew limit and backlash between actuator and LVDT, on a finer grid."""
         fine = self.dt / _OVERSAMPLING
         current = np.repeat(held, _OVERSAMPLING)
         stem = response_to_held_input(self._before_stem, current, fine, dead_time)

@@ -65,7 +65,7 @@ def slew_limited(position: FloatArray, limit: float, dt: float) -> FloatArray:
 
 
 def with_play(position: FloatArray, width: float) -> FloatArray:
-    """Follow `position` through a mechanical play of total `width`, starting in its middle."""
+    """Follow `position` through backlash of total `width`, starting in its middle."""
     half = width / 2
     out = np.empty_like(position)
     current = float(position[0])

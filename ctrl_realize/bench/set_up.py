@@ -72,7 +72,7 @@ def valve(
     slew_limit : float, optional
         Fastest motion of the stem, in strokes per second.
     hysteresis : float, default 0
-        Play of the stem, as a fraction of the stroke.
+        Backlash of the stem, as a fraction of the stroke.
     dead_time_scatter : float, default 0
         Standard deviation in s by which the dead time differs from record to record, as that of
         a pneumatic drive may; `truth` holds the mean.

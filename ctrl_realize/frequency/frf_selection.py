@@ -186,7 +186,7 @@ def _leading_phase(
             f"the response is non-causal: at order {n} a negative dead time of "
             f"{1e3 * dead_time / unit:.3g} ms leaves "
             f"{100 * np.sqrt(earlier.cost / min(as_is)):.2g} % of the misfit; the FRF's time "
-            "axis starts late, perhaps because a delay was taken out: put it back before the "
+            "axis starts late, perhaps because a delay was removed: add it back before the "
             "fit",
         )
     ]

@@ -29,11 +29,12 @@ RAISED_BY = {
 """File or folder of the source -> public function whose results carry the flag."""
 
 COMPOSED = {
-    "outliers": "… sample(s), the first at index …, are …, far beyond the others: if that stands "
-    "for a missing value, interpolate there before the fit, which they spoil",
-    "outlying_records": "left out of the mean: …",
-    "structured_misfit": "no model leaves only noise: the plant is not linear or has more dynamics "
-    "than the model; the dead time is the median of several views and the interval spans them",
+    "outliers": "… sample(s), the first at index …, are …, far from the others: if this value "
+    "marks missing data, interpolate these samples before the fit",
+    "outlying_records": "outlying records, excluded from the mean: …",
+    "structured_misfit": "no model fits down to the noise level: the plant is nonlinear or has "
+    "unmodelled dynamics; the dead time is the median of five delay estimates and the interval is "
+    "their range",
     "gain_not_resolved": "structures that the data cannot rule out differ in gain or total delay, "
     "or the interval of the gain contains zero",
     "estimates_disagree": "delay estimates far from their median: …",

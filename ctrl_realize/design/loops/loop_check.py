@@ -69,7 +69,7 @@ class LoopCheck(Result):
         return None if self.robustness is None else self.robustness.stable
 
     def rows(self) -> list[tuple[str, str]]:
-        """List what was found, for the card of a controller."""
+        """List the results, for the report of a controller."""
         found = self.margins
         if not found.stable:
             return [("on the design model", "UNSTABLE")]
@@ -77,7 +77,7 @@ class LoopCheck(Result):
             (
                 "on the design model",
                 f"stable, Ms {found.ms:.3g}, phase margin {found.phase_margin:.3g} deg, "
-                f"{in_time(found.delay_margin, 3)} more dead time until it is unstable",
+                f"delay margin {in_time(found.delay_margin, 3)}",
             )
         ]
         if self.robustness is not None:
@@ -104,7 +104,7 @@ class LoopCheck(Result):
 
 
 def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck:
-    """Close the loop on the model itself and, where it carries one, over its interval.
+    """Check the closed loop with the model, and over its interval of dead times if it has one.
 
     Parameters
     ----------

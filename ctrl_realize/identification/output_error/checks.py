@@ -266,7 +266,7 @@ def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
     if not ((at_once and moving) or (short and (at_once or moving)) or inverse):
         return []
     facts = ["the output starts to move together with the input"] * at_once
-    facts += ["the output responds the wrong way first"] * inverse
+    facts += ["the output first responds in the wrong direction"] * inverse
     facts += ["the output was moving before the step"] * moving
     facts += [f"only {in_time(rest)} was recorded before the step"] * short
     return [

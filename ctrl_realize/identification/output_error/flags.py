@@ -105,8 +105,8 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
         "apparent_dead_time",
         f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was "
         f"requested and is ruled out by the data: {time_within(fit.dead_time, fit.low, fit.high)} "
-        "is an apparent dead time, which makes up for lags that the model lacks or has too "
-        "many of, and its interval holds only if the structure is right; order "
+        "is an apparent dead time, which compensates for missing or superfluous lags, and its "
+        "interval is valid only if the structure is right; order "
         f"{other.order}, relative degree {other.relative_degree} gives "
         f"{time_within(other.dead_time, *other.interval)} "
         f"({interval_in_time(*other.interval)})",
@@ -159,8 +159,8 @@ def _disagreement(dt: float, fit: OutputErrorEstimate, firm: str) -> Flag | None
     return Flag(
         "structures_disagree",
         f"the chosen structure gives a dead time of {interval_in_time(low, high)}, other "
-        f"structures that the data cannot rule out {interval_in_time(fit.low, fit.high)}: a "
-        f"dead time and fast lags can hardly be told apart{firm}",
+        f"structures that the data cannot rule out {interval_in_time(fit.low, fit.high)}: "
+        f"dead time and fast lags are hardly distinguishable{firm}",
     )
 
 
@@ -187,8 +187,8 @@ def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
         return None
     return Flag(
         "many_lags",
-        "models with more equal lags keep fitting better, up to the highest order tried: any "
-        f"part of the dead time may be further lags of this kind{firm}",
+        "the fit improves with every further equal lag, up to the highest order tried: any part "
+        f"of the dead time may consist of further lags{firm}",
     )
 
 
@@ -224,9 +224,9 @@ def _open_start(fit: OutputErrorEstimate, firm: str) -> Flag | None:
         "onset_open",
         "the best model has a zero, which can imitate a smooth onset: how much of the time "
         "before the visible onset is dead time is not identifiable; it is between "
-        f"{interval_in_time(fit.low, fit.high)}{firm}. Play or friction that holds a valve stem "
-        "at first looks the same at one step amplitude: fit records of several amplitudes "
-        "together, whose delays then differ",
+        f"{interval_in_time(fit.low, fit.high)}{firm}. Backlash and static friction have the "
+        "same effect at one step amplitude: fit records of several amplitudes together, whose "
+        "delays then differ",
     )
 
 

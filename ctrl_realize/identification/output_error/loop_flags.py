@@ -50,10 +50,10 @@ def unstable_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...
     return (
         Flag(
             "unstable",
-            f"the output predicts itself as that of an unstable plant does (p = "
-            f"{min(chances):.1g}), one that something else holds: the model is stable, as all that "
-            "are fitted, and its dead time, gain and lags are not the plant's; do not design with "
-            "it. Identify the closed loop, from set-point to output, or a model of its physics",
+            "the autocorrelation of the output is that of an unstable plant, stabilised by a "
+            f"controller (p = {min(chances):.1g}): fitted models are always stable, so the dead "
+            "time, gain and lags of this one are wrong; do not design with it. Identify the closed "
+            "loop, from set-point to output, or use a physical model",
         ),
     )
 

@@ -79,7 +79,7 @@ def _no_sign(fit: OutputErrorEstimate, static: StaticGain, length: float) -> str
         )
     return (
         "the record determines neither the gain nor its sign: the gain of the model is "
-        f"{static.gain:.4g}, but {why}. Record for longer, or move the input further"
+        f"{static.gain:.4g}, but {why}. Use a longer record, or a larger input"
     )
 
 
@@ -111,8 +111,8 @@ def cancelled_pair(fit: OutputErrorEstimate) -> Flag | None:
             return Flag(
                 "cancelled_pair",
                 f"zeros nearly cancel a pair of poles at {abs(pole) / (2 * np.pi):.3g} Hz: "
-                "the output oscillates there independently of the input, and the model "
-                "spends two poles on it; dead time and lags may be wrong: remove this "
+                "the output oscillates there independently of the input, and two poles "
+                "of the model describe it; dead time and lags may be wrong: remove this "
                 "oscillation from the output first",
             )
     return None

@@ -75,7 +75,7 @@ class Repeatability:
         return float(np.max(np.abs(self.gains[kept] - 1.0), initial=0.0))
 
     def table(self) -> pd.DataFrame:
-        """One row for each record: delay, gain and lags of its own, and how it is followed.
+        """One row for each record: its delay, gain and lags, and the fit of the common model.
 
         Returns
         -------
@@ -109,7 +109,8 @@ class Repeatability:
             ("scatter of delays", f"{in_time(scatter)} between records"),
             (
                 "chi-square",
-                f"{self.chi_square:.3g} for {len(self.names) - 1} (p = {self.p_value:.2g})",
+                f"{self.chi_square:.3g}, {len(self.names) - 1} degrees of freedom "
+                f"(p = {self.p_value:.2g})",
             ),
         ]
         for what, ratios, (statistic, chance) in (

@@ -71,6 +71,8 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
         reasons = [
             f"{kind}: lowest information criterion of {len(fit.structures)} "
             f"structures{simple}, with a penalty on zeros and on a fourth pole"
+            if len(fit.structures) > 1
+            else f"{kind}: the only structure that was tried"
         ]
     if fit.delay_estimates:
         reasons.append(

@@ -136,8 +136,8 @@ def _marginal(others: Sequence[Candidate]) -> tuple[Flag, ...]:
     return (
         Flag(
             "marginal_decision",
-            f"order {one.order} behind delays of {one.inputs} and {one.outputs} samples "
-            f"{'with' if one.feedthrough else 'without'} direct term is as good as the model "
+            f"order {one.order} with delays of {one.inputs} and {one.outputs} samples "
+            f"{'and' if one.feedthrough else 'and no'} feedthrough fits as well as the model "
             "chosen, so that rounding on another processor may decide otherwise",
         ),
     )

@@ -83,7 +83,7 @@ def test_play_that_one_height_takes_for_dead_time_is_told_by_several():
     one = cr.fit_output_error(through_play(1.0, 0)).fit
     assert one.interval[0] > 10
     told = [str(flag) for flag in one.flags if flag.code == "onset_open"]
-    assert "Play or friction" in told[0]
+    assert "Backlash" in told[0]
     heights = (1.0, 1.5, 2.0, 3.0)
     several = cr.fit_output_error([through_play(h, k) for k, h in enumerate(heights)]).fit
     assert "amplitude_trend" in codes(several)
