@@ -5,8 +5,8 @@ sys    = cr.identify(record)              # a control.StateSpace with z^-d
 ct.bode_plot([sys, cr.read_frf("frf.csv")])
 """
 
-# Loading all of it takes half as long as python-control, and most callers need a part: names are
-# loaded when they are first asked for. The stub beside this file lists them.
+# Importing everything takes half as long as importing python-control, and most callers need only
+# a part: names are loaded when they are first used. The stub beside this file lists them.
 import lazy_loader
 
 __version__ = "0.1.0"

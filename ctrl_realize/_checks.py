@@ -1,4 +1,4 @@
-"""Checks of arguments, and rules for names, that many public functions share."""
+"""Checks of arguments and names shared by many public functions."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .errors import DataError, OptionError
 Choice = TypeVar("Choice")
 
 MOST = 10**12
-"""No count of samples, lags or states is larger."""
+"""Upper limit of any number of samples, lags or states."""
 
 
 def positive(value: Any, name: str, what: str) -> float:
-    """Return `value` as a float when it is a finite number above zero.
+    """Return `value` as a float; it must be a finite number above zero.
 
     Raises
     ------
     OptionError
-        Anything else; `what` says in the message what the number is.
+        Anything else; `what` describes the number in the message.
     """
     number = real(value, name, what)
     if number <= 0:
@@ -33,7 +33,7 @@ def positive(value: Any, name: str, what: str) -> float:
 
 
 def real(value: Any, name: str, what: str) -> float:
-    """Return `value` as a float when it is a finite real number."""
+    """Return `value` as a float; it must be a finite real number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise OptionError(f"{name}={value!r}; expected a finite number: {what}")
     return float(value)
@@ -50,7 +50,7 @@ def band(value: Any, name: str, what: str) -> tuple[float, float]:
 
 
 def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
-    """Return `value` as an int when it is a whole number in low...high."""
+    """Return `value` as an int; it must be a whole number in low...high."""
     limits = f">= {low}" if high is None else f"in {low}...{high}"
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise OptionError(f"{name}={value!r}; expected a whole number {limits}")
@@ -63,12 +63,12 @@ def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
 
 
 def numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Take real numbers and nothing else; masked ones are missing, NaN.
+    """Convert real numbers to an array; masked values become NaN.
 
     Raises
     ------
     DataError
-        Text, complex values, times, rows of different lengths.
+        Text, complex values, dates, or rows of different lengths.
     """
     array = _array(values, what)
     if array.dtype.kind in "mM":
@@ -85,7 +85,7 @@ def numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
 
 
 def complex_numbers(values: ArrayLike, what: str) -> NDArray[np.complex128]:
-    """Take real or complex numbers and nothing else; masked ones are missing, NaN."""
+    """Convert real or complex numbers to an array; masked values become NaN."""
     array = _array(values, what)
     if array.dtype.kind not in "biufc":
         raise DataError(f"{what} holds {array.dtype} values; expected complex numbers")
@@ -93,7 +93,7 @@ def complex_numbers(values: ArrayLike, what: str) -> NDArray[np.complex128]:
 
 
 def finite(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Take real numbers that are finite."""
+    """Convert finite real numbers to an array."""
     array = numbers(values, what)
     bad = int(np.sum(~np.isfinite(array)))
     if bad:
@@ -109,7 +109,8 @@ def _array(values: Any, what: str) -> NDArray[Any]:
 
 
 def _unmasked(given: Any) -> Any:
-    """Put NaN where something is masked, in lists too: below a mask is anything, often 1e20."""
+    """Replace masked values by NaN, also in lists: the data under a mask are arbitrary, often
+    1e20."""
     if isinstance(given, np.ma.MaskedArray):
         mask = np.ma.getmaskarray(given)
         if given.dtype.kind not in "biufc" or not mask.any():
@@ -123,8 +124,8 @@ def _unmasked(given: Any) -> Any:
 
 
 def one_of(value: Choice, name: str, choices: tuple[str, ...]) -> Choice:
-    """Return the choice that `value` is, written in any case."""
-    # an array would compare one by one
+    """Return the choice that `value` names, ignoring case."""
+    # an array would be compared element by element
     if isinstance(value, str):
         for choice in choices:
             if value.casefold() == choice.casefold():
@@ -133,17 +134,17 @@ def one_of(value: Choice, name: str, choices: tuple[str, ...]) -> Choice:
 
 
 def spelled_out(text: str) -> str:
-    """Make a text that can be written: file names that are no UTF-8 hold lone surrogates."""
+    """Escape lone surrogates, as in file names that are not UTF-8, so that the text is writable."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def system_name(name: str) -> str:
-    """Make a name that python-control takes: a dot stands between system and signal there."""
+    """Replace dots, which python-control reserves for ``system.signal``."""
     return name.replace(".", "_")
 
 
 def system_names(names: Sequence[str]) -> list[str]:
-    """Make names of signals that python-control takes, different ones where the given ones are.
+    """Make valid signal names for python-control; different names stay different.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Results as cards, systems as the line that is asked for, arrays as code with all digits."""
+"""Results as cards, systems in the requested representation, arrays as code with all digits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 SHORT_LABEL = 16
-"""Letters of a label that is never broken."""
+"""Letters of a label up to which it is not wrapped."""
 
 
 def text_card(
@@ -19,7 +19,7 @@ def text_card(
     choices: Sequence[str] = (),
     flags: Sequence[str] = (),
 ) -> str:
-    """Lay out label-value rows as text, choices and flags below them.
+    """Format label-value rows as text, followed by choices and flags.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def html_card(
     choices: Sequence[str] = (),
     flags: Sequence[str] = (),
 ) -> str:
-    """Lay out label-value rows as a small HTML table; everything is escaped.
+    """Format label-value rows as a small HTML table; everything is escaped.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def html_card(
     cell = "text-align:left;vertical-align:top"
     body = "".join(
         f"<tr><th style='{cell};font-weight:500;padding:2px 16px 2px 0;"
-        # On a phone the values wrap first.
+        # On a narrow screen the values wrap first.
         f"white-space:{'nowrap' if len(label) <= SHORT_LABEL else 'normal'}'>"
         f"{html.escape(label)}</th>"
         f"<td style='{cell};padding:2px 0'>{html.escape(value)}</td></tr>"
@@ -84,10 +84,10 @@ def html_card(
 
 
 def as_asked(system: Any) -> str:
-    """Write a system as its `repr_format`, or that of python-control's settings, asks for.
+    """Represent a system as its `repr_format`, or python-control's setting, requires.
 
-    What python-control takes where nothing was set, "eval", lists every number. Systems of this
-    toolbox show their one line there, and "eval" only where it was set on the system itself.
+    python-control's default, "eval", lists every number. Systems of this toolbox use one line
+    instead, and "eval" only if it was set on the system itself.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def as_asked(system: Any) -> str:
 
 
 def as_code(values: Any) -> str:
-    """Write an array, or a system of python-control, as code that has all its digits.
+    """Write an array, or a python-control system, as code with all digits.
 
     Examples
     --------
@@ -119,6 +119,7 @@ def as_code(values: Any) -> str:
     >>> print(as_code(np.array([1 / 3])))
     array([0.3333333333333333])
     """
-    # an object of python-control or NumPy; only some of the former write themselves as code
+    # an object of python-control or NumPy; only some classes of the former can write themselves
+    # as code
     with np.printoptions(precision=17, floatmode="unique", threshold=sys.maxsize):
         return str(values._repr_eval_() if hasattr(values, "_repr_eval_") else repr(values))

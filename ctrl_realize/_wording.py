@@ -1,4 +1,4 @@
-"""Numbers in words: times with a unit that suits them, with as many digits as are worth reading."""
+"""Numbers as text: times with a suitable unit, and with a sensible number of digits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from .numerics.arrays import FloatArray
 
 UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}
-"""Name of a unit of time -> how many of it are in a second."""
+"""Name of a unit of time -> number of it in a second."""
 
 
 def time_unit(largest: float) -> tuple[float, str]:
@@ -26,7 +26,7 @@ def time_unit(largest: float) -> tuple[float, str]:
 
 
 def in_time(seconds: float, digits: int = 3) -> str:
-    """Write a time with a unit that suits it.
+    """Write a time with a suitable unit.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def in_time(seconds: float, digits: int = 3) -> str:
 
 
 def poles_in_words(poles: Iterable[complex]) -> str:
-    """Write poles in rad/s as an engineer reads them: lags, pairs, integrators.
+    """Write poles in rad/s as lags, pairs and integrators.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def _pole_in_words(pole: complex) -> str:
 
 
 def interval_in_time(low: float, high: float) -> str:
-    """Write an interval of times in one unit, with digits that show its width.
+    """Write an interval of times in one unit, with two significant digits of its width.
 
     Examples
     --------
@@ -88,9 +88,9 @@ def interval_in_time(low: float, high: float) -> str:
 
 
 def time_within(value: float, low: float, high: float) -> str:
-    """Write an estimate in the unit of its interval, and rounded to the same place.
+    """Write an estimate in the unit of its interval, rounded to the same digit.
 
-    What is rounded alike keeps its order: an estimate never seems to lie outside.
+    Equal rounding keeps the order: an estimate inside its interval is also shown inside.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def time_within(value: float, low: float, high: float) -> str:
 
 
 def number_within(value: float, low: float, high: float) -> str:
-    """Write an estimate rounded to the place to which the ends of its interval are.
+    """Write an estimate rounded to the same digit as the ends of its interval.
 
     Examples
     --------
@@ -121,9 +121,9 @@ def number_within(value: float, low: float, high: float) -> str:
 
 
 def numbers_alike(values: Iterable[float], low: float, high: float) -> list[str]:
-    """Write numbers with one number of decimals, such that ``high - low`` has two digits.
+    """Write numbers with one number of decimals, so that ``high - low`` has two digits.
 
-    The larger end has at least three digits in all, four where there is no width.
+    The larger end has at least three digits, four if the width is zero.
 
     Examples
     --------
@@ -136,19 +136,19 @@ def numbers_alike(values: Iterable[float], low: float, high: float) -> list[str]
     if largest == 0 or not 1e-3 < largest < 1e6:
         return [f"{value:.6g}" for value in several]
     least = (4 if width <= 0 else 3) - 1 - int(np.floor(np.log10(largest)))
-    # a width of one that was computed as 0.9999... is one
+    # a width of 0.9999..., computed from 1, counts as 1
     shown = 1 - int(np.floor(np.log10(width) + 1e-9)) if width > 0 else least
     decimals = int(np.clip(max(shown, least), 0, 9))
     return ["0" if value == 0 else f"{value:.{decimals}f}" for value in several]
 
 
 def _plainly(value: float, digits: int) -> str:
-    """Write a number without an exponent where its digits allow it."""
+    """Write a number without an exponent if its digits allow it."""
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 def in_digits(value: float, digits: int = 4) -> str:
-    """Write a number, and nothing where it is not finite.
+    """Write a number; an empty text if it is not finite.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def in_digits(value: float, digits: int = 4) -> str:
 
 
 def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
-    """Write a matrix in one line, its rows apart; long rows are cut.
+    """Write a matrix in one line, rows separated by semicolons; long rows are shortened.
 
     Examples
     --------
@@ -177,7 +177,7 @@ def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
 
 
 def in_percent(fits: Iterable[float]) -> str:
-    """Write how much of each output a model explains.
+    """Write the fit percentage of each output.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def in_percent(fits: Iterable[float]) -> str:
 
 
 def named(kind: str, name: str) -> str:
-    """Call a thing by its name, if it has one.
+    """Refer to an object by its name, if it has one.
 
     Examples
     --------

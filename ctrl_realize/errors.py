@@ -1,8 +1,7 @@
 """Errors and warnings of the toolbox.
 
-Every error derives from `CtrlRealizeError` and from the builtin that a user would catch
-without knowing this package. Errors are for what cannot be answered, warnings for answers
-that one should look at.
+Every error derives from `CtrlRealizeError` and from the corresponding builtin exception. Errors are
+raised if there is no answer, warnings if the answer needs attention.
 """
 
 from __future__ import annotations
@@ -11,23 +10,23 @@ import sys
 import warnings
 
 _INSIDE = ("ctrl_realize", "control")
-"""Packages whose lines nobody has written who reads a warning."""
+"""Packages whose frames are skipped when a warning is attributed to a line of the caller."""
 
 
 class CtrlRealizeError(Exception):
-    """Base of all errors that this toolbox raises on purpose."""
+    """Base class of all errors of this toolbox."""
 
 
 class DataError(CtrlRealizeError, ValueError):
-    """The data cannot be used: wrong shape, not finite, too short, constant."""
+    """The data cannot be used: wrong shape, not finite, too short, or constant."""
 
 
 class TimeAxisError(DataError):
-    """The time axis is not uniform, or does not run forward."""
+    """The time axis is not uniform, or not increasing."""
 
 
 class NoStepError(DataError):
-    """The record has no step to work on."""
+    """The record contains no step."""
 
 
 class OrderError(CtrlRealizeError, ValueError):
@@ -43,11 +42,11 @@ class OptionError(CtrlRealizeError, ValueError):
 
 
 class UnsuitableSystemError(CtrlRealizeError, ValueError):
-    """The system is of a kind that the function cannot handle."""
+    """The function cannot handle this kind of system."""
 
 
 class FileFormatError(CtrlRealizeError, ValueError):
-    """The file exists, but its content is not as expected."""
+    """The content of the file is not as expected."""
 
 
 class MissingFileError(CtrlRealizeError, FileNotFoundError):
@@ -55,7 +54,7 @@ class MissingFileError(CtrlRealizeError, FileNotFoundError):
 
 
 class CtrlRealizeWarning(UserWarning):
-    """Base of all warnings of this toolbox."""
+    """Base class of all warnings of this toolbox."""
 
 
 class DataWarning(CtrlRealizeWarning):
@@ -63,11 +62,11 @@ class DataWarning(CtrlRealizeWarning):
 
 
 class ModelWarning(CtrlRealizeWarning):
-    """The model has a property that one should know before using it."""
+    """The model has a property that affects its use."""
 
 
 class UnresolvedWarning(ModelWarning):
-    """The record of a model does not determine a quantity that a design relies on."""
+    """The record does not determine a quantity that the design relies on."""
 
 
 def warn_caller(message: str, category: type[Warning]) -> None:

@@ -1,8 +1,8 @@
-"""What all results have in common: a card in a notebook, the same card as text, a plot.
+"""Common base of all results: a card in a notebook, the same card as text, a plot.
 
-A result is a frozen dataclass. It names itself (`_title`), lists its numbers with their units
-(`_rows`), and may carry `choices`, what was chosen for the caller and why, and `flags`, the
-things that one should know before trusting it.
+A result is a frozen dataclass. It has a title (`_title`) and lists its numbers with their units
+(`_rows`); it may have `choices`, what was chosen automatically and why, and `flags`, warnings about
+the result.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ._shown import html_card, text_card
 
 IntervalKind = Literal["confidence", "conditional", "spanned", "flatness", "plausible", "tracked"]
-"""What the interval of a dead time is; see `ModelFit`."""
+"""Kinds of intervals of a dead time; see `ModelFit`."""
 INTERVAL_LABELS: dict[IntervalKind | None, str] = {
     "confidence": "95 % interval",
     "conditional": "95 % interval if the structure is right",
@@ -28,14 +28,14 @@ INTERVAL_LABELS: dict[IntervalKind | None, str] = {
 
 @dataclass(frozen=True)
 class Flag:
-    """Something one should know before trusting a result.
+    """Warning about a result.
 
     Attributes
     ----------
     code : str
-        Short fixed name, for programs: ``"delay_at_bound"``.
+        Short fixed name for programs: ``"delay_at_bound"``.
     message : str
-        What was seen, with its numbers, and what to try.
+        What was found, with its numbers, and what to try.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class Flag:
 
 
 class Drawable:
-    """What has a picture among `ctrl_realize.plots`.
+    """Base of everything that has a plot in `ctrl_realize.plots`.
 
     Examples
     --------
@@ -68,18 +68,17 @@ class Drawable:
     __slots__ = ()
 
     def plot(self, **kwargs: Any) -> Any:
-        """Draw it; returns a `control.ControlPlot`.
+        """Draw the object; returns a `control.ControlPlot`.
 
-        Keyword arguments go to the function of `ctrl_realize.plots` that draws this kind of
-        object.
+        Keyword arguments are those of the function of `ctrl_realize.plots` for this kind of object.
         """
-        # The one way up in the layers: drawing is looked up when somebody asks for it, so that
-        # computing needs no matplotlib.
+        # The only upward import in the layers: plots are imported on demand, so that computing
+        # needs no matplotlib.
         return import_module("ctrl_realize.plots").draw(self, **kwargs)
 
 
 class Result(Drawable):
-    """Mixin of all results: `report`, `plot` and the card that a notebook shows.
+    """Base class of all results: `report`, `plot` and the card shown by a notebook.
 
     Examples
     --------
@@ -96,7 +95,7 @@ class Result(Drawable):
     """
 
     if TYPE_CHECKING:
-        # A subclass may have them as fields of a dataclass or as properties.
+        # A subclass may define these as fields of a dataclass or as properties.
         @property
         def choices(self) -> tuple[str, ...]:
             """Choices that were made automatically, with reasons."""
@@ -132,48 +131,47 @@ class Result(Drawable):
 
 
 class ModelFit(Result):
-    """How a model was found: what the results of all estimators have in common.
+    """How a model was found: the common attributes of all estimation results.
 
-    The `fit` of a `DelayedStateSpace` is one. Times are in s, delays in samples; None where the
-    method does not estimate a quantity. Where both are there, ``interval[0] <= dead_time <=
-    interval[1]`` and ``delay == dead_time / dt``, but for the whole samples that some methods
-    round to.
+    This is the type of `fit` of a `DelayedStateSpace`. Times are in s, delays in samples; None if
+    the method does not estimate a quantity. Otherwise ``interval[0] <= dead_time <= interval[1]``
+    and ``delay == dead_time / dt``, up to the rounding of some methods to whole samples.
 
     Attributes
     ----------
     dead_time : float or None
     interval : tuple of float, or None
-        Of the dead time; `dead_time_interval` is the same where it may be relied on.
+        Of the dead time; `dead_time_interval` is the same, or None if it is not reliable.
     interval_kind : str or None
-        What `interval` is. ``"confidence"``: a 95 % interval. ``"conditional"``: one if the
-        structure that was asked for were right, which the data rule out. ``"spanned"``: by several
-        estimates, where no model leaves only noise. ``"flatness"``: delays within 5 % of the least
-        misfit. ``"plausible"``: dead times that are not ruled out, without a probability.
-        ``"tracked"``: of the samples within a tracker's memory.
+        Kind of `interval`. ``"confidence"``: a 95 % interval. ``"conditional"``: a 95 % interval if
+        the requested structure were right, although the data rule it out. ``"spanned"``: the range
+        of several estimates, if no model fits down to the noise level. ``"flatness"``: delays
+        within 5 % of the smallest IAE. ``"plausible"``: dead times that are not ruled out, without
+        a probability. ``"tracked"``: for the samples within the forgetting time of a tracker.
     interval_label : str
         The same in words.
     delay : float or None
     delay_interval : tuple of float, or None
     total_delay : float or None
-        Delay at zero frequency: dead time and lags.
+        Delay at zero frequency: dead time plus lags.
     total_delay_interval : tuple of float, or None
         95 % interval.
     onset : float or None
-        First motion of the output after a step of the input; NaN where the input is no step.
+        Visible onset of the response after a step of the input; NaN if the input is not a step.
     order : int or None
-        States of the core.
+        Number of states of the core.
     gain : float or None
         At zero frequency.
     gain_interval : tuple of float, or None
         95 % interval.
     gain_std_given_structure : float or None
-        Standard error, if the chosen structure is the plant's.
+        Standard error for the chosen structure.
     residual_std : float or None
-        Standard deviation of what the model leaves of its one output.
+        Standard deviation of the residual; None for several outputs.
     sampling : str or None
-        How the impulse response was sampled that the model was realized from.
+        Sampling of the impulse response that the model was realized from.
     records : tuple of Record
-        What was fitted; empty where it was no record.
+        Records that were fitted; empty if there were none.
     choices : tuple of str
     flags : tuple of Flag
 
@@ -186,8 +184,8 @@ class ModelFit(Result):
     """
 
     if TYPE_CHECKING:
-        # Every class defines these, mostly as fields of a dataclass, which could not take the
-        # place of properties that are there when the program runs.
+        # Every subclass defines these, mostly as dataclass fields, which cannot override
+        # properties that exist at run time.
         @property
         def dead_time(self) -> float | None:
             """Dead time in s."""
@@ -210,12 +208,12 @@ class ModelFit(Result):
 
         @property
         def order(self) -> int | None:
-            """States of the core."""
+            """Number of states of the core."""
             ...
 
         @property
         def records(self) -> tuple[Any, ...]:
-            """What was fitted."""
+            """Records that were fitted."""
             ...
 
     @property
@@ -225,12 +223,12 @@ class ModelFit(Result):
 
     @property
     def interval_kind(self) -> IntervalKind | None:
-        """What `interval` is, as a key."""
+        """Kind of `interval`, as a key."""
         return None
 
     @property
     def interval_label(self) -> str:
-        """What `interval` is, in words."""
+        """Kind of `interval`, in words."""
         return INTERVAL_LABELS[self.interval_kind]
 
     @property
@@ -245,7 +243,7 @@ class ModelFit(Result):
 
     @property
     def onset(self) -> float | None:
-        """First motion of the output after a step of the input, in s."""
+        """Visible onset of the response after a step of the input, in s."""
         return None
 
     @property
@@ -260,21 +258,21 @@ class ModelFit(Result):
 
     @property
     def gain_std_given_structure(self) -> float | None:
-        """Standard error of the gain if the chosen structure is the plant's."""
+        """Standard error of the gain for the chosen structure."""
         return None
 
     @property
     def residual_std(self) -> float | None:
-        """Standard deviation of what the model leaves of its one output."""
+        """Standard deviation of the residual; None for several outputs."""
         return None
 
     @property
     def sampling(self) -> str | None:
-        """How the impulse response was sampled that the model was realized from."""
+        """Sampling of the impulse response that the model was realized from."""
         return None
 
     def _std(self) -> float | None:
-        """Standard error of the dead time in s, if the chosen structure is the plant's."""
+        """Standard error of the dead time in s for the chosen structure."""
         return None
 
     def _method(self) -> str:
@@ -283,7 +281,7 @@ class ModelFit(Result):
 
 
 class FractionalDelayFit(ModelFit):
-    """Fit of a dead time in s; `delay` and `delay_interval` are the same in samples.
+    """Fit of a continuous dead time in s; `delay` and `delay_interval` are the same in samples.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""How far an identified model is to be trusted: residuals, prediction, new records, bootstrap."""
+"""Validation of identified models: residuals, prediction, new records, bootstrap."""
 
 from .identification.validation.bootstrap import Bootstrap as Bootstrap
 from .identification.validation.bootstrap import bootstrap as bootstrap

@@ -1,4 +1,4 @@
-"""What is measured: records, step and impulse responses, frequency responses."""
+"""Measured data: records, step and impulse responses, frequency responses."""
 
 from .frf import MeasuredFRF
 from .impulse import FilterSpec, ImpulseResponse

@@ -1,4 +1,4 @@
-"""A measured frequency response that python-control can draw beside a model."""
+"""Measured frequency responses, as python-control frequency-response data."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ from .record_checks import check_finite, check_size
 class MeasuredFRF(FRFAlgebra):
     """Measured frequency response function.
 
-    It is a `control.FrequencyResponseData` without a time base (``dt=None``), the form in which
-    python-control draws and combines it with continuous and discrete systems alike.
+    A `control.FrequencyResponseData` without a time base (``dt=None``), so that python-control
+    draws and combines it with continuous and discrete systems alike.
 
     Parameters
     ----------
     response : array_like, shape (K,) or (p, m, K)
         Complex response.
     frequency_hz : array_like, shape (K,)
-        Frequencies in Hz, in any order; they are sorted.
+        Frequencies in Hz, in any order.
     coherence : array_like, same shape as `response`, optional
         Squared coherence, 0...1.
     std : array_like, same shape as `response`, optional
         Standard deviation of the complex response (root mean square of the error).
     repeats : float, optional
-        Number of repeats, periods or independent segments from whose scatter `std` was taken,
-        above 1 and not necessarily whole. Without it `std` counts as known.
+        Number of repeats, periods or independent segments from which `std` was estimated; above 1,
+        not necessarily whole. Without it `std` counts as known.
     sample_time : float, optional
-        Sample time in s of the records that the response was estimated from. An input that is
-        held between the samples leaves its hold in the response, half a sample of delay;
-        `fit_frf`, `compare_frf` and `impulse_from_frf` then reckon with it.
+        Sample time in s of the records that the response was estimated from. The hold of the input
+        is then part of the response, half a sample of delay, and `fit_frf`, `compare_frf` and
+        `impulse_from_frf` account for it.
     name : str, optional
     inputs, outputs : str or sequence of str, optional
-        Signal names. In all names a dot becomes an underscore, as python-control takes no dots.
+        Signal names. Dots become underscores, because python-control allows no dots.
 
     Attributes
     ----------
@@ -58,22 +58,23 @@ class MeasuredFRF(FRFAlgebra):
     Raises
     ------
     DataError
-        Shapes that do not match, values that are not finite, negative frequencies; also when
-        indexing chooses no channel.
+        Shapes that do not match, values that are not finite, negative frequencies, or an index that
+        selects no input or output.
 
     Notes
     -----
-    ``frf[output, input]`` takes channels by number, name or slice, with their coherence and
+    ``frf[output, input]`` selects channels by number, name or slice, with their coherence and
     standard deviation.
 
-    A standard deviation from few repeats is itself uncertain: 1.96 of it, or circles of
-    ``sqrt(3) * std``, hold 95 % only where there are many. `circle` and the intervals of
-    `design.margins` reckon with `repeats`.
+    A standard deviation from few repeats is itself uncertain: intervals of 1.96 std, or circles of
+    ``sqrt(3) * std``, contain 95 % only for many repeats. `circle` and the intervals of
+    `design.margins` account for `repeats`.
 
-    Arithmetic carries deviation, coherence, repeats and sample time along. Exact systems and
-    numbers scale the deviation; two measured responses count as independent, one with itself does
-    not. ``frf.feedback(K)`` knows that the response stands twice in ``frf / (1 + K frf)``. Where
-    the coherence or the hold of a result is not known a `DataWarning` says that it is left out.
+    Arithmetic propagates standard deviation, coherence, repeats and sample time. Exact systems and
+    numbers scale the standard deviation; two measured responses are treated as independent, a
+    response and itself are not. ``frf.feedback(K)`` accounts for the fact that the response occurs
+    twice in ``frf / (1 + K frf)``. If coherence or hold of a result is unknown, a `DataWarning`
+    reports that it is left out.
 
     Examples
     --------
@@ -110,7 +111,7 @@ class MeasuredFRF(FRFAlgebra):
         check_finite(grid, "frequency_hz")
         check_finite(values, "response")
         check_size(grid, "frequency_hz")
-        # not the absolute value, which overflows
+        # not the absolute value, which may overflow
         check_size(np.maximum(np.abs(values.real), np.abs(values.imag)), "response")
         if np.any(grid < 0):
             raise DataError(f"frequency_hz goes down to {grid.min():g} Hz; expected a value >= 0")
@@ -122,8 +123,8 @@ class MeasuredFRF(FRFAlgebra):
             for key, names in (("inputs", inputs), ("outputs", outputs))
             if names
         }
-        # Not smooth: python-control would draw the interpolating splines far beyond the measured
-        # band, where they run off. Margins and products with systems do without.
+        # Not smooth: python-control would draw interpolating splines far beyond the measured
+        # band, where they diverge. Margins and products with systems do not need them.
         signals["name"] = system_name(str(name))
         super().__init__(values, 2 * np.pi * grid, dt=None, smooth=False, **signals)
         self._single = values.ndim == 1
@@ -175,7 +176,7 @@ class MeasuredFRF(FRFAlgebra):
         return f"{self.frequency_hz.size} points, {low:g}...{high:g} Hz"
 
     def __str__(self) -> str:
-        # python-control's lists every point.
+        # python-control's representation lists every point.
         return self._repr_info_()
 
     def _repr_html_(self) -> str | None:
@@ -184,8 +185,8 @@ class MeasuredFRF(FRFAlgebra):
     def eval(self, omega: Any, squeeze: bool | None = None) -> Any:
         """Return the response at measured frequencies, in rad/s.
 
-        See `control.FrequencyResponseData.eval`. A frequency may differ from the measured one by
-        the rounding of a conversion, as 6.283185307179586 * f and 2 * (f * pi) do.
+        See `control.FrequencyResponseData.eval`. A frequency may differ from a measured one by
+        rounding, such as 6.283185307179586 * f and 2 * (f * pi).
         """
         asked = numbers(omega, "omega")
         right = np.clip(np.searchsorted(self.omega, asked), 1, max(self.omega.size - 1, 1))
@@ -195,15 +196,15 @@ class MeasuredFRF(FRFAlgebra):
         return super().eval(asked, squeeze)
 
     def __getitem__(self, key: Any) -> Any:
-        """Take channels as python-control does, ``frf[output, input]`` by number, name or slice.
+        """Select channels as in python-control: by number, name or slice.
 
-        Coherence and standard deviation come along. One channel comes as from one record, with
-        arrays of shape (K,).
+        Coherence and standard deviation are selected as well. A single channel has arrays of shape
+        (K,).
         """
         taken = super().__getitem__(key)
         if not isinstance(taken, ct.FrequencyResponseData):
             return taken
-        # python-control reads the key a second time, for an FRF whose values are the places.
+        # python-control interprets the key, applied to an FRF whose values are the positions.
         p, m = self.noutputs, self.ninputs
         places = ct.FrequencyResponseData(
             np.arange(p * m, dtype=np.complex128).reshape(p, m, 1),
@@ -219,11 +220,11 @@ class MeasuredFRF(FRFAlgebra):
         return self._part(lambda values: _channels(values, chosen), self.frequency_hz, taken)
 
     def circle(self, level: float = 0.95) -> FloatArray:
-        r"""Radii of the circles around the points that hold the true response, each with `level`.
+        r"""Radii of circles around the points that contain the true response, each with `level`.
 
         For a complex normal error. With the standard deviation *s* from *n* repeats the radius is
-        :math:`s \sqrt{(n - 1) ((1 - level)^{-1 / (n - 1)} - 1)}`, which many repeats bring to
-        :math:`s \sqrt{-\log(1 - level)}`.
+        :math:`s \sqrt{(n - 1) ((1 - level)^{-1 / (n - 1)} - 1)}`, which tends to :math:`s
+        \sqrt{-\log(1 - level)}` for many repeats.
 
         Returns
         -------
@@ -232,7 +233,7 @@ class MeasuredFRF(FRFAlgebra):
         Raises
         ------
         DataError
-            No standard deviation.
+            There is no standard deviation.
         OptionError
             A `level` that is not between 0 and 1.
 
@@ -252,14 +253,14 @@ class MeasuredFRF(FRFAlgebra):
         return np.asarray(self.std * circle_quantile(level, self.repeats))
 
     def between_hz(self, low: float, high: float) -> MeasuredFRF:
-        """Cut out the points with low <= frequency <= high, in Hz."""
+        """Return the points with low <= frequency <= high, in Hz."""
         return self._select(
             (self.frequency_hz >= low) & (self.frequency_hz <= high),
             f"between {low:g} and {high:g} Hz",
         )
 
     def trusted(self, min_coherence: float = 0.95) -> MeasuredFRF:
-        """Keep the points whose coherence is at least `min_coherence` (in every channel)."""
+        """Return the points with a coherence of at least `min_coherence` (in every channel)."""
         if self.coherence is None:
             raise DataError(
                 "this FRF has no coherence; choose a band with between_hz(low, high) instead"
@@ -277,7 +278,7 @@ class MeasuredFRF(FRFAlgebra):
     def _part(
         self, take: Callable[[Any], Any], frequency_hz: FloatArray, named: ct.InputOutputSystem
     ) -> MeasuredFRF:
-        """Make a response of what `take` leaves of the arrays, named as `named` is."""
+        """Make a response from the arrays that `take` returns, named as `named`."""
         response = self.frdata[0, 0] if self._single else self.frdata
         return MeasuredFRF(
             take(response),
@@ -293,7 +294,7 @@ class MeasuredFRF(FRFAlgebra):
 
 
 def _channels(values: np.ndarray[Any, Any], places: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Take the entries at `places`, counted along rows; one entry comes without its two axes."""
+    """Return the entries at `places`, counted along rows; a single entry without its two axes."""
     taken = values.reshape(-1, values.shape[-1])[places]
     return np.asarray(taken[0, 0] if places.size == 1 else taken)
 

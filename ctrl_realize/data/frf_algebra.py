@@ -1,19 +1,21 @@
-r"""Arithmetic of measured frequency responses: what becomes of deviation, coherence and hold.
+r"""Arithmetic of measured frequency responses: propagation of errors, coherence and hold.
 
-Errors are carried to first order (JCGM 100:2008, GUM, section 5.1.2, for complex numbers with
-circular errors): with a response *H* of deviation :math:`\sigma`, and *G* exact,
+Errors are propagated to first order (JCGM 100:2008, GUM, section 5.1.2, for complex numbers with
+circular errors): for a response *H* with standard deviation :math:`\sigma`, and *G* exact,
 
 * :math:`G H` has :math:`|G| \sigma`, :math:`H + G` has :math:`\sigma`,
 * :math:`1 / H` has :math:`\sigma / |H|^2`, :math:`H / (1 + K H)` has
   :math:`\sigma / |1 + K H|^2`,
-* errors of two responses are independent, and those of channels too: variances add, each times
-  the square of the derivative.
+* errors of two responses, and of different channels, are independent: variances are multiplied by
+the
+  square of the derivative and added.
 
-Coherence is the part of the output's power that the input explains. An exact factor and an inverse
-leave it; sums and products of two have one that hangs on powers that nobody has measured.
+Coherence is the share of the output's power that is explained by the input. It is not changed by an
+exact factor or by inversion; that of sums and products of two responses depends on powers that are
+not known.
 
-An input that is held between samples leaves one hold in a response. It stays in what is linear in
-that response, cancels in a quotient of two, and there are two of it in a product.
+If the input is held between the samples, the response contains one hold. It is kept by operations
+that are linear in that response, cancels in a quotient of two, and occurs twice in a product.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ from .frf_operands import (
 
 
 class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is untyped
-    """Operators of `MeasuredFRF`; names and channels stay where the shape does."""
+    """Operators of `MeasuredFRF`; names and channels are kept if the shape is."""
 
     coherence: FloatArray | None
     std: FloatArray | None
@@ -63,7 +65,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         )
 
     def _other(self, other: Any) -> Operand | None:
-        """Take the other side at the frequencies of this one; None for what is no system."""
+        """Evaluate the other operand at the frequencies of this one; None if it is not a system."""
         if isinstance(other, FRFAlgebra):
             self._check_same_frequencies(other)
             return other._operand()
@@ -103,7 +105,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         hold: float | None,
         coherence: FloatArray | None = None,
     ) -> Any:
-        """Build the result, and say what it lost."""
+        """Build the result, and warn about what could not be propagated."""
         measured = [side for side in sides if side.measured]
         known = all(side.variance is not None for side in measured)
         lost = []
@@ -131,7 +133,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
             self.frequency_hz,
             coherence=None if coherence is None else shaped(coherence),
             std=shaped(np.sqrt(variance)) if known else None,
-            # The fewest: at most as many as Welch and Satterthwaite's formula gives.
+            # The smallest number: a lower bound of that of Welch and Satterthwaite's formula.
             repeats=min(repeats) if repeats and known else None,
             sample_time=hold,
             name=self.name,
@@ -149,7 +151,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         if two is None:
             return NotImplemented
         check_shapes(one, two, same=True)
-        # An exact path leaves noise and hold of the measured one.
+        # An exact path keeps noise and hold of the measured one.
         hold = one.hold if not two.measured else common_hold(one, two, "a sum")
         return self._made(
             "a sum", one.values + two.values, one.spread + two.spread, (one, two), hold
@@ -250,15 +252,15 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         Parameters
         ----------
         other : number, matrix, system or measured response
-            What stands in the feedback.
+            System in the feedback path.
         sign : float
             -1 for negative feedback.
 
         Returns
         -------
         MeasuredFRF
-            With the deviation of the closed loop, which ``L / (1 + L)`` would not have: there the
-            errors of both L would be taken as independent.
+            Its standard deviation is that of the closed loop, unlike that of ``L / (1 + L)``, where
+            the errors of both L are treated as independent.
         """
         one, two = self._operand(), self._needed(other)
         H = np.moveaxis(one.values, 2, 0)
@@ -283,7 +285,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         return self._made("a closed loop", closed, spread, (one, two), hold)
 
     def append(self, other: Any) -> Any:
-        """Put another response beside this one; the paths between them are zero."""
+        """Append another response; the cross terms are zero."""
         one, two = self._operand(), self._needed(other)
         hold = one.hold if not two.measured else common_hold(one, two, "a response beside another")
         return self._made(

@@ -1,4 +1,4 @@
-"""What stands on either side of an operation with a measured frequency response."""
+"""Operands of the arithmetic of measured frequency responses."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..errors import DataError, DataWarning, warn_caller
 from ..numerics.arrays import ComplexArray, FloatArray
 
 SAME = 1e-9
-"""Relative difference up to which two frequencies are one: rounding of a unit's conversion."""
+"""Relative difference up to which two frequencies count as equal: rounding of unit conversions."""
 
 
 @dataclass(frozen=True)
 class Operand:
-    """One side of an operation, shapes (p, m, K) or (p, m, 1); what is exact has no variance."""
+    """One operand, with arrays of shape (p, m, K) or (p, m, 1); an exact one has no variance."""
 
     values: ComplexArray
     variance: FloatArray | None = None
@@ -27,12 +27,12 @@ class Operand:
 
     @property
     def spread(self) -> FloatArray:
-        """The variance, zero for what is exact."""
+        """Variance; zero for an exact operand."""
         return np.zeros(self.values.shape) if self.variance is None else self.variance
 
     @property
     def is_scalar(self) -> bool:
-        """Whether it acts on each entry alone."""
+        """Whether it is a scalar or a single channel, which acts on each entry."""
         return self.values.shape[:2] == (1, 1)
 
 
@@ -62,14 +62,14 @@ def last_axis(values: Any) -> ComplexArray:
 
 
 def matmul(one: Any, two: Any) -> Any:
-    """Multiply matrices at each frequency; one channel scales all entries."""
+    """Multiply matrices at each frequency; a single channel scales all entries."""
     if (1, 1) in (one.shape[:2], two.shape[:2]):
         return one * two
     return np.moveaxis(np.moveaxis(one, 2, 0) @ np.moveaxis(two, 2, 0), 0, 2)
 
 
 def blocks(one: Any, two: Any, count: int) -> Any:
-    """Put two matrices on the diagonal, at each of `count` frequencies."""
+    """Make block-diagonal matrices of two, at each of `count` frequencies."""
     (p, m), (q, n) = one.shape[:2], two.shape[:2]
     out = np.zeros((p + q, m + n, count), dtype=np.result_type(one, two))
     out[:p, :m], out[p:, m:] = one, two
@@ -77,7 +77,7 @@ def blocks(one: Any, two: Any, count: int) -> Any:
 
 
 def check_shapes(one: Operand, two: Operand, *, same: bool) -> None:
-    """Refuse matrices that do not fit."""
+    """Refuse matrices whose shapes do not match."""
     (p, m), (q, n) = one.values.shape[:2], two.values.shape[:2]
     if one.is_scalar or two.is_scalar or ((p, m) == (q, n) if same else m == q):
         return
@@ -86,12 +86,12 @@ def check_shapes(one: Operand, two: Operand, *, same: bool) -> None:
 
 
 def same_hold(one: float, two: float) -> bool:
-    """Whether two sample times are one."""
+    """Whether two sample times are equal."""
     return abs(one - two) <= 1e-6 * two
 
 
 def warn_of_hold(what: str, hold: float) -> None:
-    """Say that a result has none or two of the holds that its sample time would stand for."""
+    """Warn that a result contains no hold, or two, which its sample time cannot describe."""
     warn_caller(
         f"{what} of measured responses does not contain exactly one hold of {hold:g} s, so "
         "sample_time is dropped; give hold and dt where the result is fitted or compared",
@@ -100,7 +100,7 @@ def warn_of_hold(what: str, hold: float) -> None:
 
 
 def common_hold(one: Operand, two: Operand, what: str) -> float | None:
-    """Hold of a sum: that of both."""
+    """Hold of a sum: that of both operands."""
     known = [side.hold for side in (one, two) if side.hold is not None]
     if len(known) == 2 and same_hold(*known):
         return known[0]
@@ -110,7 +110,7 @@ def common_hold(one: Operand, two: Operand, what: str) -> float | None:
 
 
 def one_hold(one: Operand, two: Operand) -> float | None:
-    """Hold of a product: that of one of them."""
+    """Hold of a product: that of one operand."""
     known = [side.hold for side in (one, two) if side.hold is not None]
     if len(known) == 2:
         warn_of_hold("a product", known[0])

@@ -1,4 +1,4 @@
-"""Records as they are handed in: one or several, with all samples or some missing."""
+"""Records as arguments: one or several, complete or with missing samples."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .record import Record
 
 
 def as_record(given: Any) -> Record:
-    """Return what is handed in if it is a record.
+    """Return the argument if it is a record.
 
     Raises
     ------
@@ -38,18 +38,18 @@ def as_records(given: Any) -> tuple[Record, ...]:
     if not several:
         raise DataError("no records; expected at least one Record")
     if not isinstance(given, list | tuple) and not isinstance(several[0], Record):
-        # Text, an array or a table is named as what it is, not as its letters, rows or columns.
+        # Text, an array or a table is reported as such, not by its letters, rows or columns.
         return (as_record(given),)
     return tuple(map(as_record, several))
 
 
 def check_complete(record: Record, task: str) -> None:
-    """Refuse a record with missing samples; `task` says in the message who needs them all.
+    """Refuse a record with missing samples; `task` names the operation in the message.
 
     Raises
     ------
     DataError
-        When a value of input or output is NaN.
+        A value of input or output is NaN.
     """
     as_record(record)
     if record.missing == "keep" and record.n_missing:

@@ -1,4 +1,4 @@
-"""A unit-pulse response, and the filter that is still in it."""
+"""Unit-pulse responses, with the filter that they contain."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Sampling = Literal["step-invariant", "impulse-invariant"]
 
 @dataclass(frozen=True)
 class FilterSpec:
-    """Butterworth low-pass that a signal went through.
+    """Butterworth low-pass filter that was applied to a signal.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class FilterSpec:
     dt: float
 
     def response(self, omega: ArrayLike) -> ComplexArray:
-        """Frequency response at `omega` in rad/s; divide a model's by it to take it out."""
+        """Frequency response at `omega` in rad/s; divide a model's response by it to remove it."""
         points = np.atleast_1d(numbers(omega, "omega")) * self.dt
         sos = butterworth(self.order, self.cutoff_hz, self.dt)
         response = np.asarray(sosfreqz(sos, worN=points)[1], dtype=np.complex128)
@@ -59,7 +59,7 @@ class FilterSpec:
 
     @property
     def group_delay(self) -> float:
-        """Delay at low frequency that the filter adds, in samples."""
+        """Delay of the filter at low frequency, in samples."""
         if self.zero_phase:
             return 0.0
         return butterworth_group_delay(self.order, self.cutoff_hz, self.dt)
@@ -71,10 +71,10 @@ class FilterSpec:
 
 @dataclass(frozen=True, eq=False)
 class ImpulseResponse(Drawable):
-    """Response to a unit pulse: the Markov parameters G_0, G_1 and so on.
+    """Response to a unit pulse: the Markov parameters G_0, G_1, ...
 
-    The pulse has height 1 and lasts one sample, so a model's D, CB, CAB, ... are these numbers,
-    and their sum is the gain. ``density == markov / dt`` is the response to a unit area.
+    The pulse has height 1 and lasts one sample, so these are D, CB, CAB, ... of a model, and their
+    sum is the gain. ``density == markov / dt`` is the response to a pulse of unit area.
 
     Parameters
     ----------
@@ -83,16 +83,16 @@ class ImpulseResponse(Drawable):
     dt : float
         Sample time in s.
     filter : FilterSpec, optional
-        Low-pass that is still in the data.
+        Low-pass filter that the data contain.
     noise : array_like, shape (P,), optional
-        What the same processing made of samples taken at rest: the noise in `markov`.
+        Noise in `markov`: the samples before the step, processed in the same way.
     sampling : {"step-invariant", "impulse-invariant"}, optional
-        What a model of the data reproduces exactly: the step response of a plant behind a
-        zero-order hold (backward difference, the default), or samples of the continuous impulse
-        response (central difference), which come half a sample earlier.
+        Which model reproduces the data exactly: ``"step-invariant"``, that of a plant with a
+        zero-order hold (backward difference, the default), or ``"impulse-invariant"``, samples of
+        the continuous impulse response (central difference), half a sample earlier.
     name : str, optional
     step : StepResponse, optional
-        The step response that it was made of.
+        Step response that it was computed from.
 
     Raises
     ------
@@ -132,7 +132,8 @@ class ImpulseResponse(Drawable):
                 f"markov has shape {values.shape}; expected (N,) or (outputs, inputs, N) with "
                 "N >= 2"
             )
-        # the quotient of a record's largest output and smallest step; its square is a double
+        # the quotient of the largest output and the smallest step of a record; its square is
+        # finite
         if np.abs(values).max() > LARGEST**2:
             raise DataError(
                 f"markov goes up to {np.abs(values).max():g}, which is not a plausible measurement"

@@ -1,4 +1,4 @@
-"""An impulse response that was estimated, with its standard deviations."""
+"""Estimated impulse responses, with standard deviations."""
 
 from __future__ import annotations
 
@@ -17,21 +17,20 @@ from .impulse import ImpulseResponse
 class ImpulseEstimate(ImpulseResponse, Result):
     """Estimated unit-pulse response: an `ImpulseResponse` with standard deviations.
 
-    ``markov +- 2 std`` is the 95 % band of each Markov parameter by itself, under white output
-    noise; errors of neighbours are correlated. `noise_std` is the noise that is left in the
-    outputs, per output.
+    ``markov +- 2 std`` is the 95 % band of each Markov parameter, for white output noise; the
+    errors of neighbouring parameters are correlated. `noise_std` is the noise in the outputs.
 
     Attributes
     ----------
     markov, std : ndarray, shape (N,) or (p, m, N)
     noise_std : ndarray, shape (p,)
-        Standard deviation of what the estimate does not explain, in the unit of the outputs.
+        Standard deviation of the residual of each output, in its unit.
     method : str
-        How it was made, in words.
+        Method, in words.
     rows : int
-        Equations used: samples whose whole past is known.
+        Number of equations: samples whose whole past is known.
     choices : tuple of str
-        What was chosen, and why.
+        Automatic choices, with reasons.
     flags : tuple of Flag
 
     Examples

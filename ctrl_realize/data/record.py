@@ -1,4 +1,4 @@
-"""A measured experiment on a uniform time axis."""
+"""Measured records on a uniform time axis."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ MISSING = ("refuse", "keep")
 
 
 class Record(Drawable):
-    """Input and output of a plant, measured together.
+    """Measured input and output of a plant.
 
     Parameters
     ----------
     time : array_like, shape (N,)
         Time in s; uniform within 5 % of a sample (see `resampled` for more jitter).
     input, output : array_like, shape (N,) or (signals, N)
-        What was applied and what was measured, in any unit.
+        Input and output, in any unit.
     name : str, optional
-        Shown in tables and plots.
+        Name in tables and plots.
     input_labels, output_labels : sequence of str, optional
         Names of the signals; default ``u`` and ``y`` (``u[0]``, ``u[1]``, ... for several).
     missing : {"refuse", "keep"}, optional
-        What to do with NaN in `input` and `output`. ``"keep"`` states that these samples are
-        missing; `impulse_from_io` works around them, the step functions need complete records.
+        How NaN in `input` and `output` is treated. With ``"keep"`` they are missing samples, which
+        `impulse_from_io` can handle; the step functions need complete records.
 
     Attributes
     ----------
@@ -43,14 +43,14 @@ class Record(Drawable):
         Sample time in s.
     n_samples, ninputs, noutputs : int
     n_missing : int
-        Samples of `input` and `output` that are NaN.
+        True for samples of `input` and `output` that are NaN.
 
     Raises
     ------
     DataError
         Wrong shapes, fewer than three samples, text, values that are not finite.
     TimeAxisError
-        Time that jitters, has gaps, repeats or runs backwards; the first bad row is named.
+        Time that jitters, has gaps, repeats or decreases; the message gives the first bad row.
 
     Examples
     --------
@@ -173,12 +173,12 @@ class Record(Drawable):
         return self.ninputs == 1 and self.noutputs == 1
 
     def between(self, start: float, stop: float) -> Record:
-        """Cut out the samples with start <= time <= stop, in s.
+        """Return the samples with start <= time <= stop, in s.
 
         Raises
         ------
         DataError
-            When fewer than three samples are left.
+            Fewer than three samples are left.
         """
         slack = 1e-9 * self.dt
         inside = (self.time >= start - slack) & (self.time <= stop + slack)
@@ -209,30 +209,30 @@ class Record(Drawable):
         max_jitter: float = 0.5,
         **labels: Any,
     ) -> Record:
-        """Make a record of samples with time jitter, by linear interpolation.
+        """Make a record from samples with time jitter, by linear interpolation.
 
         Parameters
         ----------
         time, input, output : array_like
-            As for `Record`, but with time stamps that need only rise.
+            As for `Record`, but the time stamps only need to increase.
         dt : float, optional
             Sample time of the new axis in s; default: the mean step.
         max_jitter : float, optional
-            Largest step allowed beyond the median one, as a fraction of it; a longer step is a
-            gap, over which nothing can be interpolated honestly.
+            Largest time step, as a relative excess over the median step; a longer step is a gap,
+            across which the signals are not interpolated.
         **labels
-            Further keywords of `Record`.
+            Further arguments of `Record`.
 
         Raises
         ------
         TimeAxisError
-            Time that repeats or runs back, or a gap.
+            Time that repeats or decreases, or a gap.
         """
         return cls(*resampled(time, input, output, dt, max_jitter), **labels)
 
     @classmethod
     def from_response(cls, response: ct.TimeResponseData, *, name: str | None = None) -> Record:
-        """Make a record of a simulated response of python-control, which must contain its input.
+        """Make a record from a simulated response of python-control that includes its input.
 
         Examples
         --------

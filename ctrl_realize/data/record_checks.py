@@ -1,4 +1,4 @@
-"""What data refuse: text, wrong shapes, values that no instrument shows."""
+"""Checks of measured data: text, wrong shapes, implausible values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def check_shape(values: FloatArray, what: str, samples: int) -> None:
 
 
 def check_finite(values: FloatArray | ComplexArray, what: str, *, allow_nan: bool = False) -> None:
-    """Refuse infinities, and NaN unless it stands for a missing sample; samples run last."""
+    """Refuse infinities, and NaN unless it marks a missing sample; the last axis is time."""
     bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
     if bad.any():
         count = int(bad.sum())
@@ -35,8 +35,8 @@ def check_finite(values: FloatArray | ComplexArray, what: str, *, allow_nan: boo
 
 
 def check_size(values: FloatArray, what: str) -> None:
-    """Refuse numbers that no instrument shows and whose squares overflow."""
-    # NaN stands for a missing sample here, and is not larger than anything
+    """Refuse numbers that are implausible for a measurement and whose squares overflow."""
+    # NaN marks a missing sample here, and no comparison with it is true
     large = np.abs(values) > LARGEST
     if large.any():
         raise DataError(
@@ -66,7 +66,7 @@ def labelled(
 
 
 def axis_words(fault: AxisFault) -> str:
-    """Say what is wrong with a time axis, and where."""
+    """Describe what is wrong with a time axis, and where."""
     kind, row, value, usual, worst = fault
     return {
         "extreme": f"time is {value:g} s at row {row}",

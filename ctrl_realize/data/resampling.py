@@ -1,4 +1,4 @@
-"""A uniform time axis for samples whose time jitters."""
+"""Resampling of records with time jitter onto a uniform time axis."""
 
 from __future__ import annotations
 

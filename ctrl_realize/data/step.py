@@ -1,4 +1,4 @@
-"""An edge in a measured input, and the step response that follows it."""
+"""Edges of a measured input, and step responses."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from .record import Record
 
 @dataclass(frozen=True)
 class StepEdge(Edge):
-    """Where and how far an input stepped.
+    """Position and height of a step in the input.
 
-    ``input[index - 1]`` is still at rest, ``input[index]`` has moved, and from
-    ``index + samples - 1`` on the input stays at ``baseline + amplitude``.
+    ``input[index - 1]`` is at the baseline, ``input[index]`` has moved, and from ``index + samples
+    - 1`` on the input is at ``baseline + amplitude``.
 
     Attributes
     ----------
     index : int
-        First sample at which the input has left its rest level.
+        First sample at which the input has left the baseline.
     time : float
         Time of that sample in s.
     amplitude : float
-        New level minus rest level, in the unit of the input.
+        New level minus baseline, in the unit of the input.
     baseline : float
         Level before the edge.
     samples : int
-        Samples that the edge takes; 1 is an ideal step.
+        Duration of the edge in samples; 1 is an ideal step.
     start, stop : int
-        The input is at rest from sample `start` on, and at its new level up to sample
+        The input is at the baseline from sample `start` on, and at its new level up to sample
         `stop` (exclusive).
     edges : tuple of StepEdge
-        All edges of the record, this one among them; empty on the members.
+        All edges of the record, including this one; empty on its members.
 
     Examples
     --------
@@ -52,33 +52,33 @@ class StepEdge(Edge):
 
 @dataclass(frozen=True, eq=False)
 class StepResponse(Drawable):
-    """Response to a unit step, cut out of a record.
+    """Response to a unit step, taken from a record.
 
     ``output[k] = (y[edge.index + k] - baseline - drift * k * dt) / amplitude``; `pre_step` is the
-    same before the edge, so it holds the noise of the measurement in the same unit.
+    same before the edge, and contains the measurement noise in the same unit.
 
     Attributes
     ----------
     time : ndarray, shape (N,)
-        Time in s after the sample at which the input moved.
+        Time in s after the step.
     output : ndarray, shape (N,)
         Unit step response S_0, S_1, ... (output unit per input unit).
     input : ndarray, shape (N,)
         Measured input, scaled to a step from 0 to 1.
     pre_step : ndarray, shape (P,)
-        The samples before the edge, P = 0 where the record starts at the step.
+        Samples before the edge; P = 0 if the record starts at the step.
     dt : float
         Sample time in s.
     amplitude : float
-        Input step that the data were divided by.
+        Height of the input step.
     baseline : float
         Output level before the edge.
     drift : float
-        Slope of the output before the edge that was removed, per s; 0 when none was significant.
+        Slope of the output before the edge that was removed, per s; 0 if it was not significant.
     edge : StepEdge
     name : str
     record : Record or None
-        What it was cut out of.
+        Record that it was taken from.
 
     Examples
     --------

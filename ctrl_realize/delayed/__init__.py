@@ -1,4 +1,4 @@
-"""Systems that carry a dead time."""
+"""Systems with dead time."""
 
 from .factory import delayed_ss as delayed_ss
 from .inside.system import DelaySystem as DelaySystem

@@ -1,4 +1,4 @@
-"""Products that keep delays at the ends, on the core alone; all else has delays inside."""
+"""Products with delays at the ends, computed on the core; other operations give internal delays."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
         settings.update(changes)
         states = settings.pop("states", None) or self._core_states()
         if len(states) == core.nstates and len(set(states)) == core.nstates:
-            # python-control's operators number the states anew.
+            # python-control's operators number the states again.
             core = named(core, core.input_labels, core.output_labels, states)
         return type(self)(core, settings.pop("delay", self.input_delays), **settings)
 
@@ -41,8 +41,8 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
         return ct.StateSpace(self)
 
     def __getitem__(self, key: Any) -> Self:
-        """Choose channels, by number or name; each keeps its own delay."""
-        # The host names what it chose, and knows what is no key.
+        """Select channels, by number or name; each keeps its delay."""
+        # python-control names the selection, and refuses invalid keys.
         try:
             chosen = self.delay_free[key]
             empty = not (chosen.noutputs and chosen.ninputs)
@@ -111,7 +111,7 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
         return super().__rmul__(other) if made is None else made
 
     def minreal(self, tol: float = 0.0) -> Self:
-        """Minimal realization of the core; the chain stays as it is."""
+        """Minimal realization of the core; the delays are unchanged."""
         return self._around(self._core.minreal(tol))
 
     def _series(self, second: ct.StateSpace, first: ct.StateSpace) -> Self | None:
@@ -137,7 +137,7 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
 
 
 def _linear(system: ct.StateSpace) -> ct.StateSpace:
-    """Take a controller with a class of its own, or joined subsystems, for their matrices."""
+    """Convert a controller of another class, or an interconnected system, to a plain system."""
     if type(system) is ct.StateSpace or isinstance(system, DelayOperators):
         return system
     return ct.StateSpace(system, remove_useless_states=False)

@@ -1,4 +1,4 @@
-"""What is read off a system: poles, zeros, bandwidth, transfer function."""
+"""Properties of a system with delay: poles, zeros, bandwidth, transfer function."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .parts import CoreAndDelays
 
 
 class DelayedAnalysis(CoreAndDelays):
-    """Properties found on the core, where the augmented matrices would be slow or inexact."""
+    """Properties computed from the core, because the augmented matrices are slow or inexact."""
 
     def poles(self) -> ComplexArray:
         """Poles: those of the core, and exact zeros for the delay."""
@@ -22,22 +22,22 @@ class DelayedAnalysis(CoreAndDelays):
         return np.concatenate([self._core.poles(), chain])
 
     def zeros(self) -> ComplexArray:
-        """Finite zeros; for one input and output those of the core."""
+        """Finite zeros; for one input and output, those of the core."""
         if self.issiso() or isinstance(self.delay, int):
             return np.asarray(self._core.zeros(), dtype=np.complex128)
         return np.asarray(super().zeros(), dtype=np.complex128)
 
     def damp(self) -> Any:
         """Natural frequency, damping and poles; delay poles have infinite frequency."""
-        # log(0) of the poles at 0 is meant here, and python-control would warn of each.
+        # log(0) of the poles at 0 is intended, and python-control would warn about each.
         with np.errstate(divide="ignore", invalid="ignore"):
             return super().damp()
 
     def bandwidth(self, dbdrop: float = -3) -> float:
-        """Lowest frequency in rad/s where the gain is `dbdrop` dB below that at 0.
+        """Lowest frequency in rad/s at which the gain is `dbdrop` dB below that at 0.
 
-        python-control 0.10.2 raises here for every discrete system: it looks for the crossing
-        at G(jw) instead of G(exp(jw dt)).
+        python-control 0.10.2 raises an error for every discrete system: it evaluates G(jw) instead
+        of G(exp(jw dt)).
         """
         if not self.issiso():
             raise TypeError("system should be a SISO system")
@@ -69,10 +69,11 @@ class DelayedAnalysis(CoreAndDelays):
         )
 
     def to_tf(self, *args: Any, **kwargs: Any) -> ct.TransferFunction:
-        """Transfer function: that of the core, with the delay as d zeros behind den.
+        """Transfer function: that of the core, with d further poles at zero.
 
-        python-control's ``ct.tf(sys)`` goes through the polynomial of the augmented matrix,
-        which is noise from d = 50 on. Several channels give a matrix of transfer functions.
+        python-control's ``ct.tf(sys)`` computes the characteristic polynomial of the augmented
+        matrix, which has no correct digits from d = 50 on. Several channels give a matrix of
+        transfer functions.
         """
         core = ct.tf(self._core, *args, **kwargs)
         total = np.add.outer(self.output_delays, self.input_delays)

@@ -1,4 +1,4 @@
-"""How a system with dead time shows: one line, text, HTML."""
+"""Representation of a system with dead time: one line, text, HTML."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MOST_POLES = 8
 
 
 class DelayedCards(CoreAndDelays):
-    """Core and shift, never the augmented matrices."""
+    """Shows core and delay, not the augmented matrices."""
 
     def _shift(self) -> str:
         if isinstance(self.delay, int):
@@ -62,7 +62,7 @@ class DelayedCards(CoreAndDelays):
         return "\n".join([*lines, f"times {self._shift()}"])
 
     def _repr_html_(self) -> str:
-        # Not the host's card of the core: that is LaTeX, which not every page draws.
+        # Not python-control's card of the core: it is LaTeX, which not every page renders.
         name = "" if self._generic_name_check() else f" {self.name}"
         signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
         rows = [
@@ -86,7 +86,7 @@ class DelayedCards(CoreAndDelays):
 
 
 def _few(poles: ComplexArray) -> str:
-    """Write poles of z, a pair once; the slowest first, and not too many."""
+    """Write poles in the z-plane, pairs once, the slowest first, at most a few."""
     slowest = sorted((pole for pole in poles if pole.imag >= 0), key=lambda z: -abs(z))
     shown = [
         f"{pole.real:.4g}" + (f" ± {pole.imag:.3g}j" if pole.imag > 0 else "")

@@ -74,5 +74,5 @@ def powers(points: ComplexArray, delays: tuple[int, ...]) -> ComplexArray:
 
 
 def common(delays: tuple[int, ...]) -> int | None:
-    """Return the delay that all share, None where they differ."""
+    """Return the common delay; None if the delays differ."""
     return delays[0] if len(set(delays)) == 1 else None

@@ -1,4 +1,4 @@
-"""State-space systems whose matrices are made when somebody asks for them."""
+"""State-space systems whose matrices are computed on demand."""
 
 from __future__ import annotations
 
@@ -13,49 +13,49 @@ from ..numerics.arrays import FloatArray
 from .chains import Matrices
 
 MAX_STATES = 20_000
-"""A is dense, as python-control needs it: 20 000 states are 3 GB."""
+"""A is dense, as python-control needs it: 20 000 states take 3 GB."""
 
 
 class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is untyped
-    """What is known by a few numbers and a line of past samples; matrices at the first look.
+    """State-space system with a delay line, whose matrices are computed when they are first used.
 
-    Abstract, since only a class that knows its own line (a delayed model, a predictor) can make
-    them: without one of the three methods below it cannot be created at all.
+    Abstract: subclasses (a delayed model, a predictor) define the matrices in the three methods
+    below.
     """
 
     _augmented: Matrices | None
     _state_names: dict[str, int] | None
 
     def _begin(self, states: list[str] | int, nstates: int, dt: float, **names: Any) -> None:
-        """Set up the system without matrices; `states` are those beside the line."""
+        """Set up the system without matrices; `states` are those without the delay line."""
         self._locked = False
-        # Not StateSpace.__init__, which would need the matrices now.
+        # Not StateSpace.__init__, which needs the matrices.
         ct.NonlinearIOSystem.__init__(
             self, self._next_state, self._output, states=states, dt=dt, **names
         )
-        # The line's states get their names when somebody asks for them.
+        # The names of the delay line's states are made on demand.
         self.nstates = nstates
         self._state_names = None
         self._augmented = None
 
     @abstractmethod
     def _make_matrices(self) -> Matrices:
-        """Make A, B, C, D, the line's states last."""
+        """Compute A, B, C, D, the delay line's states last."""
 
     @abstractmethod
     def _name_states(self) -> list[str]:
-        """Give the names of all states, the line's last."""
+        """Return the names of all states, the delay line's last."""
 
     @abstractmethod
     def _without_matrices(self) -> str:
-        """Say what to do instead where the matrices would be too large."""
+        """Return advice for the case that the matrices would be too large."""
 
     @property
     def state_index(self) -> dict[str, int]:
-        """Names of the states and where they stand; past samples last."""
+        """Names and positions of the states; past samples last."""
         if self._state_names is not None:
             return self._state_names
-        # not kept: they follow the signals, which python-control may rename
+        # not stored: they depend on the signal names, which python-control may change
         return {name: i for i, name in enumerate(self._name_states())}
 
     @state_index.setter
@@ -85,7 +85,7 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
 
     @property
     def A(self) -> FloatArray:
-        """Dynamics matrix, the line's states last; read-only."""
+        """Dynamics matrix, the delay line's states last; read-only."""
         return self._matrices()[0]
 
     @property
@@ -104,8 +104,8 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
         return self._matrices()[3]
 
     def __setattr__(self, attribute: str, value: Any) -> None:
-        # What the matrices are made of would fall out of step with them, and python-control's
-        # `append` is known to do it.
+        # Core and matrices would become inconsistent; python-control's `append` does such an
+        # assignment.
         if attribute in ("A", "B", "C", "D", "dt") and self.__dict__.get("_locked", False):
             raise AttributeError(
                 f"{attribute} of a {type(self).__name__} cannot be changed; build a new one "

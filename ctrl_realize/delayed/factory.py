@@ -1,4 +1,4 @@
-"""Build a system with dead time from any linear system, sampled exactly if it is continuous."""
+"""Make a system with dead time from any linear system, with exact sampling if it is continuous."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def delayed_ss(
     Parameters
     ----------
     core : control.StateSpace or control.TransferFunction
-        Discrete, or continuous with `dt`: it is then sampled exactly behind a zero-order hold,
-        any fraction of a sample included.
+        Discrete, or continuous with `dt`: it is then sampled exactly with a zero-order hold, for
+        any dead time.
     delay : int or sequence of int, optional
         Dead time in samples; one for each input if they differ.
     dead_time : float, optional
-        The same in s, instead of `delay`. For a discrete core it must be a multiple of its
-        sample time; for a continuous one it may be anything. A dead time of (d + f) samples,
-        0 < f < 1, gives a core of the same order with feedthrough and the delay d + 1.
+        The same in s, instead of `delay`. For a discrete core it must be a multiple of its sample
+        time. For a continuous one, a dead time of (d + f) samples, 0 < f < 1, gives a core of the
+        same order with feedthrough and the delay d + 1.
     dt : float, optional
         Sample time in s for a continuous core.
     output_delay, fit, name, inputs, outputs
@@ -54,14 +54,14 @@ def delayed_ss(
     Raises
     ------
     UnsuitableSystemError
-        A core that is no linear system, a continuous one without `dt`, or a fractional delay of
-        a core with a direct term.
+        A core that is not a linear system, a continuous one without `dt`, or a fractional delay of
+        a core with feedthrough.
     DelayRangeError
-        A negative delay, or one that is no multiple of a discrete core's sample time.
+        A negative delay, or one that is not a multiple of a discrete core's sample time.
 
     Notes
     -----
-    Sampling behind a hold, with a dead time of any length, as in [1]_.
+    Sampling with a zero-order hold and a dead time of any length follows [1]_.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Core, delays, and the augmented matrices, which are made when somebody asks for them."""
+"""Core, delays, and the augmented matrices, which are computed on demand."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ MAX_DELAY = 10_000_000
 """Samples in all delays together; more are a sample time given in another unit."""
 
 HARMLESS = 20
-"""Registers whose polynomial is still exact to 1e-6 of the response.
+"""Delay up to which the characteristic polynomial is accurate to 1e-6 of the response.
 
-The error grows a hundredfold for ten registers more. On five plants, alone and with a PI
-controller, the largest was 1e-6 at 20, 2e-5 at 30, 7e-3 at 37 and 40 at 50.
+The error grows a hundredfold for ten more samples. On five plants, alone and with a PI controller,
+the largest error was 1e-6 at 20, 2e-5 at 30, 7e-3 at 37 and 40 at 50.
 """
 
 ASKS = "_convert_to_transfer_function"
-"""The one function of python-control 0.10.2 through which systems become polynomials.
+"""The function of python-control 0.10.2 that converts systems to polynomials.
 
-It reads ``A, B, C, D`` and asks the system nothing, so all that a system can know is who reads.
+It reads ``A, B, C, D`` directly, so a system can only detect which function reads them.
 """
 
 
 class CoreAndDelays(DeferredMatrices):
-    """What a system with dead time is made of.
+    """Core and delays of a system with dead time.
 
     ``A, B, C, D`` and the names of the states follow from core and delays. The matrices are dense,
-    (n + d)^2 numbers, and most uses never look at them: they are made at the first look.
+    (n + d)^2 numbers, and most uses do not need them: they are computed on demand.
     """
 
     _core: ct.StateSpace
@@ -49,7 +49,7 @@ class CoreAndDelays(DeferredMatrices):
         chain = chain_labels(self.input_labels, self.output_labels, *delays)
         names = dict.fromkeys([*self._core.state_labels, *chain])
         if len(names) < self.nstates:
-            # A core that was itself made of core and chain has the names of registers.
+            # A core that itself was made of core and delays has state names of delay lines.
             names = dict.fromkeys([*(f"x[{i}]" for i in range(self._core.nstates)), *chain])
         return list(names)
 
@@ -76,19 +76,19 @@ class CoreAndDelays(DeferredMatrices):
         names = self.input_labels, self.output_labels, self._core_states()
         core = self._core
         if names != (core.input_labels, core.output_labels, core.state_labels):
-            # python-control has renamed the signals of the system in the meantime.
+            # python-control may have renamed the signals of the system.
             self._core = named(core, *names, name=f"{self.name}_core")
         return self._core
 
     def _core_states(self) -> list[str]:
-        """Names of the core's states, as they were last given."""
+        """Names of the core's states."""
         if self._state_names is None:
             return list(self._core.state_labels)
         return list(self._state_names)[: self._core.nstates]
 
     @property
     def delay(self) -> Any:
-        """Dead time in samples: an int, or an array (outputs, inputs) where channels differ."""
+        """Dead time in samples: an int, or an array (outputs, inputs) if channels differ."""
         total: IntArray = np.add.outer(
             np.array(self.output_delays, dtype=np.int64),
             np.array(self.input_delays, dtype=np.int64),
@@ -108,7 +108,7 @@ def named(
     states: Sequence[str],
     name: str | None = None,
 ) -> ct.StateSpace:
-    """Make the same core, with matrices that cannot be written and these names."""
+    """Copy the core, with read-only matrices and these names."""
     made = ct.StateSpace(
         *(read_only(M) for M in (core.A, core.B, core.C, core.D)),
         core.dt,
@@ -178,7 +178,7 @@ def check_entries(system: Any) -> None:
 
 
 def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter: str) -> list[str]:
-    """Name signals: as given, as those of the core, or by one letter if the core has no names."""
+    """Name signals: as given, as those of the core, or by a letter if the core has no names."""
     if given is not None:
         names = [given] if isinstance(given, str) else given
         if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
@@ -191,10 +191,10 @@ def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter:
 
 
 def _warn_of_a_transfer_function(registers: int) -> None:
-    """Warn when python-control reads a long chain for its polynomial; called where A is read."""
+    """Warn if python-control computes a polynomial of a long delay line; called when A is read."""
     if registers <= HARMLESS:
         return
-    # Who reads the property that calls this function.
+    # The frame that reads the property that calls this function.
     if sys._getframe(2).f_code.co_name != ASKS:
         return
     warn_caller(

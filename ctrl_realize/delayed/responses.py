@@ -1,4 +1,4 @@
-"""Responses in frequency and time, from core and delay."""
+"""Frequency and time responses, from core and delay."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
     def step(self, count: int) -> FloatArray:
         """Compute the response to a unit step on each input, delay included.
 
-        The chain is not simulated, so the cost does not grow with the delay.
+        The delay is not simulated, so the cost does not depend on it.
 
         Returns
         -------
@@ -62,7 +62,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         return self._with_delay(responses.step_response, whole(count, "count", 1))
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
-        """Compute the response from rest to any input, delay included.
+        """Compute the response to any input from zero initial state, delay included.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         Raises
         ------
         DataError
-            Another number of inputs, or values that are not finite real numbers.
+            A wrong number of inputs, or values that are not finite real numbers.
         """
         given = finite(inputs, "inputs")
         rows = np.atleast_2d(given)

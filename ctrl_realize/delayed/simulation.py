@@ -19,28 +19,28 @@ from . import DelayedStateSpace
 Start = Literal["estimate", "rest"]
 
 PIECES = 16
-"""Levels into which the unknown input within a dead time is divided at most."""
+"""Largest number of levels that represent the unknown input within a dead time."""
 
 
 def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatArray:
     """Simulate the outputs of a record, shape (p, N), with the best initial state.
 
-    Misses count as parts of the range of each output. An offset of every output is always free.
-    With ``start="estimate"`` so are the state of the core, and what was on its way through the
-    dead times when the record began.
+    Errors are weighted by the range of each output. An offset of every output is always estimated,
+    with ``start="estimate"`` also the state of the core and the input within the dead times before
+    the record.
     """
     start = one_of(start, "start", ("estimate", "rest"))
     check_complete(record, "a simulation")
     model = as_delayed(system, record)
     u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
     p, N = y.shape
-    # At rest, the input stood at its first value before the record.
+    # In steady state, the input had its first value before the record.
     forced = np.atleast_2d(model.simulate(u - u[:, :1]))
     columns = [np.kron(np.eye(p), np.ones((N, 1)))]
     if start == "estimate":
         columns += _unknown_starts(model, N)
     regressors = np.hstack(columns)
-    # Every output in its own unit, lest the large ones alone say where the simulation starts.
+    # Every output is scaled to its unit, so that outputs with large numbers do not dominate.
     unit = np.repeat(_units(y), N)
     alike = regressors / unit[:, None]
     scale = np.linalg.norm(alike, axis=0)
@@ -50,14 +50,14 @@ def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatA
 
 
 def _units(outputs: FloatArray) -> FloatArray:
-    """Range of every output over the largest one; 1 where an output stands still."""
+    """Range of every output relative to the largest one; 1 for a constant output."""
     ranges = np.ptp(outputs, axis=1)
     largest = ranges.max() or 1.0
     return np.asarray(np.where(ranges > 0, ranges, largest) / largest)
 
 
 def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
-    """Responses (p N, columns) to the initial state, and to what is inside the delay chains."""
+    """Responses (p N, columns) to the initial state, and to the past input in the delay lines."""
     core = model.delay_free
     n, p, m = core.nstates, core.noutputs, core.ninputs
     free = markov(core.A, np.eye(n), core.C, np.zeros((p, n)), N + 1)[:, :, 1:]
@@ -85,13 +85,13 @@ def _pieces(samples: int) -> list[tuple[int, int]]:
 
 
 def _through_outputs(responses: FloatArray, model: DelayedStateSpace) -> FloatArray:
-    """Delay responses (p, columns, N) at the outputs, and lay them out as (p N, columns)."""
+    """Delay responses (p, columns, N) at the outputs, and reshape them to (p N, columns)."""
     late = np.stack([later(r, q) for r, q in zip(responses, model.output_delays, strict=True)])
     return late.transpose(0, 2, 1).reshape(-1, responses.shape[1])
 
 
 def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedStateSpace:
-    """Check that a system fits a record, and give it delays (of zero) where it has none."""
+    """Check that a system fits a record; add zero delays if it has none."""
     if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
         raise UnsuitableSystemError(
             f"system is a {type(system).__name__}; expected a discrete control.StateSpace"

@@ -1,12 +1,12 @@
-r"""State-space systems that carry a dead time: z^-d beside a delay-free core.
+r"""State-space systems with dead time: z^-d and a delay-free core.
 
-This folder is the one place that knows how python-control works inside. A `DelayedStateSpace` is a
-`control.StateSpace` whose matrices hold the delay as a chain of shift registers at the input,
-so every function of python-control accepts it. Where the matrices would be slow or inexact
-(frequency response, poles, zeros, products) the parts of the class use core and delay instead.
+This folder is the only place that depends on the internals of python-control. A `DelayedStateSpace`
+is a `control.StateSpace` whose matrices contain the delay as a shift register at the input, so that
+every function of python-control accepts it. Where the matrices would be slow or inexact (frequency
+response, poles, zeros, products) the methods use core and delay instead.
 
-The chain is attached last and never mixed with the core's states: after any dense similarity
-transform its d poles at 0 drift out to |z| = eps^(1/d), 0.37 for d = 37.
+The shift register is attached last and never mixed with the core's states: a dense similarity
+transformation would move its d poles at 0 to |z| = eps^(1/d), 0.37 for d = 37.
 """
 
 from __future__ import annotations
@@ -35,28 +35,27 @@ class DelayedStateSpace(
 ):
     """Discrete state-space system with dead time: core(z) z^-d.
 
-    It is a `control.StateSpace` with the states ``[core; u[k-1] ... u[k-d]]`` and goes into every
-    function of python-control. The delay survives negation, products with numbers, matrices and
-    systems, powers, indexing, copies, pickling and renaming; sums, feedback and append give a
-    `DelaySystem` where the delay then stands inside. ``ct.ss(sys)`` strips to a plain one at any
-    time.
+    A `control.StateSpace` with the states ``[core; u[k-1] ... u[k-d]]``, for every function of
+    python-control. Negation, products with numbers, matrices and systems, powers, indexing,
+    copying, pickling and renaming keep the delay; sums, feedback and append give a `DelaySystem`
+    with internal delays. ``ct.ss(sys)`` converts to a plain system.
 
-    Matrices are read-only: core and chain must stay in step.
+    Matrices are read-only, so that they remain consistent with core and delay.
 
     Parameters
     ----------
     core : control.StateSpace
-        Discrete system without the delay; its sample time must be a number.
+        Discrete system without the delay, with a sample time.
     delay : int or sequence of int
         Whole samples, the same for all inputs or one for each.
     output_delay : int or sequence of int, optional
-        Whole samples behind the core, the same for all outputs or one for each.
+        Whole samples at the outputs, the same for all or one for each.
     fit : ModelFit, optional
         How the model was found: the result of an estimator.
     name, inputs, outputs : optional
-        Names, as for `control.ss`. Signals are named as those of `core`, or ``u`` and ``y``. A dot,
-        which python-control keeps for ``system.signal``, becomes an underscore: ``FIC101.OP`` of a
-        record is ``FIC101_OP`` of its model.
+        Names, as for `control.ss`. Default for signals: those of `core`, or ``u`` and ``y``. A dot,
+        which python-control reserves for ``system.signal``, becomes an underscore: ``FIC101.OP`` of
+        a record is ``FIC101_OP`` of its model.
 
     Attributes
     ----------
@@ -74,28 +73,30 @@ class DelayedStateSpace(
     UnsuitableSystemError
         A core that is not a discrete state-space system with a sample time.
     OptionError
-        A `fit` that is not one.
+        A `fit` of the wrong type.
     DelayRangeError
-        Delays that are negative, no whole numbers, not one for each signal, or more than ten
-        million samples; and where matrices of more than 20 000 states are asked for.
+        Delays that are negative, not whole numbers, not one for each signal, or more than ten
+        million samples; or matrices of more than 20 000 states.
 
     Notes
     -----
     ``sys(z) == sys.delay_free(z) * z**-sys.delay`` to rounding, whatever the delay.
 
-    Up to 20 000 states the matrices A, B, C, D are made for who asks for them (A is dense: 3 GB).
-    Longer delays, of long records for instance, have everything that needs no matrices: ``sys(z)``
-    and the plots of frequency responses, `step`, `simulate`, `markov`, poles and products.
+    Up to 20 000 states, the matrices A, B, C, D are computed on demand (A is dense: 3 GB). For
+    longer delays, everything that needs no matrices still works: ``sys(z)`` and plots of frequency
+    responses, `step`, `simulate`, `markov`, poles and products.
     ``cr.design.to_discrete(*cr.design.to_continuous(sys), dt)`` samples such a system more slowly.
 
-    ``tf * sys``, ``tf + sys``, ``ct.feedback(tf, sys)`` and ``ct.tf(sys)`` are decided by
-    python-control alone: it makes a transfer function of the augmented matrices, which is noise
-    from d = 50 or so on. Beyond 20 samples a `ModelWarning` says so. Write ``sys * tf``,
-    ``sys + tf``, ``ct.feedback(ct.ss(tf), sys)`` and ``sys.to_tf()``. ``ct.margin(sys)`` reads the
-    exact response: of one input and output the system unpacks as magnitude, phase and omega.
+    ``tf * sys``, ``tf + sys``, ``ct.feedback(tf, sys)`` and ``ct.tf(sys)`` are evaluated by
+    python-control alone: it converts the augmented matrices to a transfer function, which has no
+    correct digits from about d = 50 on. Beyond 20 samples a `ModelWarning` is given. Use
+    ``sys * tf``, ``sys + tf``, ``ct.feedback(ct.ss(tf), sys)`` and ``sys.to_tf()`` instead.
+    ``ct.margin(sys)`` uses the exact response: a system of one input and one output unpacks as
+    magnitude, phase and omega.
 
-    ``repr(sys)`` is one line. A `repr_format` that is set on the system, or another than "eval" in
-    ``ct.config.defaults["iosys.repr_format"]``, is followed; "eval" is core and delay as a call.
+    ``repr(sys)`` is one line. A `repr_format` set on the system, or a setting other than "eval" in
+    ``ct.config.defaults["iosys.repr_format"]``, is respected; "eval" gives core and delay as a
+    call.
 
     Examples
     --------
@@ -158,7 +159,7 @@ class DelayedStateSpace(
         self._locked = True
 
     def replace(self, **changes: Any) -> DelayedStateSpace:
-        """Make the same system with another `delay`, `output_delay`, `fit`, `name` or labels."""
+        """Copy the system with another `delay`, `output_delay`, `fit`, `name` or labels."""
         settings: dict[str, Any] = {
             "delay": self.input_delays,
             "output_delay": self.output_delays,
@@ -175,7 +176,7 @@ class DelayedStateSpace(
         return made._as_shown(self._state_names, self._repr_format)
 
     def _as_shown(self, states: Iterable[str] | None, repr_format: str | None) -> Self:
-        """Take over names of states that somebody gave, where they fit, and `repr_format`."""
+        """Copy user-defined state names, if they fit, and `repr_format`."""
         if states is not None and len(labels := list(states)) == self.nstates:
             self.set_states(labels)
         self.repr_format = repr_format
@@ -197,18 +198,18 @@ class DelayedStateSpace(
         )  # fmt: skip
 
     def __deepcopy__(self, memo: dict[int, Any]) -> DelayedStateSpace:
-        # Everything inside is read-only, so a copy may share it; the closures of python-control
-        # must not be shared, and a new object has its own.
+        # Everything inside is read-only and may be shared; the closures of python-control must
+        # not be, and a new object makes its own.
         return self.replace()
 
 
 def fit_of(system: DelayedStateSpace, kind: type[AnyFit]) -> AnyFit:
-    """Return the fit of a system where it is of a kind.
+    """Return the fit of a system if it is of a certain type.
 
     Raises
     ------
     UnsuitableSystemError
-        Another fit, or none.
+        Another type of fit, or none.
     """
     if not isinstance(system.fit, kind):
         raise UnsuitableSystemError(

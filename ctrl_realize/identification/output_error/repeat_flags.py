@@ -37,7 +37,9 @@ def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
         )
     flags += _response_flags(result)
     if result.trend_error > 0 and abs(result.trend) > 3 * result.trend_error:
-        pause = "; with backlash or friction the pause is shorter for larger steps" * (result.trend < 0)
+        pause = "; with backlash or friction the pause is shorter for larger steps" * (
+            result.trend < 0
+        )
         flags.append(
             Flag(
                 "amplitude_trend",
