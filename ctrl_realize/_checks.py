@@ -109,8 +109,7 @@ def _array(values: Any, what: str) -> NDArray[Any]:
 
 
 def _unmasked(given: Any) -> Any:
-    """Replace masked values by NaN, also in lists: the data under a mask are arbitrary, often
-    1e20."""
+    """Replace masked values by NaN, also in lists; the data under a mask are arbitrary."""
     if isinstance(given, np.ma.MaskedArray):
         mask = np.ma.getmaskarray(given)
         if given.dtype.kind not in "biufc" or not mask.any():

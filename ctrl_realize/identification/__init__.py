@@ -1,6 +1,6 @@
 """From records to models: steps, impulse responses, realizations, fits, campaigns, tracking."""
 
-# Loaded when asked for, as the names of the package itself; the stub beside this file lists them.
+# Loaded on demand, as the names of the package itself; the stub beside this file lists them.
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

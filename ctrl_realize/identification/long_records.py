@@ -1,4 +1,4 @@
-"""What is fitted of very long records: the stretch in which their inputs move."""
+"""Part of a very long record that is fitted: that in which the inputs move."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from ..numerics.signals.excitation import lively_start
 from ..results import Flag
 
 MOST_SAMPLES = 100_000
-"""Samples of all records together that a model of sections is fitted to. A delay of whole samples
-gains nothing from more of them; memory goes with their number times that of the parameters."""
+"""Largest number of samples, of all records together, for a state-space fit. More do not improve a
+delay of whole samples; memory grows with their number times that of the parameters."""
 
 
 def lively_parts(
     records: tuple[Record, ...], most: int = MOST_SAMPLES
 ) -> tuple[tuple[Record, ...], tuple[Flag, ...]]:
-    """Cut records to `most` samples together; the flag says so. Shorter records stay whole."""
+    """Cut records to `most` samples in total, with a flag; shorter records are not changed."""
     lengths = np.array([record.n_samples for record in records])
     share = most
     while np.minimum(lengths, share).sum() > most and share > most // len(records):

@@ -1,4 +1,4 @@
-"""From a record to a model in one call: wiring of the steps, each choice an argument."""
+"""From records to a model in one call."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ METHODS: tuple[str, ...] = ("output_error", "scan", "paper")
 
 
 class IdentifyOptions(TypedDict, total=False):
-    """Arguments of `identify` beside record and method, as `identify_campaign` takes them."""
+    """Arguments of `identify` except record and method, as taken by `identify_campaign`."""
 
     order: int | None
     max_delay: int | None
@@ -48,7 +48,7 @@ class IdentifyOptions(TypedDict, total=False):
 
 
 SCANNED_ORDERS = range(1, 6)
-"""Orders that the scan chooses from; above 5 the realization models noise, or the delay."""
+"""Orders considered by the scan; above 5 the realization models noise, or the delay."""
 
 
 @single_threaded
@@ -72,19 +72,20 @@ def identify(
     Parameters
     ----------
     record : Record or sequence of Record
-        The scan and the paper's method need one record with one output and a step in its one
-        input; the output-error fit takes several records, any input (see `fit_output_error`), and
-        several channels (these go to `fit_state_space`).
+        The scan and the paper's method need one record with one output and a step in its one input.
+        The output-error fit accepts several records, any input (see `fit_output_error`), and
+        several inputs and outputs (see `fit_state_space`).
     method : {"output_error", "scan", "paper"}, optional
         ``"output_error"``: fit of the raw record with a continuous delay; the most accurate, and
-        the only one whose interval is a confidence interval. ``"scan"``: the realization scan
-        with zero-phase filter and backward difference. ``"paper"``: the same method as printed:
-        central difference, causal filter at 50 Hz, order 3, 1000 samples, delays 0...100.
+        the only one with a confidence interval. ``"scan"``: the realization scan with zero-phase
+        filter and backward difference. ``"paper"``: the published method: central difference,
+        causal filter at 50 Hz, order 3, 1000 samples, delays 0...100.
     order : int, optional
-        Order of the model without delay. Default: chosen from the data (``"paper"``: 3).
+        Order of the model without its delay. Default: chosen from the data (``"paper"``: 3).
     max_delay : int, optional
-        Largest delay in samples. Default: ``"scan"`` where the step response has risen by half,
-        ``"paper"`` 100, ``"output_error"`` see `fit_output_error`.
+        Largest delay in samples. Default: for ``"scan"`` the time at which the step response has
+        reached half of its final value, for ``"paper"`` 100, for ``"output_error"`` see
+        `fit_output_error`.
     known, loss, noise, structures, include_known : optional
         For ``"output_error"``, see `fit_output_error`.
     cutoff_hz, samples, feedthrough : optional
@@ -93,11 +94,10 @@ def identify(
     Returns
     -------
     DelayedStateSpace
-        Its `.fit` is an `OutputErrorFit`, a `DelayScan`, or a `StateSpaceFit` for several channels
-        and where lags behind a dead time are not enough (see Notes); `.fit.report()`
-        says what was chosen and why.
-        The steps before it hang on the fit: ``.fit.impulse.step.record`` for the scans,
-        ``.fit.records`` for the fit.
+        Its `.fit` is an `OutputErrorFit` or a `DelayScan`, or a `StateSpaceFit` for several
+        channels and where a model of lags with dead time is not adequate (see Notes);
+        `.fit.report()` states what was chosen and why. The preceding steps are kept:
+        ``.fit.impulse.step.record`` for the scans, ``.fit.records`` for the fit.
 
     Raises
     ------
@@ -108,17 +108,17 @@ def identify(
 
     Notes
     -----
-    A record of one channel whose input is no step is fitted with lags behind a dead time. Where
-    their residual still follows the input, states with any zeros behind whole samples of delay
-    (`fit_state_space`) are fitted to it too. They are taken where the information criterion is
-    smaller by 10 or more: on the same samples, and with autoregressive noise of its own for each.
-    Their `fit` has `dead_time`, `interval` and `total_delay`; the interval spans the delays that
-    are not ruled out at their order and the interval of the lags (``fit.lags``), but for lags
-    that leave more than twice as much.
-    Given `order`, `structures` or `known`, nothing else is tried.
+    A record with one input and one output whose input is not a step is fitted by lags with a dead
+    time. If the residual is correlated with the input, a state-space model with a delay of whole
+    samples (`fit_state_space`) is fitted as well. It is chosen if its information criterion is
+    smaller by 10 or more, on the same samples and with an autoregressive noise model for each. Its
+    `fit` has `dead_time`, `interval` and `total_delay`; the interval spans the delays that are not
+    ruled out at its order and the interval of the lag model (``fit.lags``), unless the residual of
+    the latter is more than twice as large. If `order`, `structures` or `known` is given, no other
+    model class is tried.
 
-    ``"paper"`` and ``"scan"`` are the method of [1]_; what `fit_output_error` rests on stands
-    there.
+    ``"paper"`` and ``"scan"`` are the method of [1]_; for the sources of the output-error fit see
+    `fit_output_error`.
 
     References
     ----------
@@ -234,7 +234,7 @@ def _scan(
             "half of its final value"
         )
     if order is None:
-        # A Hankel matrix of few samples holds few orders.
+        # A Hankel matrix of few samples allows few orders.
         room = (impulse.n_samples - 1 - reach) // 2
         orders = scan_orders(
             impulse,
@@ -303,12 +303,12 @@ def _named(
 
 
 def _half_risen(step: StepResponse) -> int:
-    """First sample at which the step response has made half its way: no delay lasts longer."""
+    """Sample at which the step response reaches half of its final value; the delay is shorter."""
     final = float(np.median(step.output[-max(step.n_samples // 10, 3) :]))
     risen: FloatArray = step.output / final if final else np.abs(step.output)
     crossing = np.flatnonzero(risen >= 0.5 * (1.0 if final else float(risen.max()) or 1.0))
     half = int(crossing[0]) if crossing.size else step.n_samples // 2
-    # Something must be left behind the largest delay to realize.
+    # Some samples must remain after the largest delay.
     return max(1, min(half, step.n_samples - max(step.n_samples // 4, 12)))
 
 

@@ -1,8 +1,8 @@
 """Choose between a transfer function with dead time and a general state-space model.
 
-A record of one input and one output is fitted with lags first. Where their residual still follows
-the input, a model of sampled sections is fitted as well (`fit_state_space`), and both are compared
-on the same samples under the same noise: autoregressive, its lags chosen for each by BIC.
+A record of one input and one output is fitted by lags with a dead time first. If the residual is
+correlated with the input, a state-space model is fitted as well (`fit_state_space`), and both are
+compared on the same samples with autoregressive noise models whose orders are chosen by BIC.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from .state_space_fit.starts import Outcome, from_starts
 from .validation.residuals import analyse_residuals
 
 LAGS = 25
-"""Samples after the dead time within which a residual is asked whether it follows the input."""
+"""Lags after the dead time at which the correlation of residual and input is tested."""
 CLEAR = 10.0
-"""How much smaller the criterion of the modes must be to take the place of the lags."""
+"""Least decrease of the criterion for which the state-space model is chosen."""
 MOST_STARTS = 3
-"""Estimates of the impulse response that the modes start from at most."""
+"""Largest number of impulse-response estimates from which the state-space fit starts."""
 HOPELESS = 2.0
-"""How much more lags may leave than modes for their interval to count."""
+"""Largest ratio of residuals, lags to state space, for which the lags' interval is included."""
 _KEPT = (
     "records_differ",
     "gains_differ",
@@ -48,7 +48,7 @@ _KEPT = (
     "held_output",
     "output_at_limit",
 )
-"""Flags of the record, whatever model is chosen."""
+"""Flags of the record, which do not depend on the model."""
 _FAR_APART = 0.5  # width of an interval, in dead times, from which models disagree
 _NOTHING = 0.5  # samples
 _ROUNDING = 1e-12
@@ -59,15 +59,15 @@ Residuals = list[FloatArray]
 def with_modes_judged(
     system: DelayedStateSpace, max_delay: int | None, *, asked: bool = False
 ) -> DelayedStateSpace:
-    """Try a state-space model where the residual follows the input; return the better model.
+    """Try a state-space model if the residual is correlated with the input; return the better one.
 
-    With `asked`, the structure is what the user wants: its residual is judged, nothing is tried.
+    With `asked`, the structure was requested: its residual is tested, but nothing else is tried.
     """
     fit = fit_of(system, OutputErrorFit)
     records, cut = lively_parts(fit.records)
     try:
         follows, left = _left(system, records)
-    except UnsuitableSystemError:  # an unstable model simulates nothing
+    except UnsuitableSystemError:  # an unstable model is not simulated
         follows, left = [True] * len(records), None
     if not any(follows):
         return system
@@ -106,7 +106,7 @@ def with_modes_judged(
 
 
 def _left(system: DelayedStateSpace, records: Sequence[Record]) -> tuple[list[bool], Residuals]:
-    """Tell which residuals follow the input, at any lag of a response, and return them."""
+    """Test whether residuals are correlated with the input, and return them."""
     late = int(np.ceil(np.max(system.delay)))
     checks = [
         analyse_residuals(system, record, lags=min(late + LAGS, record.n_samples // 3))
@@ -122,7 +122,7 @@ def _delay(system: DelayedStateSpace) -> int:
 def _gain(
     fit: OutputErrorFit, records: Sequence[Record], left: Residuals | None, found: Outcome
 ) -> float:
-    """How much smaller the criterion of the modes is than that of the lags."""
+    """Difference of the information criteria, lags minus state space."""
     if left is None:
         return float("inf")
     modes = found.fit
@@ -139,7 +139,7 @@ def _gain(
 def _chosen(
     found: Outcome, lags: OutputErrorFit, following: int, gain: float, cut: tuple[Flag, ...]
 ) -> DelayedStateSpace:
-    """Give the modes their dead time, its interval, and the reasons."""
+    """Return the state-space model with its dead time, the interval, and the reasons."""
     system = found.system
     modes = found.fit
     dt = lags.dt
@@ -194,13 +194,13 @@ def _chosen(
 
 
 def _total_delay(system: DelayedStateSpace) -> float | None:
-    """Delay of slow signals in s: the moments of the pulse response, less half a hold."""
+    """Total delay in s: first moment of the pulse response, minus half a sample for the hold."""
     core: ct.StateSpace = system.delay_free
     inside = np.eye(core.nstates) - core.A
     states = np.linalg.solve(inside, core.B)
     total = float((core.D + core.C @ states)[0, 0])
     first = float((core.C @ np.linalg.solve(inside, states))[0, 0])
-    # what rounding leaves of a plant without gain
+    # rounding error of a plant whose gain is zero
     nothing = _ROUNDING * float((np.abs(core.D) + np.abs(core.C) @ np.abs(states))[0, 0])
     if abs(total) <= nothing or not np.isfinite(first / total):
         return None

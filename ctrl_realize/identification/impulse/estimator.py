@@ -1,4 +1,4 @@
-"""Which estimate of a pulse response suits a record: judged on the part that it has not seen."""
+"""Choice of the estimator of an impulse response, by its prediction of held-back data."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from ...numerics.regression.arx import ArxFit, arx_state_space
 from .regression import PulseRegression, through_arx, with_prior
 
 HELD_BACK = 1 / 3
-"""Part of every record that the estimates are judged on."""
+"""Fraction of every record that is held back for validation."""
 CLEARLY = 0.5
-"""Part of the error of the regularized estimate to which OKID must bring it to be taken."""
+"""Ratio of prediction errors, OKID to regularized, below which OKID is chosen."""
 MOST_JUDGED = 6000
-"""Samples at the end of a record that are simulated to judge an estimate."""
+"""Number of samples at the end of a record that are simulated for validation."""
 
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """Method that predicts best, the kernel of every output, and what it was chosen by."""
+    """Method that predicts best, the kernel of every output, and the reason for the choice."""
 
     method: str
     kernels: tuple[str, ...]
@@ -35,8 +35,8 @@ class Choice:
 def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice:
     """Fit the first two thirds of every record by both methods, and simulate the rest.
 
-    The regularized estimate is kept unless OKID is clearly better: its errors are known better.
-    Where the first two thirds are too short for one of them, the other is taken.
+    The regularized estimate is preferred unless OKID is clearly better, because its standard
+    deviations are more reliable. If two thirds are too short for one method, the other is used.
     """
     p = group[0].noutputs
     free = ("auto",) * p
@@ -48,7 +48,7 @@ def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice
         return Choice("regularized", free, "")
     kernels = smooth.kernels
     if any(record.n_missing for record in group):
-        # What is simulated needs every sample of the input.
+        # The simulation needs every sample of the input.
         return Choice("regularized", kernels, "")
     try:
         arx = through_arx(first, count, start, None)
@@ -78,7 +78,7 @@ def _until(record: Record, split: int) -> Record:
 def _error(
     group: tuple[Record, ...], splits: list[int], found: PulseRegression, count: int
 ) -> float:
-    """Root mean square of what is missed on the held-back parts, over that of the output."""
+    """Root mean square of the prediction error on held-back data, relative to the output."""
     missed = total = 0.0
     for record, split in zip(group, splits, strict=True):
         begin = max(split - max(2 * count, record.n_samples - split), 0)
@@ -89,7 +89,7 @@ def _error(
         model = _by_arx(found.arx, part) if found.arx else _by_convolution(found.markov, part)
         error = y - model[:, behind:]
         error = error - error.mean(axis=1, keepdims=True)
-        # Of an output that stands still nearly everything can be missed: a million times is enough.
+        # For a constant output the relative error may be huge: it is limited to a million.
         least = np.maximum(1e-6 * np.abs(error).max(axis=1, keepdims=True), 1e-300)
         scale = np.maximum(y.std(axis=1, keepdims=True), least)
         missed += float(((error / scale) ** 2).sum())

@@ -1,4 +1,4 @@
-"""Unit-pulse responses from records of any input."""
+"""Unit-pulse responses from records with any input."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ Kernel = Literal["auto", "TC", "DC", "SS"]
 Start = Literal["unknown", "rest"]
 
 SHORTEST, LONGEST = 100, 1 / 3
-"""Length that is tried first, in samples, and the longest, as a part of the longest record."""
+"""First length to try, in samples, and the longest, as a fraction of the longest record."""
 
 MOST_UNKNOWNS = 400
-"""Most lags of all inputs together to which the length grows by itself; time goes with its cube."""
+"""Largest automatic number of lags of all inputs together; time grows with its cube."""
 
 SURE = 0.999
-"""Chance that no output seems to follow an input that it does not follow."""
+"""Probability that an output seems to depend on an input although none does."""
 
 TAIL = 0.05
-"""Part of the largest Markov parameter that may be left at the end of the window."""
+"""Largest tail at the end of the window, relative to the largest Markov parameter."""
 
 
 @single_threaded
@@ -46,48 +46,47 @@ def impulse_from_io(
     start: Start = "unknown",
     arx_order: int | None = None,
 ) -> ImpulseEstimate:
-    """Estimate the unit-pulse response from input and output of any shape.
+    """Estimate the unit-pulse response from input and output signals of any shape.
 
-    Means do not matter: every record has one free constant per output. Missing samples
-    (``Record(..., missing="keep")``) take out the equations that they touch.
+    Means are eliminated: every record has a free constant for each output. Missing samples
+    (``Record(..., missing="keep")``) remove the equations that contain them.
 
     Parameters
     ----------
     records : Record or sequence of Record
-        One or several experiments on the same plant, with the same sample time and channels.
+        One or several experiments on the same plant, with the same sample time and signals.
     length : int, optional
-        Number of Markov parameters; the response must have died away within it. Default: 100, or
-        twice the lag at which the last output begins to follow an input, doubled until it has, up
-        to a third of the longest record and 400 over the number of inputs.
+        Number of Markov parameters; the response must have decayed within it. Default: 100, or
+        twice the lag at which the last output begins to respond, doubled until the response has
+        decayed, up to a third of the longest record and 400 divided by the number of inputs.
     method : {"auto", "regularized", "least_squares", "okid"}
-        ``"auto"`` is ``"okid"`` where that halves the error of ``"regularized"`` on the last
-        third of the data, unseen, and ``"regularized"`` otherwise. ``"regularized"`` weighs the
-        data against a prior of decay, tuned by its marginal likelihood; ``"least_squares"`` has
-        no prior and needs an input that excites every lag; ``"okid"`` goes through a high-order
-        ARX model, and is for plants that ring for longer than can be modelled by `length` free
-        numbers.
+        ``"regularized"`` uses a prior of exponential decay, tuned by its marginal likelihood.
+        ``"least_squares"`` has no prior and needs an input that excites every lag. ``"okid"`` uses
+        an ARX model of high order, for plants whose response is longer than `length` free
+        parameters can describe. ``"auto"``: ``"okid"`` if it halves the prediction error of
+        ``"regularized"`` on the held-back last third of the data, otherwise ``"regularized"``.
     kernel : {"auto", "TC", "DC", "SS"}
-        Prior of the regularized method. TC allows a jump at lag 0, SS is smooth, DC finds the
-        correlation of neighbours itself; ``"auto"`` takes TC or SS, whichever has the larger
-        marginal likelihood, for every output by itself.
+        Prior of the regularized method. TC allows a jump at lag 0, SS is smooth, DC estimates the
+        correlation of neighbours; ``"auto"``: TC or SS, whichever has the larger marginal
+        likelihood, for each output separately.
     start : {"unknown", "rest"}
-        What came before a record: unknown (the first ``length - 1`` outputs are then only past,
-        ``arx_order`` for OKID), or rest at the first sample of the input, which uses every
-        sample.
+        Input before the record: unknown (the first ``length - 1`` outputs, or ``arx_order`` for
+        OKID, are then only used as past values), or steady state at the first sample of the input,
+        which uses every sample.
     arx_order : int, optional
-        Order of the ARX model of OKID, at least the delay plus the order of the plant; default:
-        chosen by BIC up to 128.
+        Order of the ARX model of OKID, at least the delay plus the order of the plant. Default:
+        chosen by BIC, up to 128.
 
     Returns
     -------
     ImpulseEstimate
-        Goes into `realize`, `estimate_delay` and `scan_orders` as any impulse response; has
-        `std` beside.
+        For `realize`, `estimate_delay` and `scan_orders`, like any impulse response; with standard
+        deviations `std`.
 
     Raises
     ------
     DataError
-        Records that are too short, that differ in sample time or channels, or an input that does
+        Records that are too short, with different sample times or signals, or an input that does
         not excite the plant.
     OptionError
         Unknown method, kernel or start.
@@ -95,15 +94,15 @@ def impulse_from_io(
     Warns
     -----
     DataWarning
-        When the prior had to fill in directions that the input does not excite.
+        The input does not excite some directions, which are determined by the prior alone.
 
     Notes
     -----
     The regularized method is that of [1]_ (kernel SS: [2]_), ``"okid"`` that of [3]_.
 
-    The normal equations are summed by FFT, so 1e5 samples and 1000 lags take seconds. Noise is
-    taken as white: coloured noise leaves the estimate unbiased, but makes `std` too small at the
-    frequencies where it is strong. The response is step-invariant: right for a plant behind a
+    The normal equations are summed by FFT, so 1e5 samples and 1000 lags take seconds. White noise
+    is assumed: coloured noise does not bias the estimate, but `std` is then too small at
+    frequencies where the noise is strong. The response is step-invariant: exact for a plant with a
     zero-order hold.
 
     References
@@ -142,7 +141,7 @@ def impulse_from_io(
     longest = max(record.n_samples for record in group)
     most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].ninputs), 2)
     if length is None:
-        # A window that ends before the response begins would show nothing, and no tail either.
+        # A window that ends before the response begins would show neither response nor tail.
         count = min(max(SHORTEST, 2 * _latest_onset(group, most)), most)
     else:
         count = whole(length, "length", 2)
@@ -173,7 +172,7 @@ def impulse_from_io(
 
 
 def _latest_onset(group: tuple[Record, ...], lags: int) -> int:
-    """Lag at which the last of the outputs begins to follow an input; 0 where none does."""
+    """Lag at which the last output begins to respond to an input; 0 if none responds."""
     record = max(group, key=lambda one: one.n_samples)
     if record.n_missing:
         return 0
@@ -195,7 +194,7 @@ def _estimate(
     chosen: Choice | None,
     asked: tuple[str, str, int | None],
 ) -> PulseRegression:
-    """Estimate by what was asked for, or by what was chosen."""
+    """Estimate by the requested or the chosen method."""
     method, kernel, arx_order = asked
     kernels = (kernel,) * group[0].noutputs
     if chosen is not None:
@@ -209,7 +208,7 @@ def _estimate(
 
 
 def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
-    """Flag responses that have not died away at the end of the window."""
+    """Flag responses that have not decayed at the end of the window."""
     count = found.markov.shape[-1]
     tail = slice(count - max(count // 10, 1), None)
     size = np.sqrt(np.mean(found.markov[..., tail] ** 2, axis=-1))
@@ -229,7 +228,7 @@ def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
 
 
 def as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:
-    """Check that records are of one plant: the same sample time and channels."""
+    """Check that all records have the same sample time and signals."""
     group = as_records(records)
     first = group[0]
     for i, other in enumerate(group[1:], start=1):

@@ -1,4 +1,4 @@
-"""The regressions behind `impulse_from_io`: with a prior, without, and through an ARX model."""
+"""Regressions for `impulse_from_io`: with a prior, without one, and by an ARX model."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from ...numerics.regression.normal_equations import NormalEquations, normal_equa
 from ...results import Flag
 
 OKID_ORDERS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-"""ARX orders among which BIC chooses."""
+"""Candidate ARX orders for BIC."""
 SILENT = 0.01
-"""Level of the tests for a response: share of false alarms."""
+"""Significance level of the tests for a response: rate of false alarms."""
 
 MOST_GROWTH = 60.0
-"""Decades by which a pulse response may grow before its numbers mean nothing."""
+"""Decades by which a pulse response may grow before its values are meaningless."""
 
 RIDGE = 1e-9
-"""Added to the Gram matrix of an output without noise, as a share of its diagonal."""
+"""Added to the Gram matrix of a noise-free output, relative to its diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
 class PulseRegression:
-    """Pulse responses (p, m, N) with their std, noise per output (p,), and how they were found.
+    """Pulse responses (p, m, N) with std, noise of each output (p,), and how they were estimated.
 
-    `kernels` are the priors of the outputs, `arx` the model, where there are any.
+    `kernels` are the priors of the outputs, `arx` is the ARX model, if there are any.
     """
 
     markov: FloatArray
@@ -86,9 +86,9 @@ def without_prior(group: tuple[Record, ...], count: int, start: str) -> PulseReg
 def with_prior(
     group: tuple[Record, ...], count: int, start: str, kernels: Sequence[str]
 ) -> PulseRegression:
-    """Estimate Markov parameters under a prior of decay, output by output.
+    """Estimate Markov parameters with a decaying prior, for each output separately.
 
-    `kernels` has one name for each output.
+    `kernels` contains one name for each output.
     """
     m, p = group[0].ninputs, group[0].noutputs
     equations = _fir_equations(group, count, start, 2 * m + 8)
@@ -115,7 +115,7 @@ def with_prior(
     ]
     fits = [fit_kernel(one, count, kernel) for one, kernel in zip(single, kernels, strict=True)]
     spread = [cautious_std(one, count, fit) for one, fit in zip(single, fits, strict=True)]
-    # Twice the log Bayes factor against no response at all; 6 is "strong" by Kass and Raftery.
+    # Twice the log Bayes factor against no response; 6 is "strong" according to Kass and Raftery.
     nothing = -equations.freedom / 2 * np.log(np.diag(equations.power))
     silent = 2 * (np.array([fit.evidence for fit in fits]) - nothing) < 6
     return PulseRegression(
@@ -133,11 +133,11 @@ def with_prior(
 def through_arx(
     group: tuple[Record, ...], count: int, start: str, arx_order: int | None
 ) -> PulseRegression:
-    """Estimate a long ARX model and expand it to `count` Markov parameters (OKID)."""
+    """Estimate an ARX model of high order and expand it to `count` Markov parameters (OKID)."""
     m, p = group[0].ninputs, group[0].noutputs
     total = sum(record.n_samples for record in group)
     if arx_order is None:
-        # At least five equations for each unknown, or BIC's asymptotics mean nothing.
+        # At least five equations for each parameter, as the asymptotics of BIC require.
         most = min(count - 1, total // (5 * (m + p)) - 1)
         orders = tuple(q for q in OKID_ORDERS if q <= most) or (1,)
     else:
@@ -157,7 +157,7 @@ def through_arx(
     if not np.all(np.diag(equations.gram) > 0):
         raise DataError("an output is constant: no ARX model can be estimated")
     if excited_directions(equations.gram) < equations.gram.shape[0]:
-        # Without noise the output follows many models of high order; any of them will do.
+        # Without noise, many models of high order reproduce the output; any of them will do.
         equations = replace(
             equations, gram=equations.gram + np.diag(RIDGE * np.diag(equations.gram))
         )
@@ -183,7 +183,7 @@ def through_arx(
             "method='regularized'"
         )
     markov, std = arx_markov(fit, count), arx_markov_std(fit, count)
-    # Beyond this many standard deviations lies one of all numbers in 1 % of cases.
+    # Largest of all parameters, in standard deviations, that is exceeded by chance in 1 % of cases.
     level = -float(ndtri(SILENT / 2 / (m * count)))
     silent = np.all(np.abs(markov) <= level * std, axis=(1, 2))
     return PulseRegression(
@@ -234,7 +234,7 @@ def _unexcited(excited: int, wanted: int) -> str:
 
 
 def _signals(record: Record, past: int, start: str) -> tuple[FloatArray, FloatArray]:
-    """Return input and output as (signals, N), with a past at rest in front when asked."""
+    """Return input and output as (signals, N), with a steady-state past prepended if requested."""
     u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
     if start == "rest":
         u, y = (np.concatenate([np.repeat(z[:, :1], past, axis=1), z], axis=1) for z in (u, y))
@@ -252,7 +252,7 @@ def _check_rows(equations: Sequence[NormalEquations], needed: int, past: int) ->
 
 
 def _silence(silent: NDArray[np.bool_]) -> tuple[Flag, ...]:
-    """Flag the outputs that do not follow the input."""
+    """Flag the outputs that do not respond to the input."""
     return tuple(
         Flag(
             "no_response",

@@ -22,7 +22,8 @@ BANDWIDTH_TIMES_RISE = 0.35
 """-3 dB bandwidth in Hz times the 10-90 % rise time, for a lag of any order within 5 %."""
 
 CUTOFF_OVER_BANDWIDTH = 13.0
-"""Automatic cut-off: below 8 the filter shapes the response, above 15 it lets noise through."""
+"""Automatic cut-off: below 8 the filter distorts the response, above 15 it passes too much
+noise."""
 
 
 def impulse_from_step(
@@ -33,30 +34,30 @@ def impulse_from_step(
     zero_phase: bool = True,
     difference: Literal["backward", "central"] = "backward",
 ) -> ImpulseResponse:
-    """Differentiate a step response and low-pass the result (section 3.2).
+    """Differentiate a step response and low-pass filter the result (section 3.2).
 
     Parameters
     ----------
     step : StepResponse
     cutoff_hz : float, "auto" or None, optional
-        Cut-off of the Butterworth low-pass in Hz; the paper's is 50 Hz. ``"auto"`` takes 13
-        times the bandwidth of the step response (and no filter where that is beyond 0.45 of the
-        sample rate); None filters nothing.
+        Cut-off of the Butterworth low-pass in Hz; the paper's is 50 Hz. ``"auto"``: 13 times the
+        bandwidth of the step response (no filter if that is beyond 0.45 of the sample rate); None:
+        no filter.
     filter_order : int, optional
         The paper's is 5.
     zero_phase : bool, optional
-        Forward and backward, so that the filter adds no delay. A causal filter delays the
+        Run the filter forward and backward, so that it adds no delay. A causal filter delays the
         response by its group delay: 13.1 samples for the paper's.
     difference : {"backward", "central"}, optional
-        ``"backward"`` is exactly step-invariant: right for simulation and control behind a hold.
-        ``"central"`` is the paper's five-point formula; it samples the continuous impulse
-        response, half a sample earlier.
+        ``"backward"`` is step-invariant: exact for simulation and control with a hold.
+        ``"central"`` is the paper's five-point formula; it samples the continuous impulse response,
+        half a sample earlier.
 
     Returns
     -------
     ImpulseResponse
-        Unit-pulse response from the step on; `.filter` is the filter that is left in it and
-        `.noise` what the samples before the step became.
+        Unit-pulse response from the step on; `.filter` is the filter that it contains, and `.noise`
+        the result for the samples before the step.
 
     Raises
     ------
@@ -65,8 +66,8 @@ def impulse_from_step(
 
     Notes
     -----
-    A causal filter's lag stays in the model unless it is divided out: at the paper's settings 10 ms
-    of delay.
+    The lag of a causal filter stays in the model unless it is divided out: with the paper's
+    settings 10 ms of delay.
 
     References
     ----------
@@ -89,8 +90,8 @@ def impulse_from_step(
     order = whole(filter_order, "filter_order", 1, 10)
     difference = one_of(difference, "difference", ("backward", "central"))
     cutoff = _cutoff(step, cutoff_hz)
-    # The samples before the step take part, so that differentiation and filter are settled when
-    # the step comes. Where there are too few, rest is what was before: zeros.
+    # The samples before the step are included, so that differentiation and filter have settled at
+    # the step. If there are too few, zeros are prepended.
     lead = 4 if cutoff is None else settling_samples(cutoff, step.dt) + 4
     zeros = np.zeros(max(lead - step.pre_step.size, 0))
     joint = np.concatenate([zeros, step.pre_step, step.output])
@@ -100,7 +101,7 @@ def impulse_from_step(
     if cutoff is not None:
         pulses = low_pass(pulses, order, cutoff, step.dt, zero_phase=zero_phase)
         if noise is not None:
-            # Alone, so that a zero-phase filter carries nothing of the step into it.
+            # Separately, so that a zero-phase filter carries nothing of the step into it.
             noise = low_pass(noise, order, cutoff, step.dt, zero_phase=zero_phase)
     return ImpulseResponse(
         pulses[edge:],

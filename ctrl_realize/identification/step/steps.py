@@ -1,4 +1,4 @@
-"""From a measured step to a unit step response: find its edge, cut it out, scale it."""
+"""From a measured step to a unit-step response."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ def detect_step(
 ) -> StepEdge:
     """Find the step in the input of a record.
 
-    Spikes, noise, slow drift and an offset of the input do not move the result, and no samples
-    before the step are needed. Of several edges the first large one is returned (at least half
-    as high as the highest); all of them are in its `edges`.
+    Spikes, noise, slow drift and an offset of the input do not affect the result, and no samples
+    before the step are needed. Of several edges the first large one is returned (at least half as
+    high as the highest); `edges` lists all of them.
 
     Parameters
     ----------
     record : Record
         One input signal.
     spike_samples : int, optional
-        Longest spike to ignore, in samples. Default: 0.1 % of the record, 3 to 50.
+        Longest spike to ignore, in samples. Default: 0.1 % of the record, between 3 and 50.
     min_share : float, optional
-        Smallest edge to look for, as a part of the range of the input.
+        Smallest edge to detect, as a fraction of the range of the input.
 
     Returns
     -------
@@ -42,13 +42,13 @@ def detect_step(
     Raises
     ------
     NoStepError
-        The input is constant, only noise, or its step comes with the last sample.
+        The input is constant, consists of noise only, or steps at the last sample.
 
     Notes
     -----
     Medians on both sides of every sample are compared, so that spikes shorter than half a window
-    move nothing; how long windows are and where an edge ends are our own rules. The paper has its
-    step after a known time [1]_.
+    have no effect; the window length and the rule for the end of an edge are our own. In the paper
+    the time of the step is known [1]_.
 
     References
     ----------
@@ -75,11 +75,11 @@ def found_step(
     min_share: float = 0.1,
     most: int | None = None,
 ) -> StepEdge:
-    """As `detect_step`, with one edge more than `most` at most: there may be millions."""
+    """As `detect_step`, with at most `most` + 1 edges, because there may be millions."""
     signal = _single(as_record(record).input, "input", record)
     if spike_samples is None:
         spikes = int(np.clip(record.n_samples // 1000, 3, 50))
-        # A record of a few samples holds no window of that length on either side of its step.
+        # A short record does not contain a window of that length on both sides of its step.
         spikes = min(spikes, max((record.n_samples - 3) // 6, 0))
     else:
         spikes = whole(spike_samples, "spike_samples", 0, record.n_samples // 3)
@@ -126,15 +126,15 @@ def unit_step(
     record : Record
         One input and one output.
     edge : StepEdge, optional
-        Which step; default: what `detect_step` finds.
+        Step to use. Default: that of `detect_step`.
     remove_drift : bool, optional
-        Take off the line through the samples before the step instead of their mean. Default: when
-        its slope is significant (five standard errors) over at least 50 samples.
+        Subtract a straight line through the samples before the step instead of their mean. Default:
+        if its slope is significant (five standard errors) over at least 50 samples.
 
     Returns
     -------
     StepResponse
-        From the step up to the next edge or the end; the noise before it is kept in `.pre_step`.
+        From the step to the next edge or the end; the samples before it are in `.pre_step`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The bank of delays that a tracker asks, and the next one, about poles that have moved."""
+"""The bank of candidate delays of a tracker, and its renewal when the poles have moved."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from ...numerics.state_space.pole_sensitivity import (
 from .estimate import LinearisedBank, Solution
 
 RUN_IN, SHORT_RUN_IN = 2.0, 0.5
-"""Memories that a renewed bank takes before it is asked; the short one where nothing is told by
-the bank before it, whose poles are far off. Each renewal is a Gauss-Newton step: poles that have
-halved take five or six."""
+"""Forgetting times before a renewed bank is used; the shorter one if the previous bank gives no
+estimate because its poles are far off. Each renewal is a Gauss-Newton step: poles that have halved
+take five or six."""
 MOVED, LEAP = 0.04, 0.5
-"""Relative move of a pole from which the bank is renewed, and the largest that is then made."""
+"""Relative move of a pole above which the bank is renewed, and the largest move per renewal."""
 CLEAR_MOVE = 4.0
-"""Standard deviations that such a move must have."""
+"""Significance of such a move, in standard deviations."""
 PENDING = 0.3
-"""Relative move of a pole that is being made from which nothing is told meanwhile. Up to there the
-interval is wider by as much of the slowest lag: so far may the delay be off."""
+"""Relative move of a pole, in a renewal, above which no estimate is given meanwhile. Below it the
+interval is widened by the same fraction of the slowest lag, the possible error of the delay."""
 
 
 class Banks:
-    """A bank about the poles of the starting model, and those that take its place.
+    """The bank for the poles of the starting model, and those that replace it.
 
-    `span` is the memory in samples; `fixed` poles do not move.
+    `span` is the forgetting time in samples; with `fixed`, poles do not move.
     """
 
     def __init__(
@@ -58,9 +58,9 @@ class Banks:
         return LinearisedBank(bank, core, directions, moved)
 
     def update(self, u: float, y: float, count: int) -> bool:
-        """Take in sample `count`, and tell whether the next bank has taken over.
+        """Process sample `count`; return whether the next bank has replaced the present one.
 
-        It counts from its first whole sample, and takes over when it is run in.
+        A bank counts from its first complete sample, and is used once it has settled.
         """
         self.now.bank.update(u, y)
         if self._next is None:
@@ -75,7 +75,7 @@ class Banks:
         return True
 
     def follow(self, found: Solution, count: int) -> None:
-        """Start a bank about the moved poles, to take over when it has seen enough."""
+        """Start a bank for the moved poles, to be used when it has enough samples."""
         clear = np.abs(found.moves) > np.maximum(MOVED, CLEAR_MOVE * found.move_std)
         if self._next is not None or not np.any(clear) or not found.sees_reply:
             return
@@ -89,7 +89,7 @@ class Banks:
             self._next = replace(fresh, begin=count + wait + self._candidates[1] + 1)
 
     def core_at(self, found: Solution | None) -> Core:
-        """Return the core with its poles moved as they were found; zeros as they were."""
+        """Return the core with its poles moved to the estimates; the zeros are unchanged."""
         core = self.now.core
         if found is not None and found.gain:
             made = moved_core(core, self._zeros, self.now.directions, found.moves, self._dt)
@@ -98,19 +98,19 @@ class Banks:
 
     @property
     def moved(self) -> bool:
-        """Whether the poles have left those of the starting model."""
+        """Whether the poles differ from those of the starting model."""
         return bool(np.any(self.now.moved))
 
     @property
     def step_made(self) -> float:
-        """Largest relative move of a pole in the bank that is being run in, 0 without one."""
+        """Largest relative move of a pole in the pending bank; 0 if there is none."""
         if self._next is None:
             return 0.0
         return float(max(self._next.moved - self.now.moved, key=abs))
 
     @property
     def pending(self) -> str:
-        """Say that a bank about poles far from these is being run in; empty where none is."""
+        """Report that a bank for poles far from the present ones is pending; empty otherwise."""
         step = self.step_made
         if abs(step) <= PENDING:
             return ""

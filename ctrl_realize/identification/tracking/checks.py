@@ -1,4 +1,4 @@
-"""What a delay tracker can start from, and take in."""
+"""Checks of the model, the options and the samples of a delay tracker."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ...errors import DataError, DelayRangeError, OptionError, UnsuitableSystemE
 from ...numerics.constants import LARGEST
 
 LONGEST = 1e12
-"""Samples of memory; beyond, the weights of single samples are lost in rounding."""
+"""Upper limit of the forgetting time in samples; beyond it, single samples are lost in rounding."""
 
 
 def check_candidates(min_delay: int, max_delay: int) -> tuple[int, int]:
-    """Return the first and the last candidate."""
+    """Return the first and the last candidate delay."""
     low, high = whole(min_delay, "min_delay", 0), whole(max_delay, "max_delay", 0)
     if high <= low:
         raise DelayRangeError(f"delays {low}...{high} leave only one candidate")
@@ -26,7 +26,7 @@ def check_candidates(min_delay: int, max_delay: int) -> tuple[int, int]:
 
 
 def check_forgetting_time(forgetting_time: float, dt: float, max_delay: int) -> float:
-    """Return the memory in samples; the largest candidate must lie well within it."""
+    """Return the forgetting time in samples; the largest candidate must be well below it."""
     span = positive(forgetting_time, "forgetting_time", "time in s") / dt
     if span > LONGEST:
         raise OptionError(
@@ -42,7 +42,7 @@ def check_forgetting_time(forgetting_time: float, dt: float, max_delay: int) -> 
 
 
 def model_noise(model: ct.StateSpace, given: float | None) -> float:
-    """Return the noise that a model leaves: as given, as its `fit` has it, or 0 where unknown."""
+    """Return the residual level of a model: as given, as its `fit` has it, or 0 if unknown."""
     if given is not None:
         return positive(given, "noise_std", "standard deviation of the output's noise")
     if not isinstance(model, DelayedStateSpace) or model.fit is None:
@@ -52,7 +52,7 @@ def model_noise(model: ct.StateSpace, given: float | None) -> float:
 
 
 def starting_core(model: ct.StateSpace) -> ct.StateSpace:
-    """Return a model without its delay, where it can be followed by simulation."""
+    """Return a model without its delay, if it can be simulated."""
     core = model.delay_free if isinstance(model, DelayedStateSpace) else model
     if not isinstance(core, ct.StateSpace) or not core.issiso():
         raise UnsuitableSystemError("the initial model must have one input and one output")
@@ -71,7 +71,7 @@ def starting_core(model: ct.StateSpace) -> ct.StateSpace:
 
 
 def check_sample(u: float, y: float, count: int) -> tuple[float, float]:
-    """Return input and output of sample `count` as plausible finite numbers."""
+    """Return input and output of sample `count`; they must be plausible finite numbers."""
     try:
         if np.ndim(u) or np.ndim(y):
             raise TypeError
@@ -92,7 +92,7 @@ def check_sample(u: float, y: float, count: int) -> tuple[float, float]:
 
 
 def check_record(record: Record, dt: float) -> None:
-    """Refuse a record that a tracker with the sample time `dt` cannot take in."""
+    """Refuse a record that does not suit a tracker with sample time `dt`."""
     check_complete(record, "DelayTracker.track")
     if not record.issiso():
         raise DataError(f"{record!r} has several channels; expected one input and one output")

@@ -1,4 +1,4 @@
-"""What the sums of a delay tracker say at one moment, and when they cannot tell."""
+"""Estimate of a delay tracker from its sums, and the reasons why there may be none."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from ...numerics.regression.recursive import DelayBank
 from ...numerics.state_space.pole_sensitivity import Core, Direction
 
 SPEED_STD = 0.3
-"""How far a pole is expected to move: prior standard deviation of its relative speed."""
+"""Prior standard deviation of the relative speed of a pole."""
 SIGNIFICANT = 16.0
-"""Fall of the misfit in noise variances below which nothing was seen: four sigma."""
+"""Least decrease of the misfit, in noise variances, for a significant response: four sigma."""
 CLEAR_GAIN = 3.0
-"""Standard deviations that the gain must be away from zero."""
+"""Least ratio of the gain to its standard deviation."""
 SHOWN_MOVE = 2.0
-"""Largest move of a pole that is put into numbers, as logarithm of the speed ratio."""
+"""Largest move of a pole that is computed, as logarithm of the speed ratio."""
 
 LOUD, LOUD_AFTER_MOVES = 3.0, 1.2
-"""Residual over the model's noise from which nothing is told: no model of the plant as it was
-leaves nine times the power. Poles that moved are taken for the plant's only where they leave no
-more than noise: slower poles stand in for a delay beyond the candidates (100 samples with 90 the
-largest leave 1.5 times the noise, or more)."""
+"""Residual, relative to the model's noise, above which no estimate is given: nine times the power
+is not explained by the same plant. Moved poles are accepted only if the residual does not exceed
+the noise: otherwise slower poles can take the place of a delay beyond the candidates (a delay of
+100 samples, with 90 as the largest candidate, leaves 1.5 times the noise or more)."""
 NEGLIGIBLE = 0.005
-"""Residual over what the input explains that is never called loud: data without noise leave what
-the first order in the moves of poles neglects."""
+"""Residual, relative to the response, that is always tolerated: for noise-free data, the error of
+the linearisation in the moves of the poles."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearisedBank:
-    """A bank of delays about one set of poles, `moved` from those of the starting model.
+    """A bank of candidate delays for one set of poles, `moved` from those of the starting model.
 
-    Its sums begin at the sample `begin`.
+    Its sums begin at sample `begin`.
     """
 
     bank: DelayBank
@@ -50,12 +50,12 @@ class LinearisedBank:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Best candidate of a bank, and how sure it is.
+    """Best candidate of a bank, and its uncertainty.
 
-    ``theta`` holds the gain, then gain times the `moves` of the poles; `delay` is in samples and
-    `place` the same with its fraction. `reply_std` is the size of what the input explains;
-    `sees_reply` is false where the output does not follow
-    the input; `reason` says why the data cannot tell the delay, and is empty when they can.
+    ``theta`` contains the gain, then the gain times the `moves` of the poles; `delay` is in samples
+    and `place` the same with its fraction. `reply_std` is the size of the response; `sees_reply` is
+    false if the output does not respond to the input; `reason` states why the delay is not
+    resolved, and is empty if it is.
     """
 
     delay: int
@@ -73,12 +73,12 @@ class Solution:
 
     @property
     def gain(self) -> float:
-        """Gain over that of the starting model."""
+        """Gain relative to that of the starting model."""
         return float(self.theta[0])
 
     @property
     def moves(self) -> FloatArray:
-        """Moves of the poles, zero where there is no gain to see them by."""
+        """Moves of the poles; zero if the gain is zero."""
         return _relative(self.theta)
 
 
@@ -89,9 +89,9 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
     ----------
     now : LinearisedBank
     variance : float
-        Noise variance as known before; with `SPEED_STD` it weighs the prior.
+        Noise variance known beforehand; with `SPEED_STD` it weights the prior.
     inflation : float
-        How many samples of the residual count as one.
+        Number of residual samples that count as one independent sample.
     """
     bank, q = now.bank, now.n_parameters
     spread = np.array([1.0, *(SPEED_STD for _ in now.directions)])
@@ -100,10 +100,10 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
     theta, delay = found.theta[best], bank.low + best
     freedom = max(bank.weight**2 / bank.weight_squared - q - 1, 1.0)
     variance = found.weighted_sse[best] / bank.weight * (1 + (q + 1) / freedom)
-    # Never below what sums of squares can resolve in double precision.
+    # Not below the resolution of sums of squares in double precision.
     noise = max(variance * inflation, 1e-14 * found.power, 1e-300)
     interval = _interval(found.weighted_sse - found.weighted_sse[best], noise, bank.low)
-    # root by root: the product overflows for an output 1e200 times as large as the input
+    # separate roots: the product overflows for an output 1e200 times as large as the input
     std = np.sqrt(noise) * np.sqrt(np.diag(found.inverse[best]))
     gain, gain_std = float(theta[0]), float(std[0])
     moves = _relative(theta)
@@ -133,8 +133,8 @@ def _relative(theta: FloatArray) -> FloatArray:
 
 
 def _interval(excess: FloatArray, noise: float, low: int) -> tuple[int, int]:
-    """Return the delays that hold 95 % of the probability; `low` is that of the first entry."""
-    # Beyond a thousand nothing is left of a chance, and the quotient might overflow.
+    """Return the delays that contain 95 % of the probability; `low` is that of the first entry."""
+    # exp(-500) underflows to zero; larger arguments might overflow.
     chance = np.exp(-np.minimum(excess, 1e3 * noise) / noise / 2)
     below = np.cumsum(chance) / chance.sum()
     last = min(int(np.searchsorted(below, 0.975)), below.size - 1)
@@ -142,7 +142,7 @@ def _interval(excess: FloatArray, noise: float, low: int) -> tuple[int, int]:
 
 
 def _fraction(misfit: FloatArray, best: int) -> float:
-    """Return where a parabola through the least misfit and its neighbours is lowest, -0.5...0.5."""
+    """Minimum of a parabola through the smallest misfit and its neighbours, -0.5...0.5."""
     if not 0 < best < misfit.size - 1:
         return 0.0
     before, here, after = misfit[best - 1 : best + 2]
@@ -151,7 +151,7 @@ def _fraction(misfit: FloatArray, best: int) -> float:
 
 
 def _no_reply(explained: float, gain: float, gain_std: float) -> str:
-    """Say why the output does not follow the input; `explained` is in noise variances."""
+    """State why the output does not respond to the input; `explained` is in noise variances."""
     if explained < SIGNIFICANT:
         return "no movement above the noise within the forgetting time"
     if abs(gain) < CLEAR_GAIN * gain_std:
@@ -160,7 +160,7 @@ def _no_reply(explained: float, gain: float, gain_std: float) -> str:
 
 
 def _no_choice(delay: int, interval: tuple[int, int], candidates: tuple[int, int]) -> str:
-    """Say why one delay does not stand out of the candidates."""
+    """State why no single delay is resolved."""
     low, high = candidates
     if delay == high:
         return f"the best delay is max_delay={high}; try a larger one"
@@ -172,7 +172,7 @@ def _no_choice(delay: int, interval: tuple[int, int], candidates: tuple[int, int
 
 
 def _too_far(speeds: FloatArray) -> str:
-    """Say that the poles have left the range in which their moves count to first order."""
+    """Report that the poles have moved beyond the range of the linearisation."""
     moved = float(max(speeds, key=abs, default=0.0))
     if abs(moved) <= SPEED_STD:
         return ""
@@ -183,7 +183,7 @@ def _too_far(speeds: FloatArray) -> str:
 
 
 def too_loud(found: Solution, noise: float, limit: float) -> str:
-    """Say that the residual is more than `limit` times the noise of the model."""
+    """Report that the residual exceeds `limit` times the noise of the model."""
     left = float(np.sqrt(found.variance))
     if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
         return ""

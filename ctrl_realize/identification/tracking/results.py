@@ -16,31 +16,31 @@ from ...results import Flag, IntervalKind, ModelFit, Result
 class TrackPoint(ModelFit):
     """Estimate of a delay tracker at one time.
 
-    ``dead_time`` is ``delay * dt`` with the delay interpolated between samples, and lies inside
-    ``interval`` to half a sample where `resolved` is true. Where it is false, `reason` says what is
-    missing and the numbers are the best guess without any claim.
+    ``dead_time`` is ``delay * dt`` with the delay interpolated between samples; if `resolved` is
+    true it lies inside ``interval``, to half a sample. If `resolved` is false, `reason` states what
+    is missing, and the numbers are only the best guess.
 
     Attributes
     ----------
     time : float
-        Time of the last sample in s, from the first one.
+        Time of the last sample in s, relative to the first one.
     delay : int
         Best delay in samples.
     dead_time : float
         Best dead time in s.
     interval : tuple of float
-        In s: dead times that hold 95 % of the probability, and the way that the delay has gone
-        within the last memory: the estimate is behind a moving delay by about that.
+        In s: dead times with a probability of 95 %, and the change of the delay during the last
+        forgetting time, because the estimate lags a moving delay by about that.
     delay_interval : tuple of int
         The same in samples.
     lost : bool
-        The residual is much louder than the model's: the delay lies outside the candidates, the
-        dynamics have changed by more than is followed, or something else acts on the output.
-        `DelayTracker.reset` starts anew.
+        The residual is much larger than that of the model: the delay is outside of the candidates,
+        the dynamics have changed too much, or another disturbance acts on the output.
+        `DelayTracker.reset` restarts the tracker.
     gain_ratio, gain_std : float
         Gain relative to the starting model, and its standard deviation.
     pole_speed_ratios : tuple of float
-        How much faster each real pole and pole pair has become; 1 is unchanged.
+        Speed of each real pole and pole pair, relative to the starting model; 1 is unchanged.
     noise_std : float
         Standard deviation of the residual.
     resolved : bool
@@ -82,7 +82,7 @@ class TrackPoint(ModelFit):
 
     @property
     def interval_kind(self) -> IntervalKind:
-        """``"tracked"``: of the samples within the memory."""
+        """``"tracked"``: for the samples within the forgetting time."""
         return "tracked"
 
     @property
@@ -100,7 +100,7 @@ class TrackPoint(ModelFit):
 
     @property
     def dead_time_interval(self) -> tuple[float, float] | None:
-        """The same as `interval`; None where nothing is claimed."""
+        """The same as `interval`; None if the delay is not resolved."""
         return self.interval if self.resolved else None
 
     def _title(self) -> str:
@@ -129,10 +129,10 @@ class TrackPoint(ModelFit):
 
 @dataclass(frozen=True, eq=False)
 class TrackHistory(Result):
-    """Course of a tracked delay: all arrays have one entry for each moment in `time`.
+    """History of a tracked delay: all arrays have one entry for each time in `time`.
 
-    Where ``resolved`` is false, nothing is claimed; `low` and `high` then only show what is left
-    open.
+    Where ``resolved`` is false there is no estimate; `low` and `high` are then only the candidates
+    that remain.
 
     Attributes
     ----------
@@ -143,11 +143,11 @@ class TrackHistory(Result):
     low, high : ndarray, shape (K,)
         Ends of the 95 % interval in s; `delay_low` and `delay_high` are the same in samples.
     gain_ratio : ndarray, shape (K,)
-        Gain over that of the starting model.
+        Gain relative to that of the starting model.
     resolved : ndarray of bool, shape (K,)
-        Whether the samples within the memory tell a delay.
+        Whether the samples within the forgetting time determine the delay.
     lost : ndarray of bool, shape (K,)
-        Where the residual was much louder than the model's, see `TrackPoint`.
+        Where the residual was much larger than that of the model, see `TrackPoint`.
     dt : float
         Sample time in s.
 
@@ -186,7 +186,7 @@ class TrackHistory(Result):
 
     @property
     def delay(self) -> FloatArray:
-        """Delay in samples, with its fraction."""
+        """Delay in samples, not rounded."""
         return self.dead_time / self.dt
 
     def _title(self) -> str:
@@ -212,7 +212,7 @@ class TrackHistory(Result):
 
 
 def track_of(course: Sequence[TrackPoint], dt: float) -> TrackHistory:
-    """Put single moments into the arrays of a track."""
+    """Collect single estimates in the arrays of a history."""
 
     def along(values: Iterable[float]) -> FloatArray:
         return read_only(np.array(list(values)))

@@ -1,4 +1,4 @@
-"""Gain, dynamics and dead time of a running plant, followed sample by sample."""
+"""On-line tracking of gain, dynamics and dead time of a running plant."""
 
 from __future__ import annotations
 
@@ -28,63 +28,61 @@ from .estimate import LOUD, LOUD_AFTER_MOVES, Solution, solve, too_loud
 from .results import TrackHistory, TrackPoint, track_of
 
 MOMENTS = 50
-"""Estimates made in one memory."""
+"""Number of estimates per forgetting time."""
 SAMPLES_EACH = 10
-"""Samples for each parameter, behind the largest delay, before anything is solved."""
+"""Samples for each parameter, after the largest delay, before the first estimate."""
 SHARE_OF_LAG = 20
-"""Part of the slowest lag over which the residual's own noise is measured, where nothing else is
-known of it: a wrong model's error hardly changes within it."""
+"""Fraction of the slowest lag over which the noise of the residual is measured if nothing else is
+known about it: the error of a wrong model hardly changes within it."""
 
 
 class DelayTracker:
-    """Follow a plant's dead time, gain and pole speeds from its samples as they come.
+    """Track dead time, gain and pole speeds of a plant sample by sample.
 
-    Starting from a model of the plant (as `identify` gives it), every candidate delay has its own
-    least squares with forgetting; gain, offset and the speeds (and dampings) of the poles are
-    free in each. The candidates share one set of regressors, so a sample costs the same
-    whatever came before, and a few operations for each candidate.
+    Starting from a model of the plant (from `identify`, for instance), recursive least squares with
+    exponential forgetting are computed for every candidate delay, with gain, offset and the speeds
+    (and dampings) of the poles as parameters. The candidates share one set of regressors, so the
+    cost of a sample is constant, with a few operations for each candidate.
 
     Parameters
     ----------
     model : control.StateSpace
-        Model to start from: one input, one output, discrete, not unstable. Its own delay does
-        not matter.
+        Starting model: one input, one output, discrete, not unstable. Its delay is not used.
     max_delay, min_delay : int
-        Candidates, in samples.
+        Candidate delays, in samples.
     forgetting_time : float
-        Time in s after which a sample counts for 1/e. Ten settling times or more see several
-        moves of the input; the estimate trails a change by about as much.
+        Time in s after which the weight of a sample has fallen to 1/e. Ten settling times or more
+        include several moves of the input; the estimate lags a change by about this time.
     dynamics : bool, default True
-        Let the poles move. A plant of fixed lags is followed more sharply without.
+        Estimate the poles too. For a plant with constant lags, False gives narrower intervals.
     noise_std : float, optional
-        Standard deviation of what the model leaves of the output. Default: that of the model's
-        `fit`, where it carries one, else the least that it has left while it told. A residual
-        three times as large is no noise: nothing is told then, and the track counts as lost.
+        Standard deviation of the residual of the model. Default: that of the model's `fit`, or else
+        the smallest residual observed while the delay was resolved. If the residual is three times
+        as large, the track is lost.
     drift_time : float, optional
-        Time constant in s of a high-pass on input and output alike, for outputs under a drifting
-        disturbance (a random walk). What changes within it is kept: the sum of the plant's lags is
-        a good choice. Without it a drift as loud as three times the noise is not told from a lost
-        track.
+        Time constant in s of a high-pass filter on input and output, for outputs with a drifting
+        disturbance (a random walk). Changes within this time are kept: the sum of the plant's lags
+        is a good choice. Without it, a drift of three times the noise is taken for a lost track.
 
     Raises
     ------
     UnsuitableSystemError
         A model with several channels, a continuous or an unstable one.
     DelayRangeError
-        No candidates, or a memory shorter than the largest of them.
+        No candidates, or a forgetting time shorter than the largest of them.
 
     Notes
     -----
-    A delay is followed on line as in [1]_ (which inputs tell of it: [2]_), here by a bank of
+    On-line estimation of a delay as in [1]_ (for informative inputs see [2]_), here by a bank of
     candidates [3]_, each with least squares and a forgetting factor [4]_. The regressors are
-    simulated, not measured, outputs, so noise does not bias the dynamics. Pole moves enter to first
-    order about a model that is renewed when a pole has moved by 4 % or more: a second bank then
-    runs beside the first for two memories and more, and takes over. Until then the delay may be off
-    by a tenth of the lag per tenth of a pole's speed, and beyond 30 % nothing is claimed. A delay
-    outside the candidates, poles that have left at once and a drifting disturbance leave a residual
-    much louder than the model's: nothing is told then, and `TrackPoint.lost` is true. `reset`
-    starts anew from here. Probabilities of delays count exponential weights as whole samples, which
-    is on the safe side, and a residual that is slower than white as fewer of them.
+    simulated outputs, so noise does not bias the dynamics. The moves of the poles are linearised
+    about a model that is renewed when a pole has moved by 4 % or more: a second bank then runs
+    beside the first for at least two forgetting times before it replaces it. Until then the error
+    of the delay may be a tenth of the lag per tenth of the pole's speed, and beyond 30 % no
+    estimate is given. A delay outside of the candidates, poles that change abruptly and a drifting
+    disturbance give a large residual: no estimate is given, and `TrackPoint.lost` is true until
+    `reset`. The probabilities of delays treat exponentially weighted samples as whole ones, which
+    is conservative, and reduce the number of samples if the residual is coloured.
 
     References
     ----------
@@ -139,7 +137,7 @@ class DelayTracker:
         self._begin()
 
     def _begin(self) -> None:
-        """Know nothing but a core."""
+        """Initialise for a core, without samples."""
         poles = np.linalg.eigvals(self._start[0]).astype(np.complex128)
         self._banks = Banks(
             self._start,
@@ -153,20 +151,20 @@ class DelayTracker:
         self._count = 0
         self._first = (0.0, 0.0)
         self._before, self._passed = (0.0, 0.0), (0.0, 0.0)
-        # The least that the starting model has left of a whole memory while it told.
+        # Smallest residual of the starting model over a forgetting time with a resolved delay.
         self._least = np.inf
         slowest = float(np.abs(poles).max(initial=0.0))
         lag = -1 / np.log(slowest) if 0 < slowest < 1 else 1.0
-        # Over one or two samples the noise itself may be correlated, by filters and converters.
+        # Neighbouring noise samples may be correlated, by filters and converters.
         self._lag, self._well_sampled = lag, lag >= 3 * SHARE_OF_LAG
         self._residual = RunningResidual(
             float(np.exp(-1.0 / self._span)), max(1, round(min(lag, self._span) / SHARE_OF_LAG))
         )
-        # The last moment at which the sums were solved.
+        # Sample at which the sums were last solved.
         self._variance = 0.0
         self._solution: Solution | None = None
         self._told = self._nothing_yet()
-        # Delays of the last memory, NaN where nothing was told.
+        # Delays within the last forgetting time; NaN where the delay was not resolved.
         self._places: deque[float] = deque(maxlen=MOMENTS)
 
     def __repr__(self) -> str:
@@ -176,16 +174,16 @@ class DelayTracker:
         )
 
     def update(self, u: float, y: float) -> None:
-        """Take in the next sample of input and output.
+        """Process the next sample of input and output.
 
         Raises
         ------
         DataError
-            A value that is no number, not finite, or beyond 1e70.
+            A value that is not a finite number, or is beyond 1e70.
         """
         u, y = check_sample(u, y, self._count)
         if self._count == 0:
-            # What was before is rest; large offsets would cost digits.
+            # Before the first sample: steady state; large offsets would cost digits.
             self._first = (u, y)
         self._count += 1
         moved, seen = u - self._first[0], y - self._first[1]
@@ -201,25 +199,25 @@ class DelayTracker:
             self._keep(self._solve())
 
     def _high_passed(self, u: float, y: float, keep: float) -> tuple[float, float]:
-        """Pass both signals through (1 - z^-1) / (1 - keep z^-1): their relation stays."""
+        """Filter both signals by (1 - z^-1) / (1 - keep z^-1), which keeps their relation."""
         (u_before, y_before), (u_out, y_out) = self._before, self._passed
         self._before = u, y
         self._passed = keep * u_out + u - u_before, keep * y_out + y - y_before
         return self._passed
 
     def reset(self, model: ct.StateSpace | None = None) -> None:
-        """Forget all samples and begin again, where the track is lost or the plant was changed.
+        """Discard all samples and restart, if the track is lost or the plant was changed.
 
         Parameters
         ----------
         model : control.StateSpace, optional
-            To start from, of the same sample time; the one that the tracker was made with if
-            none is given. Gain and speeds are counted from it.
+            New starting model with the same sample time; default: the original one. Gain and speeds
+            are relative to it.
 
         Raises
         ------
         UnsuitableSystemError
-            A model of another sample time, or one that a tracker cannot start from.
+            A model with another sample time, or one that is not suitable for a tracker.
         """
         if model is not None:
             core = starting_core(model)
@@ -232,12 +230,12 @@ class DelayTracker:
         self._begin()
 
     def estimate(self) -> TrackPoint:
-        """Tell what the samples so far say; asking changes nothing."""
+        """Return the present estimate; the state of the tracker is not changed."""
         return self._latest()[1]
 
     @property
     def model(self) -> DelayedStateSpace:
-        """Model of the present estimate, which is its `fit`; zeros as in the starting model."""
+        """Present plant model, with the estimate as its `fit`; zeros are unchanged."""
         found, told = self._latest()
         A, B, C, D = self._banks.core_at(found)
         gain = told.gain_ratio
@@ -247,7 +245,7 @@ class DelayTracker:
 
     @single_threaded
     def track(self, record: Record) -> TrackHistory:
-        """Take in a whole record, and return the course of the estimate.
+        """Process a whole record, and return the history of the estimate.
 
         Raises
         ------
@@ -268,20 +266,20 @@ class DelayTracker:
         return track_of(course, self.dt)
 
     def _solve(self) -> Solution | None:
-        """Solve for what the samples so far say; None while there are too few."""
+        """Solve for the present estimate; None while there are too few samples."""
         if self._count < self._high + SAMPLES_EACH * self._banks.now.n_parameters:
             return None
         return solve(self._banks.now, self._variance, self._residual.inflation)
 
     def _latest(self) -> tuple[Solution | None, TrackPoint]:
-        """Return what holds now: what was kept, where no sample has come since."""
+        """Return the present solution: the stored one if no sample has been added since."""
         if self._count % self._stride == 0:
             return self._solution, self._told
         found = self._solve()
         return found, self._tell(found)
 
     def _keep(self, found: Solution | None) -> None:
-        """Go on from what was found, and start a bank about moved poles where they have moved."""
+        """Update the state from a solution, and start a new bank if the poles have moved."""
         self._told = self._tell(found)
         full = self._count >= self._span
         if found is not None and full and self._told.resolved and not self._banks.moved:
@@ -328,21 +326,21 @@ class DelayTracker:
         )
 
     def _too_loud(self, found: Solution) -> str:
-        """Say that the residual is no noise of the model's."""
+        """Report that the residual exceeds the noise of the model."""
         noise = self._noise_std or self._least
         moved = self._banks.moved
         if moved and not np.isfinite(noise) and self._well_sampled:
             noise = self._residual.noise_std
-        # What the tracker has seen itself may have been a quiet hour.
+        # The noise observed so far may have been unusually small.
         limit = LOUD_AFTER_MOVES if moved and noise != self._least else LOUD
         return too_loud(found, noise, limit)
 
     def _with_trail(self, interval: tuple[int, int], place: float) -> tuple[int, int]:
-        """Widen an interval by the way that the delay has gone within one memory, and by what a
-        move of the poles that is being made may take along.
+        """Widen an interval by the change of the delay over one forgetting time, and for a pending
+        move of the poles.
 
-        Samples are one memory old on average, so while the delay moves the estimate is behind by
-        about that way.
+        The mean age of the samples is one forgetting time, so the estimate lags a moving delay by
+        about this change.
         """
         before = self._places[0] if self._places else np.nan
         way = 0.0 if np.isnan(before) else place - before
