@@ -1,8 +1,8 @@
 """Many records of one plant: a table of delays, their statistics, one final model.
 
-The paper's way: a model for each record, the trimmed mean of the delays, and the record of least
-misfit realized at that delay (section 3.2). The better way: records averaged and fitted
-together, since averaging estimates keeps their common bias.
+In the paper: a model for each record, the trimmed mean of the delays, and the record with the
+smallest residual realized at that delay (section 3.2). More accurate: one fit of all records
+together, since the mean of estimates keeps their common bias.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class Campaign(Result):
     """Models of many records, with their statistics.
 
     ``statistics(trim)`` is over ``[row.delay for row in rows if row.system]``; `best` is the row
-    of least residual; `system` is the final model.
+    with the smallest residual; `system` is the final model.
 
     Attributes
     ----------
     rows : tuple of CampaignRow
-        One for each record, in the order given; a record that failed is a row with its error.
+        One for each record, in the order given; a record that failed has a row with its error.
     sources : tuple
         The records, or the functions that read them.
     method : str
@@ -65,17 +65,17 @@ class Campaign(Result):
 
     @cached_property
     def good(self) -> tuple[CampaignRow, ...]:
-        """The rows that have a model."""
+        """The rows with a model."""
         return tuple(row for row in self.rows if row.model is not None)
 
     @property
     def failed(self) -> tuple[CampaignRow, ...]:
-        """The rows that have an error instead."""
+        """The rows with an error."""
         return tuple(row for row in self.rows if row.model is None)
 
     @property
     def dt(self) -> float:
-        """Sample time in s that all records share.
+        """Common sample time of all records in s.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Campaign(Result):
 
     @property
     def delays(self) -> FloatArray:
-        """Estimated delays in samples of the records that have a model."""
+        """Delays of all records with a model, in samples."""
         return np.array([row.delay for row in self.good])
 
     def statistics(self, trim: int | None = None, *, ddof: int = 1) -> TrimmedStatistics:
@@ -106,15 +106,15 @@ class Campaign(Result):
         Parameters
         ----------
         trim : int, optional
-            Values to leave out at each end; the paper leaves out 3 of its 40. Default: 3, or a
-            quarter where there are fewer than twelve records.
+            Number of values left out at each end; the paper leaves out 3 of 40. Default: 3, or a
+            quarter for fewer than twelve records.
         ddof : int, optional
             Divisor of the variance is ``count - ddof``.
 
         Raises
         ------
         DataError
-            No value is left, or the records have different sample times.
+            No value remains, or the records have different sample times.
         """
         count = len(self.good)
         _ = self.dt
@@ -125,7 +125,7 @@ class Campaign(Result):
 
     @property
     def best(self) -> CampaignRow:
-        """The row whose model fits best; the records are scaled to a unit step first."""
+        """The row with the best fit; the records are scaled to a unit step first."""
         _ = self.dt
         return min(self.good, key=lambda row: row.residual)
 
@@ -156,7 +156,7 @@ class Campaign(Result):
         )
 
     def _identified(self, row: CampaignRow) -> DelayedStateSpace:
-        """The row's model with its whole fit, which a store keeps only in summary."""
+        """The model of a row with its complete fit, of which a store keeps only a summary."""
         system = row.system
         if system is not None and isinstance(system.fit, DelayScan):
             return system
@@ -164,7 +164,7 @@ class Campaign(Result):
         return identify(read_source(source), method=self.method, **self.options)
 
     def table(self) -> pd.DataFrame:
-        """One row for each record, in the order given.
+        """Table of all records, in the order given.
 
         Returns
         -------
@@ -196,7 +196,7 @@ class Campaign(Result):
     def by_amplitude(self) -> pd.DataFrame:
         """Count, mean and scatter of the delays, and the gain, for each step height.
 
-        A delay or gain that changes with the height of the step is the sign of a nonlinear plant.
+        A delay or gain that depends on the height of the step indicates a nonlinear plant.
 
         Returns
         -------
@@ -222,7 +222,7 @@ class Campaign(Result):
                     "delay": delays.mean(),
                     "std": delays.std(ddof=1) if many else np.nan,
                     "gain": gains.mean(),
-                    # integrating plants have no gain, and inf - inf would warn
+                    # the gain of integrating plants is infinite, and inf - inf would warn
                     "gain_std": gains.std(ddof=1) if many and np.isfinite(gains).all() else np.nan,
                 }
             )
@@ -231,7 +231,7 @@ class Campaign(Result):
 
     @property
     def flags(self) -> tuple[Flag, ...]:
-        """What one should know: records that failed or came twice, a delay that is not constant."""
+        """Warnings about failed or duplicate records, and about delays or gains that differ."""
         return campaign_flags(self.rows, self.good, self.failed, self.method)
 
     def _title(self) -> str:

@@ -15,7 +15,7 @@ from .rows import CampaignRow
 
 Rows = tuple[CampaignRow, ...]
 
-_SAME_HEIGHT = 1e-6  # part of the step by which heights may differ and be one
+_SAME_HEIGHT = 1e-6  # relative difference up to which heights count as equal
 
 
 def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[Flag, ...]:
@@ -31,7 +31,7 @@ def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[F
 
 
 def _different_gains(rows: Rows) -> list[Flag]:
-    """Test whether one gain holds for all records, by chi-square where their errors are known."""
+    """Test whether all records have the same gain, by chi-square if the errors are known."""
     gains = np.array([row.gain for row in rows])
     errors = np.array([row.gain_std for row in rows])
     known = np.isfinite(gains)
@@ -44,7 +44,7 @@ def _different_gains(rows: Rows) -> list[Flag]:
     differ = chance < BY_CHANCE and apart > SAME
     told = f"chi-square {statistic:.3g}, p = {chance:.2g}"
     if not np.isfinite(errors).any():
-        # A scan knows no error of its gain; what noise leaves of it is a few percent.
+        # The error of a gain from a scan is unknown; noise causes a few percent.
         differ, told = apart > NO_COMMON_GAIN, "their errors are unknown"
     if not differ:
         return []
@@ -68,7 +68,7 @@ def _different_gains(rows: Rows) -> list[Flag]:
 
 
 def _different_times(rows: Rows) -> list[Flag]:
-    """Test dead times, and dead times with lags, by chi-square about their weighted means."""
+    """Test dead times and total delays for equality, by chi-square about their weighted means."""
     flags = []
     dead_times = [(row.dead_time, *row.interval) for row in rows]
     totals = [(row.total_delay, *row.total_delay_interval) for row in rows]
@@ -79,7 +79,7 @@ def _different_times(rows: Rows) -> list[Flag]:
         values, low, high = np.array(times).reshape(-1, 3).T
         with np.errstate(invalid="ignore"):
             errors = (high - low) / (2 * Z_95)
-        # The flat set of a scan claims no level, and is no standard error.
+        # The interval of a scan has no confidence level, and gives no standard error.
         errors[~(errors > 0) | ~np.isfinite([row.gain_std for row in rows])] = np.inf
         statistic, chance = homogeneity(values, errors)
         if chance < BY_CHANCE:
@@ -108,7 +108,7 @@ def _failed(rows: Rows, failed: Rows) -> Flag | None:
 
 
 def _same_records(rows: Rows) -> Flag | None:
-    """Find records whose results agree in every digit, which noise never lets happen."""
+    """Find records whose results agree in every digit, which noise excludes."""
     alike: dict[tuple[float, ...], list[str]] = {}
     for row in rows:
         results = (row.delay, row.residual, row.gain, row.amplitude, *row.interval)
@@ -127,11 +127,11 @@ def _same_records(rows: Rows) -> Flag | None:
 
 
 def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
-    """Test whether the delay depends on the height of the step, by the rank correlation."""
+    """Test whether the delay depends on the height of the step, by rank correlation."""
     from scipy.stats import pearsonr, spearmanr  # scipy.stats takes a while to import
 
     if rows and method != "output_error":
-        # A realization of one order more takes a lag out of the delay: compared is what is alike.
+        # A realization of higher order gives a shorter delay: only equal orders are compared.
         orders = Counter(row.order for row in rows)
         rows = tuple(row for row in rows if row.order == orders.most_common(1)[0][0])
     heights = np.array([abs(row.amplitude) for row in rows])
@@ -142,14 +142,15 @@ def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
         return None
     correlation, chance = spearmanr(heights, delays)
     if heights.size < 10:
-        # So few ranks stand in order by chance (1 in 35 campaigns of four and four records, where
-        # Student's distribution says 1 in 350): the delays themselves have to agree.
+        # So few ranks may be in order by chance (1 in 35 campaigns of four and four records, where
+        # Student's distribution gives 1 in 350): the delays themselves must be correlated, too.
         chance = max(chance, pearsonr(heights, delays).pvalue)
     # 1 %: one false alarm in a hundred campaigns of a linear plant.
     if not chance < 0.01:
         return None
     way = "longer" if correlation > 0 else "shorter"
-    # Noise is larger beside a smaller step: a scan's bias grows with it, a fit misses fast lags.
+    # Noise is larger relative to a smaller step: the bias of a scan grows, and a fit misses fast
+    # lags.
     doubt = ""
     if method != "output_error":
         doubt = (

@@ -1,4 +1,4 @@
-"""A model without the dense matrices of its delay chain, for those who keep thousands."""
+"""A model without the dense matrices of its delay line, for storing thousands of them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from ...results import ModelFit
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PackedModel:
-    """Core, delays and names of a model, from which it is built again bit by bit.
+    """Core, delays and names of a model, from which it is rebuilt bit by bit.
 
-    A `DelayedStateSpace` holds dense matrices with the square of its delay, as python-control
-    needs them: 35 kB at a delay of 40 samples, 8 MB at 1000. Core and delays are some hundred
-    bytes.
+    A `DelayedStateSpace` may hold dense matrices that grow with the square of its delay: 35 kB for
+    a delay of 40 samples, 8 MB for 1000. Core and delays take some hundred bytes.
 
     Attributes
     ----------
@@ -31,7 +30,7 @@ class PackedModel:
     name : str
     inputs, outputs : tuple of str
     fit : ModelFit or None
-        How the model was found; the very object that the model had.
+        Fit of the model, the same object.
     """
 
     block: FloatArray
@@ -61,7 +60,7 @@ class PackedModel:
         )
 
     def unpack(self) -> DelayedStateSpace:
-        """Build the model; equal in every bit to the one that was packed."""
+        """Rebuild the model, equal in every bit to the original."""
         n = self.order
         A, B = self.block[:n, :n], self.block[:n, n:]
         C, D = self.block[n:, :n], self.block[n:, n:]

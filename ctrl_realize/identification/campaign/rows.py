@@ -1,4 +1,4 @@
-"""One record of a campaign: its model in numbers, or the error that stopped it."""
+"""One record of a campaign: its model, or the error that stopped it."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from .packed_model import PackedModel
 
 RecordSource = Record | Callable[[], Record]
 
-_LONGEST_ERROR = 1000  # characters; a text of megabytes would fill table and report
+_LONGEST_ERROR = 1000  # characters; a longer text would fill table and report
 
 
 @dataclass(frozen=True, eq=False)
 class CampaignRow:
     """Result of one record.
 
-    Exactly one of `system` and `error` is None; without a system all numbers are NaN. A campaign
-    has thousands of rows, so that each keeps its model packed, a few kB.
+    Exactly one of `system` and `error` is None; without a system all numbers are NaN. The model is
+    stored in packed form, a few kB, because a campaign may have thousands of rows.
 
     Attributes
     ----------
     name : str
     amplitude : float
-        Height of the input step; NaN where there is none.
+        Height of the input step; NaN for other inputs.
     delay : float
         Estimated delay in samples.
     dead_time : float
@@ -49,21 +49,21 @@ class CampaignRow:
     interval : tuple of float
         Interval of the dead time in s.
     residual : float
-        Misfit of the model for a unit step, so that records can be compared.
+        Residual of the model, scaled to a unit step so that records can be compared.
     gain, gain_std : float
-        Gain of the model at zero frequency, and its standard error if its structure is the
-        plant's; NaN where the method knows none.
+        Gain of the model at zero frequency, and its standard error for the chosen structure; NaN if
+        the method gives none.
     total_delay : float
-        Dead time and lags of the model in s, NaN where the method tells none.
+        Dead time plus lags in s; NaN if the method gives none.
     total_delay_interval : tuple of float
         95 % interval of the total delay, in s.
     model : PackedModel or None
         Core, delays and names of the model.
     error : str or None
-        What stopped this record, in one line.
+        The error that stopped this record, in one line.
     flags : tuple of Flag
     warnings : tuple of str
-        What was warned of on the way.
+        Warnings raised while it was identified.
 
     Examples
     --------
@@ -94,7 +94,7 @@ class CampaignRow:
 
     @property
     def system(self) -> DelayedStateSpace | None:
-        """The model, built anew on each access; None if the record failed."""
+        """The model, rebuilt on each access; None if the record failed."""
         return None if self.model is None else self.model.unpack()
 
     @property
@@ -118,23 +118,23 @@ class CampaignRow:
 
 
 class RowStore(Protocol):
-    """Keeps finished rows, so that a run that was stopped can go on (see `CampaignStore`)."""
+    """Keeps finished rows, so that an interrupted run can be resumed (see `CampaignStore`)."""
 
     def load(self, key: str) -> CampaignRow | None:
-        """Return the row kept under `key`, None if there is none."""
+        """Return the row stored under `key`; None if there is none."""
         ...
 
     def save(self, key: str, row: CampaignRow) -> CampaignRow:
-        """Keep a row; return it as `load` will."""
+        """Store a row; return it as `load` would."""
         ...
 
     def attempt(self, key: str) -> AbstractContextManager[None]:
-        """Note that a record is being identified, as long as the block lasts.
+        """Mark a record as being identified for the duration of the block.
 
         Raises
         ------
         DataError
-            The process has died over it before, so often that it is not tried again.
+            The process was killed over it too often before.
         """
         ...
 
@@ -146,7 +146,7 @@ def identify_row(
     options: IdentifyOptions,
     store: RowStore | None,
 ) -> CampaignRow:
-    """Identify one record; what stops it becomes the row's error."""
+    """Identify one record; an error becomes the row's error."""
     row = CampaignRow(source_name(source, position))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -165,8 +165,8 @@ def identify_row(
             with store.attempt(key) if store is not None else nullcontext():
                 row = _with_model(row, identify(record, method=method, **options))
         except Exception as error:
-            # Whatever it is, also in a function of the caller's that reads files, the other
-            # records go on. It is cheap and may be mended by then: tried again on resuming.
+            # Whatever the error is, also in a function of the caller that reads files, the other
+            # records are still identified. It is tried again when the run is resumed.
             text = spelled_out(" ".join(str(error).split())[:_LONGEST_ERROR])
             row = replace(row, error=f"{type(error).__name__}: {text}")
     row = replace(row, warnings=tuple(dict.fromkeys(str(entry.message) for entry in caught)))
@@ -175,13 +175,14 @@ def identify_row(
     try:
         return store.save(key, row)
     except (CtrlRealizeError, OSError) as error:
-        # A full disk, or labels that no file takes: the result is there, and will be made again.
+        # A full disk, or labels that cannot be written: the result is kept in memory, and computed
+        # again.
         text = spelled_out(f"not saved in the store: {error}"[:_LONGEST_ERROR])
         return replace(row, warnings=(*row.warnings, text))
 
 
 def read_source(source: RecordSource) -> Record:
-    """Return a source's record, read if it is a function."""
+    """Return the record of a source; a function is called to read it."""
     record = source if isinstance(source, Record) else source()
     if not isinstance(record, Record):
         raise DataError(f"the function returned a {type(record).__name__}; expected a Record")
@@ -189,7 +190,7 @@ def read_source(source: RecordSource) -> Record:
 
 
 def fingerprint(record: Record, method: str, options: IdentifyOptions) -> str:
-    """SHA-256 of a record's samples, of what is done with them, and by which versions."""
+    """SHA-256 of a record's samples, the settings and the versions."""
     digest = hashlib.sha256(repr(sorted(versions().items())).encode())
     for values in (record.time, record.input, record.output):
         digest.update(str(values.shape).encode())
@@ -200,7 +201,7 @@ def fingerprint(record: Record, method: str, options: IdentifyOptions) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the packages that a row's numbers depend on."""
+    """Versions of the packages that the results depend on."""
     return {"ctrl-realize": _own_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 
@@ -213,7 +214,7 @@ def _own_version() -> str:
 
 
 def _exact(value: Any) -> str:
-    """Write a setting with all digits; python-control shows eight, or a system's name alone."""
+    """Write a setting with all digits; python-control shows eight, or only a system's name."""
     if isinstance(value, ct.StateSpace):
         matrices = [M.tolist() for M in (value.A, value.B, value.C, value.D)]
         return repr([*matrices, value.dt])
@@ -242,7 +243,7 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
 
 
 def _unit_residual(fit: ModelFit, amplitude: float) -> float:
-    """Misfit for a unit step: a scan works on one, a fit on the raw record."""
+    """Residual for a unit step: a scan uses unit steps, a fit the raw record."""
     if isinstance(fit, DelayScan):
         return fit.least_iae
     return _or_nan(fit.residual_std) / (abs(amplitude) if np.isfinite(amplitude) else 1.0)
@@ -253,12 +254,12 @@ def _or_nan(value: float | None) -> float:
 
 
 def _gain(system: DelayedStateSpace) -> float:
-    # An integrating plant has no gain: it is infinite, and no warning of it.
+    # The gain of an integrating plant is infinite; no warning is given.
     return complex(system(1.0, warn_infinite=False)).real
 
 
 def source_name(source: RecordSource, position: int) -> str:
-    """Name a record before it is read: by the first argument of the function that reads it."""
+    """Name of a record before it is read: the first argument of the function that reads it."""
     known = ""
     if isinstance(source, Record):
         known = source.name

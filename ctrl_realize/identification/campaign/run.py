@@ -1,4 +1,4 @@
-"""Identify the records of a campaign, in parallel if asked, each on its own."""
+"""Identify the records of a campaign separately, in parallel if requested."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ def identify_campaign(
     Parameters
     ----------
     records : iterable of Record, or of functions that return one
-        A function, such as ``functools.partial(cr.read_record, path)``, is called where the
-        record is identified, so that files are read by the workers, one at a time, and a file
-        that cannot be read is a row with its error.
+        A function, such as ``functools.partial(cr.read_record, path)``, is called by the worker
+        that identifies the record, so that files are read one at a time, and a file that cannot be
+        read gives a row with its error.
     n_jobs : int, optional
-        Processes to use (joblib; -1 for all cores). The result does not depend on it. A record
-        whose process is killed by the system, twice, is a row that says so. Inside
-        joblib's ``parallel_config(backend="dask")`` the work goes to a Dask cluster.
+        Number of processes (joblib; -1 for all cores). The result does not depend on it. A record
+        whose process is killed by the system twice gives a row with that error. Inside joblib's
+        ``parallel_config(backend="dask")`` the work is sent to a Dask cluster.
     method : {"output_error", "scan", "paper"}, optional
     progress : bool, optional
-        Show a progress bar; default: where somebody can see it.
+        Show a progress bar; default: if the output is a terminal or a notebook.
     store : CampaignStore, optional
-        Folder that keeps each record's result as it is finished, for thousands of records: a run
-        that was stopped goes on where it was when it is called again with the same store, and
-        memory stays flat, because of each fit only a summary is kept.
+        Folder in which the result of each record is stored as soon as it is finished, for thousands
+        of records: an interrupted run is resumed when it is called again with the same store. Only
+        a summary of each fit is stored, so that memory does not grow.
     **options
         Further arguments of `identify`, the same for all records.
 
@@ -56,7 +56,7 @@ def identify_campaign(
     DataError
         `records` is empty.
     OptionError
-        An argument that `identify` does not take.
+        An argument that `identify` does not have.
 
     Examples
     --------
@@ -101,9 +101,9 @@ def _with_bar(
     rows: Iterable[tuple[int, CampaignRow]], total: int, progress: bool | None
 ) -> Iterator[tuple[int, CampaignRow]]:
     with warnings.catch_warnings():
-        # In a notebook without ipywidgets tqdm warns, and falls back to text by itself.
+        # In a notebook without ipywidgets tqdm warns, and uses text instead.
         warnings.filterwarnings("ignore", message="IProgress not found")
         from tqdm.auto import tqdm
-    # disable=None: no bar where the output is not a terminal.
+    # disable=None: no bar if the output is not a terminal.
     disable = None if progress is None else not progress
     yield from tqdm(rows, total=total, desc="identify", unit="record", disable=disable)

@@ -1,8 +1,8 @@
-"""Records of a campaign spread over processes, of which the system may kill one.
+"""Records of a campaign distributed over processes, one of which may be killed.
 
-A process dies without a word where its memory is exhausted or compiled code fails. Which of the
-records that were under way was at fault nobody tells, so each of them is identified once more, in
-a process of its own; who dies there too is a row with the reason, and all others go on.
+A process is killed if memory is exhausted or compiled code crashes. Which of the running records
+caused it is unknown, so each of them is identified once more in a separate process; a record whose
+process is killed again gives a row with that error, and the others continue.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def identified(
     options: IdentifyOptions,
     store: RowStore | None,
 ) -> Iterator[tuple[int, CampaignRow]]:
-    """Identify records with joblib; give position and row of each as it is finished."""
-    from joblib import Parallel, delayed  # not needed by who identifies one record
+    """Identify records with joblib; yield position and row of each as it is finished."""
+    from joblib import Parallel, delayed  # not needed for a single record
 
     pending = dict(enumerate(sources))
     with TemporaryDirectory(prefix="ctrl_realize-", ignore_cleanup_errors=True) as marks:
@@ -51,7 +51,7 @@ def identified(
                 started = [
                     position for position in pending if _mark(Path(marks), position).exists()
                 ]
-                # on other machines' disks no mark is seen
+                # marks on other machines' disks are not visible
                 for position in started or list(pending):
                     try:
                         # two processes: one would be this one
@@ -70,7 +70,7 @@ def _marked(
     options: IdentifyOptions,
     store: RowStore | None,
 ) -> tuple[int, CampaignRow]:
-    """Identify a record; a mark tells that it is under way."""
+    """Identify a record; a mark shows that it is running."""
     with suppress(OSError):
         _mark(marks, position).touch()
     row = identify_row(source, position, method, options, store)
@@ -84,7 +84,7 @@ def _mark(marks: Path, position: int) -> Path:
 
 
 def _is_death(error: Exception) -> bool:
-    """Tell whether a process died; Dask says so after it has tried several times."""
+    """Whether a process was killed; Dask reports it after several attempts."""
     return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
 
 

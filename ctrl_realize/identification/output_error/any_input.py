@@ -1,4 +1,4 @@
-"""Output-error fit of records whose input is no step: one, or several of one plant together."""
+"""Output-error fit of records whose input is not a step: one, or several of one plant together."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from .result import OutputErrorFit
 from .summary import summarise
 
 FOLLOWS = 36.0
-"""Least chi-square of the response to the input: six standard deviations. White noise that has
-nothing to do with the input reached 23 in 25 records, with the best of all delays and lags."""
-_APART = 5.0  # standard deviations by which a record's gain may lie from the others'
+"""Least chi-square of the response to the input: six standard deviations. White noise without any
+relation to the input reached 23 in 25 records, for the best of all delays and lags."""
+_APART = 5.0  # in standard deviations: largest distance of a record's gain from the others
 
 
 def fit_any_input(
     records: tuple[Record, ...], limit: float | None, settings: Mapping[str, Any]
 ) -> tuple[OutputErrorFit, OutputErrorEstimate]:
-    """Fit one model to all records, each with its own level, drift and initial state.
+    """Fit one model to all records; level, drift and initial state are estimated for each record.
 
-    A record whose delay or gain lies apart from the others' is left out, as among step records,
-    until none of the rest does.
+    A record whose delay or gain is an outlier is left out, as among step records, until there are
+    no more outliers.
     """
     dt = common_sample_time(records)
     latest = None if limit is None else limit * dt
@@ -108,7 +108,7 @@ def _repeatability(
 
 
 def _gain_outliers(own: list[OwnResponse], used: tuple[int, ...]) -> tuple[int, ...]:
-    """Positions of records whose gain lies apart from the others': another plant, or none."""
+    """Positions of records with an outlying gain: another plant, or no response."""
     gains = np.array([own[i].gain for i in used])
     centre, scatter = float(np.median(gains)), mad_sigma(gains)
     return tuple(
@@ -125,7 +125,7 @@ def _summary(
     flags: tuple[Flag, ...],
     repeats: Repeatability | None = None,
 ) -> OutputErrorFit:
-    """Lay what was fitted out record after record, on one time axis."""
+    """Concatenate what was fitted on one time axis."""
     data = found.data
     times: list[FloatArray] = []
     parts = zip(used, data.offsets, data.starts, data.outputs, strict=True)
@@ -158,7 +158,7 @@ def _summary(
 
 
 def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:
-    """Say where only a stretch of long records was used."""
+    """Report records of which only a part was used."""
     if found.condensed is not None:
         return ()
     sizes = [output.size for output in found.data.outputs]

@@ -1,4 +1,4 @@
-"""Average step records of one plant, and tell how much they differ."""
+"""Average step records of one plant, and measure the differences between them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ...numerics.validation.own_response import OwnResponse, homogeneity, own_st
 from ..step.steps import unit_step
 from .repeatability import Repeatability
 
-_TRIM = 0.1  # at either end: 97 % efficient in Gaussian noise, and one record of ten may be wild
+_TRIM = 0.1  # at each end: 97 % efficient in Gaussian noise; one record of ten may be an outlier
 _SAME_AMPLITUDE = 0.03  # relative, below which steps count as equally high
 _APART = 5.0  # robust standard deviations from the others
 
@@ -30,11 +30,11 @@ class MeanStep:
     Attributes
     ----------
     output, input : ndarray, shape (N,)
-        Per unit of input; sample `edge` is the first one after the step.
+        Per unit of the input; sample `edge` is the first one after the step.
     edge : int
     dt : float
     used, left_out : tuple of int
-        Positions of the records in the mean, and of those that lie apart.
+        Positions of the records in the mean, and of the outliers.
     """
 
     output: FloatArray
@@ -46,9 +46,10 @@ class MeanStep:
 
 
 def aligned_steps(records: tuple[Record, ...]) -> tuple[StepResponse, ...]:
-    """Cut all records at their steps and scale them to a unit step.
+    """Align all records at their steps and scale them to a unit step.
 
-    What they do before it stays: drifts and free responses of records add up to those of the mean.
+    The samples before the step are not corrected: drifts and free responses of the records add up
+    to those of the mean.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def aligned_steps(records: tuple[Record, ...]) -> tuple[StepResponse, ...]:
 
 
 def common_sample_time(records: tuple[Record, ...]) -> float:
-    """Return the sample time of all records in s; `DataError` where it is not the same."""
+    """Return the sample time of all records in s; `DataError` if it differs."""
     first = records[0].dt
     for record in records:
         if abs(record.dt - first) > 1e-6 * first:
@@ -78,7 +79,7 @@ def mean_step(steps: tuple[StepResponse, ...], skip: tuple[int, ...] = ()) -> Me
     ----------
     steps : tuple of StepResponse
     skip : tuple of int
-        Positions to leave out in any case; records far from the rest are left out as well.
+        Positions to leave out in any case; outliers are left out as well.
     """
     before = min(step.pre_step.size for step in steps)
     after = min(step.n_samples for step in steps)
@@ -118,11 +119,11 @@ def repeatability(
     steps : tuple of StepResponse
     mean : MeanStep
     model : ndarray, shape (N,)
-        Response of the common model, sampled as the mean.
+        Response of the common model to the mean step.
     delay : float
-        Its dead time, in s.
+        Its dead time in s.
     own : ndarray, shape (N, q)
-        What every record has for itself beside a drift: a level, hum, a free response.
+        Further effects in each record beside a drift: a level, hum, a free response.
     """
     found = []
     for step in steps:
@@ -145,16 +146,16 @@ def compared(
     used: tuple[int, ...],
     delay: float,
 ) -> Repeatability:
-    """Say how much several records differ, beyond the noise inside each.
+    """Test whether records differ by more than the noise in each.
 
     Parameters
     ----------
     names : tuple of str
     amplitudes : ndarray, shape (R,)
     own : sequence of OwnResponse
-        Every record against the common model.
+        Every record compared with the common model.
     used : tuple of int
-        Positions of the records that count.
+        Positions of the records in the mean.
     delay : float
         Dead time of the common model, in s.
     """
@@ -190,7 +191,7 @@ def compared(
 def widened(
     fit: OutputErrorEstimate, repeats: Repeatability, used: tuple[int, ...]
 ) -> OutputErrorEstimate:
-    """Add the scatter of the mean where records differ by more than their noise."""
+    """Add the standard error of the mean if records differ by more than their noise."""
     if repeats.p_value >= 0.01:
         return fit
     between = float(repeats.delays[list(used)].std(ddof=1)) / np.sqrt(len(used))
@@ -203,7 +204,7 @@ def widened(
 
 
 def delay_outliers(result: Repeatability, used: tuple[int, ...]) -> tuple[int, ...]:
-    """Positions of records whose delay lies apart from the others'."""
+    """Positions of records with an outlying delay."""
     delays = result.delays[list(used)]
     centre = float(np.median(delays))
     scale = np.maximum(mad_sigma(delays), result.errors)
@@ -211,7 +212,7 @@ def delay_outliers(result: Repeatability, used: tuple[int, ...]) -> tuple[int, .
 
 
 def _trimmed(values: FloatArray) -> FloatArray:
-    """Mean without the largest and smallest tenth at every sample (five records or more)."""
+    """Mean without the largest and smallest tenth at every sample (for five records or more)."""
     cut = max(int(_TRIM * len(values)), 1) if len(values) >= 5 else 0
     return np.asarray(np.sort(values, axis=0)[cut : len(values) - cut].mean(axis=0))
 
@@ -229,11 +230,11 @@ def _groups(amplitudes: list[float]) -> list[list[int]]:
 
 
 def _far_from_the_rest(outputs: FloatArray) -> list[int]:
-    """Records whose distance to the median response is out of proportion."""
+    """Records with an outlying distance from the median response."""
     if len(outputs) < 4:
         return []
     distance = np.sqrt(np.mean((outputs - np.median(outputs, axis=0)) ** 2, axis=1))
-    # Distances are positive and skewed: their logarithms are compared.
+    # Distances are positive and skewed, so their logarithms are compared.
     size = np.log(np.maximum(distance, 1e-300))
     scale = max(mad_sigma(size), 0.15)
     return [int(i) for i in np.flatnonzero(size - np.median(size) > _APART * scale)]
@@ -242,8 +243,8 @@ def _far_from_the_rest(outputs: FloatArray) -> list[int]:
 def _trend(amplitudes: FloatArray, shifts: FloatArray, errors: FloatArray) -> tuple[float, float]:
     """Slope of the delays over the amplitudes and its standard error; zeros if there is none.
 
-    Scatter beyond the errors is taken about the line: about the mean the trend itself would
-    widen its own error, and ten records or fewer could never show one.
+    Scatter beyond the errors is estimated about the line: about the mean, the trend itself would
+    increase its error, and ten records or fewer could never show one.
     """
     weight = errors**-2
     centre = float(np.sum(weight * amplitudes) / np.sum(weight))

@@ -1,7 +1,7 @@
 """Tests of a record against the model that was fitted to it.
 
-One model with one gain and one dead time, no feedback, an output that is measured at every
-sample, and an input that did nothing before the record: each of these is asked for.
+They test the assumptions of the fit: one gain and one dead time, no feedback, an output that is
+measured at every sample, and a constant input before the record.
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ from .loop_flags import RARE, REGRESSED, feedback_flags, past_inputs, unstable_f
 from .result import OutputErrorFit
 
 _HELD = 0.5
-"""Part of the moving samples that repeat the one before, from which an output counts as held; noise
-of one quantisation step repeats 28 %. Ablation: held output."""
-# What is worth a flag is a choice of presentation.
+"""Fraction of moving samples that repeat the previous one, above which an output counts as held;
+noise of one quantisation step repeats 28 %. Ablation: held output."""
+# The following thresholds for flags are a matter of presentation.
 _GAINS_APART = 0.1
 _DELAYS_APART = 0.05
-"""Least difference between groups of samples that is worth a flag: of gains, of the dead time
-(and no less than a sample); as a part of the common one."""
+"""Least difference between groups of samples for a flag: of gains, and of the dead time (at least
+one sample), relative to the common one."""
 _EXPLAINED = 0.05
-"""Part of the residual that products of inputs must explain to be worth a flag."""
+"""Fraction of the residual that products of inputs must explain for a flag."""
 _REACHED = 1.5
-"""Total delays over which products of inputs must reach, lest they make up for what is cut off."""
+"""Total delays covered by products of inputs, so that they do not replace missing lags."""
 _TWO_SIDED = Z_95
 _OFF = 0.2
-"""Relative difference of gains or total delays that is worth a flag."""
-_MOST_SAMPLES = 20_000  # of a record that are tested: time
+"""Relative difference of gains or total delays for a flag."""
+_MOST_SAMPLES = 20_000  # of a record that are tested, to limit the time
 
 
 def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
-    """Add what the record says against the model, and widen the interval where it says more.
+    """Add flags for violated assumptions, and widen the interval accordingly.
 
-    By the time for which samples are held; and, where the residual is coloured, by what
-    generalised least squares make of the delay.
+    It is widened by the hold time of the output and, if the residual is coloured, to contain the
+    generalised least-squares estimate.
 
     Parameters
     ----------
     fit : OutputErrorFit
-        Of one record, or of several.
+        Fit of one record, or of several.
     alone : bool, optional
-        The model is all that lies between input and output; there are no known dynamics besides.
+        There are no known dynamics besides the model.
 
     Returns
     -------
@@ -64,7 +64,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     stepped = bool(np.isfinite(fit.onset))
     loop = () if stepped else feedback_flags(fit.records, fit.delay_interval[1])
     flags += loop
-    if not fit.at_noise_level:  # a stable model that leaves only noise is no unstable plant
+    if (
+        not fit.at_noise_level
+    ):  # else an unstable plant is excluded
         flags += unstable_flags(fit.records, fit.delay_interval[1])
     if len(fit.records) == 1:
         shown = _shown(fit)
@@ -92,7 +94,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Stretch of a record that was fitted: output, model and input, shape (M,) each."""
+    """Part of a record that was fitted: output, model and input, shape (M,) each."""
 
     output: FloatArray
     fitted: FloatArray
@@ -100,7 +102,7 @@ class Shown:
 
     @property
     def residual(self) -> FloatArray:
-        """What the model leaves."""
+        """Measured minus simulated output."""
         return np.asarray(self.output - self.fitted)
 
 
@@ -113,14 +115,14 @@ def _shown(fit: OutputErrorFit) -> Shown:
 
 
 def _white(fit: OutputErrorFit, shown: Shown) -> WhiteStep | None:
-    """One step of generalised least squares from a fit whose residual is coloured."""
+    """One step of generalised least squares, from a fit with coloured residual."""
     if not np.all(fit.poles) or not fit.gain:
         return None
     lead = fit.gain * float(np.real(np.prod(-fit.poles) / np.prod(-fit.zeros)))
     numerator = lead * np.atleast_1d(np.real(np.poly(fit.zeros)))[::-1]
     step = white_step(shown.output, shown.drive, fit.dt, fit.dead_time, fit.poles, numerator)
     reach = max(fit.total_delay, fit.dead_time)
-    # Farther off, one step of a linear approximation is no estimate.
+    # Farther away, one step of a linearisation is not a valid estimate.
     return step if step is None or abs(step.dead_time - fit.dead_time) <= reach else None
 
 
@@ -146,7 +148,7 @@ def _moves(drive: FloatArray) -> int:
 
 
 def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
-    """Tell whether one gain and one dead time (in samples) hold for all of a record."""
+    """Test whether one gain and one dead time (in samples) hold for the whole record."""
     fitted, residual, size = shown.fitted, shown.residual, shown.fitted.size
     late = shown.drive[np.clip(np.arange(size) - round(delay), 0, None)]
     parts = np.minimum(3 * np.arange(size) // size, 2)
@@ -177,14 +179,14 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
 
 
 def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...]:
-    """Tell whether products of past inputs predict the output.
+    """Test whether products of past inputs predict the output.
 
-    Not of step records, where such products are but other functions of the time since the step,
-    nor where the regression does not reach over the response; `delay` and `total` in samples.
+    Not for step records, in which such products are merely other functions of time, nor if the
+    regression does not cover the response; `delay` and `total` are in samples.
     """
     output, drive = shown.output[:REGRESSED], shown.drive[:REGRESSED]
     past = min(2 * past_inputs(output.size, delay), output.size // 5)
-    # Of a total delay beyond a tenth of the record flags of its own tell.
+    # Total delays beyond a tenth of the record have flags of their own.
     if past < _REACHED * min(total, output.size / 10):
         return ()
     chance, part = nonlinear_chance(output, drive, past)
@@ -209,7 +211,7 @@ def _thirds(values: FloatArray) -> IntArray:
 
 
 def _told(change: ParameterChange | None, delay: float) -> str:
-    """Say by how much gains and delays differ; nothing where they do not, or hardly."""
+    """Describe the differences of gains and delays; empty if they are small."""
     if change is None or change.chance >= RARE:
         return ""
     apart = np.ptp(change.shifts) > max(_DELAYS_APART * delay, 1.0)
@@ -224,7 +226,7 @@ def _told(change: ParameterChange | None, delay: float) -> str:
 
 
 def _held_flags(shown: Shown, dt: float) -> tuple[list[Flag], float]:
-    """Tell whether an output is held between samples, and for how long, in s."""
+    """Test whether an output is held between samples, and return the hold time in s."""
     share = held_share(shown.output, shown.fitted)
     if share <= _HELD:
         return [], 0.0
@@ -252,11 +254,12 @@ def _limit_flags(output: FloatArray) -> list[Flag]:
 
 
 def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
-    """Tell whether a move before the record may be behind the beginning of a response.
+    """Test whether an input change before the record may explain the start of the response.
 
-    Where it begins with its step; or where what an earlier move does may still have been on its
-    way: the output was moving, and was recorded for less than a total delay before the step, or
-    it responds the wrong way first, and was recorded for less than the dead time.
+    This is possible if the response starts together with the step; or if the response to an earlier
+    change may still have been on its way: the output was moving and was recorded for less than a
+    total delay before the step, or it first responds in the wrong direction and was recorded for
+    less than the dead time.
     """
     before = float(fit.records[0].time[0])
     rest = _first_move(fit.records[0]) - before

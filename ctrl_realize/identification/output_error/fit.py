@@ -1,4 +1,4 @@
-"""Dead time and model from raw records, by an output-error fit."""
+"""Output-error fit of raw records: dead time and model."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from .summary import fitted_core, summarise
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
 
-_LAST = 5  # samples at the end of a record in which a first step says nothing
+_LAST = 5  # a first step in the last samples of a record has no response to fit
 
-MOST_ORDER = 8  # that can be asked for: of more, rounding shows in the partial fractions
+MOST_ORDER = 8  # higher orders suffer from rounding in the partial fractions
 FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
-_DWELL = 3  # times the first motion: steps that follow faster hide each other's onset
+_DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 
 
 @single_threaded
@@ -61,69 +61,68 @@ def fit_output_error(
     ----------
     records : Record or sequence of Record
         One input, one output, any input that moves. Several records of one plant are fitted
-        together: steps are aligned and averaged; with other inputs poles, gain and dead time are
-        common, and every record has a level, a drift and an initial state of its own.
+        together: step records are aligned and averaged; for other inputs poles, gain and dead time
+        are common, and level, drift and initial state are estimated for each record.
     structures : sequence of (order, relative_degree), optional
-        Models to try. Default: orders 1 to 5 with relative degrees 1 to the order. With
-        structures given the delay is that of the best of them, adequate or not.
+        (order, relative degree) of the models to try. Default: orders 1 to 5 with relative degrees
+        1 to the order. If structures are given, the delay is that of the best of them, adequate or
+        not.
     max_delay : float, optional
-        Largest dead time in samples. Default: the first lasting motion of the output, after
-        which it cannot be.
+        Largest dead time in samples. Default: the visible onset of the output, which the dead time
+        cannot exceed.
     known : control.TransferFunction or control.StateSpace, optional
-        Continuous dynamics that were measured along (sensor, anti-aliasing filter, converter).
-        They are in the fit, but not in the model that is returned.
+        Known continuous dynamics between plant and record (sensor, anti-aliasing filter,
+        converter). They are part of the fit, but not of the returned model.
     loss : {"huber", "least_squares"}, optional
-        Huber's loss (k = 1.345) costs 2 % of accuracy on clean data and is hardly moved by
-        outliers.
+        Huber's loss (k = 1.345) costs 2 % of accuracy on clean data and is insensitive to outliers.
     noise : {"auto", "white"}, optional
-        Of step records. ``"auto"``: noise that is coloured while the output rests is made white
-        first, by its autoregression, where the model leaves no more than that noise (generalised
-        least squares). ``"white"``: all samples weigh alike, and colour only widens
-        the interval.
+        For step records. ``"auto"``: if the baseline noise is coloured and the residual does not
+        exceed it, the data are prewhitened by its autoregressive model (generalised least squares).
+        ``"white"``: all samples have equal weight, and correlation only widens the interval.
     include_known : bool, optional
-        Put the known dynamics into the model that is returned.
+        Include the known dynamics in the returned model.
 
     Returns
     -------
     DelayedStateSpace
-        Continuous model sampled exactly behind a hold, the fraction of a sample included; its
-        `.fit` is a `OutputErrorFit`.
+        Continuous model, sampled exactly with a zero-order hold and the fractional dead time; its
+        `.fit` is an `OutputErrorFit`.
 
     Raises
     ------
     NoStepError, DataError
         No step, several channels, an output that does not move.
     OrderError, OptionError, UnsuitableSystemError
-        Unusable structures, options, or known dynamics.
+        Invalid structures, options, or known dynamics.
 
     Notes
     -----
-    Where the residual of the best structure is noise, the interval spans the 95 %
+    If the residual of the best structure is at noise level, the interval spans the 95 %
     profile-likelihood intervals of all structures within 10 of the best information criterion.
-    Where it is not, no likelihood knows the error: the dead time is the median of five views
-    (first motion, first- and second-order lag on the first 15 % of the excursion, best model of
-    up to three poles on 63 % and on all of it). The interval spans them and a third-order lag on
-    the first 15 %, but for the lowest.
+    Otherwise a likelihood does not describe the error: the dead time is the median of five delay
+    estimates (visible onset, first- and second-order models of the first 15 % of the response, best
+    models of up to three poles of the first 63 % and of all of it). The interval then spans these
+    and that of a third-order model of the first 15 %, except the lowest.
 
-    Chains of four to eight nearly equal lags compete with the structures by the same criterion
-    where three poles or more are needed, so that many lags are not read as dead time. The modes
-    of diffusion widen the interval where they fit as well. Where the best structure has a zero,
-    which imitates a smooth beginning, the interval reaches to a sample after the first motion, and
-    three times as far before the delay as the first motion comes after it. One lag more than was
-    chosen is never ruled out. A flow that disperses (inverse Gaussian residence times, with or
-    without a lag behind it) is fitted to step records as well: it widens the interval where it is
-    not ruled out, and where it is clearly better than all lags the dead time is that before it.
+    If three poles or more are needed, chains of four to eight nearly equal lags are compared with
+    the structures by the same criterion, so that many lags are not taken for dead time. A diffusion
+    model widens the interval if it fits as well. If the best structure has a zero, which can
+    imitate a smooth onset, the interval extends to one sample after the visible onset, and to three
+    times the distance between dead time and onset before the dead time. One lag more than chosen is
+    never ruled out. For step records an axial-dispersion model (inverse Gaussian residence times,
+    with or without a lag in series) is fitted as well: it widens the interval if it is not ruled
+    out, and if it is clearly better than all lags, its dead time is used.
 
-    A slope before the step is a drift, a drift that ends, the plant's own free response, or
-    nothing: the information criterion decides.
+    A slope before the step is modelled as a drift, a drift that ends, the free response of the
+    plant, or not at all, as chosen by the information criterion.
 
-    A dead time has no Fisher information in a model with more zeros than the plant: a superfluous
-    zero imitates it. That is why the relative degree is chosen, not left free.
+    In a model with more zeros than the plant the dead time has no Fisher information: a superfluous
+    zero can take its place. Therefore the relative degree is chosen, not left free.
 
-    The model is an output-error model [1]_ in continuous time; gain, level and drift, in which it
-    is linear, are eliminated by variable projection [2]_. Huber's loss is that of [3]_; noise of
-    known colour is made white as in [4]_; intervals are profile likelihoods [5]_; dispersion is
-    that of [6]_.
+    The model is a continuous output-error model [1]_; gain, level and drift, which enter linearly,
+    are eliminated by variable projection [2]_. Huber's loss is that of [3]_; coloured noise is
+    prewhitened as in [4]_; intervals are profile likelihoods [5]_; the dispersion model is that of
+    [6]_.
 
     References
     ----------
@@ -166,7 +165,7 @@ def fit_output_error(
         "whiten": noise == "auto",
     }
     if len(several) > 1:
-        # Where every record is a step experiment they can be averaged at it.
+        # If all records are step experiments they can be averaged.
         way = _fit_mean if all(map(_edges, several)) else fit_any_input
         result, fit = way(several, limit, settings)
         result = replace(result, flags=result.flags + same_record_flags(several))
@@ -275,7 +274,7 @@ def _structures(structures: Sequence[tuple[int, int]] | None) -> tuple[Structure
 
 
 def _step_data(record: Record) -> StepData | None:
-    """Data of a step record, None where the input is anything else."""
+    """Data of a step record; None for any other input."""
     signal, output = np.ravel(record.input), np.ravel(record.output)
     edges = _edges(record)
     if not edges:
@@ -293,22 +292,22 @@ def _step_data(record: Record) -> StepData | None:
 
 
 def _edges(record: Record) -> tuple[StepEdge, ...]:
-    """Edges of a step experiment; none where the input is anything else."""
+    """Edges of a step experiment; none for any other input."""
     signal = np.ravel(record.input)
     try:
         edges = found_step(record, most=_MOST_EDGES).edges
     except NoStepError:
         if np.ptp(signal[:-_LAST]) == 0:
-            # It moves at the very end, if at all: there is nothing to fit.
+            # It moves only at the very end: there is no response to fit.
             raise
         return ()
     return edges if len(edges) <= _MOST_EDGES and _holds_between(signal, edges) else ()
 
 
 def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
-    """Whether an input stays near one level from edge to edge, for nine samples of ten.
+    """Whether an input is nearly constant between edges, for nine samples of ten.
 
-    A sweep or noise has moves that look like an edge, but does not hold. On measured steps the
+    A sweep or noise may move like an edge, but is not constant afterwards. On measured steps the
     nine tenths lie within 2 % of the amplitude, on random inputs and sweeps beyond 45 %.
     """
     bounds = [0, *(edge.index for edge in edges), signal.size]

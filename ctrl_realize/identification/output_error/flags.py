@@ -15,8 +15,8 @@ from ...results import Flag
 from .model_flags import cancelled_pair, slow_modes, unresolved_gain
 from .words import ESTIMATE_WORDS, is_firm, model_words
 
-# What only flags and words depend on is a choice of presentation.
-_SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it is none
+# Thresholds for flags alone are a matter of presentation.
+_SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it counts as zero
 _BEYOND = 20.0  # ranges: no overshoot goes as far
 _FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
 
@@ -37,7 +37,7 @@ def fit_flags(
 def sampled_flags(
     fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
 ) -> tuple[Flag, ...]:
-    """List the flags of a fit of a record whose input is no step."""
+    """List the flags of a fit of a record whose input is not a step."""
     found = model_flags(fit, dt, length, max_delay)
     if not fit.adequate:
         found.append(
@@ -54,7 +54,7 @@ def sampled_flags(
 def model_flags(
     fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
 ) -> list[Flag | None]:
-    """List what the model itself shows."""
+    """List the flags that follow from the model itself."""
     extrapolated = slow_modes(fit, length), unresolved_gain(fit, length)
     firm = "" if any(extrapolated) else _only_total(fit)
     return [
@@ -73,7 +73,7 @@ def model_flags(
 
 
 def _marginal(fit: OutputErrorEstimate) -> Flag | None:
-    """Report decisions so close that rounding may turn them."""
+    """Report decisions so close that rounding may change them."""
     if not fit.close:
         return None
     words: dict[DecisionKey, str] = {
@@ -96,7 +96,7 @@ def _marginal(fit: OutputErrorEstimate) -> Flag | None:
 
 
 def _apparent(fit: OutputErrorEstimate) -> Flag | None:
-    """Say so where structures were asked for and another one rules them out."""
+    """Report that the requested structures are ruled out by another one."""
     if fit.better is None:
         return None
     other = fit.better
@@ -193,7 +193,7 @@ def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
 
 
 def _dispersed(fit: OutputErrorEstimate) -> Flag | None:
-    """Say so where a flow explains the response better than lags."""
+    """Report that axial dispersion explains the response better than lags."""
     flow = min(fit.flows, key=lambda flow: flow.delta_bic, default=None)
     if flow is None or (flow.delta_bic >= 0 and not fit.follows_flow):
         return None
@@ -231,14 +231,14 @@ def _open_start(fit: OutputErrorEstimate, firm: str) -> Flag | None:
 
 
 def _only_total(fit: OutputErrorEstimate) -> str:
-    """Say that the total delay is firm, where it is."""
+    """State that the total delay is well determined, if it is."""
     firm = fit.static is None or is_firm(fit.static.total, fit.total_ends)
     return "; only the total delay is well determined" if firm else ""
 
 
 def _inverse(fit: OutputErrorEstimate) -> Flag | None:
     if fit.follows_flow:
-        # Zeros on the right make the beginning late, as that of a flow is.
+        # Right half-plane zeros delay the onset, as dispersion does.
         return None
     zeros = np.roots(fit.numerator[::-1])
     right = zeros[zeros.real > 0]
@@ -314,7 +314,7 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
 
 
 def _code(output: FloatArray) -> str:
-    """Name one value far beyond all others that a few samples have, as loggers write for none."""
+    """Find a single value far beyond all others, as loggers write for missing samples."""
     low, high = np.percentile(output, [1, 99])
     far = np.flatnonzero(
         (output < low - _BEYOND * (high - low)) | (output > high + _BEYOND * (high - low))

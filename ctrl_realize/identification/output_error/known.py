@@ -1,4 +1,4 @@
-"""Read known dynamics, given as a python-control system, for a fit."""
+"""Known dynamics of a fit, given as a python-control system."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from ...errors import UnsuitableSystemError
 from ...numerics.separable.varpro import KnownFactor
 
-_APART = 1e-3  # relative distance that poles are given, where they coincide
+_APART = 1e-3  # relative distance by which coincident poles are separated
 
 
 def known_factor(known: Any) -> KnownFactor:
-    """Turn a continuous, stable, proper system of one input and one output into a factor.
+    """Convert a continuous, stable, proper system of one input and one output to a factor.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def _zeros_poles_gain(known: Any) -> tuple[Any, Any, float]:
 
 
 def _apart(poles: Any) -> Any:
-    """Partial fractions need distinct poles."""
+    """Separate coincident poles, because partial fractions need distinct ones."""
     apart = np.array(poles, dtype=np.complex128)
     for j in range(1, apart.size):
         while np.any(np.abs(apart[:j] - apart[j]) < 0.5 * _APART * np.abs(apart[j])):

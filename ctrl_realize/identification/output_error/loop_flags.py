@@ -1,4 +1,4 @@
-"""What records say of a loop that was closed about the plant, and of an unstable plant in it."""
+"""Tests of records for feedback and for an unstable plant in a closed loop."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ from ...numerics.validation.instability import unstable_chance
 from ...results import Flag
 
 RARE = 1e-4
-"""Chance of an alarm by noise alone, of each test. Of 290 records without feedback (29 worlds of
-`benchmarks.worlds`) the least chance was 1e-3; of 60 loops that are no pure limit cycle, all were
-below 1e-4."""
+"""Probability of a false alarm of each test. In 290 records without feedback (29 worlds of
+`benchmarks.worlds`) the smallest p-value was 1e-3; in 60 loops other than pure limit cycles, all
+were below 1e-4."""
 REGRESSED = 4000
-"""Samples of the long regressions."""
-_LEAST_PAST, _MOST_PAST = 30, 150  # inputs in these regressions, whose time goes with the square
+"""Largest number of samples in the long regressions."""
+_LEAST_PAST, _MOST_PAST = (
+    30,
+    150,
+)  # past inputs in them; time grows with the square
 
 
 def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:
-    """Tell whether an input follows the output; `delay`, in samples, is not exceeded."""
+    """Test whether the input depends on the output; `delay` in samples is an upper bound."""
     chances = [
         feedback_chance(y[0], u[0], past_inputs(y[0].size, delay)) for y, u in _stretches(records)
     ]
@@ -39,7 +42,7 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...
 
 
 def unstable_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:
-    """Tell whether a plant of any channels is unstable; `delay`, in samples, is not exceeded."""
+    """Test whether a plant of any channels is unstable; `delay` in samples is an upper bound."""
     chances = [
         unstable_chance(own, u, past_inputs(own.size // len(u), delay))
         for y, u in _stretches(records)
@@ -59,7 +62,7 @@ def unstable_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...
 
 
 def _stretches(records: tuple[Record, ...]) -> list[tuple[FloatArray, FloatArray]]:
-    """Outputs (p, n) and inputs (m, n) of every record's liveliest stretch."""
+    """Outputs (p, n) and inputs (m, n) of the part of each record with the largest variation."""
     found = []
     for record in records:
         inputs, outputs = np.atleast_2d(record.input), np.atleast_2d(record.output)
@@ -70,5 +73,5 @@ def _stretches(records: tuple[Record, ...]) -> list[tuple[FloatArray, FloatArray
 
 
 def past_inputs(size: int, delay: float) -> int:
-    """Past inputs that reach beyond a dead time, also one that is found wrong."""
+    """Number of past inputs: more than a dead time, even if its estimate is wrong."""
     return int(min(max(size // 12, _LEAST_PAST, 1.5 * delay + 10), _MOST_PAST, size // 6))

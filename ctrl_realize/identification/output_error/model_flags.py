@@ -12,17 +12,17 @@ from ...numerics.separable.static_gain import INTEGRATOR, StaticGain
 from ...results import Flag
 from .words import sign_is_told
 
-# Choices of presentation: they decide on flags alone.
-_GAINS_APART = 0.2  # part of gain or total delay by which structures may differ
-_AS_GOOD = 4.0  # excess of a criterion that chance explains: chi-square, one degree, 95 %
-_CANCELLED = 0.05  # of its frequency: distance of a pole from a zero that hides it
+# Thresholds for flags alone are a matter of presentation.
+_GAINS_APART = 0.2  # relative difference of gain or total delay between structures
+_AS_GOOD = 4.0  # insignificant difference of the criterion: chi-square, one degree of freedom, 95 %
+_CANCELLED = 0.05  # distance of a pole from a zero that cancels it, relative to its frequency
 
 SETTLED = 3.0
 """Time constants after which a lag counts as settled: 95 % of its step response."""
 
 
 def slow_modes(fit: OutputErrorEstimate, length: float) -> Flag | None:
-    """Tell whether a record of `length` s ends before the slowest mode has died away."""
+    """Report that a record of `length` s ends before the slowest mode has decayed."""
     slowest = float(np.abs(fit.poles).min()) * length
     if slowest < INTEGRATOR:
         return Flag(
@@ -46,9 +46,9 @@ def slow_modes(fit: OutputErrorEstimate, length: float) -> Flag | None:
 
 
 def unresolved_gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
-    """Tell whether gain or total delay are open: their structures differ, or not even its sign.
+    """Report that gain or total delay are not determined: structures differ, or the sign is open.
 
-    Whether the sign is told is what the interval of the gain says (`sign_is_told`).
+    The sign is determined if the interval of the gain does not contain zero (`sign_is_told`).
     """
     if fit.static is not None and not sign_is_told(fit.gain_ends):
         return Flag("gain_not_resolved", _no_sign(fit, fit.static, length))
@@ -94,17 +94,17 @@ def _apart(values: FloatArray) -> bool:
 
 
 def _not_died_away(poles: ComplexArray, seen: float) -> ComplexArray:
-    """Poles whose part of a response has not died away when the record ends.
+    """Poles whose part of the response has not decayed at the end of the record.
 
-    What decays is exp(re(p) t), whatever |p| is. A pair that rings on has shown its mean, and
-    with it the gain, after a period; of one that was seen for less, the record holds a rise.
+    The decay is exp(re(p) t), whatever |p| is. An oscillatory pair shows its mean, and thus the
+    gain, after a period; if it was observed for less, the record only contains its rise.
     """
     slow = -poles.real * seen < SETTLED
     return poles[slow & (np.abs(poles.imag) * seen < 2 * np.pi)]
 
 
 def cancelled_pair(fit: OutputErrorEstimate) -> Flag | None:
-    """Tell whether the model has a pair of poles that the input does not move."""
+    """Report a pair of poles that is nearly cancelled by zeros."""
     zeros = np.roots(fit.numerator[::-1])
     for pole in fit.poles[fit.poles.imag > 0]:
         if np.any(np.abs(zeros - pole) < _CANCELLED * abs(pole)):

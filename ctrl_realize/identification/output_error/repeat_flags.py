@@ -9,11 +9,11 @@ from ...numerics.arrays import FloatArray
 from ...results import Flag
 from .repeatability import Repeatability
 
-# Choices of presentation: they decide on flags alone.
-BY_CHANCE = 0.01  # one false alarm in a hundred groups of records of one plant
-SAME = 0.01  # differences of a hundredth are those of sensors, whatever the noise
+# Thresholds for flags alone are a matter of presentation.
+BY_CHANCE = 0.01  # one false alarm in a hundred sets of records of one plant
+SAME = 0.01  # differences of 1 % are attributed to the sensors
 NO_COMMON_GAIN = 0.2
-"""Part by which a record's gain may lie off the common one before the model is no record's own."""
+"""Relative difference of all gains from the common one above which the model fits no record."""
 
 
 def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
@@ -48,6 +48,9 @@ def repeat_flags(result: Repeatability) -> tuple[Flag, ...]:
             )
         )
     return tuple(flags)
+
+
+"""Report that gains or time constants differ by more than their noise."""
 
 
 def _response_flags(result: Repeatability) -> list[Flag]:
@@ -89,6 +92,9 @@ def _response_flags(result: Repeatability) -> list[Flag]:
 
 def _range(values: FloatArray) -> str:
     return f"{values.min():.3g} to {values.max():.3g}"
+
+
+"""Find records whose outputs agree in every digit, which noise excludes."""
 
 
 def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:

@@ -1,4 +1,4 @@
-"""How much records of one plant differ."""
+"""Differences between records of one plant."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _MOST_NAMED = 8
-"""Most records that a card lists one by one; the table has all."""
+"""Largest number of records listed in a card; the table lists all."""
 
 
 def _nothing() -> FloatArray:
@@ -23,32 +23,33 @@ def _nothing() -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Repeatability:
-    """How much records of one plant differ, beyond the noise inside each.
+    """Differences between records of one plant, beyond the noise in each.
 
-    ``chi_square`` is the sum over the records of ((delay - weighted mean) / standard error)^2
-    and `p_value` the chance of a larger one when records differ by noise alone; `gain_test` and
-    `lag_test` are the same two numbers for gains and (logarithms of) time constants.
+    ``chi_square`` is the sum over the records of ((delay - weighted mean) / standard error)^2 and
+    `p_value` the probability of a larger value if records differ by noise alone; `gain_test` and
+    `lag_test` are the same for gains and (logarithms of) time constants.
 
     Attributes
     ----------
     names : tuple of str
         Of the records.
     amplitudes : ndarray, shape (R,)
-        Height of the step of each, or how far its input goes from lowest to highest.
+        Height of each step, or the range of each input.
     delays, errors : ndarray, shape (R,)
-        Delay of each against the common model, and its standard error from the noise, in s.
+        Delay of each record relative to the common model, and its standard error due to noise, in
+        s.
     gains, gain_errors : ndarray, shape (R,)
-        Gain of each over the common one, and its standard error.
+        Gain of each record relative to the common one, and its standard error.
     lags, lag_errors : ndarray, shape (R,)
-        Time constants of each over the common ones, delay and gain being free, and the relative
-        standard error of that ratio.
+        Time constants of each record relative to the common ones, with delay and gain free, and the
+        relative standard error of that ratio.
     fit_percent : ndarray, shape (R,)
-        How much of each record the common model explains, its own level and drift apart:
-        ``100 (1 - |y - model| / |y - mean y|)``.
+        Fit of the common model to each record, after correction of level and drift: ``100 (1 - |y -
+        model| / |y - mean y|)``.
     trend, trend_error : float
         Slope of the delays over the amplitudes, in s per unit of input.
     outlying : tuple of str
-        Records that lie apart from the rest; they are not in the mean.
+        Outlying records, which are not in the mean.
     """
 
     names: tuple[str, ...]
@@ -70,7 +71,7 @@ class Repeatability:
 
     @property
     def gain_spread(self) -> float:
-        """Largest part by which the gain of a record lies off the common one."""
+        """Largest relative difference of a record's gain from the common one."""
         kept = [name not in self.outlying for name in self.names]
         return float(np.max(np.abs(self.gains[kept] - 1.0), initial=0.0))
 

@@ -23,30 +23,29 @@ from .words import ESTIMATE_WORDS, gain_in_words, total_in_words
 class OutputErrorFit(FractionalDelayFit):
     """Dead time and model from an output-error fit of raw records.
 
-    ``interval[0] <= dead_time <= interval[1]`` and
-    ``total_delay == dead_time + sum of the model's lags - sum of its leads``. The total is
-    mostly known better than how it splits into dead time and lags; `total_delay_interval` and
-    `interval` say how far. The model is ``gain exp(-s dead_time)`` times a transfer function of
-    unit gain with `poles` and `zeros`. What is called firm is so where the
-    record shows the response to its end, of one linear plant in open loop: flags say where it does
-    not.
+    ``interval[0] <= dead_time <= interval[1]`` and ``total_delay == dead_time + sum of the model's
+    lags - sum of its leads``. The total delay is usually determined better than its division into
+    dead time and lags; see `total_delay_interval` and `interval`. The model is ``gain exp(-s
+    dead_time)`` times a transfer function of unit gain with `poles` and `zeros`. This assumes a
+    linear plant in open loop whose response has settled within the record; flags report where it
+    has not.
 
     Attributes
     ----------
     estimate : OutputErrorEstimate
-        What the numerics have found; most other attributes are read from it.
+        Numerical result; most other attributes are read from it.
     data : StepData
-        What was fitted (the mean, for several records of steps), and its noise.
+        Data that were fitted (the mean, for several step records), and their noise.
     time : ndarray, shape (N,)
         In s.
     records : tuple of Record
-        What was given.
+        Records that were given.
     repeatability : Repeatability or None
-        Delay of every record by itself, where there are several.
+        Delay of each record separately, if there are several.
     choices : tuple of str
-        What was chosen, and why.
+        Automatic choices, with reasons.
     flags : tuple of Flag
-        What one should know before trusting the result.
+        Warnings about the result.
 
     Examples
     --------
@@ -81,10 +80,11 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def std_given_structure(self) -> float:
-        """Standard error of the dead time in s if the chosen structure is the plant's.
+        """Standard error of the dead time in s for the chosen structure.
 
-        That of the spread of the delay estimates where the residual is not noise. It knows nothing
-        of the doubt about the structure, which is mostly the larger part: `interval` does.
+        If the residual exceeds the noise, the standard error of the delay estimates. It does not
+        contain the uncertainty of the structure, which is usually the larger part and is contained
+        in `interval`.
         """
         return self.estimate.std
 
@@ -92,28 +92,28 @@ class OutputErrorFit(FractionalDelayFit):
     def interval(self) -> tuple[float, float]:
         """95 % interval of the dead time in s.
 
-        Of all structures that the data cannot rule out where the residual is noise (and wider
-        where a zero leaves the beginning open), of the delay estimates where it is not.
+        Of all structures that the data do not rule out if the residual is at noise level (wider if
+        the model has a zero), otherwise of the delay estimates.
         """
         return self.estimate.low, self.estimate.high
 
     @property
     def onset(self) -> float:
-        """First motion of the output after the input has moved, in s; NaN when it is no step."""
+        """Visible onset of the response after the step in s; NaN if the input is not a step."""
         motion = self.data.motion
         return float("nan") if motion is None else motion.onset * self.dt
 
     @property
     def total_delay(self) -> float:
-        """Delay at zero frequency in s; integrators are left out."""
+        """Delay at zero frequency in s, without integrators."""
         return self.dead_time + lag_sum(self._moving_poles, self.estimate.numerator)
 
     @property
     def total_delay_interval(self) -> tuple[float, float]:
-        """95 % interval of the total delay in s, if the residual is noise.
+        """95 % interval of the total delay in s, if the residual is at noise level.
 
-        Without end where the record does not resolve it. Called firm where it reaches a tenth of
-        it to either side.
+        Infinite if the record does not determine it. Called well determined if its ends are within
+        a tenth of the estimate.
         """
         return self.estimate.total_ends
 
@@ -129,7 +129,7 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def _plain_poles(self) -> ComplexArray:
-        """Poles of the estimate, those of integrators at 0."""
+        """Poles of the estimate; those of integrators are exactly 0."""
         length = (self.data.output.size - self.data.edge) * self.dt
         poles = self.estimate.poles.copy()
         poles[np.abs(poles) < INTEGRATOR / length] = 0.0
@@ -154,21 +154,21 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def gain(self) -> float:
-        """Gain at zero frequency; of a model with an integrator, the slope per second."""
+        """Gain at zero frequency; for a model with an integrator, the slope per second."""
         return float(self.estimate.numerator[0] / np.prod(-self._moving_poles).real)
 
     @property
     def gain_std_given_structure(self) -> float:
-        """Standard error of the gain if the chosen structure is the plant's."""
+        """Standard error of the gain for the chosen structure."""
         static = self.estimate.static
         return float("nan") if static is None else static.gain_std
 
     @property
     def gain_interval(self) -> tuple[float, float]:
-        """95 % interval of the gain: of the structures that the data cannot rule out.
+        """95 % interval of the gain, for all structures that the data do not rule out.
 
-        Of the records too, where their gains differ. Without end where the record is shorter than
-        the slowest time constant and does not resolve the gain.
+        Also for all records, if their gains differ. Infinite if the record is shorter than the
+        slowest time constant and does not determine the gain.
         """
         low, high = self.estimate.gain_ends
         repeats = self.repeatability
@@ -180,12 +180,12 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def at_noise_level(self) -> bool:
-        """The residual is as small as the noise before the step."""
+        """Whether the residual is as small as the noise before the step."""
         return self.estimate.adequate
 
     @property
     def normalized_rms(self) -> float:
-        """Residual over noise, in means over bins of samples."""
+        """Residual divided by noise, for means over bins of samples."""
         return self.estimate.normalized_rms
 
     @property
@@ -195,25 +195,25 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def residual(self) -> float:
-        """Standard deviation of what the model leaves."""
+        """Standard deviation of the residual."""
         return self.estimate.residual
 
     @property
     def correlation(self) -> float:
-        """Samples of the residual that one independent sample is worth."""
+        """Number of residual samples that count as one independent sample."""
         return self.estimate.correlation
 
     @property
     def delay_estimates(self) -> dict[str, float]:
-        """Dead time in s as seen in six ways, of which the last serves the interval only.
+        """Dead times in s by six methods; the last one only contributes to the interval.
 
-        Empty where one model explains everything.
+        Empty if the residual is at noise level.
         """
         return {ESTIMATE_WORDS[key]: delay for key, delay in self.estimate.delay_estimates}
 
     @property
     def structures(self) -> tuple[StructureFit, ...]:
-        """Everything that was fitted, best first."""
+        """All models that were fitted, best first."""
         return self.estimate.structures
 
     @property
@@ -233,23 +233,23 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def better(self) -> StructureFit | None:
-        """Where structures were asked for, and are ruled out: the structure that does it.
+        """The best structure, if the requested structures are ruled out; otherwise None.
 
-        Its `delta_bic` is negative. The dead time is then an apparent one, with the lags that the
-        model lacks in it.
+        Its `delta_bic` is negative. The dead time is then an apparent one, which includes lags that
+        are missing in the model.
         """
         return self.estimate.better
 
     @property
     def interval_kind(self) -> IntervalKind:
-        """What `interval` is: of confidence only where one model leaves only noise."""
+        """Kind of `interval`: a confidence interval only if the residual is at noise level."""
         if self.better is not None:
             return "conditional"
         return "confidence" if self.at_noise_level else "spanned"
 
     @property
     def residual_std(self) -> float:
-        """Standard deviation of what the model leaves, the same as `residual`."""
+        """Standard deviation of the residual, the same as `residual`."""
         return self.residual
 
     @property

@@ -1,4 +1,4 @@
-"""Turn what the numerics found into the model and the result that users see."""
+"""Model and result of an output-error fit, from its numerical estimate."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def summarise(
     repeatability: Repeatability | None = None,
     choices: tuple[str, ...] = (),
 ) -> OutputErrorFit:
-    """Make the result of an estimate; `choices` come before those of the estimate."""
+    """Make the result from an estimate; `choices` come before those of the estimate."""
     return OutputErrorFit(
         estimate=fit,
         data=data,
@@ -100,7 +100,7 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
 
 
 def _interval_of(fit: OutputErrorEstimate) -> str:
-    """Say what the interval is made of: structures of the table, and what reaches beyond them."""
+    """Describe the interval: structures, and other models that extend it."""
     ends = [line.interval for line in fit.structures if line.interval is not None]
     parts = [f"{len(ends)} structure(s)"] if ends else []
     low = min((end[0] for end in ends), default=np.inf)

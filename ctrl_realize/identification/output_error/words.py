@@ -1,4 +1,4 @@
-"""What cards, flags and reports say of an output-error fit, and when they may call it firm."""
+"""Texts about an output-error fit for cards, flags and reports."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ESTIMATE_WORDS: dict[RobustKey, str] = {
     "model_of_record": "best model of the whole record",
 }
 
-_FIRM = 0.1  # part of a total delay up to which an interval on either side makes it firm
+_FIRM = 0.1  # relative half width of the interval of a total delay that is called well determined
 
 _TOTAL_IN_DOUBT = frozenset(
     {
@@ -38,11 +38,11 @@ _TOTAL_IN_DOUBT = frozenset(
         "earlier_input",
     }
 )
-"""Flags after which not even the total delay is firm."""
+"""Flags with which the total delay is not well determined."""
 
 
 def model_words(model: LagChain | DispersedFlow) -> str:
-    """Name a model that is not one of the structures."""
+    """Name a model other than the structures."""
     if isinstance(model, DispersedFlow):
         return "axial-dispersion model"
     if model.hidden:
@@ -51,7 +51,7 @@ def model_words(model: LagChain | DispersedFlow) -> str:
 
 
 def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[Flag]) -> str:
-    """Write a total delay with its interval, and whether it is firm."""
+    """Write a total delay with its interval, and whether it is well determined."""
     low, high = interval
     if high == np.inf:
         return "not determined: the record is much shorter than the slowest time constant"
@@ -64,18 +64,18 @@ def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[
 
 
 def is_firm(value: float, interval: tuple[float, float]) -> bool:
-    """Whether an interval reaches a tenth of the estimate to either side at most."""
+    """Whether the ends of an interval are within a tenth of the estimate."""
     low, high = interval
     return bool(max(high - value, value - low) <= _FIRM * abs(value))
 
 
 def sign_is_told(interval: tuple[float, float] | None) -> bool:
-    """Whether the interval of a gain, if there is one, leaves its sign no question."""
+    """Whether the interval of a gain, if there is one, excludes zero."""
     return interval is not None and (interval[0] > 0 or interval[1] < 0)
 
 
 def gain_in_words(gain: float, interval: tuple[float, float]) -> str:
-    """Write a gain with its interval, and say so where it is not resolved."""
+    """Write a gain with its interval, or that it is not determined."""
     low, high = interval
     if np.isfinite(low) != np.isfinite(high):
         said = f"at least {low:.3g}" if np.isfinite(low) else f"at most {high:.3g}"
