@@ -1,7 +1,7 @@
 """Controllers for plants with dead time, and analysis of the closed loop.
 
-Systems in, `control` systems out. Everything works on core and delay apart, so it is exact at any
-delay.
+All functions use core and delay separately, so that they are exact at any delay. Results are
+`control` systems.
 """
 
 from .delay_line import DelayLineController

@@ -1,7 +1,7 @@
-"""Controllers that remember their own last outputs in a delay line.
+"""Controllers with a delay line of their own past outputs.
 
-Smith predictors and predictor state feedback share one structure: a few inner states and the
-outputs u[k-1] ... u[k-d] that they have sent into the dead time.
+Smith predictors and predictor state feedback share one structure: a few inner states and the last
+outputs u[k-1] ... u[k-d], which have not yet acted on the plant.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ Pulses = tuple[FloatArray, FloatArray, FloatArray]
 
 
 class DelayLineController(DeferredMatrices):
-    """Discrete controller with a line of its own past outputs; a `control.StateSpace`.
+    """Discrete controller with a delay line of its past outputs; a `control.StateSpace`.
 
     States ``[x; u[k-1] ... u[k-d]]``; with v the line::
 
         x[k+1] = A x + B e + E v
         u[k]   = C x + D e + h v
 
-    The frequency response is computed from this structure, so it stays exact and fast at any d.
-    The matrices of all states are made when somebody asks for them, up to 20 000 states.
+    The frequency response is computed from this structure, so it is exact and fast at any d. The
+    matrices with all states are computed on demand, up to 20 000 states.
 
     Parameters
     ----------
@@ -45,19 +45,19 @@ class DelayLineController(DeferredMatrices):
     inputs, outputs : str
     pulses : tuple of ndarray, optional
         ``(A_p, B_p, C_p)`` where column i of ``[E; h]`` is ``C_p A_p^(i-1) B_p`` for all but the
-        last, as predictions give: long lines are then evaluated in closed form.
+        last, as for predictors: long delay lines are then evaluated in closed form.
 
     Attributes
     ----------
     line_length : int
         d.
     inner_poles : ndarray, shape (n,)
-        Eigenvalues of A. They are not the controller's poles: the line closes a loop around them.
+        Eigenvalues of A. They are not the controller's poles, because the delay line closes a loop.
 
     Raises
     ------
     DelayRangeError
-        Where A, B, C or D of more than 20 000 states are asked for.
+        A, B, C or D with more than 20 000 states.
 
     Examples
     --------
@@ -138,7 +138,8 @@ class DelayLineController(DeferredMatrices):
         return escape(line) if html else line
 
     def _line(self) -> str:
-        # python-control's lists every matrix, of as many states as the line is long.
+        # python-control's representation lists the matrices, with as many states as the line is
+        # long.
         return (
             f"<{type(self).__name__} {self.name!r}: order {self.inner_poles.size}, line of "
             f"{self.line_length} samples, dt = {self.dt:.6g} s>"
@@ -161,7 +162,7 @@ class DelayLineController(DeferredMatrices):
         return f"Controller {self.name} with a delay line", rows, []
 
     def report(self) -> str:
-        """Tell what the controller is made of, and what its loop does, as plain text."""
+        """Describe the controller and its closed loop as plain text."""
         title, rows, flags = self._card()
         return text_card(title, rows, flags=flags)
 
@@ -183,7 +184,7 @@ class DelayLineController(DeferredMatrices):
         return _rebuild, (type(self), self._parts, self.dt, settings)
 
     def _design(self) -> dict[str, Any]:
-        """Further arguments of a subclass, which say what it was designed from."""
+        """Further arguments of a subclass that describe its design."""
         return {}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> DelayLineController:
@@ -208,7 +209,7 @@ class DelayLineController(DeferredMatrices):
             part = slice(start, start + CHUNK)
             points = z[part]
             line = self._taps(points)
-            # At an inner pole (z = 1 with a PI) both paths are infinite.
+            # At an inner pole (z = 1 with a PI controller) both are infinite.
             with np.errstate(divide="ignore", invalid="ignore"):
                 rows = frequency_response(
                     self._form, np.hstack([B, eye]), C, np.hstack([D, np.zeros((1, n))]), points

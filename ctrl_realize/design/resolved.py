@@ -1,4 +1,4 @@
-"""Refuse, or warn of, a model whose record does not resolve what a design needs."""
+"""Refuse, or warn about, models whose record does not determine what a design needs."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ QUANTITIES = {
     "delay_at_bound": "the dead time",
     "unstable": "whether the plant is stable",
 }
-"""Flags of a fit, and what is not resolved where they are raised."""
+"""Flags of a fit, and the quantities that are then not determined."""
 
 PREDICTED = {"no_delay_resolved": "a dead time to predict over"}
-"""The same, of what only a predictor relies on."""
+"""The same for quantities that only a predictor needs."""
 
 
 def check_sign(system: Any, purpose: str) -> None:
-    """Refuse to design for a model the sign of whose gain its record does not tell.
+    """Refuse to design for a model whose sign of the gain is not determined by its record.
 
-    That is so where the gain is flagged, and its interval reaches over zero or is not known.
+    This is so if the gain is flagged and its interval contains zero or is not known.
 
     Raises
     ------
@@ -43,12 +43,12 @@ def check_sign(system: Any, purpose: str) -> None:
 
 
 def warn_unresolved(system: Any, *, predicts: bool = False) -> None:
-    """Warn of what the record behind a model does not resolve.
+    """Warn about quantities that the record behind a model does not determine.
 
-    With `predicts` also of a dead time that may be none: a predictor relies on it.
+    With `predicts` also about a dead time that may be zero, on which a predictor depends.
 
-    The warning belongs to the line that called the package, so that it is shown once for a
-    design in several steps.
+    The warning is attributed to the caller's line, so that it is shown once for a design in several
+    steps.
     """
     for flag in _flags(system):
         quantity = (QUANTITIES | (PREDICTED if predicts else {})).get(flag.code)
@@ -75,6 +75,6 @@ def _sign_is_known(fit: ModelFit) -> bool:
 
 
 def _gain_is_known(fit: ModelFit) -> bool:
-    """Whether the interval of a gain is narrow, though the record ends early."""
+    """Whether the interval of a gain is narrow although the record ends early."""
     gain, interval = fit.gain, fit.gain_interval
     return gain is not None and interval is not None and is_firm(gain, interval)

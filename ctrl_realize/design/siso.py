@@ -14,12 +14,12 @@ from ..errors import OptionError, UnsuitableSystemError
 
 
 def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedStateSpace:
-    """Return a discrete system as a `DelayedStateSpace`, or say why it cannot be one.
+    """Return a discrete system as a `DelayedStateSpace`.
 
     Raises
     ------
     UnsuitableSystemError
-        No linear system, a continuous one, several channels where one is needed.
+        Not a linear system, a continuous one, or several channels if one is needed.
     """
     if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
         raise UnsuitableSystemError(
@@ -41,7 +41,7 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
 
 
 def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
-    """Convert to state space; an improper transfer function is refused in our words."""
+    """Convert to state space; an improper transfer function is refused with advice."""
     if isinstance(system, ct.StateSpace):
         check_entries(system)
         return system
@@ -59,7 +59,7 @@ def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
 
 
 def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
-    """Return a discrete single-channel controller of the sample time `dt` in state space."""
+    """Return a discrete single-channel controller with sample time `dt` in state space."""
     if isinstance(controller, (int, float)):
         check_entries(controller)
         return ct.ss([], [], [], float(controller), dt)
@@ -83,12 +83,12 @@ def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
 def interval_of_dead_time(
     system: DelayedStateSpace, given: tuple[float, float] | None
 ) -> tuple[float, float] | None:
-    """Return the interval that was given, else that of the identification; None without both.
+    """Return the given interval, or that of the identification; None without both.
 
     Raises
     ------
     OptionError
-        No interval of dead times.
+        Not an interval of dead times.
     """
     fitted = None if system.fit is None else system.fit.dead_time_interval
     interval = fitted if given is None else given
@@ -101,10 +101,10 @@ def interval_of_dead_time(
 
 
 def held_fraction(system: DelayedStateSpace) -> float:
-    """Time in s by which the delay overstates the dead time that was identified.
+    """Time in s by which the delay exceeds the identified dead time.
 
-    A dead time of (d + f) samples is held as the delay d + 1 and a direct term; an interval of
-    the dead time is around the former.
+    A dead time of (d + f) samples is represented by the delay d + 1 and a feedthrough; an interval
+    of the dead time refers to the former.
     """
     identified = None if system.fit is None else system.fit.dead_time
     if identified is None:

@@ -1,4 +1,4 @@
-"""Frequency responses: measured, estimated, compared with models."""
+"""Measured frequency responses: estimation, fit, comparison with models."""
 
 from __future__ import annotations
 

@@ -38,18 +38,18 @@ def compare_frf(
     system : control.LTI
         One input, one output; discrete or continuous, with or without dead time.
     frf : MeasuredFRF
-        Measured response; any `control.FrequencyResponseData` will do.
+        Measured response; any `control.FrequencyResponseData`.
     min_coherence : float, optional
-        Coherence that makes a point trusted. Default 0.95 where the FRF has a coherence;
-        otherwise points with a standard deviation of at most 10 % of the response are trusted,
-        and all points where it has neither.
+        Least coherence of a trusted point. Default 0.95 if the FRF has a coherence; otherwise
+        points with a standard deviation of at most 10 % of the response are trusted, and all points
+        if it has neither.
     band_hz : tuple of float, optional
         Compare in this band in Hz instead.
     hold : {"auto", "zoh", None}
-        "zoh": divide the zero-order hold out of a discrete model. None: do not. "auto": do so for
-        a discrete model, unless its ``.fit`` says that it is impulse-invariant. An FRF that knows
-        its sample time has a hold in it as well: with the same sample time as the model both
-        stay, else that of the FRF is divided out too.
+        "zoh": divide the zero-order hold out of a discrete model. None: do not. "auto": do so for a
+        discrete model, unless its ``.fit`` states that it is impulse-invariant. An FRF with a known
+        sample time contains a hold as well: if it has the sample time of the model neither is
+        divided out, otherwise both.
 
     Returns
     -------
@@ -60,22 +60,22 @@ def compare_frf(
     DataError
         No point in the band, or none below the model's Nyquist frequency.
     OptionError
-        A coherence outside 0...1, or asked for where there is none; a hold of a continuous model.
+        A coherence outside 0...1, or given for an FRF without one; a hold for a continuous model.
     UnsuitableSystemError
         A system or FRF with several inputs or outputs.
 
     Notes
     -----
-    A *step-invariant* model (backward difference, ``ct.sample_system(..., "zoh")``) is the plant
-    behind a hold. Its frequency response lags that of the plant by half a sample, ``w dt / 2``:
-    1.83 degrees at 13 Hz and 1280 Hz. An FRF that was measured on the plant with analog signals
-    has no hold in it, and the hold is divided out of the model before they are compared. An
-    *impulse-invariant* model (central difference) needs no such thing, nor does an FRF that was
-    itself estimated from the samples of a held input, as one of `spectral_frf` is taken to be:
-    pass ``hold="zoh"`` where it was not, and ``hold=None`` where an FRF from elsewhere was.
+    A *step-invariant* model (backward difference, ``ct.sample_system(..., "zoh")``) describes the
+    plant with a hold. Its frequency response lags that of the plant by half a sample, ``w dt / 2``:
+    1.83 degrees at 13 Hz and 1280 Hz. An FRF measured on the plant with analog signals contains no
+    hold, so the hold is divided out of the model before the comparison. This is not needed for an
+    *impulse-invariant* model (central difference), nor for an FRF estimated from the samples of a
+    held input, as is assumed for `spectral_frf`: give ``hold="zoh"`` if the input was not held, and
+    ``hold=None`` for an FRF from another source with a held input.
 
-    The trusted band is the widest stretch (in octaves) in which the coherence, smoothed by a
-    running median of five points, stays up.
+    The trusted band is the widest band (in octaves) in which the coherence, smoothed by a running
+    median of five points, is sufficient.
 
     The hold is the factor ``(1 - exp(-s dt)) / (s dt)`` of [1]_.
 
@@ -156,7 +156,7 @@ def _without_hold(points: MeasuredPoints, dt: float) -> MeasuredPoints:
 
 
 def _own_name(system: Any, otherwise: str) -> str:
-    """Return the name that somebody gave; python-control numbers the others, as ``sys[3]``."""
+    """Return a user-defined name; python-control's default names are like ``sys[3]``."""
     name = str(system.name or "")
     return otherwise if not name or name.startswith("sys[") else name
 
@@ -164,7 +164,7 @@ def _own_name(system: Any, otherwise: str) -> str:
 def _comparable(
     points: MeasuredPoints, dt: float | None
 ) -> tuple[MeasuredPoints, tuple[Flag, ...]]:
-    """Leave out zeros and what a model of this sample time cannot follow."""
+    """Leave out points at zero frequency, and those beyond the Nyquist frequency of the model."""
     frequency = points.frequency_hz
     usable = np.abs(points.response) > SMALLEST
     flags = []
@@ -195,7 +195,7 @@ def _unwrapped_error(ratio: ComplexArray, first: int) -> FloatArray:
 
 
 def _sample_time(system: Any) -> float | None:
-    """Return the sample time of a discrete system in s, None for a continuous one."""
+    """Return the sample time of a discrete system in s; None for a continuous one."""
     if system.dt is None or system.dt == 0:
         return None
     if system.dt is True:

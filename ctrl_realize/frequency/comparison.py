@@ -19,28 +19,28 @@ class FRFComparison(Result):
     """Comparison of a model with a measured frequency response, point by point.
 
     With ``r = model / measured``: ``gain_error_db == 20 log10 |r|``, ``phase_error_deg`` is the
-    unwrapped angle of ``r`` in degrees, and ``relative_error == |r - 1|``. A positive phase error
-    is a model that lags less than the plant. Summaries (`rms_gain_error_db` and so on) are taken
-    over the points with ``trusted``, all of which lie inside `band_hz`.
+    unwrapped angle of ``r`` in degrees, and ``relative_error == |r - 1|``. With a positive phase
+    error the model lags less than the plant. Summaries (`rms_gain_error_db` etc.) are over the
+    points with ``trusted``, all of which lie inside `band_hz`.
 
     Attributes
     ----------
     frequency_hz : ndarray, shape (K,)
     measured, model : ndarray of complex, shape (K,)
-        What was compared; a hold that was divided out of the model is out of `model`.
+        Responses that were compared; if a hold was divided out, it is removed from `model`.
     gain_error_db, phase_error_deg, relative_error : ndarray, shape (K,)
     measured_phase_deg, model_phase_deg : ndarray, shape (K,)
-        Unwrapped with the model's dead time taken out first, so right at any delay.
+        Unwrapped after removal of the model's dead time, so that it is correct at any delay.
     trusted : ndarray of bool, shape (K,)
         Points inside the band.
     band_hz : tuple of float
         Lowest and highest frequency of the trusted band.
     band_from : {"coherence", "std", "all"}
-        What the band was taken from.
+        Criterion of the band.
     coherence, std : ndarray or None
-        Those of the measurement.
+        Coherence and standard deviation of the measurement.
     hold : {"zoh", None}
-        The hold that was divided out of the model.
+        Hold that was divided out of the model.
     name : str
         Names of model and measurement.
     flags : tuple of Flag
@@ -98,13 +98,13 @@ class FRFComparison(Result):
 
     @property
     def relative_noise(self) -> float | None:
-        """Relative error that the measurement's own noise would make, rms in the band."""
+        """Relative error expected from the noise of the measurement, rms in the band."""
         if self.std is None:
             return None
         return _rms((self.std / np.abs(self.measured))[self.trusted])
 
     def table(self) -> pd.DataFrame:
-        """List all points, one a row."""
+        """List all points, one per row."""
         import pandas as pd
 
         columns: dict[str, Any] = {
@@ -166,7 +166,7 @@ class FRFComparison(Result):
 
 
 def _rms(values: FloatArray) -> float:
-    # in units of the largest, so that the squares neither overflow nor vanish
+    # relative to the largest value, so that the squares neither overflow nor underflow
     largest = float(np.abs(values).max(initial=0.0)) or 1.0
     return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
 

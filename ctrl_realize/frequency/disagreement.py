@@ -1,4 +1,4 @@
-"""Flag of a measured frequency response that contradicts a model."""
+"""Flag for a measured frequency response that contradicts a model."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from ..results import Flag
 from .comparison import FRFComparison, hertz
 
 CLOSE, FAR = 0.05, 0.2
-"""Relative errors (rms, in the trusted band) under which a model is close, over which it is off."""
+"""Relative errors (rms, in the trusted band) below which a model agrees, above which it does
+not."""
 
-_SMOOTHED_POINTS = 3  # one bad point of a response is no disagreement over a band
+_SMOOTHED_POINTS = 3  # a single bad point is not a disagreement
 
 
 def disagreement(comparison: FRFComparison) -> Flag | None:
-    """Flag of a model whose error, beyond the measurement's own noise, is not small.
+    """Flag for a model whose error exceeds the noise of the measurement.
 
-    ``"frf_differs"`` from 5 % on (rms in the trusted band), ``"frf_disagrees"`` from 20 % on.
+    ``"frf_differs"`` from 5 % (rms in the trusted band), ``"frf_disagrees"`` from 20 %.
     """
     error, noise = comparison.rms_relative_error, comparison.relative_noise or 0.0
     beyond = float(np.sqrt(max(error**2 - noise**2, 0.0)))
@@ -37,7 +38,7 @@ def disagreement(comparison: FRFComparison) -> Flag | None:
 
 
 def _worst(comparison: FRFComparison) -> str:
-    """Tell where it is off: the widest band in which it is so by more than the limit."""
+    """Name the widest band in which the error exceeds the limit."""
     inside = comparison.trusted
     hz, error = comparison.frequency_hz[inside], comparison.relative_error[inside]
     worst = int(np.argmax(error))

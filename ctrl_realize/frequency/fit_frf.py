@@ -1,4 +1,4 @@
-"""A model with free dead time from a measured frequency response."""
+"""Fit of a model with continuous dead time to a measured frequency response."""
 
 from __future__ import annotations
 
@@ -37,72 +37,72 @@ def fit_frf(
     band_hz: tuple[float, float] | None = None,
     name: str | None = None,
 ) -> DelayedStateSpace:
-    r"""Fit a stable transfer function with free dead time to a frequency response.
+    r"""Fit a stable transfer function with continuous dead time to a frequency response.
 
-    Maximum likelihood [1]_, [5]_ for :math:`e^{-s\tau} b(s) / a(s)` with noise of the measured
-    standard deviation. No initial guess is needed: for each dead time on a grid the poles come from
-    a linear problem, and the best of these starts are refined. Order and relative degree are chosen
-    by BIC where not given.
+    Maximum likelihood [1]_, [5]_ for :math:`e^{-s\tau} b(s) / a(s)`, with noise of the measured
+    standard deviation. No initial guess is needed: for each dead time on a grid the poles follow
+    from a linear problem, and the best of these starts are refined. Order and relative degree are
+    chosen by BIC if not given.
 
     Parameters
     ----------
     frf : MeasuredFRF
-        One input, one output. Any `control.FrequencyResponseData` will do.
+        One input, one output. Any `control.FrequencyResponseData`.
     order : int or sequence of int, optional
-        Number of poles, or candidates; default 1 to 4, and beyond (to 10) as long as the largest
+        Number of poles, or candidates; default 1 to 4, and more (up to 10) as long as the largest
         is the best.
     relative_degree : int or sequence of int, optional
-        Poles minus zeros, or candidates; default 1 to the order. With 0 the dead time is rounded
-        to whole samples of the model.
+        Poles minus zeros, or candidates; default 1 to the order. With 0 the dead time is rounded to
+        whole samples of the model.
     dt : float, optional
-        Sample time of the model in s; default that of the records that the FRF was estimated
-        from, or a twentieth of the shortest period measured.
+        Sample time of the model in s; default: that of the records behind the FRF, or a twentieth
+        of the shortest measured period.
     max_dead_time : float, optional
         Upper bound of the search in s; default from the slope of the measured phase. At most a
         thousand periods of the eighth frequency.
     weighting : {"auto", "std", "relative", "uniform"}
-        "std": the FRF's standard deviation. "relative": an error in proportion to the response,
-        and to what the coherence says where there is one. "uniform": the same error everywhere.
-        "auto": "std" where there is one, else "relative".
+        "std": the FRF's standard deviation. "relative": an error proportional to the response,
+        weighted by the coherence if there is one. "uniform": the same error everywhere. "auto":
+        "std" if there is one, otherwise "relative".
     hold : {"auto", "zoh", None}
-        "zoh" for an FRF that was estimated from samples of a held input: the hold, for which `dt`
-        must be that of the samples where the FRF does not know it, is divided out, and points
-        near Nyquist, where samples fold, count for less. "auto": do so where the FRF knows its
-        sample time, as one from `spectral_frf` does. None: the FRF has no hold in it.
+        "zoh": the FRF was estimated from samples of a held input. The hold is divided out (`dt`
+        must be its sample time if the FRF has none), and points near the Nyquist frequency, where
+        aliasing occurs, have less weight. "auto": do so if the FRF has a sample time, as from
+        `spectral_frf`. None: the FRF contains no hold.
     band_hz : tuple of float, optional
-        Use points in this band alone.
+        Use only points in this band.
     name : str, optional
         Name of the model.
 
     Returns
     -------
     DelayedStateSpace
-        Sampled behind a zero-order hold with the exact fractional dead time; ``.fit`` is an
-        `FRFFit` with the continuous core, the dead time with its interval, and the structures.
+        Sampled with a zero-order hold and the exact fractional dead time; ``.fit`` is an `FRFFit`
+        with the continuous core, the dead time with its interval, and the structures.
 
     Raises
     ------
     UnsuitableSystemError
         An FRF with several inputs or outputs.
     DataError
-        Too few points for the order, or a response that does not stand out of its noise.
+        Too few points for the order, or a response below its noise.
     OrderError, OptionError
-        An order, a degree or an option that makes no sense.
+        An invalid order, relative degree or option.
 
     Notes
     -----
-    The standard deviations of few repeats are themselves uncertain. With 50 points or more they
-    are smoothed over nine neighbours (geometric mean) before they weight the points.
+    Standard deviations from few repeats are themselves uncertain. With 50 points or more they are
+    smoothed over nine neighbours (geometric mean) before they weight the points.
 
-    Where the noise is not known, the deviations of the poles come from the residuals, each point
-    with its own [3]_: a noisy part of the band makes uncertain what rests on it.
+    If the noise is not known, the standard deviations of the poles are computed from the residuals
+    of the individual points [3]_: poles that depend on a noisy part of the band are more uncertain.
 
-    The flag ``"phase_leads"`` tells of an FRF whose time axis starts late.
+    The flag ``"phase_leads"`` reports an FRF whose time axis starts late.
 
-    The interval is the profile likelihood's, widened for residuals larger than the noise or
-    correlated along frequency, joined with that of the mixture of all structures, each with the
-    weight ``exp(-BIC / 2)`` [4]_: the split of the phase between dead time and lags depends on the
-    structure, which the data may not tell.
+    The interval is that of the profile likelihood, widened if residuals are larger than the noise
+    or correlated along frequency, joined with that of the mixture of all structures with weights
+    ``exp(-BIC / 2)`` [4]_: how the phase is divided between dead time and lags depends on the
+    structure, which the data may not determine.
 
     References
     ----------
@@ -136,8 +136,8 @@ def fit_frf(
     if held is not None:
         response = response / hold_response(2 * np.pi * frequency, held)
         if points.noise_known:
-            # Samples fold what lies beyond Nyquist back, which a continuous model cannot follow;
-            # of a plant that falls with 1/omega it is about this large.
+            # Aliases from beyond the Nyquist frequency, which a continuous model cannot describe,
+            # have about this size for a plant that falls with 1/omega.
             sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / held - frequency)) ** 2)
     orders = _candidates(order, "order", 1)
     degrees = _candidates(relative_degree, "relative_degree", 0)
@@ -151,7 +151,7 @@ def fit_frf(
         if max_dead_time is None
         else _searchable(positive(max_dead_time, "max_dead_time", "time in s"), omega)
     )
-    # Equal size of response and weights around 1: the optimiser's thresholds are relative.
+    # Scale response and weights to about 1: the tolerances of the optimiser are relative.
     size = float(np.sqrt(np.mean(np.abs(response) ** 2)))
     data = FRFData(
         s=np.asarray(1j * omega / unit, dtype=np.complex128),
@@ -165,7 +165,7 @@ def fit_frf(
 
 
 def _searchable(max_dead_time: float, omega: FloatArray) -> float:
-    """Refuse a bound up to which dead times cannot be told apart, counted, or told from none."""
+    """Refuse a bound with too many candidates, or with dead times that are indistinguishable."""
     most, least = longest_search(omega), 1e-15 / float(omega[-1])
     if max_dead_time > most:
         raise OptionError(
@@ -199,7 +199,7 @@ def _candidates(given: int | Sequence[int] | None, name: str, low: int) -> tuple
 def _check_structures(
     orders: tuple[int, ...] | None, degrees: tuple[int, ...] | None, n_points: int
 ) -> None:
-    """Refuse degrees above all orders, and more parameters than there are points."""
+    """Refuse relative degrees above all orders, and more parameters than points."""
     tried = orders or DEFAULT_ORDERS
     pairs = [(n, r) for n in tried for r in (degrees or range(1, n + 1)) if r <= n]
     if not pairs:

@@ -26,12 +26,12 @@ class FRFStructure:
     order, relative_degree : int
         Number of poles, and poles minus zeros.
     dead_time, std : float
-        Estimate and its standard deviation in s; infinite where this structure leaves the dead
-        time undetermined.
+        Estimate and its standard deviation in s; infinite if this structure does not determine the
+        dead time.
     cost : float
         Weighted misfit.
     bic : float
-        Bayesian information criterion; smaller is better, differences count.
+        Bayesian information criterion; smaller is better, only differences matter.
     """
 
     order: int
@@ -58,25 +58,25 @@ class FRFFit(FractionalDelayFit):
     dead_time : float
         In s, not rounded to samples.
     std_given_structure : float
-        Standard deviation of `dead_time` in s if the chosen structure is the plant's.
+        Standard deviation of `dead_time` in s for the chosen structure.
     interval : tuple of float
         95 % interval of the dead time in s.
     frequency_hz : ndarray, shape (K,)
     measured : ndarray of complex, shape (K,)
-        What was fitted; the hold of an FRF from samples was divided out.
+        Points that were fitted; the hold of a sampled FRF was divided out.
     sigma : ndarray, shape (K,)
-        Standard deviation that weighted each point; where the FRF had none, a relative one.
+        Standard deviation used as weight of each point; a relative one if the FRF had none.
     noise_known : bool
         Whether `sigma` is the measured standard deviation.
     weighted_rms : float
-        Size of the residuals in units of `sigma`; 1 is a fit down to the noise if it is known.
+        Residuals in units of `sigma`; 1 is at noise level if the noise is known.
     matrices : tuple of ndarray
         A, B, C, D of the continuous core.
     poles : ndarray of complex, shape (order,)
         Poles of the core in rad/s, slow ones first.
     pole_std : ndarray, shape (order,)
-        Root mean square error of each pole within the structure, in rad/s. Where the noise is
-        not known it comes from the residuals, each point with its own.
+        Standard error of each pole for the chosen structure, in rad/s. If the noise is not known it
+        is computed from the residuals of the individual points.
     structures : tuple of FRFStructure
         All that were tried, best first.
     name : str
@@ -84,7 +84,7 @@ class FRFFit(FractionalDelayFit):
     dt : float
         Sample time of the model, in s.
     hold_time : float or None
-        Sample time in s of the hold that was divided out of `measured`; None where none was.
+        Sample time in s of the hold that was divided out of `measured`; None if there was none.
     flags : tuple of Flag
     choices : tuple of str
 

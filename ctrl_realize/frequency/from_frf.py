@@ -1,4 +1,4 @@
-"""A unit-pulse response from a measured frequency response."""
+"""Unit-pulse response from a measured frequency response."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from ..results import Flag
 from .points import FRFPoints, frf_points, held_every, same_time
 
 _BLOCK = 256
-"""Points whose rows are in memory at once."""
+"""Number of points whose rows are in memory at the same time."""
 _STILL_ALIVE = 0.02
-"""Of the largest response, at the highest frequency."""
+"""Relative to the largest response, at the highest frequency."""
 _TAIL = 0.05
-"""Of the largest Markov parameter, in the last tenth."""
+"""Relative to the largest Markov parameter, in the last tenth."""
 _UNEXPLAINED = 0.02
-"""Of the power of the response."""
+"""Fraction of the power of the response."""
 _LEAST_NOISE = 1e-3
-"""No FRF is taken to be more exact: hold and aliases are not, and a prior that may trust them
-fully fills the frequencies between the points with anything."""
+"""Least relative error of an FRF: hold and aliases are approximate, and with smaller errors the
+prior would leave the frequencies between the points undetermined."""
 
 
 @single_threaded
@@ -42,12 +42,12 @@ def impulse_from_frf(
     hold: Literal["auto", "zoh"] | None = "auto",
     band_hz: tuple[float, float] | None = None,
 ) -> ImpulseEstimate:
-    r"""Estimate the unit-pulse response that explains a frequency response.
+    r"""Estimate the unit-pulse response that belongs to a frequency response.
 
-    Regularised least squares: the Markov parameters whose transform is nearest to the measured
-    points, under a prior of decay (and smoothness) whose parameters maximise the marginal
-    likelihood. Frequencies may lie anywhere: no interpolation to a uniform grid and no inverse
-    FFT is involved, so nothing wraps around and nothing rings.
+    Regularised least squares: the Markov parameters whose transform is closest to the measured
+    points, with a prior of decay (and smoothness) whose parameters maximise the marginal
+    likelihood. The frequencies need not be uniform: there is no interpolation and no inverse FFT,
+    and therefore no circular wrap-around and no ringing.
 
     Parameters
     ----------
@@ -56,22 +56,22 @@ def impulse_from_frf(
     dt : float
         Sample time of the response in s.
     length : int
-        Number of Markov parameters; the response must have died away within it.
+        Number of Markov parameters; the response must have decayed within it.
     kernel : {"TC", "DC", "SS"}
         Prior; "SS" is smooth, "TC" allows a jump at lag 0 (see `impulse_from_io`).
     weighting : {"auto", "std", "relative", "uniform"}
-        As for `fit_frf`, but "auto" is "std" where there is one, else "uniform".
+        As for `fit_frf`, but "auto" is "std" if there is one, otherwise "uniform".
     hold : {"auto", "zoh", None}
-        None: the FRF is that of the plant itself, and the hold of a step-invariant model is put
-        in. "zoh": it was estimated from samples of a held input and has the hold in it. "auto":
-        the latter where the FRF knows its sample time, as one from `spectral_frf` does.
+        None: the FRF is that of the plant itself, and the hold of a step-invariant model is added.
+        "zoh": it was estimated from samples of a held input and contains the hold. "auto": the
+        latter if the FRF has a sample time, as from `spectral_frf`.
     band_hz : tuple of float, optional
-        Use points in this band alone.
+        Use only points in this band.
 
     Returns
     -------
     ImpulseEstimate
-        Step-invariant; goes into `realize` and `estimate_delay`, with `std` beside.
+        Step-invariant, with `std`; for `realize` and `estimate_delay`.
 
     Raises
     ------
@@ -80,17 +80,17 @@ def impulse_from_frf(
     UnsuitableSystemError
         An FRF with several inputs or outputs.
     OptionError
-        Options that make no sense.
+        Invalid options.
 
     Notes
     -----
-    The data say nothing about frequencies outside of their band; there the prior speaks. Two
-    flags tell when that matters: ``"ends_early"`` when the response is still alive at the highest
-    frequency (the pulse response is then smoother than the plant's, and features shorter than
-    half a period of that frequency are not in it), and ``"starts_late"`` when the lowest
-    frequency is above that of one period in `length` (gain and slow modes are then
-    extrapolated). ``"cut_off"`` and ``"unexplained"`` tell that `length` is too short, the latter
-    also that the data are noisy. `fit_frf` needs no such care where a model of low order will do.
+    Outside of the measured band the estimate is determined by the prior alone. Two flags report
+    when this matters: ``"ends_early"`` if the response is still significant at the highest
+    frequency (the pulse response is then smoother than that of the plant, without features shorter
+    than half a period of that frequency), and ``"starts_late"`` if the lowest frequency is above
+    one period in `length` (gain and slow modes are then extrapolated). ``"cut_off"`` and
+    ``"unexplained"`` report that `length` is too short, the latter also that the data are noisy. If
+    a model of low order is sufficient, `fit_frf` is easier to use.
 
     Prior and tuning are those of [1]_, for data in the frequency domain as in [2]_.
 
@@ -129,13 +129,13 @@ def impulse_from_frf(
     elif held is None:
         response = response * hold_response(omega, step)
         if points.noise_known:
-            # What the plant still answers beyond Nyquist comes back as an alias that no hold
-            # knows; of a plant that falls with 1/omega it is about this large.
+            # Aliases from beyond the Nyquist frequency, which the hold does not describe, have
+            # about this size for a plant that falls with 1/omega.
             image = omega / (2 * np.pi / step - omega)
             sigma = np.hypot(sigma, np.abs(response) * image**2)
     if 2 * omega.size < 16:
         raise DataError(f"{omega.size} points are too few for a pulse response; 8 are needed")
-    # In a unit near the response's own; a power of two, so that nothing is rounded.
+    # Scaled by a power of two near the size of the response, so that nothing is rounded.
     unit = 2.0 ** round(float(np.log2(np.median(np.abs(response)))))
     equations = _equations(omega * step, response / unit, unit / sigma, count)
     fit = fit_kernel(equations, count, kernel)
@@ -158,7 +158,7 @@ def _equations(
     """Sum the normal equations of ``response = sum_k markov[k] exp(-1j angle k)``."""
     lags = np.arange(count)
     gram, cross = np.zeros((count, count)), np.zeros((count, 1))
-    # Blocks of points: memory stays with the block.
+    # Blocks of points, to limit the memory.
     for first in range(0, angle.size, _BLOCK):
         part = slice(first, first + _BLOCK)
         turned = weight[part, None] * np.exp(-1j * angle[part, None] * lags)
@@ -173,7 +173,7 @@ def _equations(
 def _flags(
     points: FRFPoints, response: ComplexArray, markov: FloatArray, dt: float, variance: float
 ) -> tuple[Flag, ...]:
-    """Say where the estimate stands on little; `variance` is a row's, as a share of the power."""
+    """Flag estimates with little support in the data; `variance` is relative to the power."""
     flags = []
     unexplained = variance * 2 * response.size
     if unexplained > _UNEXPLAINED:

@@ -1,4 +1,4 @@
-"""A frequency response from whole periods of a periodic input."""
+"""Frequency response from whole periods of a periodic input."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from ..numerics.rational.spectra import PeriodStatistics, period_statistics
 from .spectral_estimate import Estimate, Stream
 
 _MIN_LINE_POWER = 1e-4
-"""Of the strongest line."""
+"""Relative to the strongest line."""
 _MIN_LINE_TO_NOISE = 10.0
-"""Power of a line over the variance of its mean."""
+"""Least power of a line relative to the variance of its mean."""
 
 
 def from_periods(stream: Stream, period: int, skip: int) -> tuple[Estimate, float]:
@@ -24,7 +24,7 @@ def from_periods(stream: Stream, period: int, skip: int) -> tuple[Estimate, floa
     response = Y / U
     relative = var_y / np.abs(Y) ** 2 + var_u / np.abs(U) ** 2 - 2 * (cov / (Y * U.conj())).real
     std = np.abs(response) * np.sqrt(np.maximum(relative, 0.0) / count)
-    # Sums over the periods from means and scatter: sum |U|^2 = P |mean|^2 + (P - 1) var.
+    # Sums over the periods from means and variance: sum |U|^2 = P |mean|^2 + (P - 1) var.
     share = (count - 1) / count
     uu, yy = np.abs(U) ** 2 + share * var_u, np.abs(Y) ** 2 + share * var_y
     coherence = np.minimum(np.abs(Y * U.conj() + share * cov) ** 2 / (uu * yy), 1.0)
@@ -33,7 +33,7 @@ def from_periods(stream: Stream, period: int, skip: int) -> tuple[Estimate, floa
 
 
 def _statistics(stream: Stream, period: int, skip: int) -> tuple[PeriodStatistics, float]:
-    """Take means and scatter over all whole periods; also the sample time."""
+    """Mean and variance over all whole periods; also the sample time."""
     inputs, outputs, dt, n_skipped = [], [], 0.0, 0
     for inputs_now, outputs_now, sample_time in stream:
         if (len(inputs_now), len(outputs_now)) != (1, 1):

@@ -1,4 +1,4 @@
-"""Points of a frequency response: values, deviations, and the hold of a sampled input."""
+"""Points of a frequency response: values, standard deviations, and the hold of a sampled input."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.constants import SMALLEST
 
 _SMOOTHED_POINTS = 9
-"""Neighbours over which standard deviations are smoothed; odd."""
+"""Number of neighbours over which standard deviations are smoothed; odd."""
 _MANY_POINTS = 50
-"""Points from which on they are."""
+"""Least number of points for smoothing."""
 _SIGNIFICANT = 6.0
-"""Mean power over that of noise, in ``1 / sqrt(points)``, from which there is a signal."""
+"""Least ratio of mean power to that of noise, in ``1 / sqrt(points)``, for a significant signal."""
 _WIDEST = 1e15
 """Largest ratio of two frequencies."""
 
 
 @dataclass(frozen=True, eq=False)
 class FRFPoints:
-    """Rising frequencies, responses, and standard deviations up to a factor.
+    """Increasing frequencies, responses, and standard deviations up to a factor.
 
     `noise_known` says that `sigma` is the measured standard deviation itself.
     """
@@ -47,9 +47,9 @@ def frf_points(
     frf : control.FrequencyResponseData
     weighting : {"auto", "std", "relative", "uniform"}
     band_hz : tuple of float or None
-        Ends of the band, both inside.
+        Ends of the band, included.
     below_hz : float
-        Points from here on are left out.
+        Frequency from which on points are left out.
     """
     points = measured_points(frf)
     weighting = one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
@@ -79,7 +79,7 @@ def frf_points(
 
 
 def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
-    """Refuse points that are nothing but noise, as those of an input that does not excite."""
+    """Refuse points that are only noise, as those of an input without excitation."""
     power = float(np.mean(np.abs(response / sigma) ** 2))
     if power < 1 + _SIGNIFICANT / np.sqrt(response.size):
         raise DataError(
@@ -92,9 +92,9 @@ def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
 def _sigma(
     response: ComplexArray, std: FloatArray | None, coherence: FloatArray | None, weighting: str
 ) -> tuple[FloatArray, bool]:
-    """Return the standard deviation of each point and whether it was measured."""
+    """Return the standard deviation of each point, and whether it was measured."""
     if weighting in ("auto", "std") and std is not None and np.any(std > 0):
-        # nothing is measured to the last digits
+        # no measurement is accurate to the last digits
         least = max(1e-3 * float(np.median(std[std > 0])), 1e-14 * float(np.abs(response).max()))
         return _smoothed(np.maximum(std, least)), True
     if weighting == "std":
@@ -110,7 +110,7 @@ def _sigma(
 
 
 def _smoothed(std: FloatArray) -> FloatArray:
-    """Smooth uncertain standard deviations along frequency where there are many points."""
+    """Smooth uncertain standard deviations along frequency if there are many points."""
     if std.size < _MANY_POINTS:
         return std
     half = _SMOOTHED_POINTS // 2
@@ -121,14 +121,14 @@ def _smoothed(std: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoints:
-    """Frequencies and what was measured there; all arrays have shape (K,)."""
+    """Frequencies and measured values; all arrays have shape (K,)."""
 
     frequency_hz: FloatArray
     response: ComplexArray
     coherence: FloatArray | None
     std: FloatArray | None
     repeats: float | None = None
-    """From whose scatter `std` was taken; None where it counts as known."""
+    """Number of repeats behind `std`; None if it counts as known."""
 
     @property
     def omega(self) -> FloatArray:
@@ -136,7 +136,7 @@ class MeasuredPoints:
         return 2 * np.pi * self.frequency_hz
 
     def only(self, kept: BoolArray) -> MeasuredPoints:
-        """Keep the points that are marked."""
+        """Select the marked points."""
         return MeasuredPoints(
             self.frequency_hz[kept],
             self.response[kept],
@@ -147,7 +147,7 @@ class MeasuredPoints:
 
 
 def measured_points(frf: Any) -> MeasuredPoints:
-    """Take the points of an FRF of one channel, with coherence and std where it has some."""
+    """Return the points of a single-channel FRF, with coherence and std if there are any."""
     if not isinstance(frf, ct.FrequencyResponseData):
         raise UnsuitableSystemError(
             f"frf is a {type(frf).__name__}; expected a MeasuredFRF or a control FRD"
@@ -178,23 +178,23 @@ def check_single_channel(system: Any, what: str) -> None:
 
 
 SAME = 1e-6
-"""Relative difference up to which two sample times are one."""
+"""Relative difference up to which two sample times count as equal."""
 
 
 def sampled_every(frf: Any) -> float | None:
-    """Sample time of the records that a response was estimated from, in s; None if not known."""
+    """Sample time of the records behind a response, in s; None if not known."""
     return frf.sample_time if isinstance(frf, MeasuredFRF) else None
 
 
 def held_every(frf: Any, hold: str | None, dt: float | None) -> float | None:
-    """Sample time in s of the hold that a response has in it; None for none.
+    """Sample time in s of the hold that a response contains; None if there is none.
 
     Parameters
     ----------
     frf : control.FrequencyResponseData
     hold : {"auto", "zoh", None}
     dt : float or None
-        Sample time of the hold where `frf` does not tell it.
+        Sample time of the hold if `frf` has none.
     """
     if hold is None:
         return None
@@ -206,5 +206,5 @@ def held_every(frf: Any, hold: str | None, dt: float | None) -> float | None:
 
 
 def same_time(one: float, other: float) -> bool:
-    """Tell whether two sample times are one."""
+    """Whether two sample times are equal."""
     return abs(one - other) <= SAME * other

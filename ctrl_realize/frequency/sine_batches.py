@@ -1,4 +1,4 @@
-"""Sines fitted to many records at once, where each has settled."""
+"""Fit of sines to many records at once, after their transients."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ..numerics.arrays import FloatArray
 from ..numerics.rational.sines import SineFit, fit_sines
 
 LEAST_SAMPLES = 8
-"""Samples that a sine with offset and drift needs."""
+"""Least number of samples for a sine with offset and drift."""
 _BATCH_SAMPLES = 300_000
-"""Samples in a batch: what a record needs beside it fits into memory."""
+"""Number of samples in a batch, which fits into memory."""
 _STEADY_RATIO = 1.5
-"""Misfit of a block over the largest of the late ones, from which the record still settles."""
+"""Misfit of a block, relative to the largest of the late ones, above which there is a transient."""
 _BLOCKS = 32
-"""Pieces of a record whose misfits are compared."""
+"""Number of blocks of a record whose misfits are compared."""
 _MIN_PERIODS = 0.9
 _BESIDE = (0.75, 4.5)
-"""Bins of the spectrum beside a line that tell the noise at its frequency; the line and what the
-fit took out with it lie nearer."""
+"""Bins of the spectrum beside a line from which the noise at its frequency is estimated; the
+nearest ones are affected by the line and the fit."""
 
 
 def batches(flat: Sequence[Record]) -> list[list[int]]:
-    """Group records of one length and sample time, in pieces that fit into memory."""
+    """Group records of equal length and sample time, in batches that fit into memory."""
     groups: dict[tuple[int, float], list[int]] = {}
     for index, record in enumerate(flat):
         groups.setdefault((record.n_samples, record.dt), []).append(index)
@@ -45,7 +45,7 @@ def fit_batch(
     free_frequency: bool,
     drift: bool,
 ) -> SineFit:
-    """Fit records of one length: once where it is settled for sure, then where it really is."""
+    """Fit records of equal length: first their last half, then from the end of the transient on."""
     time, signals = _time_and_signals(records)
     n_samples, dt = time.size, records[0].dt
     if settle is None:
@@ -74,26 +74,26 @@ def fit_batch(
 
 
 def _time_and_signals(records: Sequence[Record]) -> tuple[FloatArray, FloatArray]:
-    """Stack records of one length: time (N,), input and output (B, 2, N)."""
+    """Stack records of equal length: time (N,), input and output (B, 2, N)."""
     time = records[0].dt * np.arange(records[0].n_samples, dtype=np.float64)
     return time, np.stack([[record.input, record.output] for record in records])
 
 
 def _left(time: FloatArray, signals: FloatArray, fit: SineFit) -> FloatArray:
-    """Take the fitted sine, offset and drift out of the signals."""
+    """Subtract the fitted sine, offset and drift from the signals."""
     turning = np.exp(1j * fit.omega[:, None] * time)
     model = (fit.phasor[..., None] * turning[:, None]).real
     return np.asarray(signals - model - fit.offset[..., None] - fit.slope[..., None] * time)
 
 
 def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
-    """Mark the samples from where on the late half's sine explains the record."""
+    """Mark the samples from which on the sine fitted to the late half describes the record."""
     n_samples = time.size
     edges = np.linspace(0, n_samples, min(_BLOCKS, n_samples // 4) + 1).astype(int)
     left = _left(time, signals, late)
     squares = np.add.reduceat(left**2, edges[:-1], axis=2) / np.diff(edges)
     half = squares.shape[2] // 2
-    # Rounding is a misfit, too: without noise nothing but the exact sine would be steady.
+    # Rounding counts as misfit, too: otherwise noise-free data would never be steady.
     floor = (1e-6 * np.abs(late.phasor[..., None])) ** 2
     # The largest of the late blocks, and more: an early one may be as large by chance.
     late_most = squares[..., half:].max(axis=2, keepdims=True)
@@ -101,8 +101,8 @@ def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
     moving = np.any(squares > bound, axis=1)
     moving[:, half:] = False
     settled = np.where(moving.any(axis=1), half - np.argmax(moving[:, half - 1 :: -1], 1), 0)
-    # By then a transient has sunk to the noise; left in, it would still be a bias common to all
-    # repeats. What decays exponentially is gone after the same time once more.
+    # By then a transient has decayed to the noise level; it would still cause a bias common to all
+    # repeats. An exponential has vanished after the same time once more.
     start = edges[np.minimum(2 * settled + 1, half)]
     return np.asarray((np.arange(n_samples) >= start[:, None]) * 1.0)
 
@@ -110,17 +110,17 @@ def _steady(time: FloatArray, signals: FloatArray, late: SineFit) -> FloatArray:
 def misfit_beside_line(
     records: Sequence[Record], fit: SineFit
 ) -> tuple[FloatArray, NDArray[np.int_]]:
-    """Return how much stronger the misfit is beside the line than on average; at least 1.
+    """Ratio of the misfit's spectrum beside the line to its mean; at least 1.
 
-    The covariance of the fit takes the misfit for white, which a sine in slow noise feels most.
-    Where the noise is weaker there than elsewhere, eight bins are too few to say so.
+    The covariance of the fit assumes white noise, which underestimates slow noise for a sine. If
+    the noise is weaker there than elsewhere, eight bins are too few to detect it.
 
     Returns
     -------
     stronger : ndarray, shape (B, 2)
         For input and output of each record.
     count : ndarray, shape (B,)
-        Bins that tell it.
+        Number of bins behind it.
     """
     time, signals = _time_and_signals(records)
     late = _left(time, signals, fit)[..., time.size // 2 :]

@@ -1,4 +1,4 @@
-"""A frequency response from records of noise, operating data or periodic signals."""
+"""Frequency response from records of noise, operating data or periodic signals."""
 
 from __future__ import annotations
 
@@ -30,77 +30,76 @@ def spectral_frf(
 ) -> MeasuredFRF:
     r"""Estimate a frequency response from input and output spectra.
 
-    Without `period`: Welch's method, the averaged spectra of overlapping windowed segments.
-    With `period`: the mean over whole periods of a periodic input (multisine), which has no
-    leakage, at the lines that the input excites.
+    Without `period`: Welch's method, averaged spectra of overlapping windowed segments. With
+    `period`: the mean over whole periods of a periodic input (multisine), which has no leakage, at
+    the lines that the input excites.
 
     Parameters
     ----------
     records : Record or iterable of Record
-        Any number of inputs and outputs (with `method` "H1"). An iterable is gone through once
-        and never held in memory, so it may be a generator that reads a long file piece by piece.
-        No segment reaches from one record into the next.
+        Any number of inputs and outputs (with `method` "H1"). An iterable is read once and never
+        held in memory, so it may be a generator that reads a long file piece by piece. No segment
+        crosses the boundary of a record.
     method : {"H1", "H2", "Hv"}
-        "H1" is for noise on the output, "H2" for noise on the input, "Hv" is their geometric
-        mean. For periodic records all three are the ratio of the mean spectra.
+        "H1" for noise on the output, "H2" for noise on the input, "Hv" is their geometric mean. For
+        periodic records all three are the ratio of the mean spectra.
     segment : int, optional
-        Samples in a segment; default a power of two, about an eighth of the first record, at
-        most 8192.
+        Samples per segment; default: a power of two, about an eighth of the first record, at most
+        8192.
     window : str or tuple, default "hann"
-        Any window that `scipy.signal.get_window` knows.
+        Any window of `scipy.signal.get_window`.
     overlap : float, default 0.5
-        Part of a segment that the next one shares, in 0...0.95.
+        Overlap of neighbouring segments, 0...0.95.
     delay : int, default 0
-        Dead time in samples that is known beforehand. The output is shifted by it before the
-        segments are cut and the phase is put back afterwards: the segments of input and output
-        then belong together, and the estimate loses its bias of ``delay / segment``.
+        Known dead time in samples. The output is shifted by it before the segments are cut, and the
+        phase is corrected afterwards: the segments of input and output then correspond, and the
+        estimate has no bias of ``delay / segment``.
     period : int, optional
-        Samples in a period of the input.
+        Samples per period of the input.
     skip_periods : int, default 1
-        Periods to leave out at the start of each record, where the transient is.
+        Periods to leave out at the start of each record, because of the transient.
     name : str, default "measured"
         Name of the result in plots.
 
     Returns
     -------
     MeasuredFRF
-        With coherence and the standard deviation of the complex response, which the scatter of
-        `repeats` periods or independent segments tells (`MeasuredFRF.circle`). With several
-        channels, shape (outputs, inputs, K); the coherence is then the multiple coherence of
-        each output, the same for all its inputs.
+        With coherence and the standard deviation of the complex response, estimated from `repeats`
+        periods or independent segments (`MeasuredFRF.circle`). With several channels, shape
+        (outputs, inputs, K); the coherence is then the multiple coherence of each output, the same
+        for all its inputs.
 
     Raises
     ------
     DataError
         Records too short for two segments or periods, of different sample time or channels, or
-        inputs that do not excite, or not independently.
+        inputs that do not excite the plant or are not independent.
     OptionError
-        Options that make no sense.
+        Invalid options.
 
     Notes
     -----
-    H1, H2 and Hv are compared in [4]_. The coherence is
-    :math:`\gamma^2 = |S_{yu}|^2 / (S_{uu} S_{yy})`. The variance of the complex response is
-    :math:`|H|^2 (1 - \gamma^2) / (\gamma^2 (K - 1))` with K independent segments [3]_: the number
-    of segments, reduced for what overlapping ones share [2]_. For periods it comes from their
-    scatter [1]_.
+    H1, H2 and Hv are compared in [4]_. The coherence is :math:`\gamma^2 = |S_{yu}|^2 / (S_{uu}
+    S_{yy})`. The variance of the complex response is :math:`|H|^2 (1 - \gamma^2) / (\gamma^2 (K -
+    1))` with K independent segments [3]_: the number of segments, reduced for their overlap [2]_.
+    For periods it is estimated from their scatter [1]_.
 
-    That scatter is of what differs from period to period. What comes again in each of them it
-    does not tell: what a plant that is not linear adds to a multisine, and the rounding of a
-    converter without noise. Of a sensor with a quadratic term of a tenth the circles of 95 %
-    held the linear response at one point of five.
+    This scatter contains only what differs from period to period, not errors that repeat: the
+    nonlinear distortions of a plant for a multisine, and the rounding of a converter without noise.
+    For a sensor with a quadratic term of a tenth the 95 % circles contained the linear response at
+    one point of five.
 
-    A file that does not fit into memory is gone through piece by piece::
+    A file that does not fit into memory can be read piece by piece::
 
         n, t = 2**20, dt * np.arange(2**20)
         u, y = (np.memmap(name, dtype="f4", mode="r") for name in ("u.bin", "y.bin"))
         pieces = (cr.Record(t, u[k : k + n], y[k : k + n]) for k in range(0, u.size - n + 1, n))
         frf = cr.spectral_frf(pieces, segment=8192)
 
-    An input that is held between the samples makes this the response of the *sampled* plant,
-    which has the hold in it. The result knows its `sample_time`, and `fit_frf`, `compare_frf` and
-    `impulse_from_frf` take it that the input was held. Where it was not (a record of analog
-    signals behind filters, with nothing beyond the Nyquist frequency), give them ``hold=None``.
+    If the input is held between the samples, this is the response of the *sampled* plant, which
+    includes the hold. The result has a `sample_time`, from which `fit_frf`, `compare_frf` and
+    `impulse_from_frf` conclude that the input was held. If it was not (a record of analog signals
+    with anti-aliasing filters), give them ``hold=None``.
 
     References
     ----------
@@ -152,7 +151,7 @@ def spectral_frf(
 
 
 def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:
-    """Yield input, output (moved earlier by `delay`) and sample time of each record."""
+    """Yield input, output (advanced by `delay`) and sample time of each record."""
     first_dt, channels = None, None
     for record in as_records(records):
         check_complete(record, "spectral_frf")

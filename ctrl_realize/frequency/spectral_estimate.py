@@ -1,4 +1,4 @@
-"""What an estimate from spectra takes and gives."""
+"""Arguments and result of an estimate from spectra."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Stream: TypeAlias = Iterator[tuple[FloatArray, FloatArray, float]]
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A frequency response as estimated, at rising frequencies.
+    """Estimated frequency response, at increasing frequencies.
 
     ``response``, ``coherence`` and ``std`` have the shape (K,), or (p, m, K) with several channels;
-    ``std`` comes from the scatter of ``repeats``.
+    ``std`` is estimated from ``repeats``.
     """
 
     frequency_hz: FloatArray

@@ -1,4 +1,4 @@
-"""A frequency response from records of sines, one frequency after the other."""
+"""Frequency response from records of sines, one frequency after the other."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .sine_batches import LEAST_SAMPLES, batches, fit_batch, misfit_beside_line
 Sweep: TypeAlias = Sequence[Record] | Sequence[Sequence[Record]]
 
 _ENOUGH = 3
-"""Repeats from which on their scatter tells the standard deviation."""
+"""Least number of repeats for estimating the standard deviation from them."""
 
 
 def stepped_sine_frf(
@@ -32,59 +32,58 @@ def stepped_sine_frf(
 ) -> MeasuredFRF:
     r"""Estimate a frequency response from a stepped-sine measurement.
 
-    In each record one sine with offset is fitted to input and output by least squares, at one
-    frequency that both share and that is estimated as well. The response is the ratio of their
-    phasors. Repeats of a frequency are averaged.
+    In each record a sine with offset is fitted to input and output by least squares, with a common
+    frequency that is estimated as well. The response is the ratio of their phasors. Repeats of a
+    frequency are averaged.
 
     Parameters
     ----------
     records : sequence of Record, or sequence of sequences of Record
-        One record for each frequency, or for each frequency its repeats. Frequencies in any
-        order; sample times and lengths may differ from record to record.
+        One record for each frequency, or for each frequency its repeats. The frequencies may have
+        any order; sample times and lengths may differ.
     frequency_hz : sequence of float, optional
-        Frequency of each point in Hz, where the sines were generated. The start of the fit, or
-        with ``free_frequency=False`` the truth. By default the strongest line of the input.
+        Frequency of each point in Hz, if known from the generator: the initial value of the fit, or
+        the exact value with ``free_frequency=False``. Default: the strongest line of the input.
     settle : float, optional
-        Time in s to leave out at the start of each record. By default it is found: twice the
-        time after which the misfit of the sine stays at the level of the last half; at most half
-        of the record.
+        Time in s to leave out at the start of each record. Default: twice the time after which the
+        misfit of the sine remains at the level of the last half; at most half of the record.
     free_frequency : bool, default True
         Estimate the frequency of each record.
     drift : bool, default False
-        Fit a straight line, too, not just an offset.
+        Fit a linear drift in addition to the offset.
     name : str, default "measured"
         Name of the result in plots.
 
     Returns
     -------
     MeasuredFRF
-        At the frequencies as measured (mean over the repeats), sorted. `std` is that of the
-        averaged complex response: from the scatter of the repeats where there are at least
-        three, from the misfit of the sines otherwise, as strong as it is beside their frequency.
-        `repeats` is the smallest number of values that told it at a point, repeats or bins of the
-        misfit's spectrum: where they are few 1.96 `std` hold less than 95 %,
-        `MeasuredFRF.circle` holds them. The rounding of a converter without noise comes again in
-        every repeat, and is in no scatter.
+        At the measured frequencies (mean over the repeats), sorted. `std` is that of the averaged
+        complex response: from the scatter of the repeats if there are at least three, otherwise
+        from the misfit of the sines beside their frequency. `repeats` is the smallest number of
+        values behind it at any point, repeats or bins of the misfit's spectrum: if they are few,
+        intervals of 1.96 `std` contain less than 95 %, but those of `MeasuredFRF.circle` do. The
+        rounding of a converter without noise is the same in every repeat, and is not part of the
+        scatter.
 
     Raises
     ------
     DataError
         No records, records with several signals, too short for a sine, or an input without one.
     OptionError
-        As many frequencies as points are needed.
+        The number of frequencies is not that of the points.
 
     Notes
     -----
-    The coherence is that of all samples kept at one frequency,
+    The coherence is that of all samples used at one frequency,
 
     .. math:: \gamma^2 = \frac{|\sum_i Y_i \bar{U}_i|^2}
               {4 \sum_i P_{u,i} \; \sum_i P_{y,i}},
 
     with the phasors :math:`U_i, Y_i` of repeat *i* and the power :math:`P` of sine and misfit.
-    It is the part of the output's power that is a sine and repeats: 1 for
-    a perfect linear plant, and ``1 / (1 + noise power / sine power)`` with noise on the output.
+    It is the fraction of the output's power that is a repeatable sine: 1 for a noise-free linear
+    plant, and ``1 / (1 + noise power / sine power)`` with noise on the output.
 
-    The sine with a free frequency is the four-parameter fit of [1]_; averaging over repeats as in
+    The sine with a free frequency is the four-parameter fit of [1]_; averaging over repeats follows
     [2]_.
 
     References
@@ -119,7 +118,8 @@ def stepped_sine_frf(
         fit = fit_batch(members, starts[batch], settle, free_frequency, drift)
         omega[batch], phasors[batch] = fit.omega, fit.phasor
         power[batch] = 0.5 * np.abs(fit.phasor) ** 2 + fit.noise_variance
-        # Total variance of a phasor is the trace; that of a ratio adds the relative ones.
+        # The total variance of a phasor is the trace; that of a ratio is the sum of the relative
+        # ones.
         variance = np.trace(fit.phasor_covariance, axis1=2, axis2=3)
         stronger, bins[batch] = misfit_beside_line(members, fit)
         variance = variance * stronger
@@ -154,7 +154,7 @@ def _as_points(records: Sweep) -> list[list[Record]]:
 def _start_frequencies(
     points: list[list[Record]], flat: list[Record], frequency_hz: Sequence[float] | None
 ) -> FloatArray:
-    """Give every record a frequency to start from, in rad/s."""
+    """Return an initial frequency for every record, in rad/s."""
     if frequency_hz is None:
         return _strongest_lines(flat)
     given = numbers(frequency_hz, "frequency_hz")
@@ -172,9 +172,9 @@ def _strongest_lines(flat: list[Record]) -> FloatArray:
     for batch in batches(flat):
         inputs = np.stack([np.asarray(flat[i].input).ravel() for i in batch])
         dt, half = flat[batch[0]].dt, inputs.shape[1] // 2
-        # The second half: a transient of the input, if any, is over.
+        # The second half: a transient of the input has decayed.
         late = dominant_frequency(inputs[:, half:], dt)
-        # Fewer than three periods in the half record: the whole one knows better.
+        # With fewer than three periods in half of the record, the whole record is used.
         few = late * dt * inputs.shape[1] < 12 * np.pi
         starts[batch] = np.where(few, dominant_frequency(inputs, dt), late)
     return starts
@@ -201,7 +201,7 @@ def _averaged(
         if np.any(np.abs(u) == 0):
             raise DataError(f"the input of {point[0]!r} has no sine in it")
         values = y / u
-        # H1 over the repeats: the strong ones count more, and coherence belongs to it.
+        # H1 over the repeats: strong ones have more weight, and the coherence is defined for it.
         response[k] = (y @ u.conj()) / (u @ u.conj()).real
         frequency[k] = omega[these].mean() / (2 * np.pi)
         total = 4 * power[these, 0].sum() * power[these, 1].sum()
@@ -211,7 +211,7 @@ def _averaged(
             told[k] = len(point)
         else:
             variance = np.mean(np.abs(values) ** 2 * relative_variance[these]) / len(point)
-            # No mean is taken off: as many values as bins are worth one repeat more.
+            # No mean is subtracted: the number of bins corresponds to one repeat more.
             told[k] = 1 + bins[these].sum()
         std[k] = np.sqrt(variance)
     return MeasuredFRF(

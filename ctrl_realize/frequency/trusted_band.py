@@ -1,4 +1,4 @@
-"""Where a measured frequency response can be trusted."""
+"""Band in which a measured frequency response can be trusted."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def trusted_points(
     min_coherence: float | None,
     band_hz: tuple[float, float] | None,
 ) -> tuple[BoolArray, Source]:
-    """Mark the points of the trusted band, and say what it was taken from."""
+    """Mark the points of the trusted band, and name its criterion."""
     if min_coherence is not None:
         if not 0 <= real(min_coherence, "min_coherence", "value in 0...1") <= 1:
             raise OptionError(f"min_coherence={min_coherence!r}; expected a value in 0...1")
@@ -60,7 +60,7 @@ def _inside(points: MeasuredPoints, band_hz: tuple[float, float]) -> BoolArray:
 
 
 def _widest(points: MeasuredPoints, good: BoolArray, missing: str) -> BoolArray:
-    """Return the widest stretch of good points; `missing` says what there is none of."""
+    """Return the widest band of good points; `missing` is for the message if there is none."""
     if not good.any():
         raise DataError(f"there is no trusted band: {missing}, or pass band_hz=(low, high)")
     return widest_run(good, points.frequency_hz)

@@ -1,4 +1,4 @@
-"""A frequency response from the spectra of overlapping segments."""
+"""Frequency response from the spectra of overlapping segments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .spectral_estimate import Estimate, Stream
 
 _LONGEST_DEFAULT_SEGMENT = 8192
 _INDEPENDENT = 1e-6
-"""Smallest eigenvalue of the inputs' coherence matrix at which their shares can be told apart."""
+"""Least eigenvalue of the coherence matrix of the inputs for which they are distinguishable."""
 
 
 def from_segments(
@@ -44,7 +44,7 @@ def from_segments(
             f"segments of {taps.size}; expected at least two: give a shorter segment"
         )
     frequency = np.asarray(np.fft.rfftfreq(taps.size, dt), dtype=np.float64)
-    # Zero was removed with the mean; the last line is the Nyquist frequency.
+    # Zero frequency was removed with the mean; the last line is the Nyquist frequency.
     lines = slice(1, (taps.size + 1) // 2)
     averages = independent_segments(taps, hop, sums.count)
     several = sums.yu.shape[:2] != (1, 1)
@@ -88,7 +88,7 @@ def _many_channels(
         )
     power = np.einsum("fii->fi", uu).real
     excited = np.all(power > np.finfo(float).eps ** 2 * power.max(), axis=1)
-    # Inputs that move together cannot be told apart: their matrix is singular.
+    # Fully correlated inputs cannot be distinguished: their matrix is singular.
     scaled = uu / np.sqrt(np.maximum(power[:, :, None] * power[:, None, :], 1e-300))
     excited &= np.linalg.eigvalsh(scaled)[:, 0] > _INDEPENDENT
     if not excited.any():

@@ -1,4 +1,4 @@
-"""Open loops that are known at measured frequencies only."""
+"""Open loops known only at measured frequencies."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from .loop import open_loop
 class DataLoop:
     """Loop response on a grid, interpolated in log magnitude and delay-free phase.
 
-    ``log_gain`` and ``phase`` are monotone cubics over log omega, which pass through the points
-    and do not overshoot between them; ``phase`` is without ``dead_time``.
+    ``log_gain`` and ``phase`` are monotone cubics over log omega that pass through the points
+    without overshoot; ``phase`` excludes ``dead_time``.
     """
 
     omega: FloatArray
@@ -45,7 +45,7 @@ class DataLoop:
         return np.asarray(np.exp(self.log_gain(x) + 1j * turn), dtype=np.complex128)
 
     def dense(self) -> tuple[FloatArray, ComplexArray]:
-        """Grid with 8 points between neighbours, and more where the delay turns fast."""
+        """Grid with 8 points between neighbours, and more for a long delay."""
         low, top = self.omega[0], self.omega[-1]
         ratios = np.log(self.omega[1:] / self.omega[:-1])
         share = np.arange(8) / 8
@@ -55,19 +55,19 @@ class DataLoop:
         return grid, self(grid)
 
     def closed_loop_count(self) -> tuple[int, bool]:
-        """Nyquist count between the first and the last point; see `flags` for what is assumed."""
+        """Nyquist count between the first and the last point; for its assumptions see `flags`."""
         grid, values = self.dense()
-        # An integrator would start the curve a quarter turn away from the real axis; a stable
-        # high-pass in its place starts it there.
+        # With an integrator the curve would start 90 deg away from the real axis; with a stable
+        # high-pass in its place it starts there.
         slow = (1j * grid / (1j * grid + 0.1 * grid[-1])) ** self.integrators
         turns = half_turns((1 + values) * slow)
-        # Beyond the last point the loop is taken to be small, and the curve to return to 1.
+        # Beyond the last point the loop gain is assumed to be small, and the curve to return to 1.
         turns -= float(np.angle(1 + values[-1]) + np.angle(slow[-1])) / np.pi
         count = self.unstable_poles - turns
         return max(0, round(count)), abs(count - round(count)) > 0.25
 
     def flags(self) -> tuple[Flag, ...]:
-        """Warn of what lies outside the band."""
+        """Flag assumptions about the response outside of the band."""
         found = []
         if abs(self.values[-1]) > 0.9:
             found.append(
@@ -93,7 +93,7 @@ class DataLoop:
 def data_loop(
     plant: Any, controller: Any, unstable_poles: int, integrators: int | None
 ) -> DataLoop:
-    """Make a `DataLoop` of measured or computed responses, with systems on their grid."""
+    """Make a `DataLoop` from measured or computed responses, with systems on their grid."""
     data = plant if isinstance(plant, ct.FrequencyResponseData) else controller
     other = controller if data is plant else plant
     check_entries(data)
@@ -107,7 +107,7 @@ def data_loop(
         if integrators is None and beside.integrators:
             integrators = beside.integrators + _read_integrators(omega, points.response)
         std = None if std is None else std * np.abs(beside.values)
-    # What is known of the delay is taken out before the rest is searched for.
+    # The known delay is removed before the rest is estimated.
     wait = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
     phase = unwrap_with_dead_time(omega, values, wait) + omega * wait
     x = np.log(omega)
@@ -132,7 +132,7 @@ def _above_zero(data: ct.FrequencyResponseData) -> MeasuredPoints:
 
 
 def _check_points(points: MeasuredPoints) -> None:
-    """Refuse what cannot be interpolated."""
+    """Refuse data that cannot be interpolated."""
     count = points.frequency_hz.size
     if count < 3 or np.any(np.diff(points.frequency_hz) <= 0):
         raise DataError(
@@ -145,7 +145,7 @@ def _check_points(points: MeasuredPoints) -> None:
 
 @dataclass(frozen=True)
 class _Beside:
-    """The other part of a loop on the grid of the data; `delay` in s is what is known of it."""
+    """The other part of a loop on the grid of the data; `delay` in s is its known delay."""
 
     values: ComplexArray
     delay: float = 0.0
@@ -153,7 +153,7 @@ class _Beside:
 
 
 def _on_grid(other: Any, omega: FloatArray) -> _Beside:
-    """Evaluate what stands beside the data in the loop."""
+    """Evaluate the other systems of the loop."""
     if not isinstance(other, ct.FrequencyResponseData):
         loop = open_loop(other)
         return _Beside(loop(omega), loop.delay, loop.integrators())
@@ -166,9 +166,9 @@ def _on_grid(other: Any, omega: FloatArray) -> _Beside:
 
 
 def _read_integrators(omega: FloatArray, values: ComplexArray) -> int:
-    """Read the number of integrators off the slope of the gain over the lowest octave.
+    """Determine the number of integrators from the slope of the gain over the lowest octave.
 
-    The phase alone does not tell: an unstable pole starts at -180 deg too.
+    The phase alone is not sufficient: an unstable pole also starts at -180 deg.
     """
     lowest = np.flatnonzero((omega <= 2 * omega[0]) | (np.arange(omega.size) < 3))
     gain = np.abs(values[lowest])

@@ -23,34 +23,34 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MAX_DELAYS = 21
-"""Most delays within an interval that are tried."""
+"""Largest number of delays that are tried within an interval."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DelayRobustness(Result):
     """Stability and margins of one controller over a range of dead times.
 
-    ``stable`` is true when the loop is stable for every delay within `dead_time_interval` (widened
-    to whole samples and to the nominal delay); `stable_from` and `stable_to` bound the whole range
+    ``stable`` is true if the loop is stable for every delay within `dead_time_interval` (widened to
+    whole samples and to the nominal delay); `stable_from` and `stable_to` are the ends of the range
     around the nominal delay in which it is stable.
 
     Attributes
     ----------
     delays : ndarray of int, shape (K,)
-        Delays tried, in samples, rising.
+        Delays that were tried, in samples, increasing.
     stable_at : ndarray of bool, shape (K,)
     modulus_margin : ndarray, shape (K,)
-        ``min |1 + L|``; 0 where unstable.
+        ``min |1 + L|``; 0 if unstable.
     dead_time_interval : tuple of float
         In s, from the identification or as given.
     nominal : int
-        Delay of the system as given.
+        Nominal delay of the system.
     dt : float
     stable_from, stable_to : float
         Dead times in s, in whole samples; beyond them the loop is unstable.
     fractional_time : float
-        Time in s by which the delay overstates the dead time, where the core holds a fraction of
-        a sample: ``dead_times = delays * dt - fractional_time``.
+        Time in s by which the delay exceeds the dead time, if the core contains a fraction of a
+        sample: ``dead_times = delays * dt - fractional_time``.
 
     Examples
     --------
@@ -77,10 +77,10 @@ class DelayRobustness(Result):
 
     @property
     def stable(self) -> bool:
-        """Stable over the whole interval, delays between those tried included."""
+        """Stable over the whole interval, including delays between those tried."""
         times = self.dead_times[self._inside()]
         slack = 1e-6 * self.dt
-        # nan, of a loop that is unstable to begin with, compares as false.
+        # nan, for a loop that is unstable at the nominal delay, compares as false.
         return bool(
             self.stable_from <= max(times.min(), 0.0) + slack
             and times.max() <= self.stable_to + slack
@@ -148,11 +148,11 @@ def delay_robustness(
     Parameters
     ----------
     system : DelayedStateSpace
-        Plant; its core stays, its delay is varied.
+        Plant; its core is kept, its delay is varied.
     controller : system
         Of the same sample time.
     dead_time_interval : (float, float), optional
-        In s; by default that of the identification, ``system.fit.dead_time_interval``.
+        In s; default: that of the identification, ``system.fit.dead_time_interval``.
 
     Returns
     -------
@@ -161,12 +161,12 @@ def delay_robustness(
     Raises
     ------
     OptionError
-        No interval given and none known, or one that is none.
+        No interval is given or known, or it is invalid.
 
     Notes
     -----
-    A loop that predicts may be stable at the nominal dead time and at neither side of it [1]_; so
-    the whole interval is looked at, and not its ends alone.
+    A loop with a predictor may be stable at the nominal dead time but unstable at shorter and
+    longer ones [1]_; so the whole interval is checked, not only its ends.
 
     References
     ----------
@@ -200,9 +200,9 @@ def over_interval(
     interval: tuple[float, float],
     most: int,
 ) -> DelayRobustness:
-    """Vary the delay of a loop's first factor, the plant; `found` are the loop's own margins.
+    """Vary the delay of the first factor of a loop, the plant; `found` are the nominal margins.
 
-    Within the interval at most `most` delays are tried, its ends always.
+    Within the interval at most `most` delays are tried, including its ends.
     """
     low, high = interval
     nominal, dt, held = int(plant.delay), float(plant.dt), held_fraction(plant)
@@ -226,7 +226,7 @@ def over_interval(
 
 
 def _at(loop: Loop, delay: int) -> Margins:
-    # The chain of so long a delay need not exist for its response to be known.
+    # The matrices for such a long delay are not needed for its response.
     plant = replace(loop.factors[0], delay=delay)
     return loop_margins(replace(loop, factors=(plant, *loop.factors[1:])))
 
@@ -236,10 +236,10 @@ def _modulus(found: Margins) -> float:
 
 
 def _room(found: Margins) -> tuple[float, float]:
-    """Whole samples that the delay may shrink and grow by; nan from an unstable start.
+    """Samples by which the delay may decrease and increase; nan if the nominal loop is unstable.
 
-    The gain of the loop does not depend on the delay: stability is lost where one of its gain
-    crossovers turns to -1, and nowhere else.
+    The gain of the loop does not depend on the delay: stability is only lost where the loop
+    response at one of its gain crossovers passes -1.
     """
     if not found.stable:
         return float("nan"), float("nan")

@@ -1,4 +1,4 @@
-"""One system of a loop, as functions of frequency that a Nyquist count can use."""
+"""One system of a loop, as functions of frequency for a Nyquist count."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from ...numerics.state_space.responses import frequency_response, schur_form
 from ..delay_line import DelayLineController
 
 NEAR_AXIS = 1e-7
-"""Poles closer than this to the border of stability, or beyond it, are reflected inwards."""
+"""Poles closer than this to the stability boundary, or beyond it, are reflected inwards."""
 
 MAX_FEATURES = 100
-"""Zeros are looked for in factors of at most this order; plain systems above it are chains."""
+"""Largest order for computing zeros; plain systems above it contain delay lines."""
 
 
 @dataclass(frozen=True)
 class Factor:
     """One system of a loop.
 
-    ``response(w)`` and ``characteristic(w)`` take the shifted variable w = z - 1 (discrete) or
-    w = s (continuous). Near z = 1, where oversampled systems live, z - 1 keeps its digits.
+    ``response(w)`` and ``characteristic(w)`` take the shifted variable w = z - 1 (discrete) or w =
+    s (continuous). Near z = 1, where the poles of oversampled systems are, z - 1 keeps its digits.
     """
 
     response: Callable[[ComplexArray], ComplexArray]
@@ -58,14 +58,14 @@ def factor(system: Any, dt: float, rate: float = 0.0) -> Factor:
 def reflected(
     poles: ComplexArray, dt: float, rate: float = 0.0
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Find the poles at or beyond the border of stability, and stable places for them.
+    """Find the poles at or beyond the stability boundary, and stable replacements for them.
 
-    In continuous time `rate` (rad/s) says how far from the axis a place must be to be far.
+    In continuous time `rate` (rad/s) is the scale of the distance to the axis.
 
     Returns
     -------
     moved, places : ndarray
-        In the plane of z, or of s when `dt` is 0.
+        In the z-plane, or the s-plane if `dt` is 0.
     """
     if dt:
         moved = poles[np.abs(poles) > 1 - NEAR_AXIS]
@@ -92,10 +92,10 @@ def pole_ratio(
 
 
 def in_s_plane(points: ComplexArray, dt: float) -> ComplexArray:
-    """Map poles or zeros to the s-plane; those at z = 0 have no place there."""
+    """Map poles or zeros to the s-plane; those at z = 0 are left out."""
     if not dt:
         return points
-    # Far inside the circle nothing sharp happens that the even part of a grid would miss.
+    # Far inside the circle there are no sharp features that the uniform part of a grid would miss.
     return np.asarray(np.log(points[np.abs(points) > 0.05]) / dt, dtype=np.complex128)
 
 
@@ -116,7 +116,7 @@ def _state_space_factor(core: ct.StateSpace, dt: float, rate: float, delay: int)
     if 0 < core.nstates <= MAX_FEATURES:
         zeros = np.asarray(core.zeros(), dtype=np.complex128)
         features = np.concatenate([poles, zeros[np.isfinite(zeros)]])
-    # A plain system may hold a chain of its own: its order bounds how often it turns.
+    # A plain system may contain a delay line: its order bounds the number of turns of the phase.
     hidden = int(np.sum(np.abs(poles) < 1 - 1e-3)) if dt and core.nstates > 8 else 0
     return Factor(
         response, pole_ratio(poles, dt, rate), delay, hidden, in_s_plane(features, dt), poles
@@ -164,7 +164,7 @@ def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> F
             return np.asarray(top(w) / bottom(w), dtype=np.complex128)
 
     def characteristic(w: ComplexArray) -> ComplexArray:
-        # den itself over its roots: where roots of a cluster are inexact the dipole cancels.
+        # den divided by its roots: if roots of a cluster are inexact the dipole cancels.
         exact = bottom(w)
         rooted = den[0] * np.prod(w[:, None] + shift - poles, axis=1)
         return np.asarray(ratio(w) * exact / rooted, dtype=np.complex128)
@@ -176,7 +176,7 @@ def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> F
 def shifted_polynomial(
     coefficients: FloatArray, shift: float
 ) -> Callable[[ComplexArray], ComplexArray]:
-    """Make p(w + shift) as a function of w, by a Taylor shift where the degree allows it."""
+    """Make p(w + shift) as a function of w, by a Taylor shift if the degree allows it."""
     degree = coefficients.size - 1
     if shift == 0.0 or degree > 8:
         return lambda w: np.asarray(np.polyval(coefficients, w + shift), dtype=np.complex128)

@@ -1,11 +1,11 @@
-"""Open loops as functions of frequency, with what a Nyquist count must know about them.
+"""Open loops as functions of frequency, for a Nyquist count.
 
-A loop is a product of factors. Each factor tells its exact response (core(z) z^-d, never a
-polynomial of the augmented matrix), and its *characteristic*: its open-loop characteristic
-polynomial over a stable reference polynomial of the same degree. The product of
-1 + L and all characteristics has the closed-loop poles as its zeros, and no pole outside the
-stable region. Poles on the unit circle therefore need no indented contour, and a pole cancelled
-inside the loop still counts as the closed-loop pole that it is.
+A loop is a product of factors. Each factor has an exact response (core(z) z^-d, never a polynomial
+of the augmented matrix), and a *characteristic*: its open-loop characteristic polynomial divided by
+a stable reference polynomial of the same degree. The product of 1 + L and all characteristics has
+the closed-loop poles as its zeros, and no pole outside the stable region. Poles on the unit circle
+therefore need no indented contour, and a pole cancelled inside the loop still counts as a
+closed-loop pole.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Loop:
     dt : float
         Sample time in s; 0 for a continuous loop.
     dead_time : float
-        Delay in s of a continuous loop, beside its factors.
+        Delay in s of a continuous loop, separate from its factors.
     """
 
     factors: tuple[Factor, ...]
@@ -47,11 +47,11 @@ class Loop:
 
     @property
     def delay(self) -> float:
-        """Delay in s that stands apart from all dynamics."""
+        """Pure delay in s."""
         return self.dead_time + self.dt * sum(part.delay for part in self.factors)
 
     def delay_free(self, omega: FloatArray) -> ComplexArray:
-        """Response without the delay that stands apart."""
+        """Response without the pure delay."""
         w = self.variable(omega)
         value = np.ones(omega.size, dtype=np.complex128)
         with np.errstate(invalid="ignore"):
@@ -84,7 +84,7 @@ class Loop:
         return int(np.sum(np.abs(self.poles - origin) < scale))
 
     def grid(self) -> FloatArray:
-        """Frequencies that follow the loop from far below its slowest pole to its end."""
+        """Frequencies from far below the slowest pole up to the end, for following the loop."""
         features = np.concatenate([part.features for part in self.factors])
         sizes = np.abs(features)
         sizes = sizes[sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)]
@@ -100,8 +100,8 @@ class Loop:
         return frequency_grid(low, top, features, self.delay)
 
     def _low_end(self, low: float) -> float:
-        # An integrating loop must start above gain 1, however slow it is. Where the gain does not
-        # grow towards 0 a zero cancels the integrator.
+        # An integrating loop must start above gain 1, however slow it is. If the gain does not
+        # increase towards 0, a zero cancels the integrator.
         if self.integrators():
             gain = abs(self.delay_free(np.array([low]))[0])
             while gain < 10 and low > 1e-200:
@@ -117,7 +117,7 @@ class Loop:
         return max(self._below(top * 1e-6), 20 / self.delay)
 
     def _below(self, top: float) -> float:
-        # A strictly proper loop is done where its gain stays small.
+        # A strictly proper loop ends where its gain stays small.
         for _ in range(60):
             gains = np.abs(self.delay_free(top * np.geomspace(1, 1e3, 30)))
             if gains.max() < 0.05 or np.ptp(gains) < 1e-3 * gains.max():
@@ -132,7 +132,7 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
     Raises
     ------
     UnsuitableSystemError
-        Systems with several channels, of mixed time bases, or that are no linear systems.
+        Systems with several channels, of mixed time bases, or not linear.
     """
     systems = [plant] if controller is None else [plant, controller]
     for system in systems:
@@ -151,7 +151,7 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
 
 
 def _rate(systems: list[Any], dead_time: float) -> float:
-    """Fastest rate of a continuous loop in rad/s: what counts as far from the axis."""
+    """Fastest rate of a continuous loop in rad/s: the scale of the distance to the axis."""
     sizes = [
         float(np.abs(system.poles()).max(initial=0.0))
         for system in systems
@@ -165,7 +165,7 @@ def _words(dt: float) -> str:
 
 
 def _time_base(system: Any) -> float | None:
-    """Return dt, 0.0 for continuous, None for a pure gain."""
+    """Return dt; 0.0 for continuous, None for a static gain."""
     if isinstance(system, (int, float, np.number)):
         return None
     if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):

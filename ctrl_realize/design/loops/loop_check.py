@@ -1,7 +1,7 @@
 """Check of the closed loop before a design function returns a controller.
 
-The loop is closed on the model as it is, not on what a tuning rule made of it, and over the
-interval of dead times that the identification left open.
+The loop is closed with the model itself, not with a reduced one, and over the interval of dead
+times from the identification.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from .margin_result import Margins
 from .margins import loop_margins
 
 TRIED = 2
-"""Delays of the interval whose margins are computed: its ends. Whether the loop is stable between
-them is known from its crossovers, see `DelayRobustness`."""
+"""Delays of the interval whose margins are computed: its ends. Stability between them follows from
+the crossovers, see `DelayRobustness`."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopCheck(Result):
-    """Result of closing the loop on the design model.
+    """Check of the closed loop with the design model.
 
-    ``stable`` is ``margins.stable``; `robustness`, where there is an interval of dead times, has
-    the nominal delay and the ends of the interval among its `delays`.
+    ``stable`` is ``margins.stable``; `robustness`, if there is an interval of dead times, has the
+    nominal delay and the ends of the interval among its `delays`.
 
     Attributes
     ----------
     margins : Margins
-        Of the controller with the model that it was designed for, dead time exact.
+        Of the controller with the design model, with exact dead time.
     robustness : DelayRobustness or None
-        Over ``system.fit.dead_time_interval``; None where the system carries no interval.
+        Over ``system.fit.dead_time_interval``; None if the system has no interval.
     flags : tuple of Flag
-        ``"unstable_within_interval"`` where a dead time within the interval makes the loop
+        ``"unstable_within_interval"`` if some dead time within the interval makes the loop
         unstable.
 
     Examples
@@ -60,12 +60,12 @@ class LoopCheck(Result):
 
     @property
     def stable(self) -> bool:
-        """The loop is stable on the model itself."""
+        """The loop with the model itself is stable."""
         return self.margins.stable
 
     @property
     def stable_within_interval(self) -> bool | None:
-        """Stable for all dead times of the interval; None where there is no interval."""
+        """Stable for all dead times of the interval; None if there is no interval."""
         return None if self.robustness is None else self.robustness.stable
 
     def rows(self) -> list[tuple[str, str]]:
@@ -134,17 +134,17 @@ def _unstable_inside(found: DelayRobustness) -> Flag:
 
 
 def warn_of(check: LoopCheck, advice: str, *, stacklevel: int = 4) -> None:
-    """Warn of what was found over the interval; `advice` says what to try.
+    """Warn if the loop is unstable within the interval; `advice` says what to try.
 
-    The place that is named is the caller of a design function that runs with one BLAS thread,
-    whose wrapper is a level of its own.
+    The warning is attributed to the caller of a design function; its single-thread wrapper is one
+    more frame.
     """
     for flag in check.flags:
         warnings.warn(ModelWarning(f"{flag}; {advice}"), stacklevel=stacklevel)
 
 
 def refuse_unstable(check: LoopCheck, what: str, advice: str) -> None:
-    """Refuse a controller whose loop is not stable on the design model.
+    """Refuse a controller whose loop with the design model is unstable.
 
     Raises
     ------

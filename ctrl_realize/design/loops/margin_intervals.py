@@ -1,10 +1,11 @@
-"""How well measured data know the margins of a loop.
+"""Confidence intervals of the margins of a loop from measured data.
 
-The errors of the points are taken to be independent, Gaussian and equal in all directions of the
-plane; their standard deviation is known, or from the scatter of so many repeats. Around each
-measured value lies a disk for the true one, and what a margin may be is read off these disks. A
-derivative at the crossover that was measured would not do: noise lets a flat loop cross the unit
-circle many times, and the derivative at one crossing knows nothing of the others.
+The errors of the points are assumed to be independent, Gaussian and equal in all directions of the
+plane; their standard deviation is known, or estimated from a number of repeats. Around each
+measured value there is a disk for the true one, and the intervals of the margins are determined
+from these disks. The derivative at the measured crossover would not be sufficient: noise lets a
+flat loop cross the unit circle many times, and the derivative at one crossing does not account for
+the others.
 """
 
 from __future__ import annotations
@@ -20,21 +21,21 @@ from .margin_result import Margins
 
 Interval = tuple[float, float]
 Stretch = tuple[float, float, bool]
-"""Lowest and highest value that a stretch of frequency allows, and whether it must hold one."""
+"""Lowest and highest value in a range of frequencies, and whether it must contain one."""
 
 TAIL = 0.025
-"""Probability that is left beyond either end of an interval."""
+"""Probability beyond each end of an interval."""
 
 NEAR = np.geomspace(1e-8, 0.1, 280)
-"""Relative distances from a crossover at which the curve is looked at, for the smallest noise."""
+"""Relative distances from a crossover at which the curve is evaluated, for the smallest noise."""
 
 
 @dataclass(frozen=True)
 class _Tube:
-    """The measured curve and the radius of its disks.
+    """Measured curve and the radius of its disks.
 
-    On a curve without noise a margin depends on one direction of the error only, and 1.96 standard
-    deviations of it (Student's where repeats told them) are exact to first order; noise beside the
+    On a noise-free curve a margin depends on one direction of the error only, and 1.96 standard
+    deviations of it (Student's quantile for few repeats) are exact to first order; noise beside the
     crossover makes the interval wider, never narrower.
     """
 
@@ -49,9 +50,9 @@ class _Tube:
         return self.alone * self.spread
 
     def runs(self, distance: FloatArray, side: FloatArray) -> list[tuple[slice, bool]]:
-        """Stretches of frequency in which the truth may cross a line, and whether it must.
+        """Ranges of frequency in which the true curve may cross a line, and whether it must.
 
-        Beyond a stretch all disks together (`together`) tell on which side of the line it is.
+        Outside of these ranges all disks together (`together`) determine the side of the line.
         """
         near = np.concatenate([[False], distance <= self.together * self.spread, [False]])
         starts, stops = np.flatnonzero(near[1:] & ~near[:-1]), np.flatnonzero(near[:-1] & ~near[1:])
@@ -67,8 +68,8 @@ def margin_intervals(loop: DataLoop, plain: Margins) -> dict[str, Interval]:
     """95 % intervals of the margins of measured data.
 
     Phase and delay margin: disks that meet the unit circle. Gain margin: disks that meet the
-    negative real axis. The true crossover is somewhere, and it is the disk at that one frequency
-    that has to hold the truth, whatever noise does elsewhere. Modulus margin: `closest_approach`.
+    negative real axis. The true crossover is at one frequency, and the disk at that frequency has
+    to contain the true value, whatever the noise elsewhere. Modulus margin: `closest_approach`.
     """
     tube = _tube(loop, np.concatenate([plain.gain_crossovers, plain.phase_crossovers]))
     found = {}
@@ -88,26 +89,26 @@ def margin_intervals(loop: DataLoop, plain: Margins) -> dict[str, Interval]:
 def closest_approach(loop: DataLoop) -> Interval:
     r"""Interval of at least 95 % for ``min |1 + L|``.
 
-    The smallest of many distances that are measured with errors is too small by itself, and
-    more so the flatter the minimum; an interval around it would not cover the truth. Here each
-    point bounds its own distance :math:`\theta_i`, from the distance r that was measured and the
-    standard deviation s in any direction:
+    The smallest of many distances measured with errors is biased downwards, the more so the flatter
+    the minimum; an interval around it would not cover the true value. Here each point bounds its
+    own distance :math:`\theta_i`, from the measured distance r and the standard deviation s in any
+    direction:
 
     .. math:: \sqrt{r_i^2 - a s_i^2} - z s_i \le \theta_i \le r_i + z' s_i.
 
-    The smallest lower bound holds as soon as that of the truly closest point does: z = 1.96. The
-    smallest upper bound needs all of them to hold: z' is for 0.025 / K with K points. With
-    ``a = -2 log 0.025 - z^2`` the bound is exact at distance 0 and far away, and conservative
-    between (r is Rice-distributed). Where repeats told s, Student's quantiles and that of F take
-    the places.
+    The smallest lower bound is valid if that of the truly closest point is: z = 1.96. The smallest
+    upper bound is valid if all of them are: z' is for 0.025 / K with K points. With ``a = -2 log
+    0.025 - z^2`` the bound is exact at distance 0 and far away, and conservative between (r is
+    Rice-distributed). If s was estimated from repeats, quantiles of Student's and of the F
+    distribution are used.
     """
     spread = _spread(loop, loop.omega)
     most = upper_quantile(TAIL / loop.omega.size, loop.repeats)
     high = float(np.min(np.abs(1 + loop.values) + most * spread))
-    # Between the points the curve itself counts, with the error of its neighbours.
+    # Between the points the interpolated curve is used, with the error of its neighbours.
     omega, values = loop.dense()
     beside, z = _spread(loop, omega), upper_quantile(TAIL, loop.repeats)
-    # The circle counts in standard deviations of both directions together.
+    # The circle is for the standard deviation of both directions together.
     bend = 2 * circle_quantile(1 - TAIL, loop.repeats) ** 2 - z**2
     inner = np.sqrt(np.maximum(np.abs(1 + values) ** 2 - bend * beside**2, 0))
     return max(0.0, float(np.min(inner - z * beside))), high
@@ -135,7 +136,7 @@ def _tube(loop: DataLoop, crossovers: FloatArray) -> _Tube:
 
 
 def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:
-    """Phase margins in rad and delay margins in s of each stretch that may meet the circle."""
+    """Phase margins in rad and delay margins in s of each range that may meet the circle."""
     size, radius = np.abs(tube.values), tube.radius
     meets = np.abs(size - 1) <= radius
     cosine = (size**2 + 1 - radius**2) / (2 * size)
@@ -146,13 +147,13 @@ def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:
         at = np.arange(part.start, part.stop)[meets[part]]
         if at.size == 0:
             continue
-        # Phases of a stretch are counted from one of them, so that none is cut at 180 deg.
+        # The phases of a range are relative to one of them, so that no range is cut at 180 deg.
         first = at[np.argmin(np.abs(size[at] - 1))]
         middle = np.angle(-tube.values[first]) + np.angle(tube.values[at] / tube.values[first])
         low, high = middle - arc[at], middle + arc[at]
         phases.append((float(low.min()), float(high.max()), crosses))
-        # A lead of less than nothing is a lag of almost a turn; where -1 itself is within
-        # reach the loop may be at the border.
+        # A negative phase lead is a lag of almost a turn; if -1 itself is within reach the loop may
+        # be on the stability boundary.
         later = np.where(high < 0, 2 * np.pi, 0.0)
         wait = np.maximum(low + later, 0) / tube.omega[at], (high + later) / tube.omega[at]
         waits.append((float(wait[0].min()), float(wait[1].max()), crosses))
@@ -160,7 +161,7 @@ def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:
 
 
 def _log_gain_margins(tube: _Tube) -> list[Stretch]:
-    """Logarithms of the gain margin of each stretch that may meet the negative real axis."""
+    """Logarithms of the gain margin of each range that may meet the negative real axis."""
     x, y, radius = tube.values.real, tube.values.imag, tube.radius
     half = np.sqrt(np.maximum(radius**2 - y**2, 0))
     meets = (np.abs(y) <= radius) & (half - x > 0)
@@ -176,7 +177,7 @@ def _log_gain_margins(tube: _Tube) -> list[Stretch]:
 
 
 def _nearest(stretches: list[Stretch]) -> Interval:
-    """Interval of the value nearest to 0, of values that lie one or more in each stretch."""
+    """Interval of the value nearest to 0, among values of which each range has one or more."""
     close = [0.0 if low <= 0 <= high else min(abs(low), abs(high)) for low, high, _ in stretches]
     far = [max(abs(low), abs(high)) for low, high, _ in stretches]
     sure = [bound for bound, (_, _, crosses) in zip(far, stretches, strict=True) if crosses]

@@ -15,31 +15,31 @@ from ...results import Flag, Result
 class Margins(Result):
     """Stability margins of a loop with negative feedback.
 
-    With L the open loop: ``gain_margin = 1/|L|`` at a phase crossover, ``phase_margin = 180 deg +
+    With the open loop L: ``gain_margin = 1/|L|`` at a phase crossover, ``phase_margin = 180 deg +
     arg L`` at a gain crossover, ``modulus_margin = min |1 + L|``, and ``delay_margin`` is the
-    least of ``(phase margin taken in 0...360 deg) / omega`` over all gain crossovers. Of several
-    gain or phase margins the one nearest to instability is given, as python-control does; all
-    crossovers are there.
+    smallest ``(phase margin in 0...360 deg) / omega`` over all gain crossovers. Of several gain or
+    phase margins the one nearest to instability is given, as in python-control; the arrays contain
+    all of them.
 
     Attributes
     ----------
     gain_margin : float
-        Ratio; below 1 where the gain must not be *reduced* further. inf without a phase crossover.
+        Ratio; below 1 if the gain must not be *reduced* further. inf without a phase crossover.
     phase_margin : float
         Degrees, -180...180. inf without a gain crossover.
     modulus_margin : float
         Smallest distance of L to -1; its inverse is the peak of the sensitivity, `ms`.
     delay_margin : float
-        Dead time in s that may be added before the loop is unstable; nan if it already is.
+        Additional dead time in s at which the loop becomes unstable; nan if it already is.
     delay_margin_samples : float
         The same in samples; nan for a continuous loop.
     stable : bool
-        Closed-loop stability, from a Nyquist count that sees every pole of the factors, hidden
-        ones and those on the unit circle included.
+        Closed-loop stability, by a Nyquist count that includes all poles of the factors, also
+        cancelled ones and those on the unit circle.
     unstable_poles : int
-        Closed-loop poles on or outside the stable region.
+        Number of closed-loop poles outside the stability region or on its boundary.
     gain_crossovers, phase_crossovers : ndarray
-        In rad/s, rising.
+        In rad/s, increasing.
     phase_margins, gain_margins : ndarray
         One for each gain crossover in degrees, one for each phase crossover.
     modulus_crossover : float
@@ -47,14 +47,13 @@ class Margins(Result):
     dt : float
         Sample time in s, 0 if continuous.
     intervals : dict of str to (float, float)
-        For measured responses with a standard deviation, which counts as known unless the
-        response says from how many `repeats` it was taken: 95 % intervals of the four margins.
-        They hold at noise that makes the response cross and come back many
-        times, and are then not centred: the smallest of many noisy distances is too small by
-        itself. Otherwise empty.
+        For measured responses with a standard deviation (which counts as known unless the response
+        has `repeats`): 95 % intervals of the four margins. They remain valid if noise makes the
+        response cross many times, and are then not centred: the smallest of many noisy distances is
+        biased downwards. Otherwise empty.
     flags : tuple of Flag
     response : tuple of ndarray
-        (omega, L) as followed by the count, for drawing.
+        (omega, L) along the count, for plots.
 
     Examples
     --------

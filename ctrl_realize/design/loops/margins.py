@@ -30,7 +30,7 @@ Curve = Callable[[FloatArray], ComplexArray]
 """Response of a loop at frequencies in rad/s."""
 
 MARGINAL = 1e-9
-"""Distance to -1 below which the closed loop counts as being on the border of stability."""
+"""Distance to -1 below which the closed loop counts as being on the stability boundary."""
 
 
 def margins(
@@ -43,24 +43,24 @@ def margins(
 ) -> Margins:
     """Compute gain, phase, modulus and delay margin of a loop, exact at any dead time.
 
-    All crossovers are bracketed on the exact frequency response, core(z) z^-d, and found by root
-    finding. Stability is decided by a Nyquist count.
+    All crossovers are bracketed on the exact frequency response, core(z) z^-d, and computed by root
+    finding. Stability is determined by a Nyquist count.
 
     Parameters
     ----------
     loop : system or FrequencyResponseData
-        The open loop, or the plant if `controller` is given. Discrete systems with or without a
-        `DelayedStateSpace` among them, continuous systems, or a response from data.
+        The open loop, or the plant if `controller` is given. Discrete systems, among them
+        `DelayedStateSpace`, continuous systems, or a measured response.
     controller : system or float, optional
-        Controller; the loop is then plant times controller with negative feedback. Giving both
-        apart is better than giving their product: poles that cancel are still counted.
+        Controller; the loop is then plant times controller with negative feedback. It is better to
+        give both separately than their product, because cancelled poles are then counted.
     dead_time : float, optional
-        Further dead time in s, for continuous systems, which cannot hold one.
+        Additional dead time in s, for continuous systems.
     unstable_poles : int, optional
-        For data only: unstable poles that the loop has.
+        For data only: number of unstable poles of the loop.
     integrators : int, optional
-        For data only: integrators in the loop; read off the slope of the gain over the lowest
-        octave when not given.
+        For data only: number of integrators of the loop; default: from the slope of the gain over
+        the lowest octave.
 
     Returns
     -------
@@ -71,16 +71,16 @@ def margins(
     UnsuitableSystemError
         Several channels, mixed or missing time bases, an improper system.
     OptionError
-        An option that does not belong to this kind of loop.
+        An option that does not apply to this kind of loop.
 
     Notes
     -----
-    python-control's ``stability_margins`` forms the polynomial of the augmented matrix first
-    and is silently wrong from d of about 37 on.
+    python-control's ``stability_margins`` uses the characteristic polynomial of the augmented
+    matrix and is silently wrong from about d = 37 on.
 
-    Gain and phase margin and the modulus margin 1/Ms (the *stability margin* of [1]_) are read off
-    the loop's crossovers; the delay margin is the least of phase margin over crossover frequency
-    [2]_. The count of encirclements is the generalized Nyquist criterion [1]_.
+    Gain and phase margin and the modulus margin 1/Ms (the *stability margin* of [1]_) are computed
+    at the crossovers of the loop; the delay margin is the smallest ratio of phase margin and
+    crossover frequency [2]_. Encirclements are counted by the generalized Nyquist criterion [1]_.
 
     References
     ----------
@@ -129,7 +129,7 @@ def margins(
 
 
 def loop_margins(loop: Loop) -> Margins:
-    """Margins of a loop that is made already."""
+    """Margins of a loop."""
     omega, values = follow(loop, loop.grid())
     count, marginal = closed_loop_count(loop, omega)
     crossings = _crossings(loop, omega, values)
@@ -139,14 +139,14 @@ def loop_margins(loop: Loop) -> Margins:
     if start < crossings.distance:
         crossings = replace(crossings, distance=start, closest=0.0)
     plain = _collect(loop, crossings, count, marginal, loop.dt)
-    # So close to -1 the count cannot tell the side.
+    # So close to -1 the count is not reliable.
     stable = plain.stable and crossings.distance > MARGINAL
     return replace(plain, stable=stable, delay_margin=plain.delay_margin if stable else np.nan)
 
 
 @dataclass(frozen=True)
 class _Crossings:
-    """Where a loop on the grid `omega` has gain 1, phase -180 deg, and is closest to -1."""
+    """Find where a loop on the grid `omega` has gain 1, phase -180 deg, and is closest to -1."""
 
     omega: FloatArray
     values: ComplexArray
@@ -169,7 +169,7 @@ def _crossings(loop: Curve, omega: FloatArray, values: ComplexArray) -> _Crossin
 
 
 def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
-    """Add omega = 0 and the Nyquist frequency where the real response there is negative."""
+    """Add omega = 0 and the Nyquist frequency if the real response there is negative."""
     top = np.pi / loop.dt
     start = loop(np.zeros(1))[0]
     end = loop(np.array([top]))[0]
@@ -182,20 +182,20 @@ def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
 
 
 def closed_loop_count(loop: Loop, omega: FloatArray) -> tuple[int, bool]:
-    """Count the closed-loop poles outside the stable region.
+    """Count the closed-loop poles outside the stability region.
 
     Returns
     -------
     count : int
     marginal : bool
-        A closed-loop pole is so close to the border that no side can be told.
+        A closed-loop pole is too close to the boundary for a decision.
     """
     _, values = follow(loop.characteristic, omega)
     if np.any(values == 0):
         return 0, True
     steps = np.abs(np.angle(values[1:] / values[:-1]))
     turns = half_turns(values)
-    # A real system starts on the real axis, unless a closed-loop pole sits at frequency 0.
+    # A real system starts on the real axis, unless a closed-loop pole is at frequency 0.
     start = abs(float(np.sin(np.angle(values[0]))))
     marginal = bool(np.any(steps > 2.0) or abs(turns - round(turns)) > 0.1 or start > 0.5)
     return max(0, -round(turns)), marginal
@@ -221,8 +221,8 @@ def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
 
 
 def _collect(loop: Curve, at: _Crossings, count: int, marginal: bool, dt: float) -> Margins:
-    """Read the margins off the crossings of a loop whose unstable poles are counted."""
-    # -1 is half a turn away: the angle of -L is the margin itself, in -180...180.
+    """Compute the margins from the crossings of a loop whose unstable poles are counted."""
+    # -1 is at 180 deg: the angle of -L is the phase margin, in -180...180.
     pm = np.degrees(np.angle(-loop(at.gains)))
     gm = 1 / np.abs(loop(at.phases))
     waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / at.gains

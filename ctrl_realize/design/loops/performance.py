@@ -1,4 +1,4 @@
-"""Responses of a closed loop to steps of set-point and load."""
+"""Closed-loop responses to steps of set-point and load."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from .loop import open_loop
 from .margins import margins
 
 LONGEST = 2**19
-"""Most samples of a response."""
+"""Largest number of samples of a response."""
 SETTLED = 1e-4
-"""Range of the last part of a response, relative, in which it counts as settled."""
+"""Relative range of the last part of a response that counts as settled."""
 SETTLING_BAND = 0.02
-"""Part of the final value within which a response counts as arrived."""
+"""Distance from the final value, relative to it, within which a response counts as settled."""
 
 
 @dataclass(frozen=True, repr=False)
 class Performance:
-    """Responses of a stable loop to unit steps, in numbers.
+    """Characteristics of the closed-loop responses to unit steps.
 
     Attributes
     ----------
     setpoint_error, load_error : float
-        Integral of the absolute error in s (times the output's unit); inf where an error stays.
+        Integral of the absolute error in s (times the output's unit); inf for a steady-state error.
     overshoot : float
-        Of the set-point response over its final value, as a ratio; 0 without.
+        Of the set-point response, relative to its final value; 0 if there is none.
     settling_time : float
         In s until the set-point response stays within 2 % of its final value.
 
@@ -76,15 +76,15 @@ def step_responses(
 ) -> tuple[FloatArray, FloatArray]:
     """Output after a unit step of set-point, and of load at the plant input.
 
-    From the frequency response on a circle a little outside the unit one: exact to about 1e-6
-    whatever the delay. The loop must be stable.
+    From the frequency response on a circle slightly larger than the unit circle: exact to about
+    1e-6 at any delay. The loop must be stable.
 
     Parameters
     ----------
     plant : DelayedStateSpace
     controller : control system of the same sample time
     count : int
-        Samples; a power of two is fastest.
+        Number of samples; a power of two is fastest.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def step_responses(
 def performance(
     plant: DelayedStateSpace, controller: Any, total_time: float | None = None
 ) -> Performance:
-    """Compute the response of a stable loop to steps of set-point and load at the plant input.
+    """Compute the closed-loop responses to steps of set-point and load at the plant input.
 
     Parameters
     ----------
@@ -113,10 +113,9 @@ def performance(
     controller : system or float
         Of the plant's sample time, with negative feedback.
     total_time : float, optional
-        Dead time and lags together, in s: the first guess of how long the loop takes. The
-        responses are computed for longer until they have settled. Default: dead time and twice
-        the slowest lag of the plant, or the time that the slowest crossover takes, 1 / omega, if
-        that is longer.
+        Initial guess of the settling time in s; the responses are computed for longer until they
+        have settled. Default: dead time and twice the slowest lag of the plant, or the inverse of
+        the slowest crossover frequency if that is longer.
 
     Returns
     -------
@@ -125,12 +124,12 @@ def performance(
     Raises
     ------
     UnsuitableSystemError
-        A loop that is not stable.
+        The loop is not stable.
 
     Warns
     -----
     ModelWarning
-        A loop that goes on for more than 260 000 samples; the numbers are those up to there.
+        The responses do not settle within 260 000 samples; the results are those up to there.
 
     Notes
     -----
@@ -166,7 +165,7 @@ def performance(
 
 
 def plant_time(plant: DelayedStateSpace) -> float:
-    """Guess how long a plant takes: dead time and twice its slowest lag, in s."""
+    """Guess the settling time of a plant: dead time and twice its slowest lag, in s."""
     poles = np.abs(plant.delay_free.poles())
     slow = poles[poles < 1 - 1e-9]
     slowest = -1 / np.log(slow.max()) if slow.size and slow.max() > 0 else 1.0
@@ -174,12 +173,12 @@ def plant_time(plant: DelayedStateSpace) -> float:
 
 
 def loop_time(plant: DelayedStateSpace, controller: Any, name: str = "") -> float:
-    """Guess how long a loop takes, in s: as its plant, or as its slowest crossover.
+    """Guess the settling time of a loop in s: that of its plant, or of its slowest crossover.
 
     Raises
     ------
     UnsuitableSystemError
-        A loop that is not stable; `name` says which.
+        The loop is not stable; `name` is for the message.
     """
     found = margins(plant, controller)
     if not found.stable:
@@ -195,14 +194,14 @@ def loop_time(plant: DelayedStateSpace, controller: Any, name: str = "") -> floa
 def settled_responses(
     plant: DelayedStateSpace, controller: Any, total_time: float
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Responses of a stable loop to steps of set-point and load, and whether they have settled.
+    """Closed-loop responses to steps of set-point and load, and whether they have settled.
 
-    `total_time` in s is the first guess of how long that takes.
+    `total_time` in s is the initial guess of the settling time.
     """
     dt = float(plant.dt)
     count = 2 ** int(np.ceil(np.log2(max(64.0, min(20 * total_time / dt, LONGEST)))))
     while True:
-        # Half of the record is thrown away: the end is where wrapped-around values show.
+        # Half of the record is discarded: circular wrap-around shows at the end.
         setpoint, load = (y[: count // 2] for y in step_responses(plant, controller, count))
         tail = slice(-max(1, count // 40), None)
         left = max(
@@ -215,9 +214,9 @@ def settled_responses(
 
 
 def measured(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
-    """Put settled responses in numbers."""
+    """Compute the characteristics of settled responses."""
     final = float(setpoint[-1])
-    # 1e-5 is what the transform leaves; an error that stays is far larger.
+    # The transform has an error of 1e-5; a steady-state error is far larger.
     kept = (abs(1 - final) > 1e-3, abs(load[-1]) > 1e-3 * np.abs(load).max())
     return Performance(
         setpoint_error=float("inf") if kept[0] else float(np.abs(1 - setpoint).sum() * dt),
@@ -228,7 +227,7 @@ def measured(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
 
 
 def lasting(setpoint: FloatArray, load: FloatArray) -> int:
-    """Samples until both responses stay within 2 % of where they end, that of load of its peak."""
+    """Samples until both responses stay within 2 % of their ends (for the load: of its peak)."""
     away = np.abs(load - load[-1])
     moving = np.flatnonzero(away > SETTLING_BAND * np.abs(load).max())
     return max(settling(setpoint), int(moving[-1]) + 1 if moving.size else 0)

@@ -1,4 +1,4 @@
-"""Phase of systems and responses with a dead time, unwrapped right on any grid."""
+"""Unwrapped phase of systems and responses with dead time, correct on any grid."""
 
 from __future__ import annotations
 
@@ -25,21 +25,20 @@ def unwrapped_phase(
 ) -> FloatArray:
     """Unwrap the phase of a response with dead time.
 
-    For a system the phase of the core is followed on a grid fine enough for it, and the delay's
-    ``-omega tau`` is added as it is: the result does not depend on how far apart `omega` lies. It
-    starts near ``-90 deg`` times the number of integrators (and 180 deg below that for a
-    negative gain). For data the dead time is taken out, the rest unwrapped, and put back.
+    For a system the phase of the core is unwrapped on a sufficiently fine grid, and the delay's
+    ``-omega tau`` is added: the result does not depend on the spacing of `omega`. It starts near
+    ``-90 deg`` times the number of integrators (and 180 deg below that for a negative gain). For
+    data the dead time is removed, the rest unwrapped, and the dead time added again.
 
     Parameters
     ----------
     system : system or FrequencyResponseData
         One input, one output.
     omega : array_like, shape (K,), optional
-        Frequencies in rad/s, in any order. For data they are those of the data and must not be
-        given.
+        Frequencies in rad/s, in any order; for a system only.
     dead_time : float, optional
-        Dead time in s: of a continuous system, or of data where it is known. Without it, data
-        are searched for the delay that leaves the smoothest phase.
+        Dead time in s: of a continuous system, or of data if it is known. Otherwise the delay that
+        gives the smoothest phase of the data is searched.
     deg : bool, optional
         Degrees instead of radians.
 
@@ -50,13 +49,13 @@ def unwrapped_phase(
     Raises
     ------
     UnsuitableSystemError
-        Several channels, or no linear system.
+        Several channels, or not a linear system.
     OptionError
-        `omega` with data or missing with a system.
+        `omega` is given with data, or missing with a system.
 
     Notes
     -----
-    `control.bode_plot` unwraps between neighbouring points; at d = 300 its phase is off by 39600
+    `control.bode_plot` unwraps between neighbouring points; at d = 300 its phase is wrong by 39600
     degrees on its own grid.
 
     Examples
@@ -97,11 +96,11 @@ def _of_data(data: ct.FrequencyResponseData, dead_time: float | None) -> FloatAr
 
 
 def _of_loop(loop: Loop, omega: FloatArray) -> FloatArray:
-    # A few nodes per turn of the rest suffice: between them the phase is read modulo one turn.
+    # A few points per turn of the rest suffice: between them the phase is known modulo one turn.
     nodes, values = follow(loop.delay_free, loop.grid())
     course = np.unwrap(np.angle(values))
     expected = -np.pi / 2 * loop.integrators()
-    # Within half a turn below to a quarter above: a negative gain starts 180 deg lower.
+    # Between half a turn below and a quarter above: a negative gain starts 180 deg lower.
     course += 2 * np.pi * np.floor((expected + np.pi / 2 - course[0]) / (2 * np.pi))
     near = np.interp(omega, nodes, course)
     direct = np.angle(loop.delay_free(np.maximum(omega, nodes[0] * 1e-3)))

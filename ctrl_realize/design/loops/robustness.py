@@ -24,7 +24,7 @@ from .margin_result import Margins
 from .margins import margins
 
 GRID_POINTS = 400
-"""Frequencies of a bound where none are given."""
+"""Default number of frequencies of a bound."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +42,7 @@ class UncertaintyBound(Result):
         Ratios.
     nominal : DelayedStateSpace
     n_systems : int
-        How many systems the spread is from.
+        Number of systems behind the spread.
 
     Examples
     --------
@@ -70,7 +70,7 @@ class UncertaintyBound(Result):
         return ct.frd(self.bound.astype(complex), self.omega, name="uncertainty", smooth=True)
 
     def check(self, controller: Any) -> RobustnessCheck:
-        """Test a controller against this bound, see `robust_stability`."""
+        """Test a controller with this bound, see `robust_stability`."""
         return robust_stability(self, controller)
 
     def _title(self) -> str:
@@ -96,8 +96,8 @@ class UncertaintyBound(Result):
 class RobustnessCheck(Result):
     """Result of a robust-stability test (small-gain theorem).
 
-    ``robust`` is ``nominal.stable`` and ``|T| bound < 1`` at every frequency; `margin` is by how
-    much the bound may be multiplied until that fails.
+    ``robust`` is ``nominal.stable`` and ``|T| bound < 1`` at every frequency; `margin` is the
+    factor by which the bound can be multiplied before this fails.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class RobustnessCheck(Result):
     nominal : Margins
     performance : float
         Largest ``|S| / (1 - |T| bound)``: the worst sensitivity peak of all plants within the
-        bound; inf where it is not robust.
+        bound; inf if it is not robust.
 
     Examples
     --------
@@ -165,14 +165,14 @@ def uncertainty_bound(
     Parameters
     ----------
     systems : Campaign or sequence of systems
-        Models of the same plant; may be empty where only the dead time is unsure.
+        Models of the same plant; may be empty if only the dead time is uncertain.
     nominal : DelayedStateSpace, optional
-        By default the campaign's ``system``, or the first of the sequence.
+        Default: the campaign's ``system``, or the first of the sequence.
     omega : array_like, optional
-        rad/s, rising, > 0; by default 400 points up to the Nyquist frequency.
+        rad/s, increasing, > 0; default: 400 points up to the Nyquist frequency.
     dead_time_interval : (float, float), optional
-        In s; by default that of the nominal model's identification if it has one. Its effect is
-        added to the spread of the systems, which is measured at their own delays.
+        In s; default: that of the nominal model's identification, if it has one. Its effect is
+        added to the spread of the systems, which is computed at their own delays.
 
     Returns
     -------
@@ -181,14 +181,14 @@ def uncertainty_bound(
     Raises
     ------
     OptionError
-        Nothing to make a bound from.
+        There is nothing to make a bound from.
     DataError
-        Frequencies that do not rise, systems of another sample time.
+        Frequencies that do not increase, or systems with another sample time.
 
     Notes
     -----
     The bound is on the multiplicative (relative) uncertainty of [1]_: plants ``G (1 + Delta)`` with
-    ``|Delta(j w)|`` at most the bound. A dead time that is off by x alone gives ``|exp(-j w x) -
+    ``|Delta(j w)|`` at most the bound. An error x of the dead time alone gives ``|exp(-j w x) -
     1|``.
 
     References
@@ -234,7 +234,7 @@ def uncertainty_bound(
         low, high = interval
         wait = plant.dead_time - held_fraction(plant)
         off = max(abs(low - wait), abs(high - wait))
-        # |exp(-jx) - 1| grows to 2 at x = pi; beyond that some smaller error reaches 2.
+        # |exp(-jx) - 1| increases to 2 at x = pi; beyond that a smaller error gives 2.
         delay_part = 2 * np.sin(np.minimum(grid * off, np.pi) / 2)
     return UncertaintyBound(
         omega=read_only(grid),
@@ -262,11 +262,11 @@ def robust_stability(uncertainty: UncertaintyBound, controller: Any) -> Robustne
 
     Notes
     -----
-    Sufficient, and for a bound on the size of Delta alone also necessary; a wrong dead time is
-    only one of the errors that such a bound admits, so `delay_robustness` may be kinder.
+    Sufficient, and for a bound on the size of Delta alone also necessary; such a bound contains
+    other errors than a wrong dead time, so `delay_robustness` may be less conservative.
 
-    The condition is ``|T(j w)| |Delta(j w)| < 1`` at all frequencies, T the complementary
-    sensitivity [1]_.
+    The condition is ``|T(j w)| |Delta(j w)| < 1`` at all frequencies, with the complementary
+    sensitivity T [1]_.
 
     References
     ----------

@@ -1,1 +1,1 @@
-"""Models made for design: reduction, conversion, approximation."""
+"""Models for design: reduction, conversion, approximation."""

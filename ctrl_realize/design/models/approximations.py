@@ -1,4 +1,4 @@
-"""Rational systems that stand for a dead time: Pade in continuous time, Thiran in discrete time."""
+"""Rational approximations of a dead time: Pade in continuous time, Thiran in discrete time."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ MAX_PADE_ORDER = 20
 def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.StateSpace:
     """Compute the Pade approximant of a dead time in state space, well-conditioned to order 20.
 
-    All-pass, of equal numerator and denominator degree; realized as a lossless ladder whose
-    Gramians are the identity. (`control.pade` gives polynomial coefficients; for 29 ms and order
-    20 the condition of their A is 1e100, against 340 here, and step responses are nan.) For 29 ms
-    order 5 is right to 1e-5 up to 13 Hz, order 10 up to 50 Hz. Do not sample it: z^-d is exact.
+    All-pass with equal numerator and denominator degree, realized as a lossless ladder whose
+    Gramians are the identity. (`control.pade` gives polynomial coefficients; for 29 ms and order 20
+    the condition number of its A is 1e100, against 340 here, and step responses are nan.) For 29 ms
+    order 5 is accurate to 1e-5 up to 13 Hz, order 10 up to 50 Hz. Do not sample it: z^-d is exact.
 
     Parameters
     ----------
@@ -68,16 +68,16 @@ def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.
 def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     """Compute the Thiran all-pass for a dead time that is not a multiple of the sample time.
 
-    Whole samples stay a delay; a Thiran filter of order N makes the rest, N - 0.5...N + 0.5
-    samples, with maximally flat group delay at frequency 0. For a plant behind a zero-order
-    hold this is an approximation: `to_discrete` is exact there. It is meant for signals.
+    Whole samples remain a delay; a Thiran filter of order N approximates the rest, N - 0.5...N +
+    0.5 samples, with maximally flat group delay at frequency 0. It is meant for signals; for a
+    plant with a zero-order hold `to_discrete` is exact.
 
     Parameters
     ----------
     dead_time, dt : float
         In s.
     order : int, optional
-        N, 1...20; taken smaller where the dead time is shorter than that.
+        N, 1...20; smaller if the dead time is shorter than that.
 
     Returns
     -------
@@ -86,11 +86,11 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     Raises
     ------
     DelayRangeError
-        Less than half a sample, but not nothing: no causal all-pass has that delay.
+        More than zero but less than half a sample: no causal all-pass has that delay.
 
     Notes
     -----
-    The coefficients are Thiran's [1]_, read as an all-pass [2]_.
+    The coefficients are Thiran's [1]_, used for an all-pass [2]_.
 
     References
     ----------

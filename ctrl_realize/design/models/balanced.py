@@ -1,4 +1,4 @@
-"""Balanced truncation of the core, delay kept."""
+"""Balanced truncation of the core; the delay is kept."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ STABLE = 1 - 1e-9
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BalancedReduction(ModelFit):
-    """How a core was reduced.
+    """Result of a reduction of the core.
 
-    ``error_bound = 2 * singular_values[kept:].sum()``, where ``kept = order - kept_unstable``; no
-    frequency response of the reduced system is farther than that from the full one's.
+    ``error_bound = 2 * singular_values[kept:].sum()``, where ``kept = order - kept_unstable``,
+    bounds the error of the frequency response.
 
     Attributes
     ----------
     singular_values : ndarray, shape (k,)
-        Hankel singular values of the stable part of the core, falling.
+        Hankel singular values of the stable part of the core, descending.
     order : int
         Order of the reduced core, unstable part included.
     full_order : int
@@ -87,12 +87,12 @@ class BalancedReduction(ModelFit):
 def hankel_singular_values(system: Any) -> FloatArray:
     """Compute the Hankel singular values of the stable part of a discrete core, descending.
 
-    The delay has no part in it: with the chain each input would add d values of its own.
+    The delay is excluded: it would add d values for each input.
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Any number of channels; any discrete system is taken.
+        Any number of channels; any discrete system.
 
     Returns
     -------
@@ -129,15 +129,15 @@ def reduce(
 ) -> DelayedStateSpace:
     """Reduce the order of the core by balanced truncation, and keep the delay.
 
-    Poles on or outside the unit circle are split off and kept. python-control's ``balred`` runs
-    the continuous algorithm on discrete systems and returns a continuous one.
+    Poles on or outside the unit circle are kept. python-control's ``balred`` applies the continuous
+    algorithm to discrete systems and returns a continuous one.
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Any number of channels; any discrete system is taken.
+        Any number of channels; any discrete system.
     order : int, optional
-        Order of the core to reach.
+        Order of the reduced core.
     tolerance : float, optional
         Instead of `order`: the smallest order whose error bound is below this (in the unit of the
         gain).
@@ -157,7 +157,7 @@ def reduce(
     Notes
     -----
     Balanced truncation [1]_, [2]_, by the square-root method [3]_. The error is bounded by twice
-    the sum of the Hankel singular values left out [4]_, in discrete time as well [5]_.
+    the sum of the truncated Hankel singular values [4]_, also in discrete time [5]_.
 
     References
     ----------
@@ -232,7 +232,7 @@ def reduce(
 
 
 def _parts(core: ct.StateSpace) -> tuple[Part, Part]:
-    """Stable part, and what lies on or outside the unit circle."""
+    """Stable part, and the part with poles on or outside the unit circle."""
     A, B, C = (np.asarray(M, dtype=np.float64) for M in (core.A, core.B, core.C))
     if np.all(np.abs(np.linalg.eigvals(A)) < STABLE):
         n = A.shape[0]

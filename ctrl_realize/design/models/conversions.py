@@ -1,4 +1,4 @@
-"""Conversions that keep the dead time exact: polynomial, continuous, discrete."""
+"""Conversions with exact dead time: transfer function, continuous, discrete."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ from .approximations import pade_ss
 def to_tf(system: Any) -> ct.TransferFunction:
     """Convert a discrete system with dead time to a transfer function, exactly.
 
-    Only the core's polynomial is formed, den from its poles and num from den times the Markov
-    parameters, so that the relative degree stays what it is; the delay is d zeros behind den.
+    Only the polynomials of the core are computed, den from its poles and num from den times the
+    Markov parameters, so that the relative degree is preserved; the delay is d further poles at
+    zero.
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Any number of channels; any discrete system is taken.
+        Any number of channels; any discrete system.
 
     Returns
     -------
@@ -76,17 +77,17 @@ def _numerator(den: FloatArray, pulses: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContinuousModel(Result):
-    """Continuous core and the dead time before it; unpacks as ``core, dead_time = model``.
+    """Continuous core and its dead time; unpacks as ``core, dead_time = model``.
 
-    Sampled behind a zero-order hold at `dt`, ``to_discrete(core, dead_time, dt)``, it is the
-    system that it was made from.
+    Sampled with a zero-order hold at `dt`, ``to_discrete(core, dead_time, dt)``, it is the original
+    discrete system.
 
     Attributes
     ----------
     core : control.StateSpace
         Continuous.
     dead_time : float
-        In s; may hold a fraction of a sample.
+        In s; not necessarily whole samples.
     dt : float
         Sample time in s of the discrete system.
 
@@ -108,7 +109,7 @@ class ContinuousModel(Result):
         return iter((self.core, self.dead_time))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # python-control's own systems do not pickle.
+        # python-control's systems cannot be pickled.
         core = self.core
         parts = (core.A, core.B, core.C, core.D, core.name, core.input_labels, core.output_labels)
         return _rebuild_model, (*parts, self.dead_time, self.dt)
@@ -157,12 +158,11 @@ def _rebuild_model(
 
 @single_threaded
 def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
-    """Convert the core to continuous time (inverse zero-order hold), and keep the dead time apart.
+    """Convert the core to continuous time (inverse zero-order hold), with a separate dead time.
 
-    Exact where it exists: every pole of the core needs a logarithm. Of the many continuous models
-    with the same samples, the one with all poles below the Nyquist frequency is given. A direct
-    term that stands behind a delay is read as a fraction of a sample where one explains it (see
-    `delayed_ss`).
+    Exact if it exists: every pole of the core needs a logarithm. Of the many continuous models with
+    the same samples, the one with all poles below the Nyquist frequency is given. A feedthrough
+    after a delay is converted to a fraction of a sample if that explains it (see `delayed_ss`).
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     ------
     UnsuitableSystemError
         A pole at z = 0 or on the negative real axis: no continuous system of the same order has
-        these samples. Channels with different delays. A system that is continuous already.
+        these samples. Channels with different delays. A system that is already continuous.
 
     Notes
     -----
@@ -234,7 +234,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
 
 
 def _check_logarithm(poles: FloatArray) -> None:
-    # Rounding may leave a pole that is real and negative a hair off the axis.
+    # Rounding may move a negative real pole slightly off the axis.
     bad = poles[(np.abs(poles) < 1e-12) | ((np.abs(poles.imag) < 1e-9) & (poles.real < 0))]
     if bad.size:
         raise UnsuitableSystemError(
@@ -248,16 +248,16 @@ def _check_logarithm(poles: FloatArray) -> None:
 def to_discrete(
     core: Any, dead_time: float | None = None, dt: float | None = None, **names: Any
 ) -> DelayedStateSpace:
-    """Sample a continuous model with a zero-order hold, any dead time included exactly.
+    """Sample a continuous model with a zero-order hold, with any dead time exactly.
 
     Parameters
     ----------
     core : control.StateSpace, control.TransferFunction or ContinuousModel
     dead_time : float, optional
-        In s; that of a `ContinuousModel` if there is one, else 0. In place of a model's own it
-        is taken together with `dt` only.
+        In s; default: that of a `ContinuousModel`, else 0. To replace the dead time of a model,
+        give `dt` as well.
     dt : float, optional
-        Sample time in s; a `ContinuousModel` remembers its own.
+        Sample time in s; default: that of a `ContinuousModel`.
     **names
         ``name``, ``inputs``, ``outputs``.
 
@@ -267,7 +267,7 @@ def to_discrete(
 
     Notes
     -----
-    Sampling behind a hold, with a dead time of any length, as in [1]_.
+    Sampling with a hold and a dead time of any length follows [1]_.
 
     References
     ----------
@@ -283,8 +283,8 @@ def to_discrete(
     """
     if isinstance(core, ContinuousModel):
         if dead_time is not None and dt is None:
-            # Else to_discrete(model, 0.05), meant as a sample time, would put 0.05 s of dead time
-            # in place of the model's own, and keep the sample time.
+            # Otherwise to_discrete(model, 0.05), with 0.05 meant as a sample time, would replace
+            # the dead time by 0.05 s and keep the sample time.
             raise OptionError(
                 f"the model already has a dead time, {core.dead_time:.6g} s; give dt=... for "
                 "another sample time, or dead_time= and dt= to replace both"

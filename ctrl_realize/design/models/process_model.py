@@ -1,4 +1,4 @@
-"""First- and second-order models with dead time, the currency of tuning rules."""
+"""First- and second-order models with dead time, for tuning rules."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class ProcessModel(Result):
     method : str
         How it was found: ``"given"``, ``"half rule"`` or ``"optimal"``.
     error : float
-        Distance to the reduced system's step response: the root of its mean square over the
-        system's total time (dead time and lags together), relative to the gain (for an
-        integrating system to gain times total time); nan where nothing was reduced.
+        Error of the step response relative to that of the reduced system: root mean square over the
+        system's total time (dead time plus lags), divided by the gain (for an integrating system by
+        gain times total time); nan if nothing was reduced.
 
     Examples
     --------
@@ -90,7 +90,7 @@ class ProcessModel(Result):
         return delayed_ss(self.transfer_function(), dead_time=self.dead_time, dt=dt)
 
     def step(self, time: ArrayLike) -> FloatArray:
-        """Step response at times in s."""
+        """Step response at given times in s."""
         at = finite(time, "time")
         shape = process_step(
             at, self.lag, self.second_lag, self.dead_time, integrating=self.integrating
@@ -99,12 +99,12 @@ class ProcessModel(Result):
 
     @property
     def normalized_dead_time(self) -> float:
-        """Part of the dead time in dead time and lag: near 0 lag-, near 1 delay-dominated."""
+        """Dead time divided by dead time plus lag: near 0 lag-, near 1 delay-dominated."""
         return self.dead_time / (self.dead_time + self.lag) if self.dead_time else 0.0
 
     @property
     def total_time(self) -> float:
-        """Dead time and lags together, in s."""
+        """Dead time plus lags, in s."""
         return self.lag + self.second_lag + self.dead_time
 
     @property

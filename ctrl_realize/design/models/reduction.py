@@ -1,4 +1,4 @@
-"""Reduction of a model to one or two lags and a dead time."""
+"""Reduction of a model to one or two lags with dead time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .process_model import ProcessModel
 METHODS = ("optimal", "half_rule")
 MOST_SAMPLES = 2**18
 FIT_POINTS = 1500
-"""Points of the step response that a fit looks at; more do not move the parameters."""
+"""Number of points of the step response in a fit; more do not change the parameters."""
 
 
 @single_threaded
@@ -36,32 +36,31 @@ def reduce_fopdt(
     Parameters
     ----------
     system : DelayedStateSpace, ContinuousModel, or a continuous control system
-        One input and one output, stable or with one integrator. An integrating system becomes
+        One input and one output, stable or with one integrator. An integrating system is reduced to
         ``gain exp(-theta s) / s``.
     method : {"optimal", "half_rule"}, optional
-        ``"optimal"`` fits the step response by least squares with the static gain kept and no
-        less dead time than the system has: a lag in its place would promise phase that is not
-        there.
-        ``"half_rule"`` is Skogestad's, from the poles and zeros of the continuous core (a complex
-        pair counts as two equal lags of the same sum).
+        ``"optimal"`` fits the step response by least squares, with the static gain and at least the
+        dead time of the system: a lag in its place would overestimate the phase. ``"half_rule"`` is
+        Skogestad's, from the poles and zeros of the continuous core (a complex pair counts as two
+        equal lags with the same sum).
     dead_time : float, optional
         In s, for a continuous control system.
 
     Returns
     -------
     ProcessModel
-        Its `error` tells how far off its step response is.
+        Its `error` is that of the step response.
 
     Raises
     ------
-    UnsuitableSystemError
-        An unstable system, several channels, no static gain; for the half rule also a core that
+    An unstable system, several channels, no static gain; for the half rule also a core that has no
+    continuous equivalent.
         has no continuous counterpart.
 
     Notes
     -----
-    The half rule is that of [1]_: half of the largest lag that is left out goes to the dead time
-    and half to the lag that stays.
+    The half rule is that of [1]_: half of the largest neglected lag is added to the dead time and
+    half to the remaining lag.
 
     References
     ----------
@@ -89,7 +88,7 @@ def reduce_sopdt(
 ) -> ProcessModel:
     """Reduce a system to gain, two lags and dead time.
 
-    As `reduce_fopdt`; an integrating system keeps one lag beside its integrator.
+    As `reduce_fopdt`; an integrating system keeps one lag in addition to its integrator.
 
     Parameters
     ----------
@@ -154,7 +153,7 @@ def _both_forms(
             raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
         model = ContinuousModel(core, wait, span / 1000)
         if np.any(core.D):
-            # A direct term jumps; whole samples keep the jump where it is.
+            # A feedthrough causes a jump; with whole samples it stays in place.
             step = wait / max(1, round(wait / model.dt)) if wait else model.dt
             model = ContinuousModel(core, wait, step)
         return model, to_discrete(model)
@@ -163,7 +162,7 @@ def _both_forms(
 
 
 def _dead_time(plant: DelayedStateSpace) -> float:
-    """Dead time in s, without the fraction of a sample that a direct term may hold."""
+    """Dead time in s, without the fraction of a sample that a feedthrough may represent."""
     if plant.delay and np.any(plant.delay_free.D):
         try:
             return float(to_continuous(plant).dead_time)
@@ -173,7 +172,7 @@ def _dead_time(plant: DelayedStateSpace) -> float:
 
 
 def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool, float]:
-    """Step response until it has settled (or runs along its ramp), thinned; its gain."""
+    """Step response until it has settled (or follows its ramp), thinned; and its gain."""
     if not plant.issiso():
         raise UnsuitableSystemError(
             f"a reduction needs one input and one output; {plant.name!r} has {plant.ninputs} "
@@ -217,7 +216,7 @@ def _by_half_rule(
     if np.any(poles.real >= 0):
         raise UnsuitableSystemError("the half rule needs stable lags")
     zeros = zeros[np.isfinite(zeros) & (np.abs(zeros) > 0)]
-    # A complex pair becomes two equal lags of the same sum: each has tau = -Re p / |p|^2.
+    # A complex pair is replaced by two equal lags with the same sum: each has tau = -Re p / |p|^2.
     lags = -poles.real / np.abs(poles) ** 2
     times = -zeros.real / np.abs(zeros) ** 2
     factor, kept, wait = half_rule(
@@ -242,7 +241,7 @@ def _by_fit(
 ) -> ProcessModel:
     """Fit lags and a dead time of at least `dead_time`."""
     lags = order - int(integrating)
-    # Total of dead time and lags: the area over the step response, or the offset of the ramp.
+    # Sum of dead time and lags: the area above the step response, or the offset of the ramp.
     total = _total(time, shape, integrating)
     span = time[-1]
 

@@ -1,1 +1,1 @@
-"""Controllers that predict through the dead time: Smith predictor, LQR, LQG."""
+"""Controllers with prediction over the dead time: Smith predictor, LQR, LQG."""

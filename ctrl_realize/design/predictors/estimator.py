@@ -20,26 +20,26 @@ from ..siso import delayed_system
 from .riccati import has_states, riccati, weight_matrix
 
 MOST_APART = 2000
-"""Samples by which outputs may differ in delay; the solver then holds 500 MB."""
+"""Largest difference of output delays in samples; the solver then takes 500 MB."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KalmanPredictor(Result):
     """Stationary Kalman filter of a core with dead time.
 
-    ``x[k+1] = A x[k] + B u[k-d] + gain (y[k] - C x[k] - D u[k-d])``. The inputs on their way are
-    known, so the chain needs no gain: the filter of the whole system is ``[gain; 0]``.
+    ``x[k+1] = A x[k] + B u[k-d] + gain (y[k] - C x[k] - D u[k-d])``. Past inputs are known, so the
+    input delay needs no gain: that of the whole system is ``[gain; 0]``.
 
-    Where outputs are delayed, x is the core's state with the outputs on their way behind it,
-    ``y*[k-1] ... y*[k-q]`` of each, and A, B, C, D are those of core and outputs: the filter
-    predicts the core's state of now from what was measured `q` samples late.
+    If outputs are delayed, x is the core's state followed by the outputs within their delays,
+    ``y*[k-1] ... y*[k-q]`` of each, and A, B, C, D are those of core and output delays: the filter
+    predicts the present state from measurements that are `q` samples old.
 
     Attributes
     ----------
     gain : ndarray, shape (n + q, p)
         q is the sum of the output delays.
     covariance : ndarray, shape (n, n)
-        Of the error of the core's state predicted one sample ahead.
+        Of the one-sample-ahead prediction error of the core's state.
     poles : ndarray, shape (n + q,)
         Of the estimator, eigenvalues of A - gain C.
     dt : float
@@ -77,17 +77,17 @@ class KalmanPredictor(Result):
 def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) -> KalmanPredictor:
     """Compute the stationary Kalman filter of a system with dead time.
 
-    Equal to `control.dlqe` of the augmented system with process noise on the core's states only,
-    at the cost of a Riccati equation of the core: what all outputs are late by is a prediction.
+    Equal to `control.dlqe` of the augmented system with process noise on the core's states only, at
+    the cost of a Riccati equation of the core: the common output delay is a prediction.
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Its delays may differ from channel to channel. Outputs of different delays make the
-        Riccati equation larger by what they differ.
+        The delays may differ between channels. Different output delays enlarge the Riccati equation
+        by their differences.
     QN : array_like, shape (n, n)
-        Covariance of the process noise on the core's states. For noise that enters with the
-        input use ``B @ B.T`` of the core.
+        Covariance of the process noise on the core's states. For noise at the input use ``B @ B.T``
+        of the core.
     RN : array_like, shape (p, p) or number
         Covariance of the measurement noise.
 
@@ -98,16 +98,16 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     Raises
     ------
     UnsuitableSystemError
-        A core that these covariances cannot observe, or one without states.
+        A core that is not observable with these covariances, or one without states.
     DelayRangeError
-        Delays of outputs that differ by more than 2000 samples.
+        Output delays that differ by more than 2000 samples.
     DataError, OptionError
         Covariances of the wrong shape, or not symmetric.
 
     Notes
     -----
-    The steady filter of the core [1]_; predicting its state over the delay of the outputs is
-    optimal, since no measurement tells of the samples in between.
+    The stationary filter of the core [1]_; prediction of its state over the output delay is
+    optimal, since there are no measurements of the samples between.
 
     References
     ----------
@@ -149,7 +149,7 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
 
 
 def _with_outputs(core: ct.StateSpace, delays: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-    """Return A and C of the core with the outputs that are on their way."""
+    """Return A and C of the core with output delays."""
     matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
     A, _, C, _ = augment(matrices, (0,) * core.ninputs, delays)
     return A, C
@@ -158,10 +158,10 @@ def _with_outputs(core: ct.StateSpace, delays: tuple[int, ...]) -> tuple[FloatAr
 def _late(
     core: ct.StateSpace, delays: tuple[int, ...], common: int, found: tuple[FloatArray, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    """Predict the filter of outputs that all are `common` samples late.
+    """Extend the filter to outputs that are all delayed by `common` samples.
 
-    What is learnt about the state then is carried on by A to now; what is on its way to an
-    output is that output of the states between.
+    The estimated past state is predicted by A to the present; the samples within an output delay
+    are the outputs of the states between.
     """
     A, gain, cost, noise = found
     n, C = core.nstates, np.asarray(core.C, dtype=np.float64)
@@ -172,7 +172,7 @@ def _late(
     rows = [between[-1][:n]]
     at = n
     for i, q in enumerate(delays):
-        # y*[k+1-j] for j = 1 ... common, then what the smaller filter holds of its own delay.
+        # y*[k+1-j] for j = 1 ... common, then the states of the smaller filter for its own delays.
         rows += [C[[i]] @ between[common - j][:n] for j in range(1, common + 1)]
         rows.append(gain[at : at + q - common])
         at += q - common

@@ -1,4 +1,4 @@
-"""Output feedback through a dead time: filter, prediction, state feedback."""
+"""Output feedback for plants with dead time: filter, prediction, state feedback."""
 
 from __future__ import annotations
 
@@ -76,14 +76,14 @@ def lqg(
 ) -> ct.StateSpace:
     """Design an LQG controller: Kalman filter, prediction over the dead time, state feedback.
 
-    Works for unstable and integrating cores too, where a Smith predictor cannot. Its states are
-    those of the core and of the delay line. It has no integral action: for that, put an integrator
-    before the plant first and after the controller then.
+    Also for unstable and integrating cores, for which a Smith predictor is not possible. Its states
+    are those of the core and of the delay line. It has no integral action: for that, add an
+    integrator to the plant for the design, and then to the controller.
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Its delays may differ from channel to channel.
+        The delays may differ between channels.
     Q, R
         As for `predictor_lqr`.
     QN, RN
@@ -100,20 +100,20 @@ def lqg(
     Raises
     ------
     UnsuitableSystemError
-        A core without states, weights that do not stabilize it, or an unstable core behind a dead
-        time that it cannot be predicted over.
+        A core without states, weights that do not stabilize it, or an unstable core that cannot be
+        predicted over the dead time.
     DelayRangeError
         Several channels with delays too long for dense matrices.
 
     Warns
     -----
     ModelWarning
-        The loop is unstable for some dead time within the interval that the system carries.
+        The loop is unstable for some dead time within the system's interval.
 
     Notes
     -----
-    Separation of estimator and regulator [1]_; the regulator acts on the state predicted over the
-    dead time of the inputs, as in the reduction of [2]_.
+    Separation of estimator and regulator [1]_; the regulator uses the state predicted over the
+    input delays, as in the reduction of [2]_.
 
     References
     ----------
@@ -141,14 +141,14 @@ def lqg(
     matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
     A, B, C, D = augment(matrices, (0,) * core.ninputs, tuple(plant.output_delays))
     L = estimator.gain
-    # Estimated core and line of own outputs, as the chains of the plant hold them.
+    # Estimated core and delay line, as in the augmented plant.
     inner, into = A - L @ C, B - L @ D
     n, d = A.shape[0], sum(plant.input_delays)
-    # What is on its way to an output counts among the states of the estimator, and for nothing.
+    # Samples within an output delay are states of the estimator, with zero weight.
     gain, passed = np.split(law.gain, [core.nstates + d], axis=1)
     K = np.hstack([gain[:, : core.nstates], passed, gain[:, core.nstates :]])
     if not plant.issiso():
-        # Separation: the loop has the poles of the regulator and those of the estimator.
+        # Separation: the closed-loop poles are those of the regulator and of the estimator.
         poles = np.concatenate([law.poles, estimator.poles])
         refuse_poles(poles, "the controller", TOO_LONG)
         return _several_channels(plant, (inner, into, K, L), name)
@@ -156,7 +156,7 @@ def lqg(
     if d:
         line[:, -1:] = into
     else:
-        # u[k] is formed from the state alone, and acts at once.
+        # u[k] depends on the state alone, and acts at once.
         inner = inner - into @ K
 
     def made(check: LoopCheck | None = None) -> LQGController:
@@ -192,7 +192,7 @@ def lqg(
 def _several_channels(
     plant: DelayedStateSpace, parts: tuple[FloatArray, ...], name: str
 ) -> ct.StateSpace:
-    """Close the estimator's own lines by the gain; all channels in one plain system."""
+    """Close the estimator's delay lines by the gain; all channels in one plain system."""
     inner, into, K, L = parts
     n, m = into.shape
     if n + sum(plant.input_delays) > MAX_STATES:

@@ -25,9 +25,9 @@ def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating
     delay : int
         Delay of the model in samples.
     poles : ndarray, shape (s,)
-        Real poles to remove, z = 1 not among them.
+        Real poles to remove, other than z = 1.
     integrating : bool
-        Whether a pole at z = 1 is to be removed too.
+        Whether a pole at z = 1 is removed too.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating
         rows.append((1 - alpha) / (p - alpha) * ((p - 1) / (p - alpha)) ** basis)
         values.append(float(p) ** delay)
     weights = np.linalg.solve(np.array(rows), np.array(values))
-    # A cascade: each stage sees the stage before it, plus that stage's own input.
+    # A cascade: the input of each stage is the stage before it, plus that stage's input.
     A, B = alpha * np.eye(count), np.zeros((count, 1))
     B[0] = 1 - alpha
     for i in range(1, count):
@@ -66,10 +66,10 @@ def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating
 
 
 def removed_part(filter_: Filter, removed: Part) -> FloatArray:
-    """Input vector of the filter's states for what is left of F times the removed modes.
+    """Input vector of the filter's states for the remainder of F times the removed modes.
 
-    F(z) G_s(z) splits into the removed poles, which the predictor cancels, and the filter's own
-    poles; the latter have the filter's A and C and this input.
+    F(z) G_s(z) is split into the removed poles, which the predictor cancels, and the filter's
+    poles; the latter part has the filter's A and C and this input.
 
     Returns
     -------

@@ -1,10 +1,9 @@
-"""Optimal state feedback through a dead time, without the big Riccati equation.
+"""Optimal state feedback for plants with input delay, by the Riccati equation of the core.
 
-An input sent now acts d samples later on the core. What the core's state will be then is known:
-``x[k+d] = A^d x[k] + sum_i A^(i-1) B u[k-i]``. Feeding back that prediction with the gain of the
-core alone is the optimum of the whole system, chain included. Where the inputs have different
-delays the optimum is still a law on the core and what is under way, see
-`numerics.delayed_regulator`.
+An input acts on the core d samples later. The state at that time is known: ``x[k+d] = A^d x[k] +
+sum_i A^(i-1) B u[k-i]``. Feedback of this prediction with the gain of the core alone is optimal for
+the whole system, including the delay. If the inputs have different delays the optimum is still a
+state feedback from the core and the past inputs, see `numerics.delayed_regulator`.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from ..siso import delayed_system
 from .riccati import has_states, riccati, weight_matrix
 
 MOST_MEMORY = 2e9
-"""Bytes for the laws of inputs that act after different delays."""
+"""Upper limit of the memory for inputs with different delays, in bytes."""
 TOO_LONG = (
     "An unstable core cannot be predicted over such a long dead time in double precision; "
     "use a longer sample time, or a shorter dead time"
@@ -40,32 +39,31 @@ TOO_LONG = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PredictorLQR(Result):
-    """State feedback ``u = -gain @ x`` on the states of the system, chain included.
+    """State feedback ``u = -gain @ x`` from the states of the system, delay line included.
 
     With one delay d for all inputs: ``gain = [core_gain A^d, ...]`` on the core's states, and
-    ``core_gain A^(i-1) B`` on the input that was sent i samples ago, together ``core_gain`` times
-    the predicted state. With different delays the inputs that act sooner make the best of what
-    the slower ones have under way; after the longest delay the core moves as ``A - B core_gain``
-    in any case.
+    ``core_gain A^(i-1) B`` on the input of i samples ago, together ``core_gain`` times the
+    predicted state. With different delays the faster inputs take into account what the slower ones
+    will do; after the longest delay the core moves as ``A - B core_gain`` in any case.
 
     Attributes
     ----------
     gain : ndarray, shape (m, n + sum of delays)
-        On the states of the `DelayedStateSpace`, in its order.
+        For the states of the `DelayedStateSpace`, in its order.
     core_gain : ndarray, shape (m, n)
-        On the core's state as if there were no delay.
+        For the core's state without the delay.
     poles : ndarray
-        Closed-loop poles: those of the core with `core_gain`; those of the chains are at 0.
+        Closed-loop poles: those of the core with `core_gain`; those of the delays are at 0.
     cost : ndarray, shape (n, n)
-        Solution P of the core's Riccati equation: the cost from the state on that is predicted
-        for the end of the longest delay.
+        Solution P of the core's Riccati equation: the cost from the state predicted for the end of
+        the longest delay on.
     delay : int, or tuple of int where the inputs differ
         In samples.
     dt : float
     check : LoopCheck or None
-        Of the loop that the gain closes, broken at the plant's input, with the states measured,
-        on the system itself and over its interval of dead times. None for several inputs, whose
-        loop is known by its `poles` only.
+        Of the loop with this gain, broken at the plant's input, with measured states, for the
+        system itself and over its interval of dead times. None for several inputs, for which only
+        the `poles` are computed.
 
     Examples
     --------
@@ -112,18 +110,18 @@ class PredictorLQR(Result):
 def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     """Compute the linear-quadratic regulator of a system with dead time.
 
-    Equal to `control.dlqr` of the augmented system with Q on the core's states, at the price of
-    the core's Riccati equation: milliseconds at any delay.
+    Equal to `control.dlqr` of the augmented system with Q on the core's states, at the cost of the
+    core's Riccati equation: milliseconds at any delay.
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Its delays may differ from input to input; delays at outputs do not matter here.
+        The delays may differ between inputs; output delays have no effect here.
     Q : array_like, shape (n, n)
         Weight on the core's states, positive semidefinite. For a weight on the output use
         ``C.T @ C`` of the core.
     R : array_like, shape (m, m) or number
-        Weight on the inputs, positive definite. It must not couple inputs of different delays.
+        Weight on the inputs, positive definite. It must not couple inputs with different delays.
 
     Returns
     -------
@@ -132,10 +130,10 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     Raises
     ------
     UnsuitableSystemError
-        A core that these weights cannot stabilize, or one without states; a core so unstable that
-        double precision cannot predict it over the dead time.
+        A core that cannot be stabilized with these weights, or one without states; a core so
+        unstable that it cannot be predicted over the dead time in double precision.
     DelayRangeError
-        Different delays of inputs, so long that the recursion does not fit into memory.
+        Different input delays, so long that the recursion does not fit into memory.
     DataError
         Weights of the wrong shape.
     OptionError
@@ -144,12 +142,12 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     Warns
     -----
     ModelWarning
-        The loop is unstable for some dead time within the interval that the system carries.
+        The loop is unstable for some dead time within the system's interval.
 
     Notes
     -----
-    Different delays cost one step of a Riccati recursion of the core's size for each sample
-    between the shortest and the longest; known as the regulator for multiple input delays [1]_.
+    Different delays take one step of a Riccati recursion of the core's size for each sample between
+    the shortest and the longest, the regulator for multiple input delays [1]_.
 
     References
     ----------
@@ -187,7 +185,7 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
 
 
 def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
-    """Solve for the gain, see `predictor_lqr`, without a look at the loop."""
+    """Compute the gain, see `predictor_lqr`, without a check of the loop."""
     plant = delayed_system(system, "predictor_lqr", siso=False)
     check_sign(plant, "predictor_lqr")
     warn_unresolved(plant, predicts=True)
@@ -212,7 +210,7 @@ def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
             f"the core is unstable and overflows within the delay of {max(delays)} samples: "
             "no controller can stabilize it over such a long dead time"
         )
-    # What is on its way to an output has left the core: no input can change it any more.
+    # Samples within an output delay have left the core and cannot be changed by any input.
     passed = np.zeros((gain.shape[0], sum(plant.output_delays)))
     return PredictorLQR(
         gain=read_only(np.hstack([lines, passed])),
@@ -227,7 +225,7 @@ def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
 def _state_loop(
     plant: DelayedStateSpace, found: PredictorLQR
 ) -> tuple[DelayedStateSpace, DelayLineController]:
-    """Loop of one input: the core's states, weighted by the gain, and the line of past inputs."""
+    """Loop of one input: the core's states, weighted by the gain, and the delay line."""
     core, d, dt = plant.delay_free, plant.input_delays[0], float(plant.dt)
     n = core.nstates
     on_state, line = found.gain[:, :n], found.gain[:, n : n + d]

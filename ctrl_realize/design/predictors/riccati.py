@@ -1,4 +1,4 @@
-"""Riccati equations of a core: weights checked, failures in words."""
+"""Riccati equations of a core, with checked weights."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...numerics.arrays import ComplexArray, FloatArray
 
 
 def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray:
-    """Return a symmetric weight or covariance of the size that is needed."""
+    """Return a symmetric weight or covariance of the required size."""
     weight = np.atleast_2d(numbers(given, name))
     if weight.shape != (size, size):
         raise DataError(
@@ -29,7 +29,7 @@ def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray
 
 
 def has_states(core: ct.StateSpace, purpose: str) -> None:
-    """Refuse a static core, which has no state to regulate or to estimate."""
+    """Refuse a static core, which has no states to control or estimate."""
     if core.nstates == 0:
         raise UnsuitableSystemError(
             f"{purpose} needs a core with states; this plant is a static gain with dead time. "
@@ -58,7 +58,7 @@ def riccati(
     """
     try:
         gain, cost, poles = solver(A, B, Q, R)
-    # Slycot, where it is there, has errors of its own, all of them ArithmeticErrors.
+    # Slycot, if installed, has its own errors, all of them ArithmeticErrors.
     except (ArithmeticError, ct.ControlArgument, ValueError) as error:
         raise UnsuitableSystemError(
             "the Riccati equation of the core has no stabilizing solution for these "

@@ -34,7 +34,7 @@ class SmithPredictor(CheckedController):
     filter_time : float or None
         Time constant of the prediction-error filter in s.
     removed_poles : ndarray
-        Poles taken out of the predictor.
+        Poles removed from the predictor.
     check : LoopCheck or None
         Check of the closed loop with the plant.
 
@@ -78,12 +78,12 @@ def smith_predictor(
     remove_slow: bool | None = None,
     name: str = "smith",
 ) -> SmithPredictor:
-    """Make a Smith predictor of a controller that was designed for the delay-free core.
+    """Make a Smith predictor for a controller designed for the delay-free core.
 
     The result C_s is used like any controller, ``loop = system * C_s`` with negative feedback.
-    Without a filter the closed loop from set-point to output is that of core and controller
-    alone, z^-d later. It has nC + n + d states and no hidden mode (feedback of the difference of
-    two models has n more, which show as uncontrollable poles of the core).
+    Without a filter the closed loop from set-point to output is that of core and controller alone,
+    delayed by z^-d. It has nC + n + d states and no hidden mode (the difference of two separate
+    models has n more states, which are uncontrollable poles of the core).
 
     Parameters
     ----------
@@ -93,12 +93,12 @@ def smith_predictor(
         Controller designed for ``system.delay_free``, of the same sample time.
     filter_time : float, optional
         Time constant in s of the filter on the prediction error. It makes the loop robust to a
-        wrong dead time or gain, slows down the rejection of loads, and leaves the set-point
-        response to a prefilter. Half the dead time is a usual start.
+        wrong dead time or gain, and slows down load rejection; the set-point response is then
+        shaped by a prefilter. Half the dead time is a usual initial choice.
     remove_slow : bool, optional
-        Take poles slower than the dead time out of the predictor, so that loads die out with the
-        controller rather than with the plant (for lag-dominated cores). An integrator is always
-        taken out.
+        Remove poles slower than the dead time from the predictor, so that the response to loads
+        decays with the controller rather than with the plant (for lag-dominated cores). An
+        integrator is always removed.
     name : str, optional
 
     Returns
@@ -110,24 +110,23 @@ def smith_predictor(
     Raises
     ------
     UnsuitableSystemError
-        An unstable core: its modes would be hidden inside the predictor and grow there. An
-        integrating core without `filter_time`, for the same reason. A continuous, improper or
-        multi-channel system. A controller that makes the loop unstable on `system` itself.
+        An unstable core, whose modes would be hidden and grow inside the predictor. An integrating
+        core without `filter_time`, for the same reason. A continuous, improper or multi-channel
+        system. A controller that makes the loop with `system` itself unstable.
     OptionError
-        A filter that is no filter.
+        An invalid filter.
 
     Warns
     -----
     ModelWarning
-        The closed loop is unstable for some dead time within the interval that the
-        identification gave.
+        The closed loop is unstable for some dead time within the interval from the identification.
 
     Notes
     -----
     The structure is Smith's [1]_; the filter on the prediction error, and the slow poles that it
-    takes out of the predictor, are those of the filtered Smith predictor [2]_, [3]_, [4]_. The
-    prediction is computed as ``y0[k] = sum_i g_i u[k-i] + C A^d x[k-d]``, with the
-    line of past inputs and the state of the model behind its dead time.
+    removes from the predictor, are those of the filtered Smith predictor [2]_, [3]_, [4]_. The
+    prediction is computed as ``y0[k] = sum_i g_i u[k-i] + C A^d x[k-d]``, from the past inputs and
+    the state of the delayed model.
 
     References
     ----------
@@ -253,7 +252,7 @@ def _assemble(
 ) -> tuple[Any, ...]:
     """Matrices of u = C v, v = F (e + y_d) - y_0, with states [x_c; x_d; x_F] and the line.
 
-    Last the pulse response that all but the last column of the line are made of.
+    Also the pulse response from which all but the last column of the delay line are computed.
     """
     core, d = plant.delay_free, int(plant.delay)
     Ac, Bc, Cc, Dc = (
@@ -263,7 +262,7 @@ def _assemble(
     Af, Bf, Cf, Df = filter_
     nc, nk, nf = Ac.shape[0], Ak.shape[0], Af.shape[0]
     if d == 0:
-        # Nothing to predict, and with F = 1 nothing to filter: the controller itself.
+        # Nothing to predict and, with F = 1, nothing to filter: the controller itself.
         return Ac, Bc, Cc, Dc, np.zeros((nc, 0)), np.zeros((1, 0)), None
     taps = responses.markov(core.A, core.B, core.C, core.D, d + 1)[0, 0]
     direct = float(core.D[0, 0])
@@ -275,7 +274,7 @@ def _assemble(
     into[0][0, nc + nk :] = Cf[0]
     into[1][0] = -taps[1:]
     into[1][0, -1] += Df * direct
-    # v still holds -g_0 u[k]: u (1 + Dc g_0) = Cc x_c + Dc (the rest of v)
+    # v still contains -g_0 u[k]: u (1 + Dc g_0) = Cc x_c + Dc (the rest of v)
     solve = 1 + Dc[0, 0] * taps[0]
     if abs(solve) < 1e-12:
         raise UnsuitableSystemError(
@@ -295,7 +294,7 @@ def _assemble(
         A[nc + nk :, nc + nk :] = Af
         E[nc + nk :, -1] = Bf[:, 0] * direct + removed_part(filter_, removed)[:, 0]
         B[nc + nk :] = Bf
-    # The line holds -taps alone, through the controller's B and D.
+    # The delay line contains -taps alone, through the controller's B and D.
     mix = -np.vstack([Bc, np.zeros((nk + nf, 1)), Dc]) / solve
     core_A, core_B, core_C = (np.asarray(M, np.float64) for M in (core.A, core.B, core.C))
     return A, B, out[0], out[2], E, out[1], (core_A, core_B, mix @ core_C)

@@ -1,4 +1,4 @@
-"""PID controllers with their parameters."""
+"""PID controllers."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     """PID controller in ideal form, continuous or discrete; a `control.StateSpace`.
 
     Continuous: ``kp (1 + 1/(ti s) + td s / (tf s + 1))`` from error to plant input. Discrete: the
-    integral by `method`, the derivative by backward differences, which never ring.
+    integral by `method`, the derivative by backward differences, which do not ring.
 
     Parameters
     ----------
     kp : float
         Gain.
     ti : float
-        Integral time in s; inf for none.
+        Integral time in s; inf for no integral.
     td : float
-        Derivative time in s; 0 for none.
+        Derivative time in s; 0 for no derivative.
     tf : float
-        Time constant of the derivative filter in s; > 0 where there is a derivative.
+        Time constant of the derivative filter in s; > 0 if there is a derivative.
     dt : float
         Sample time in s; 0 for a continuous controller.
     method : {"tustin", "forward", "backward"}
-        Rule for the integral.
+        Discretization of the integral.
     rule : str
-        Where the parameters come from.
+        Tuning rule.
     model : ProcessModel, optional
-        What the rule looked at.
+        Process model used by the rule.
     name : str, optional
     check : LoopCheck, optional
-        What the loop does on the model that the controller was tuned for.
+        Check of the closed loop with the model that the controller was tuned for.
 
     Examples
     --------
@@ -125,9 +125,9 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         return pole, 1.0, slope * (pole - 1), slope
 
     def discretised(self, dt: float, method: str | None = None) -> PIDController:
-        """Sample the controller (or sample it anew) with `dt` in s."""
+        """Discretize the controller (or change its sample time) with `dt` in s."""
         positive(dt, "dt", "sample time in s")
-        # What was found of the loop was found of this sample time.
+        # The loop check is valid for one sample time only.
         return self._again(dt=dt, method=method or self.method, check=None)
 
     @property
@@ -136,11 +136,11 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         return self._again(dt=0.0, check=None)
 
     def checked(self, check: LoopCheck) -> PIDController:
-        """The same controller with what was found of its loop."""
+        """The same controller with a loop check."""
         return self._again(check=check)
 
     def report(self) -> str:
-        """Tell the parameters, and what the loop does on its model, as plain text."""
+        """List the parameters and the loop check as plain text."""
         title, rows, flags = self._card()
         return text_card(title, rows, flags=flags)
 
@@ -149,7 +149,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         return PIDController(self.kp, self.ti, self.td, self.tf, **settings)
 
     def _settings(self) -> dict[str, Any]:
-        """All that makes this controller, beside its four parameters."""
+        """All arguments of the constructor beside the four parameters."""
         return {
             "dt": self.dt,
             "method": self.method,
@@ -177,7 +177,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
             f"float('{value!r}')" if np.isinf(value) else repr(value)
             for value in (self.kp, self.ti, self.td, self.tf)
         )
-        # Not the model that a rule looked at, nor what was found of the loop.
+        # Without process model and loop check.
         settings = self._settings()
         words = ", ".join(f"{key}={settings[key]!r}" for key in ("dt", "method", "rule", "name"))
         return f"PIDController({parameters}, {words})"
@@ -196,7 +196,7 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         return f"<PIDController {self.name!r}: {', '.join(words)}>"
 
     def __str__(self) -> str:
-        # python-control's shows matrices, in which nobody finds the parameters again.
+        # python-control shows only matrices, in which the parameters are not visible.
         return f"{self._line()}\n{self._gains()}\n\n{super().__str__()}"
 
     def _gains(self) -> str:

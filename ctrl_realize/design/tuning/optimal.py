@@ -1,4 +1,4 @@
-"""PID parameters of least absolute load error under a limit on the sensitivity."""
+"""PID parameters that minimize the absolute load error under a limit on the sensitivity."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from .controller import PIDController
 from .rules import INF, Parameters
 
 LONGEST = 2**18
-"""Most samples of a load response."""
+"""Largest number of samples of a load response."""
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """The plant's response on two sets of points: on `omega` for the limit on the sensitivity, on
-    `circle` for the step response of `count` samples; `distance` is 1 / Ms, `sign` the gain's.
+    """Response of the plant on two sets of points: on `omega` for the limit on the sensitivity, on
+    `circle` for the step response of `count` samples; `distance` is 1 / Ms, `sign` that of the gain.
     """
 
     plant: DelayedStateSpace
@@ -51,13 +51,13 @@ class _Problem:
         return PIDController(kp, ti, td, tf, dt=self.plant.dt, method=self.method)
 
     def gain(self, ti: float, td: float) -> float:
-        """Largest gain within the limit, for these times."""
+        """Largest gain within the limit, for given times."""
         unit = self.controller(self.sign, ti, td)
         z = np.exp(1j * self.omega * self.plant.dt)
         shape = self.loop * _values(unit, z)
         if not (self.integrating and ti < INF):
             return largest_gain(shape, self.distance)[0]
-        # Two integrators: small gains are the badly damped ones, and the limit has a lower end.
+        # Two integrators: small gains are badly damped, and the limit has a lower end.
         for low, high in reversed(gain_gaps(shape, self.distance)):
             if high < INF and high > low * (1 + 1e-6):
                 kp = self.sign * (low * high) ** 0.5 if low else self.sign * high / 2
@@ -98,8 +98,8 @@ def optimal(
 ) -> Parameters:
     """Minimize the integrated absolute error after a load step, subject to Ms.
 
-    For each pair of times the largest gain within the limit has a closed form; over the times the
-    error is minimized. Without an integral the lasting error is smallest at the largest gain.
+    For given times the largest gain within the limit has a closed form; the error is minimized over
+    the times. Without an integral the steady-state error is smallest at the largest gain.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _problem(
             "stability. Use design.lqg"
         )
     loop = open_loop(plant)
-    # Finer than for bracketing: the limit is read at the points of the grid.
+    # Finer than for bracketing: the limit is evaluated at the points of the grid.
     omega, values = follow(loop, loop.grid(), largest_turn=0.05)
     slow = values[int(np.argmax(np.abs(values)))] if loop.integrators() else loop(np.zeros(1))[0]
     sign = -1.0 if (slow.imag > 0 if loop.integrators() else slow.real < 0) else 1.0

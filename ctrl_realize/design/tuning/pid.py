@@ -25,14 +25,14 @@ from .rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
 SAFE = ("amigo", "simc", "lambda")
-"""Rules that are tried in place of one whose loop is unstable; then the optimal PI."""
+"""Rules that are suggested if the loop of another is unstable; then the optimal PI."""
 MOST_SENSITIVE = 2.0
-"""Largest Ms of a loop to recommend: gain and phase margin are then at least 2 and 29 deg
-(Astrom and Hagglund, Advanced PID Control, 2006, chapter 4)."""
+"""Largest Ms of a suggested loop: gain and phase margin are then at least 2 and 29 deg (Astrom and
+Hagglund, Advanced PID Control, 2006, chapter 4)."""
 FINE = 1000
-"""Samples within the total time of a process model, so many that sampling does not matter."""
+"""Samples within the total time of a process model, so many that sampling has no effect."""
 SETTLED = 10_000
-"""Samples behind the delay after which a step response has the sign of the gain."""
+"""Samples after the delay at which a step response has the sign of the gain."""
 
 
 @single_threaded
@@ -54,16 +54,15 @@ def pid(
     Parameters
     ----------
     system : DelayedStateSpace or ProcessModel
-        Plant with one input and one output. A system gives a discrete controller of its sample
-        time; the rules then see half a sample more dead time, the age of a held output. A
-        process model gives a continuous controller unless `dt` is given.
+        Plant with one input and one output. For a system the controller is discrete with its sample
+        time; the rules then use half a sample more dead time, for the hold. For a process model the
+        controller is continuous unless `dt` is given.
     rule : str, optional
-        ``"simc"``, ``"lambda"``, ``"imc"``, ``"amigo"``, ``"ziegler_nichols"`` and
-        ``"cohen_coon"`` look at a reduced model; ``"ziegler_nichols_ultimate"`` at the exact
-        ultimate gain; ``"optimal"`` minimizes the integrated absolute error after a load step
-        subject to `max_sensitivity`.
+        ``"simc"``, ``"lambda"``, ``"imc"``, ``"amigo"``, ``"ziegler_nichols"`` and ``"cohen_coon"``
+        use a reduced model; ``"ziegler_nichols_ultimate"`` the exact ultimate gain; ``"optimal"``
+        minimizes the integrated absolute error after a load step subject to `max_sensitivity`.
     kind : {"P", "PI", "PD", "PID"}, optional
-        Not every rule knows every kind.
+        Not every rule exists for every kind.
     closed_loop_time : float, optional
         In s, for simc, lambda and imc.
     max_sensitivity : float, optional
@@ -71,7 +70,7 @@ def pid(
     derivative_filter : float, optional
         td / tf, 1...100.
     reduction : {"optimal", "half_rule"}, optional
-        How a system is reduced, see `reduce_fopdt`.
+        Reduction of a system, see `reduce_fopdt`.
     method : {"tustin", "forward", "backward"}, optional
         Discretization of the integral.
     dt : float, optional
@@ -82,16 +81,16 @@ def pid(
     -------
     PIDController
         A `control.StateSpace` from error to plant input, with the parameters as attributes. Its
-        `check`, a `LoopCheck`, tells what the loop does on `system` itself, not on what the rule
-        made of it, and over the interval of dead times that an identified system carries.
+        `check`, a `LoopCheck`, is for the closed loop with `system` itself, not with a reduced
+        model, and over the interval of dead times of an identified system.
 
     Raises
     ------
     OptionError
-        A rule or kind that does not exist, or options that do not belong together.
+        A rule or kind that does not exist, or options that do not apply.
     UnsuitableSystemError
-        An unstable plant, several channels, an integrating plant for a rule that has no answer;
-        a rule whose controller makes the loop unstable on `system` itself.
+        An unstable plant, several channels, an integrating plant for a rule that does not allow it;
+        or a controller that makes the loop with `system` itself unstable.
 
     Warns
     -----
@@ -218,7 +217,7 @@ def closed_on(system: Any, plant: DelayedStateSpace, controller: PIDController) 
 
 
 def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
-    """Say which rule gives a loop that is stable and not on the verge of being unstable."""
+    """Suggest a rule whose loop is stable with a sufficient margin."""
     tries = [
         (name, form, reduction)
         for form in dict.fromkeys((kind, "PI"))
@@ -243,12 +242,12 @@ def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -
 
 
 def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, float]:
-    """Discrete plant to look at, and the sample time of the controller (0: continuous)."""
+    """Discrete plant, and the sample time of the controller (0: continuous)."""
     if isinstance(system, ProcessModel):
         if dt is not None:
             step = positive(dt, "dt", "sample time in s")
             return system.system(step), step
-        # A continuous controller is tuned on a plant sampled so finely that it does not matter.
+        # A continuous controller is tuned on a plant sampled so fast that it has no effect.
         return system.system(system.total_time / FINE), 0.0
     plant = delayed_system(system, "a PID controller")
     check_sign(plant, "a PID controller")
@@ -271,7 +270,7 @@ def _model(
             found = reduce_fopdt(system, method=reduction)
     else:
         found = (reduce_sopdt if second else reduce_fopdt)(plant, method=reduction)
-    # A controller output held over a sample is half a sample old on average.
+    # A held controller output is half a sample old on average.
     return replace(found, dead_time=found.dead_time + step / 2)
 
 

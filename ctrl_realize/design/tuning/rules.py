@@ -1,6 +1,6 @@
 """Tuning rules: parameters of an ideal PID from a process model.
 
-Each function returns (kp, ti, td); ti is inf and td 0 where the kind has none.
+Each function returns (kp, ti, td); ti is inf without an integral, td is 0 without a derivative.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ def simc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Para
         )
     if "I" not in kind:
         return kp, INF, second
-    # The rule is for the series form; this is the ideal form of the same controller.
+    # The rule is for the series form; this is the equivalent ideal form.
     factor = 1 + second / ti
     return kp * factor, ti * factor, second / factor
 
 
 def lambda_(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Lambda tuning: cancel the lag; closed-loop time by default the lag, or 3 dead times if more.
+    """Lambda tuning: cancel the lag; closed-loop time by default max(lag, 3 dead times).
 
     Dahlin (1968); for integrating models after Chien and Fruehauf (1990).
     """
@@ -59,8 +59,8 @@ def lambda_(model: ProcessModel, kind: str, closed_loop_time: float | None) -> P
 def imc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
     """Internal model control: Rivera, Morari and Skogestad (1986), table II.
 
-    PI is the improved one; the closed-loop time defaults to 1.7 (PI) or 0.8 (PID) dead times, the
-    smallest that they allow.
+    The improved PI is used; the closed-loop time defaults to 1.7 (PI) or 0.8 (PID) dead times, the
+    smallest values that they allow.
     """
     _needs_lag(model, "imc")
     theta, tau = model.dead_time, model.lag
@@ -100,7 +100,7 @@ def ziegler_nichols(model: ProcessModel, kind: str, closed_loop_time: float | No
 
 
 def cohen_coon(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Cohen and Coon (1953): quarter-amplitude damping, with the lag's own decay."""
+    """Cohen and Coon (1953): quarter-amplitude damping, with the decay of the lag."""
     _needs_lag(model, "cohen_coon")
     L = _dead_time(model, "cohen_coon")
     r, a = L / model.lag, model.gain * L / model.lag
@@ -143,15 +143,15 @@ MODEL_RULES: dict[str, tuple[Rule, tuple[str, ...]]] = {
     "ziegler_nichols": (ziegler_nichols, ("P", "PI", "PID")),
     "cohen_coon": (cohen_coon, ("P", "PI", "PD", "PID")),
 }
-"""Rules that look at a process model, and the kinds that they know."""
+"""Rules that use a process model, and the kinds that they offer."""
 
 SYSTEM_RULES: dict[str, tuple[str, ...]] = {
     "ziegler_nichols_ultimate": ("P", "PI", "PID"),
     "optimal": ("P", "PI", "PD", "PID"),
 }
-"""Rules that look at the frequency response of the plant itself, and the kinds that they know."""
+"""Rules that use the frequency response of the plant itself, and the kinds that they offer."""
 
 
 def kinds_of(rule: str) -> tuple[str, ...]:
-    """Return the kinds of controller that a rule knows."""
+    """Return the kinds of controller that a rule offers."""
     return MODEL_RULES[rule][1] if rule in MODEL_RULES else SYSTEM_RULES[rule]

@@ -1,4 +1,4 @@
-"""Tuning rules side by side on one plant."""
+"""Comparison of tuning rules on one plant."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 UNSTABLE = Performance(float("inf"), float("inf"), float("nan"), float("inf"))
-"""What a loop achieves that does not settle."""
+"""Performance of a loop that does not settle."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PIDComparison(Result):
-    """Controllers of several rules for one plant, with what each achieves.
+    """Controllers of several rules for one plant, with margins and performance.
 
     ``margins[i]`` and ``performance[i]`` belong to ``controllers[i]``.
 
@@ -37,9 +37,9 @@ class PIDComparison(Result):
     controllers : tuple of PIDController
     margins : tuple of Margins
     performance : tuple of Performance
-        inf where the loop is unstable.
+        inf if the loop is unstable.
     refused : tuple of (str, str, str)
-        Rule, kind and reason where a rule has no answer for this plant.
+        Rule, kind and reason if a rule does not apply to this plant.
 
     Examples
     --------
@@ -84,10 +84,9 @@ class PIDComparison(Result):
         )
 
     def best(self, max_sensitivity: float = 2.0) -> PIDController:
-        """Controller of least load error among the stable ones with Ms within the limit.
+        """Controller with the smallest load error among the stable ones with Ms within the limit.
 
-        Where the system carries an interval of dead times, the loop must be stable over all of
-        it.
+        If the system has an interval of dead times, the loop must be stable over all of it.
         """
         fit = [
             (p.load_error, i)
@@ -162,8 +161,8 @@ def compare_pid(
 
     Notes
     -----
-    The sources of the rules are those of `pid`; the limit on the sensitivity by which the best is
-    chosen is the usual one of [1]_.
+    For the sources of the rules see `pid`; the default limit on the sensitivity of the best is the
+    usual one [1]_.
 
     References
     ----------
@@ -194,7 +193,7 @@ def compare_pid(
             try:
                 controller, _ = tuned(system, rule, kind, settings)
             except ValueError as error:
-                # A rule without an answer for this plant is a row of the result, not its end.
+                # A rule that does not apply to this plant becomes a row of the result.
                 refused.append((rule, kind, str(error)))
                 continue
             sampled = controller if controller.dt else controller.discretised(plant.dt)
@@ -214,7 +213,7 @@ def _performance(plant: DelayedStateSpace, controller: Any, total: float) -> Per
 
 
 def _span(system: Any, plant: DelayedStateSpace) -> float:
-    """Guess how long the plant takes, in s."""
+    """Guess the settling time of the plant, in s."""
     if isinstance(system, ProcessModel):
         return system.total_time
     return plant_time(plant)

@@ -64,9 +64,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     stepped = bool(np.isfinite(fit.onset))
     loop = () if stepped else feedback_flags(fit.records, fit.delay_interval[1])
     flags += loop
-    if (
-        not fit.at_noise_level
-    ):  # else an unstable plant is excluded
+    if not fit.at_noise_level:  # else an unstable plant is excluded
         flags += unstable_flags(fit.records, fit.delay_interval[1])
     if len(fit.records) == 1:
         shown = _shown(fit)
