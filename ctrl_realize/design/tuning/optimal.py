@@ -31,7 +31,7 @@ LONGEST = 2**18
 @dataclass(frozen=True)
 class _Problem:
     """Response of the plant on two sets of points: on `omega` for the limit on the sensitivity, on
-    `circle` for the step response of `count` samples; `distance` is 1 / Ms, `sign` that of the gain.
+    `circle` for the step response of `count` samples; `distance` is 1 / Ms.
     """
 
     plant: DelayedStateSpace

@@ -1,4 +1,4 @@
-"""The delay estimate of the paper: realize after every delay, choose the smallest IAE."""
+"""The paper's delay estimate: realize after every delay, and choose the smallest IAE."""
 
 from __future__ import annotations
 
@@ -29,36 +29,32 @@ def estimate_delay(
     hankel: str = "square",
     dt: float | None = None,
 ) -> DelayedStateSpace:
-    """Estimate the delay of an impulse response by the scan of the paper, and realize the model.
+    """Estimate the delay of an impulse response by the paper's scan, and realize the model.
 
-    For every d in 0...max_delay the response from d on is realized at the
-    given order, z^-d is put back, and the integrated absolute error against
-    the data is taken over one window, the same for all d. The least error
-    wins.
+    For every d in 0...max_delay the response from d on is realized at the given order and delayed
+    by z^-d, and the integrated absolute error is computed over one window, the same for all d. The
+    delay with the smallest error is chosen.
 
     Parameters
     ----------
     impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
-        Markov parameters. An array needs `dt`. Several channels share one
-        delay.
+        Markov parameters. An array needs `dt`. Several channels share one delay.
     order : int
-        States of the model without its delay. An order that is too low reads
-        lags as delay, one that is much too high models the delay.
+        States of the model without its delay. If the order is too low, lags are taken for delay; if
+        it is much too high, states model the delay.
     max_delay : int
         Largest delay to try, in samples.
     samples : int, optional
-        Markov parameters behind each ``G[d]`` to use (the paper's n).
-        Default: three times the settling time of the data (2 %), at least
-        256, at most what fits behind `max_delay`. Longer records hold only
-        noise.
+        Markov parameters after each ``G[d]`` to use (the paper's n). Default: three times the
+        settling time of the data (2 %), at least 256, at most what remains after `max_delay`. Later
+        samples contain only noise.
     feedthrough : bool, optional
-        True: all models have the direct term ``D = G[d]`` (the paper's
-        choice). False: ``D = 0``. Default: ``G[d]`` for the candidates; the
-        returned model then follows the rule of `realize`.
+        True: all models have the feedthrough ``D = G[d]`` (as in the paper). False: ``D = 0``.
+        Default: ``G[d]`` for the candidates; the returned model then follows the rule of `realize`.
     hankel : {"square", "padded"}, optional
         As for `realize`.
     dt : float, optional
-        Sample time in s, where `impulse` is an array.
+        Sample time in s, if `impulse` is an array.
 
     Returns
     -------
@@ -69,24 +65,22 @@ def estimate_delay(
     Raises
     ------
     OrderError
-        The order is not in 1...rows of the Hankel matrix, or larger than the
-        numerical rank of the data at the best delay.
+        The order is not in 1...rows of the Hankel matrix, or larger than the numerical rank of the
+        data at the best delay.
     DelayRangeError
         `max_delay` and `samples` need more data than there are.
 
     Notes
     -----
-    With a direct term, exact data of a sampled strictly proper plant are
-    fitted equally well by its delay and by one more sample; the smaller is
-    returned. MATLAB's ``nk`` of a strictly proper model is one more.
+    With feedthrough, exact data of a sampled strictly proper plant are fitted equally well by its
+    delay and by one more sample; the smaller delay is returned. MATLAB's ``nk`` of a strictly
+    proper model is one more.
 
-    The class of models has free B, C and D, and in it the delay is only
-    weakly determined: `interval` is wide even at low noise. What is left in
-    the data by filters and differentiation moves the estimate.
+    The model class has free B, C and D, in which the delay is only weakly determined: `interval` is
+    wide even at low noise. Filters and differentiation that remain in the data bias the estimate.
 
-    All delays are decomposed together by a truncated, residual-controlled
-    Lanczos recurrence; the errors are those of the dense SVD to
-    ``1e-11 sum |G| + 1e-9 IAE``.
+    All delays are decomposed together by a truncated, residual-controlled Lanczos recurrence; the
+    errors agree with those of the dense SVD to ``1e-11 sum |G| + 1e-9 IAE``.
 
     References
     ----------
@@ -112,7 +106,7 @@ def estimate_delay(
 
 
 def best_of(surface: Surface, order: int) -> DelayedStateSpace:
-    """Realize the model of one order after its best delay."""
+    """Realize the model of one order at its best delay."""
     iae, rounding = surface.row(order), surface.rounding
     delay = best_delay(iae, rounding)
     models = surface.models

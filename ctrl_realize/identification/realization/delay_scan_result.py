@@ -1,4 +1,4 @@
-"""IAE over delay, and the models of every delay."""
+"""IAE as a function of the delay, and the models for every delay."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from .result import Realization
 
 
 class Candidates(Sequence[DelayedStateSpace]):
-    """The models of a delay scan, one for each delay, built when asked for.
+    """The models of a delay scan, one for each delay, computed on demand.
 
-    ``candidates[d]`` has the delay d and the direct term that the scan used.
+    ``candidates[d]`` has the delay d and the feedthrough that the scan used.
     """
 
     def __init__(
@@ -53,10 +53,9 @@ class Candidates(Sequence[DelayedStateSpace]):
 class DelayScan(ModelFit):
     """IAE of the best model for every candidate delay.
 
-    ``iae[d]`` is the sum of ``|impulse.markov[k] - candidates[d].markov(n)[k]|``
-    over the fixed window ``n = samples + max_delay + 1``, all channels
-    together. ``delay`` is the smallest d whose misfit is the least but for
-    rounding; ``interval`` holds all d within 5 % of it.
+    ``iae[d]`` is the sum of ``|impulse.markov[k] - candidates[d].markov(n)[k]|`` over the fixed
+    window ``n = samples + max_delay + 1``, for all channels together. ``delay`` is the smallest d
+    whose IAE equals the minimum up to rounding; ``interval`` contains all d within 5 % of it.
 
     Attributes
     ----------
@@ -64,28 +63,28 @@ class DelayScan(ModelFit):
     delay : int
         Best delay in samples.
     delay_interval : tuple of int
-        Smallest and largest delay, in samples, with a misfit within 5 % of
-        the least; `interval` is the same in s. It tells how flat the curve is, and is no confidence
-        interval: the bias of the method is not in it.
+        Smallest and largest delay, in samples, with an IAE within 5 % of the minimum; `interval` is
+        the same in s. It shows how flat the curve is, and is not a confidence interval: it does not
+        contain the bias of the method.
     order, samples : int
-        Order of all models; Markov parameters behind each delay used.
+        Order of all models; Markov parameters after each delay used.
     feedthrough : bool
-        Whether the candidates have the direct term G[d] (the paper), else 0.
+        Whether the candidates have the feedthrough G[d] (the paper); otherwise 0.
     singular_values : ndarray, shape (max_delay + 1, order)
-        Of the Hankel matrix behind each delay.
+        Of the Hankel matrix for each delay.
     noise_floor : float or None
-        Largest singular value of a Hankel matrix of nothing but the noise
-        before the step; None where that noise is not known.
+        Largest singular value of a Hankel matrix of the noise before the step; None if that noise
+        is not known.
     candidates : Candidates
-        The models, built when asked for.
+        The models, computed on demand.
     realization : Realization
-        How the returned model was realized behind `delay`.
+        Realization of the returned model after `delay`.
     flags : tuple of Flag
         ``"delay_at_bound"``, ``"no_delay_resolved"``, ``"several_minima"``,
         ``"order_in_noise"``, ``"order_near_noise"``, and those of
         `realization`.
     choices : tuple of str
-        What was chosen for the caller, and why (`identify`).
+        Automatic choices, with reasons (`identify`).
 
     Examples
     --------
@@ -112,7 +111,7 @@ class DelayScan(ModelFit):
 
     @property
     def impulse(self) -> ImpulseResponse:
-        """The data."""
+        """The impulse response."""
         return self.realization.impulse
 
     @property
@@ -132,7 +131,7 @@ class DelayScan(ModelFit):
 
     @property
     def interval_kind(self) -> IntervalKind:
-        """``"flatness"``: it tells how flat the curve is."""
+        """``"flatness"``: it shows how flat the curve is."""
         return "flatness"
 
     @property
@@ -147,7 +146,7 @@ class DelayScan(ModelFit):
 
     @property
     def least_iae(self) -> float:
-        """Least integrated absolute error, in the unit of the output per input."""
+        """Smallest integrated absolute error, in the unit of the output per input."""
         return float(self.iae[self.delay])
 
     @property
@@ -157,13 +156,13 @@ class DelayScan(ModelFit):
 
     @property
     def contrast(self) -> float:
-        """Misfit without delay over the least one; below 1.3 no delay is resolvable."""
+        """IAE without delay divided by the smallest; below 1.3 no delay is resolved."""
         least = float(self.iae[self.delay])
         return float(self.iae[0]) / least if least > 0 else np.inf
 
     @property
     def noise_ratio(self) -> float | None:
-        """Last singular value of the model over that of the noise; above 3 the scan is reliable."""
+        """Last singular value of the model over that of the noise; reliable above 3."""
         if self.noise_floor is None:
             return None
         last = float(self.singular_values[self.delay, -1])

@@ -1,4 +1,4 @@
-"""What realization and delay scan ask of an impulse response, checked once."""
+"""Checks and default sizes for realization and delay scan."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from ...numerics.hankel.lanczos import largest_magnitude
 from ...results import Flag
 
 SETTLING_BAND = 0.02
-"""Part of its range within which a step response counts as settled."""
+"""Distance from the final value, relative to the range, within which a step response is settled."""
 
 MIN_NOISE = 32
-"""Samples at rest that are needed to say how large the noise is."""
+"""Least number of baseline samples for an estimate of the noise."""
 
 MOST_WORK = 30_000_000
-"""Delays times samples that a scan takes on by itself; twenty seconds, or a minute at most."""
+"""Largest automatic product of delays and samples of a scan; it takes twenty seconds to a
+minute."""
 
 MAX_WINDOWS = 16
-"""Stretches of a long rest that are looked at, evenly spread."""
+"""Windows of a long baseline that are used, evenly spaced."""
 
 
 def as_impulse(impulse: ImpulseResponse | ArrayLike, dt: float | None) -> ImpulseResponse:
-    """Return an impulse response as it is, or make one of an array with a sample time."""
+    """Return an impulse response unchanged, or make one from an array and a sample time."""
     if isinstance(impulse, ImpulseResponse):
         if dt is not None and dt != impulse.dt:
             raise OptionError(f"dt={dt!r}, the impulse response has dt={impulse.dt:g}; omit dt")
@@ -50,9 +51,9 @@ def channels(impulse: ImpulseResponse) -> FloatArray:
 def check_samples(
     impulse: ImpulseResponse, samples: Any, order: int, max_delay: int, *, padded: bool, what: str
 ) -> int:
-    """Return the number of samples behind the feedthrough; None: all that fit.
+    """Return the number of samples after the feedthrough; None: as many as there are.
 
-    `what` is the name of the argument that `max_delay` came in by.
+    `what` is the name of the argument behind `max_delay`.
     """
     available = impulse.n_samples
     if available <= max_delay + 1:
@@ -74,7 +75,7 @@ def check_samples(
 
 
 def check_order(impulse: ImpulseResponse, order: int, samples: int, *, padded: bool) -> None:
-    """Raise when the Hankel matrix is too small for the order."""
+    """Raise an error if the Hankel matrix is too small for the order."""
     largest = hankel_size(samples, padded=padded) * min(impulse.ninputs, impulse.noutputs)
     if not 1 <= order <= largest:
         raise OrderError(
@@ -84,17 +85,16 @@ def check_order(impulse: ImpulseResponse, order: int, samples: int, *, padded: b
 
 
 def settled_samples(impulse: ImpulseResponse, order: int, max_delay: int) -> int:
-    """Return how many samples a delay scan uses by default.
+    """Return the default number of samples of a delay scan.
 
-    Three times the settling time of the step response (2 % of its range),
-    at least 256 and 8 per order, as far as they fit. More samples hold
-    nothing but noise, and cost time for every delay: of many delays fewer
-    samples are used, such that a scan ends within a minute.
+    Three times the settling time of the step response (2 % of its range), at least 256 and 8 per
+    order, as far as available. Later samples contain only noise, and cost time for every delay: for
+    many delays fewer samples are used, so that a scan takes less than a minute.
 
     Raises
     ------
     DataError
-        Too few samples could be used for that many delays.
+        Too few samples remain for that many delays.
     """
     fits = impulse.n_samples - 1 - max_delay
     step = np.cumsum(channels(impulse), axis=-1)
@@ -113,7 +113,7 @@ def settled_samples(impulse: ImpulseResponse, order: int, max_delay: int) -> int
 
 
 def noise_floor(impulse: ImpulseResponse, size: int) -> float | None:
-    """Return the largest singular value of a Hankel matrix of nothing but noise.
+    """Return the largest singular value of a Hankel matrix of pure noise.
 
     Parameters
     ----------
@@ -125,10 +125,9 @@ def noise_floor(impulse: ImpulseResponse, size: int) -> float | None:
     Returns
     -------
     float or None
-        The largest over windows that overlap by half; filtered noise varies
-        by a third from window to window. Where the noise is shorter than a
-        window, it is scaled by the square root of the size, as white noise
-        goes. None when fewer than 32 samples at rest are known.
+        The largest over windows that overlap by half; for filtered noise it varies by a third
+        between windows. If the noise is shorter than a window, it is scaled by the square root of
+        the size, as for white noise. None if fewer than 32 baseline samples are known.
     """
     noise = impulse.noise
     if noise is None or impulse.markov.ndim == 3 or noise.size < MIN_NOISE:
@@ -141,7 +140,7 @@ def noise_floor(impulse: ImpulseResponse, size: int) -> float | None:
 
 
 def filter_flags(impulse: ImpulseResponse) -> tuple[Flag, ...]:
-    """Say that a causal filter is still in the data, and by how much it delays."""
+    """Flag a causal filter that the data contain, with its delay."""
     still = impulse.filter
     if still is None or still.zero_phase:
         return ()

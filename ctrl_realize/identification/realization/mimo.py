@@ -1,4 +1,4 @@
-"""Realization of several channels that have delays of their own."""
+"""Realization of several inputs and outputs with individual delays."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from .realize import HANKEL
 
 Structure = Literal["auto", "common", "rows", "columns"]
 NOISE_STDS = 5.0
-"""Standard deviations from which a Markov parameter counts as response: one of 2e6 by chance."""
+"""Standard deviations for a significant Markov parameter: one of 2e6 by chance."""
 ALIKE, EXACT = 1.5, 1e-9
-"""Models whose misfits are within this factor, or below this level, count as equally good."""
+"""Models whose errors are within this factor, or below this level, count as equally good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,18 +42,17 @@ class MimoRealization(ModelFit):
 
     ``delays[i, j] == output_delays[i] + input_delays[j] + residual_delays[i, j]``, where
     `residual_delays` are inside the core; entries without response have the delay -1.
-    `relative_iae` is the sum of absolute errors of each entry over the sum of its absolute Markov
-    parameters.
+    `relative_iae` is the IAE of each entry divided by the sum of its absolute Markov parameters.
 
     Attributes
     ----------
     delays, residual_delays : ndarray of int, shape (p, m)
     output_delays, input_delays : tuple of int
     structure : str
-        ``"common"``: one A for all channels. ``"rows"``: one model for each output behind tapped
-        input lines. ``"columns"``: one for each input in front of tapped output lines.
+        ``"common"``: one A for all channels. ``"rows"``: one model for each output with tapped
+        input delay lines. ``"columns"``: one for each input with tapped output delay lines.
     orders : tuple of int
-        Of the models that the core is made of.
+        Of the models that the core consists of.
     states : int
         Of the whole model, delays included.
     relative_iae : ndarray, shape (p, m)
@@ -91,7 +90,7 @@ class MimoRealization(ModelFit):
 
     @property
     def order(self) -> int:
-        """Orders of all models that the core is made of, together."""
+        """Sum of the orders of all models that the core consists of."""
         return sum(self.orders)
 
     @property
@@ -130,24 +129,23 @@ def delay_matrix(
     ----------
     impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
     level : float, default 0.1
-        Part of a channel's largest Markov parameter that counts as response. Five standard
-        deviations of the noise are asked for as well: those of `impulse_from_io`, or what the
-        second half of the data shows.
+        Threshold for a response, relative to the channel's largest Markov parameter. It must also
+        exceed five standard deviations of the noise: those of `impulse_from_io`, or an estimate
+        from the second half of the data.
     dt : float, optional
-        Sample time in s, where `impulse` is an array.
+        Sample time in s, if `impulse` is an array.
 
     Returns
     -------
     ndarray of int, shape (p, m)
-        Samples before the last Markov parameter below the level, so that ``D = 0`` behind the
-        delay: a pulse that first shows at lag 6 has the delay 5. -1 where there is no
-        response.
+        Samples before the last Markov parameter below the threshold, so that ``D = 0`` after the
+        delay: a pulse that starts at lag 6 has the delay 5. -1 if there is no response.
 
     Notes
     -----
-    Differences between channels are firm where their responses look alike; of a smooth onset the
-    level cuts off the beginning, by more samples the lower the order of the plant is not. Scan a
-    channel with `estimate_delay` where that matters.
+    Differences between channels are reliable if their responses are similar; for a smooth onset the
+    threshold delays the estimate, by more samples the higher the relative degree. Use
+    `estimate_delay` for a channel if this matters.
 
     Examples
     --------
@@ -190,29 +188,27 @@ def realize_mimo(
     hankel: str = "square",
     dt: float | None = None,
 ) -> DelayedStateSpace:
-    """Realize a MIMO response, with a delay for each input-output pair, with few states.
+    """Realize a MIMO response with few states, and a delay for each input-output pair.
 
-    The delays are split into those of inputs and of outputs, the data are aligned by them, and
-    realized with one A. Where no split leaves all channels aligned, this is compared with a model
-    of its own for every output (or every input) behind (in front of) a delay line with taps: of
-    those that explain the data about as well as the best, the one with the fewest states is
-    returned.
+    The delays are split into those of inputs and of outputs, the data are aligned accordingly, and
+    realized with one A. If no split aligns all channels, the result is compared with separate
+    models for every output (or every input) with tapped delay lines: among those that explain the
+    data about as well as the best, the one with the fewest states is returned.
 
     Parameters
     ----------
     impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
     order : int
-        States of each model that the core is made of, without delays; less where the data have a
+        States of each model that the core consists of, without delays; fewer if the data have a
         lower rank.
     delays : array_like of int, shape (p, m), optional
-        Delay of every channel, -1 where there is no response. Default: `delay_matrix`.
+        Delay of every channel, -1 if there is no response. Default: `delay_matrix`.
     level : float, default 0.1
         For `delay_matrix`.
     structure : {"auto", "common", "rows", "columns"}
-        ``"common"`` keeps one A even where channels are left with delays inside; they then count
-        in `order`.
+        ``"common"`` uses one A even if delays remain inside the core; they then count in `order`.
     samples : int, optional
-        Markov parameters behind the delays to use; default: as many as all channels have.
+        Markov parameters after the delays to use; default: as many as all channels have.
     feedthrough, hankel, dt : optional
         As for `realize`.
 
@@ -224,7 +220,7 @@ def realize_mimo(
     Raises
     ------
     DelayRangeError
-        Delays of the wrong shape or beyond the data.
+        Delays of the wrong shape or longer than the data.
     DataError
         No channel has a response.
     OrderError, OptionError
@@ -232,8 +228,8 @@ def realize_mimo(
 
     Notes
     -----
-    Aligned responses are realized by Kung's algorithm [1]_ on the block Hankel matrix [2]_; how the
-    delays are split and the structures compared is our own.
+    Aligned responses are realized by Kung's algorithm [1]_ with the block Hankel matrix [2]_; the
+    split of the delays and the comparison of structures are our own.
 
     References
     ----------
@@ -304,7 +300,7 @@ def realize_mimo(
 
 
 def given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
-    """Check the delays of a caller against the data."""
+    """Check given delays against the data."""
     found = np.asarray(delays)
     p, m, N = markov.shape
     if found.shape != (p, m) or found.dtype.kind not in "iu" or np.any(found < -1):

@@ -41,7 +41,7 @@ class RealizationOptions:
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """Core of all channels, with the delays outside it and the orders of what it is made of."""
+    """Core of all channels, with the delays outside it and the orders of its models."""
 
     core: Matrices
     inputs: tuple[int, ...]
@@ -55,13 +55,13 @@ class Assembly:
         return int(self.core[0].shape[0]) + sum(self.inputs) + sum(self.outputs)
 
     def system(self, dt: float, fit: Any = None) -> DelayedStateSpace:
-        """Attach the delays."""
+        """Make the system with its delays."""
         core = ct.ss(*self.core, dt)
         return DelayedStateSpace(core, self.inputs, output_delay=self.outputs, fit=fit)
 
 
 def misfit(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
-    """Return the sum of absolute errors of every entry over that of its data."""
+    """Return the IAE of every entry relative to its data."""
     markov = channels(data)
     model = np.reshape(pieces.system(data.dt).markov(data.n_samples), markov.shape)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -73,7 +73,7 @@ def misfit(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
 
 
 def _aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
-    """Move every channel ahead by its delay; the length is what all channels have."""
+    """Advance every channel by its delay; the length is what all channels have."""
     p, m, N = markov.shape
     length = N - int(delays.max())
     return np.stack(
@@ -125,7 +125,7 @@ def cores_by_rows(
     found: IntArray,
     options: RealizationOptions,
 ) -> Assembly:
-    """Realize every output by itself, behind tapped input lines."""
+    """Realize every output separately, with tapped input delay lines."""
     markov = channels(data)
     first, full = _first_taps(found, axis=0)
     rows = [_aligned(markov[[i]], full[[i]]) for i in range(full.shape[0])]
@@ -145,7 +145,7 @@ def cores_by_columns(
     found: IntArray,
     options: RealizationOptions,
 ) -> Assembly:
-    """Realize every input by itself, in front of tapped output lines."""
+    """Realize every input separately, with tapped output delay lines."""
     markov = channels(data)
     first, full = _first_taps(found, axis=1)
     columns = [_aligned(markov[:, [j]], full[:, [j]]) for j in range(full.shape[1])]
@@ -160,9 +160,9 @@ def cores_by_columns(
 
 
 def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
-    """Return where each line is tapped first, and the delay of every channel.
+    """Return the first tap of each delay line, and the delay of every channel.
 
-    A channel without response follows its line as it is, and adds no tap to it.
+    A channel without response uses its delay line unchanged, and adds no tap.
     """
     known = found >= 0
     first = np.where(known, found, found.max() + 1).min(axis=axis)
@@ -173,7 +173,7 @@ def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
 def _each_alone(
     data: ImpulseResponse, aligned: list[FloatArray], order: int, options: RealizationOptions
 ) -> tuple[list[Matrices], tuple[Flag, ...]]:
-    """Realize rows or columns of the channels, and keep one flag of each kind."""
+    """Realize rows or columns of the channels; keep one flag of each kind."""
     realized = [_realized(data, part, order, options) for part in aligned]
     flags = {flag.code: flag for _, notes in realized for flag in notes}
     return [core for core, _ in realized], tuple(flags.values())

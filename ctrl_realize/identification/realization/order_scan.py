@@ -1,4 +1,4 @@
-"""IAE over order and delay, from one decomposition for each delay."""
+"""IAE as a function of order and delay, from one decomposition for each delay."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ if TYPE_CHECKING:
 class OrderScan(Result):
     """IAE of the best models over order and delay.
 
-    ``iae[i, d]`` is the integrated absolute error of order ``orders[i]``
-    behind d samples, as `DelayScan.iae` has it; ``delays[i]`` is the best
-    delay of that order, ``delay_intervals[i]`` all within 5 % of its misfit.
+    ``iae[i, d]`` is the integrated absolute error of order ``orders[i]`` with a delay of d samples,
+    as in `DelayScan.iae`; ``delays[i]`` is the best delay of that order, ``delay_intervals[i]``
+    contains those within 5 % of its IAE.
 
     Attributes
     ----------
     orders : tuple of int
     iae : ndarray, shape (orders, max_delay + 1)
-        An order above the numerical rank has the misfit of the rank.
+        An order above the numerical rank has the IAE of the rank.
     delays : tuple of int
         Best delay of each order, in samples.
     delay_intervals : tuple of (int, int)
-        Delays of each order within 5 % of its least misfit, in samples.
+        Delays of each order within 5 % of its smallest IAE, in samples.
     singular_values : ndarray, shape (max_delay + 1, max(orders))
-        Of the Hankel matrix behind each delay.
+        Of the Hankel matrix for each delay.
     noise_floor : float or None
-        Largest singular value of pure noise; None where it is not known.
+        Largest singular value of pure noise; None if it is not known.
     order : int
-        Suggested order. With a known noise: singular values up to it are above 1.3 times
-        the noise floor at the order's own delay, and it lowers the misfit by more than a
-        factor of 1.3 against one order less (4 against two). With known standard deviations, as
-        from `impulse_from_io`: the smallest one whose misfit is below their sum, or a larger one
-        that lowers it by more than a factor of 3.
-        Otherwise: the smallest one whose misfit is within 10 % of the least.
+        Suggested order. With known noise: singular values up to it are above 1.3 times the noise
+        floor at the order's own delay, and it lowers the IAE by more than a factor of 1.3 compared
+        with one order less (4 compared with two). With known standard deviations, as from
+        `impulse_from_io`: the smallest one whose IAE is below their sum, or a larger one that
+        lowers it by more than a factor of 3. Otherwise: the smallest one whose IAE is within 10 %
+        of the smallest.
     samples : int
-        Markov parameters behind each delay used.
+        Markov parameters after each delay used.
     impulse : ImpulseResponse
     flags : tuple of Flag
         For the suggested order.
@@ -102,12 +102,12 @@ class OrderScan(Result):
         return self.delays[self.orders.index(self.order)]
 
     def system(self, order: int | None = None) -> DelayedStateSpace:
-        """Return what `estimate_delay` finds for an order, without another decomposition.
+        """Return the result of `estimate_delay` for an order, without another decomposition.
 
         Parameters
         ----------
         order : int, optional
-            One of `orders`; default the suggested one.
+            One of `orders`; default: the suggested one.
 
         Returns
         -------
@@ -129,7 +129,7 @@ class OrderScan(Result):
         Returns
         -------
         pandas.DataFrame
-            Index ``order``; columns ``delay`` and its 5 % range
+            Index ``order``; columns ``delay`` and its 5 % interval
             ``delay_low``, ``delay_high`` in samples, ``dead_time`` in s, ``iae``, ``contrast``,
             ``singular_value``, ``noise_ratio``, ``suggested``.
         """
@@ -191,17 +191,17 @@ def scan_orders(
     hankel: str = "square",
     dt: float | None = None,
 ) -> OrderScan:
-    """Compute the IAE over order and delay, and suggest an order.
+    """Compute the IAE for all orders and delays, and suggest an order.
 
-    The models of all orders are leading parts of one decomposition for each
-    delay, so the whole surface costs little more than its highest order.
+    The models of all orders are leading parts of one decomposition for each delay, so the scan
+    costs little more than its highest order.
 
     Parameters
     ----------
     impulse : ImpulseResponse, or array_like of shape (N,) or (p, m, N)
         Markov parameters. An array needs `dt`.
     orders : int or iterable of int, optional
-        Orders to try; a number stands for 1...orders.
+        Orders to try; a number n stands for 1...n.
     max_delay, samples, feedthrough, hankel, dt
         As for `estimate_delay`.
 
@@ -216,8 +216,8 @@ def scan_orders(
 
     Notes
     -----
-    Kung's models of lower order are leading parts of those of higher order [1]_: the singular
-    vectors are the same, and there are fewer of them.
+    Kung's models of lower order are leading parts of those of higher order [1]_: they use the first
+    of the same singular vectors.
 
     References
     ----------

@@ -21,13 +21,13 @@ from .result import Realization
 HANKEL = ("square", "padded")
 
 NO_GAP = 0.8
-"""Ratio of neighbouring singular values from which there is no gap between them."""
+"""Ratio of neighbouring singular values above which there is no gap between them."""
 
 DIED_AWAY = 0.2
-"""Part of a response that may be left at the end of the data."""
+"""Fraction of a response that may remain at the end of the data."""
 
 CLEAR = 3.0
-"""Standard deviations of the noise from which a direct term is believed."""
+"""Standard deviations of the noise above which a feedthrough is significant."""
 
 
 @single_threaded
@@ -43,8 +43,8 @@ def realize(
 ) -> DelayedStateSpace:
     """Realize an impulse response as a state-space system with dead time.
 
-    Kung's algorithm on G[delay], G[delay + 1], ...; the delay itself is
-    joined to the model unchanged.
+    Kung's algorithm on G[delay], G[delay + 1], ...; the delay itself is added to the model
+    unchanged.
 
     Parameters
     ----------
@@ -55,19 +55,18 @@ def realize(
     delay : int, optional
         Delay of all channels in samples.
     samples : int, optional
-        Markov parameters behind ``G[delay]`` to use; default all.
+        Markov parameters after ``G[delay]`` to use; default: all.
     feedthrough : bool, optional
-        True: the direct term is ``D = G[delay]`` as measured (the paper).
-        False: ``D = 0``, the model is strictly proper. Default: as measured,
-        unless the noise of the data is known and ``G[delay]`` is within three
-        standard deviations of it; exact data of proper and strictly proper
-        plants both come out exact.
+        True: the feedthrough is ``D = G[delay]`` (the paper). False: ``D = 0``, the model is
+        strictly proper. Default: ``D = G[delay]``, unless the noise of the data is known and
+        ``G[delay]`` is within three standard deviations of it; exact data of proper and strictly
+        proper plants are both reproduced exactly.
     hankel : {"square", "padded"}, optional
-        The paper's square Hankel matrix of samples // 2 rows, or Kung's
-        zero-padded one, whose models are stable by construction and have an
-        error bound; it needs data that have decayed within `samples`.
+        The paper's square Hankel matrix of samples // 2 rows, or Kung's zero-padded one, whose
+        models are stable by construction and have an error bound; it needs data that have decayed
+        within `samples`.
     dt : float, optional
-        Sample time in s, where `impulse` is an array.
+        Sample time in s, if `impulse` is an array.
 
     Returns
     -------
@@ -86,10 +85,9 @@ def realize(
 
     Notes
     -----
-    Step (5) of the paper [1]_ is used with its misprints corrected:
-    ``H_a = T(2:r+1, 1:r)``, ``H_b = T(1:r, 1)``, ``H_c = T(1, 1:r)`` and
-    ``V`` without the transposes. The decomposition is truncated and
-    matrix-free, with time and memory proportional to the data.
+    Step (5) of the paper [1]_ is used with its misprints corrected: ``H_a = T(2:r+1, 1:r)``, ``H_b
+    = T(1:r, 1)``, ``H_c = T(1, 1:r)`` and ``V`` without the transposes. The decomposition is
+    truncated and matrix-free, with time and memory proportional to the data.
 
     References
     ----------
@@ -144,7 +142,7 @@ def realize(
 
 
 def uses_feedthrough(impulse: ImpulseResponse, delay: int, feedthrough: bool | None) -> bool:
-    """Decide whether the direct term is what was measured at the delay."""
+    """Decide whether the feedthrough is the Markov parameter at the delay."""
     if feedthrough is not None:
         return bool(feedthrough)
     noise = impulse.noise
@@ -154,7 +152,7 @@ def uses_feedthrough(impulse: ImpulseResponse, delay: int, feedthrough: bool | N
 
 
 def _iae(window: FloatArray, model: OneModel, D: FloatArray, delay: int) -> float:
-    """Sum up how far the model is from the data; infinite where it grows beyond all numbers."""
+    """IAE of the model; infinite if it grows beyond all numbers."""
     response = np.zeros_like(window)
     count = window.shape[2] - delay
     with np.errstate(over="ignore", invalid="ignore"):

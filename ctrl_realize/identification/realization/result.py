@@ -1,4 +1,4 @@
-"""How a model was realized from an impulse response."""
+"""Result of the realization of an impulse response."""
 
 from __future__ import annotations
 
@@ -15,46 +15,42 @@ from .impulses import channels
 
 @dataclass(frozen=True, eq=False)
 class Realization(ModelFit):
-    """How a model was realized from an impulse response.
+    """Result of the realization of an impulse response.
 
-    ``iae`` is the sum of ``|impulse.markov[k] - sys.markov(n)[k]|`` over the
-    ``n = delay + samples + 1`` samples that the model has seen, all channels
-    together.
+    ``iae`` is the sum of ``|impulse.markov[k] - sys.markov(n)[k]|`` over the ``n = delay + samples
+    + 1`` samples that were used, for all channels together.
 
     Attributes
     ----------
     order : int
         States of the core.
     delay : int
-        Delay in samples that was taken out of the data.
+        Delay in samples that was removed from the data.
     samples : int
-        Markov parameters behind the feedthrough that were used,
-        ``delay + 1 ... delay + samples``.
+        Markov parameters after the feedthrough that were used, ``delay + 1 ... delay + samples``.
     hankel : {"square", "padded"}
     feedthrough : bool
-        Whether the direct term is G[delay]; else it is 0.
+        Whether the feedthrough is G[delay]; otherwise it is 0.
     singular_values : ndarray, shape (q,), q >= order
-        Leading singular values of the Hankel matrix: all of them where it is
-        small, else the `order` ones that the model is made of.
-        `leading_singular_values` computes more.
+        Leading singular values of the Hankel matrix: all of them if it is small, otherwise the
+        `order` ones of the model. `leading_singular_values` computes more.
     next_singular_value : float
-        Singular value ``order + 1``, the first that was left out; beyond a
-        Hankel matrix of 200 rows an estimate from below.
+        Singular value ``order + 1``, the first that was truncated; for a Hankel matrix of more than
+        200 rows an estimate from below.
     error_bound : float or None
-        For the padded Hankel matrix: no frequency has a larger error (2-norm)
-        against the data's own response, ``sum G[k] z^-k`` over the samples
-        used. Twice the sum of the singular values that were left out; where
-        they are not all known, its largest value that their sum of squares
-        allows. None for the square one, for which no bound is known.
+        For the padded Hankel matrix: upper bound of the error (2-norm) at any frequency with
+        respect to the data's own response, ``sum G[k] z^-k`` over the samples used. Twice the sum
+        of the truncated singular values; if they are not all known, the largest value consistent
+        with their sum of squares. None for the square one, for which no bound is known.
     iae : float
         Integrated absolute error, in the unit of the output per input.
     impulse : ImpulseResponse
-        The data.
+        The impulse response.
     flags : tuple of Flag
         ``"unstable"``, ``"not_died_away"``, ``"negative_pole"``, ``"no_gap"``,
         ``"filter_delay"``.
     choices : tuple of str
-        What was chosen, and why.
+        Automatic choices, with reasons.
 
     Examples
     --------
@@ -109,7 +105,7 @@ class Realization(ModelFit):
 
         Returns
         -------
-        ndarray, shape (count,), or fewer where the matrix is smaller
+        ndarray, shape (count,), or fewer if the matrix is smaller
         """
         count = whole(count, "count", 1)
         padded = self.hankel == "padded"

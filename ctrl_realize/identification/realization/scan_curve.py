@@ -1,4 +1,4 @@
-"""Reading a curve of misfit over delay: its minimum, how flat it is, what to distrust."""
+"""Evaluation of a curve of IAE over delay: minimum, flatness, warnings."""
 
 from __future__ import annotations
 
@@ -8,41 +8,41 @@ from ...numerics.arrays import FloatArray
 from ...results import Flag
 
 FLAT = 1.05
-"""Misfit over the least one up to which delays count as equally good."""
+"""IAE relative to the smallest, up to which delays count as equally good."""
 
 CONTRAST = 1.3
-"""Misfit without delay over the least one below which there is no delay to be seen."""
+"""IAE without delay relative to the smallest, below which no delay is resolved."""
 
 NOISE_CAUTION = 3.0
 NOISE_REFUSE = 1.3
-"""Last singular value over that of the noise: above 3 the scan works, below 1.3 it follows
+"""Last singular value relative to that of the noise: above 3 the scan works, below 1.3 it follows
 the noise (paper scan on simulated valves: errors of 3-5 samples between, 10 and more below)."""
 
 
 def best_delay(iae: FloatArray, rounding: float) -> int:
-    """Return the smallest delay whose misfit is the least but for rounding.
+    """Return the smallest delay whose IAE equals the minimum up to rounding.
 
-    Exact data of a strictly proper plant are fitted exactly by two delays;
-    which of them wins must not depend on rounding.
+    Exact data of a strictly proper plant are fitted exactly by two delays; the choice between them
+    must not depend on rounding.
     """
     return int(np.flatnonzero(iae <= iae.min() + rounding)[0])
 
 
 def flat_set(iae: FloatArray, delay: int, rounding: float) -> tuple[int, int]:
-    """Return the smallest and largest delay within 5 % of the least misfit."""
+    """Return the smallest and largest delay within 5 % of the smallest IAE."""
     flat = np.flatnonzero(iae <= FLAT * iae[delay] + rounding)
     return int(flat[0]), int(flat[-1])
 
 
 def local_minima(iae: FloatArray, delay: int, rounding: float) -> int:
-    """Count the separate dips of the curve that reach within 5 % of the least misfit."""
+    """Count the separate minima of the curve within 5 % of the smallest IAE."""
     level = FLAT * iae[delay] + rounding
     inside = np.concatenate([[False], iae <= level, [False]])
     return int(np.count_nonzero(inside[1:] & ~inside[:-1]))
 
 
 def curve_flags(iae: FloatArray, delay: int, rounding: float) -> tuple[Flag, ...]:
-    """Say what the curve itself gives away."""
+    """List the flags that follow from the curve itself."""
     flags = []
     last = iae.size - 1
     least = float(iae[delay])

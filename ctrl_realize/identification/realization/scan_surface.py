@@ -1,4 +1,4 @@
-"""What delay scan and order scan share: models and misfits over order and delay."""
+"""Common parts of delay scan and order scan: models and IAE for all orders and delays."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .realize import HANKEL
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Models behind every delay, and the misfit of each order.
+    """Models for every delay, and the IAE of each order.
 
-    The model of order j is the leading part of `models`; ``iae[i]`` belongs
-    to ``orders[i]``. `feedthrough` and `hankel` are what the caller asked for.
+    The model of order j is the leading part of `models`; ``iae[i]`` belongs to ``orders[i]``.
+    `feedthrough` and `hankel` are as requested.
     """
 
     impulse: ImpulseResponse
@@ -37,21 +37,21 @@ class Surface:
 
     @property
     def rounding(self) -> float:
-        """Differences of misfits up to which delays are equally good."""
+        """Differences of the IAE up to which delays are equally good."""
         return 1e-11 * float(np.abs(channels(self.impulse)[:, :, : self.window]).sum())
 
     @property
     def window(self) -> int:
-        """Samples over which misfits are summed."""
+        """Number of samples of the IAE."""
         return int(self.samples + self.iae.shape[1])
 
     def row(self, order: int) -> FloatArray:
-        """Misfit over delay of one order."""
+        """IAE over delay for one order."""
         misfits: FloatArray = self.iae[self.orders.index(order)]
         return misfits
 
     def singular_value(self, order: int, delay: int) -> float:
-        """Singular value `order` of the Hankel matrix behind a delay."""
+        """Singular value `order` of the Hankel matrix for a delay."""
         return float(self.models.singular_values[delay, order - 1])
 
 
@@ -64,7 +64,7 @@ def scan_surface(
     hankel: str,
     dt: float | None,
 ) -> Surface:
-    """Check the arguments, decompose behind every delay, take all misfits over one window."""
+    """Check the arguments, decompose for every delay, and compute all IAEs over one window."""
     data = as_impulse(impulse, dt)
     max_delay = whole(max_delay, "max_delay", 0)
     hankel = one_of(hankel, "hankel", HANKEL)

@@ -36,22 +36,22 @@ def fit_state_space(
     """Fit a state-space model with delays to whole records: several channels, or many modes.
 
     The impulse response of `impulse_from_io` is realized at every order tried, and each of these
-    starts is refined until the simulated outputs are as near to the measured ones as white noise
-    of an unknown size in every output allows (output error). BIC chooses the order, the delays of
-    inputs and outputs, and whether there is a direct term.
+    initial models is refined until the simulated outputs fit the measured ones best, with white
+    noise of unknown variance on every output (output error). Order, input and output delays, and
+    feedthrough are chosen by BIC.
 
     Parameters
     ----------
     records : Record or sequence of Record
-        One or several experiments on the same plant. Inputs without gaps; outputs may have
-        missing samples.
+        One or several experiments on the same plant. Inputs without gaps; outputs may have missing
+        samples.
     order : int or sequence of int, optional
-        States without delays, or candidates. Default: from 1 up to 20, until three in a row were
-        no better.
+        States without delays, or candidates. Default: from 1 up to 20, until three in a row bring
+        no improvement.
     delays : array_like of int, shape (p, m), optional
-        Delay of every channel, -1 where there is no response. Default: found.
+        Delay of every channel, -1 if there is no response. Default: estimated.
     feedthrough : bool, optional
-        Whether there is a direct term behind the delays. Default: chosen.
+        Whether there is a feedthrough after the delays. Default: chosen by BIC.
 
     Returns
     -------
@@ -62,23 +62,23 @@ def fit_state_space(
     Raises
     ------
     DataError
-        Inputs that do not excite the plant, outputs that do not follow them, too few samples.
+        Inputs that do not excite the plant, outputs that do not depend on them, too few samples.
     OrderError, DelayRangeError, OptionError
-        Arguments that make no sense.
+        Invalid arguments.
 
     See Also
     --------
-    fit_output_error : One input and output, with a delay between samples and its interval.
-    identification.refine_state_space : The last step by itself, from any model.
+    fit_output_error : One input and output, with a continuous delay and its interval.
+    identification.refine_state_space : The last step alone, from any model.
 
     Notes
     -----
-    Of records of more than 100 000 samples together that many are fitted, from where the inputs
-    move (flag "cut").
+    Of records with more than 100 000 samples in total only that many are fitted, from where the
+    inputs move (flag "cut").
 
-    Noise need not be white for the model to come out right, only for BIC: with noise of long
-    memory the order comes out a little high. The delays are whole samples; what does not split
-    into delays of inputs and outputs is left to the states.
+    The model is consistent for coloured noise as well, but BIC assumes white noise: with strongly
+    correlated noise the order may be slightly too high. The delays are whole samples; delays that
+    cannot be split into those of inputs and outputs are modelled by states.
 
     References
     ----------
@@ -122,12 +122,12 @@ def refine_state_space(
     Parameters
     ----------
     system : control.StateSpace
-        Discrete, with the sample time of the records, from `realize` for example; poles outside
-        the unit circle are drawn inside first.
+        Discrete, with the sample time of the records, from `realize` for example; poles outside the
+        unit circle are first moved inside.
     records : Record or sequence of Record
         As for `fit_state_space`.
     feedthrough : bool, optional
-        Whether there is a direct term. Default: if `system` has one.
+        Whether there is a feedthrough. Default: as in `system`.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def refine_state_space(
     Raises
     ------
     DataError, UnsuitableSystemError
-        Records and a system that do not fit each other.
+        Records and a system that do not match.
 
     References
     ----------
@@ -195,7 +195,7 @@ def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
         "output": [np.atleast_2d(record.output) for record in group],
     }
     for name, known in signals.items():
-        # no copy of a long record: the largest size is that of an end of the range
+        # Without a copy of a long record: the largest magnitude is at an end of the range.
         ends = [np.fmax.reduce(x, axis=1) for x in known] + [
             -np.fmin.reduce(x, axis=1) for x in known
         ]

@@ -20,29 +20,29 @@ from ..validation.residuals_result import ResidualAnalysis
 from .search import Candidate
 
 COLOURED, WANDERING = 0.5, 0.97
-"""Correlation of neighbouring residuals from which they are said to be coloured, and to wander
-as what an integrator makes of noise does."""
+"""Correlation of neighbouring residuals above which they are called coloured, with a drift like
+integrated noise."""
 INTEGRATES = 5.0
-"""Time constants that a record lasts, below which its slowest pole may be an integrator."""
+"""Record length in time constants below which the slowest pole may be an integrator."""
 LAGS = 25
-"""Of the correlations in the residual checks."""
+"""Confidence of the correlations in the residual checks."""
 
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """Dead time of a model of one input and output that takes the place of a fit of lags.
+    """Dead time of a state-space model that replaces a fit of lags.
 
     Attributes
     ----------
     dead_time : float
         In s.
     interval : tuple of float
-        In s: dead times that the data do not rule out, of this model and of `lags` unless they
-        leave twice as much.
+        In s: dead times that the data do not rule out, for this model and for `lags` unless its
+        residual is twice as large.
     total_delay : float or None
-        Delay at zero frequency in s; None for a plant without gain.
+        Delay at zero frequency in s; None for a plant with zero gain.
     lags : OutputErrorFit
-        The fit of lags behind a dead time, which left too much.
+        The fit of lags with dead time, whose residual is too large.
     """
 
     dead_time: float
@@ -62,25 +62,25 @@ class StateSpaceFit(ModelFit):
     input_delays, output_delays : tuple of int
         In samples.
     feedthrough : bool
-        Whether the core has a direct term.
+        Whether the core has a feedthrough.
     bic : dict of int to float
-        Bayesian information criterion of every order tried; of the last one, with its final
-        delays. Smaller is better, 6 less is clear.
+        Bayesian information criterion of every order tried; for the final order, with its final
+        delays. Smaller is better; a difference of 6 is clear.
     noise_std : ndarray, shape (p,)
-        Standard deviation of what the model leaves of every output.
+        Standard deviation of the residual of every output.
     iterations : int
-        Gauss-Newton steps of the last fit.
+        Gauss-Newton iterations of the last fit.
     fit_percent : ndarray, shape (p,)
         ``100 (1 - noise_std / std y)`` of every output, over all records.
     checks : tuple of ResidualAnalysis
         Of every record without gaps.
     timing : Timing or None
-        Dead time, interval and total delay of one input and output that `identify` has fitted,
-        and the fit of lags whose place this one takes; None otherwise.
+        Dead time, interval and total delay of one input and output in `identify`, and the fit of
+        lags that this one replaces; None otherwise.
     records : tuple of Record
-        What was fitted.
+        Records that were fitted.
     choices : tuple of str
-        What was chosen, and why.
+        Automatic choices, with reasons.
     flags : tuple of Flag
         Those of the checks, and ``"highest_order"``, ``"no_response"``,
         ``"coloured_residual"``, ``"unstable"``.
@@ -116,27 +116,27 @@ class StateSpaceFit(ModelFit):
 
     @property
     def dead_time(self) -> float | None:
-        """Dead time in s; None where `identify` has not asked for it."""
+        """Dead time in s; None unless `identify` has estimated it."""
         return None if self.timing is None else self.timing.dead_time
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Dead times in s that the data do not rule out; None where nobody has asked."""
+        """Dead times in s that are not ruled out; None unless `identify` has estimated them."""
         return None if self.timing is None else self.timing.interval
 
     @property
     def total_delay(self) -> float | None:
-        """Delay at zero frequency in s; None where nobody has asked."""
+        """Delay at zero frequency in s; None unless `identify` has estimated it."""
         return None if self.timing is None else self.timing.total_delay
 
     @property
     def lags(self) -> OutputErrorFit | None:
-        """Fit of lags behind a dead time whose place this one takes."""
+        """Fit of lags with dead time that this one replaces."""
         return None if self.timing is None else self.timing.lags
 
     @property
     def delay(self) -> int | None:
-        """Dead time in samples; None where `identify` has not asked for it."""
+        """Dead time in samples; None unless `identify` has estimated it."""
         return None if self.dead_time is None else self.input_delays[0] + self.output_delays[0]
 
     @property
@@ -147,12 +147,12 @@ class StateSpaceFit(ModelFit):
 
     @property
     def interval_kind(self) -> IntervalKind | None:
-        """``"plausible"``: what is not ruled out has no probability; None without an interval."""
+        """``"plausible"``: dead times that are not ruled out; None without an interval."""
         return None if self.interval is None else "plausible"
 
     @property
     def residual_std(self) -> float | None:
-        """Standard deviation of what the model leaves of its one output; None for several."""
+        """Standard deviation of the residual; None for several outputs."""
         return float(self.noise_std[0]) if self.noise_std.size == 1 else None
 
     def _method(self) -> str:
@@ -202,7 +202,7 @@ def fitted_system(
     choices: tuple[str, ...],
     flags: tuple[Flag, ...],
 ) -> DelayedStateSpace:
-    """Make the system and say how well it follows the records."""
+    """Make the system, and measure how well it fits the records."""
     A, B, C, D = best.found.model.matrices()
     A, B, C, _ = balanced_truncation(A, B, C, best.order)
     core = ct.ss(A, B, C, D, group[0].dt)

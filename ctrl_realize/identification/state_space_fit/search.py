@@ -17,35 +17,36 @@ from ...numerics.state_space.section_fit import MOST_STEPS, Experiment, SectionF
 from ...numerics.state_space.sections import Sections, in_sections
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20)
-"""Orders that are tried, the smallest first, until three in a row were no better."""
+"""Orders that are tried in increasing order, until three in a row bring no improvement."""
 PATIENCE = 3
 ENOUGH_SAMPLES = 20000
-"""Samples from which order and delays are chosen; the last fit sees all."""
+"""Number of samples for the choice of order and delays; the last fit uses all."""
 PER_PARAMETER = 3
-"""Measured values that each parameter needs at least."""
+"""Least number of measured values for each parameter."""
 ROUGHLY = 0.1
-"""Log likelihood to which candidates are fitted first."""
+"""Convergence of the log likelihood in the first fit of each candidate."""
 REACH = 40.0
-"""BIC above the best up to which a candidate is fitted to its minimum before it is compared: the
-last steps gained up to 40 on measured records (a robot arm, orders 8 to 12)."""
+"""Largest difference of BIC from the best for which a candidate is fitted to its minimum before it
+is compared: the last iterations gained up to 40 on measured records (a robot arm, orders 8 to
+12)."""
 CONVERGED, MOST_TURNS = 1e-6, 100
-"""Log likelihood by which the last step gains there, and steps at most."""
+"""Convergence of the log likelihood then, and the largest number of iterations."""
 NEARBY = 10
-"""Steps in which a neighbour of a fitted model shows whether it is better."""
+"""Iterations after which a neighbour of a fitted model is compared with it."""
 FARTHEST = 200
-"""Moves of delays after which the search for them ends."""
+"""Largest number of changes of the delays."""
 
 RULED_OUT = 10.0
-"""Excess of the criterion from which the data rule a delay out, as in `fit_output_error`."""
+"""Increase of the criterion from which the data rule a delay out, as in `fit_output_error`."""
 FARTHEST_PLAUSIBLE = 12
-"""Samples around a delay that are looked at."""
+"""Number of delays around the estimate that are tried."""
 
 Shares = tuple[tuple[int, ...], tuple[int, ...]]
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A fitted model behind its delays, with the value of the criterion: smaller is better."""
+    """A fitted model with its delays, and the value of the criterion: smaller is better."""
 
     found: SectionFit
     order: int
@@ -61,8 +62,8 @@ def experiments(
 ) -> list[Experiment]:
     """Align inputs and outputs by their delays, up to `most` samples of all records together.
 
-    The state behind the delays is unknown when a record begins, so what was in the delays then
-    needs no guess: the first samples, which depend on it, are left out.
+    The state after the delays is unknown at the start of a record, so the past inputs within the
+    delays need not be known: the first samples, which depend on them, are left out.
     """
     inputs, outputs = shares
     first = max(inputs)
@@ -87,10 +88,11 @@ def experiments(
 
 
 class Search:
-    """Fits of one group of records, at any order and delay, from one impulse response.
+    """Fits of one set of records, for any order and delay, from one impulse response.
 
-    `markov` (p, m, N) is what the fits start from; channels are scaled to the same size first,
-    or the smallest would be the last to be modelled. All but the last fit see `enough` samples.
+    `markov` (p, m, N) is the starting point of the fits; channels are scaled to the same size
+    first, otherwise the smallest would be modelled last. All fits but the last use `enough`
+    samples.
     """
 
     def __init__(
@@ -123,7 +125,7 @@ class Search:
         self.highest = max((self._samples * p // PER_PARAMETER - p * m) // per_order, 0)
 
     def orders(self, asked: Sequence[int] | None) -> tuple[int, ...]:
-        """Return the orders that the records can tell: excited, and with data enough."""
+        """Return the orders that the records support: excited, and with enough data."""
         tried = tuple(asked) if asked is not None else ORDERS
         possible = tuple(n for n in tried if n <= self.highest and self._excites(n))
         missing = sorted(set(tried) - set(possible))
@@ -141,7 +143,7 @@ class Search:
     def fit(
         self, order: int, shares: Shares, *, feedthrough: bool, start: Candidate | None = None
     ) -> Candidate:
-        """Fit one structure; its start is another fit, or Kung's realization."""
+        """Fit one structure, starting from another fit or from Kung's realization."""
         data = experiments(self._group, shares, self._enough)
         sections = start.found.model if start is not None else self._kung(order, shares)
         most = MOST_STEPS if start is None else NEARBY
@@ -149,7 +151,7 @@ class Search:
         return self._judged(found, order, shares, feedthrough)
 
     def converged(self, fits: Sequence[Candidate]) -> list[Candidate]:
-        """Follow what may be the best to its minimum: elsewhere rounding would decide."""
+        """Fit what may be the best to its minimum: otherwise rounding might decide."""
         found = list(fits)
         for i in sorted(range(len(found)), key=lambda i: found[i].bic):
             one = found[i]
@@ -159,7 +161,7 @@ class Search:
         return found
 
     def as_good(self, best: Candidate, within: float) -> list[Candidate]:
-        """Other orders, delays and direct terms that were compared and are as good but for that."""
+        """Other orders, delays and feedthroughs that are as good, up to convergence."""
         own = best.order, best.inputs, best.outputs, best.feedthrough
         return [
             c
@@ -178,11 +180,11 @@ class Search:
             most=MOST_TURNS,
         )
         end = self._judged(fit, one.order, shares, one.feedthrough)
-        # B is found anew first, which may lead elsewhere.
+        # B is estimated again first, which may lead to another minimum.
         return replace(min(one, end, key=lambda c: c.bic), converged=True)
 
     def finish(self, best: Candidate) -> Candidate:
-        """Fit once more, to all samples."""
+        """Final fit to all samples."""
         shares = best.inputs, best.outputs
         data = experiments(self._group, shares)
         found = fit_sections(data, best.found.model, feedthrough=best.feedthrough)
@@ -191,7 +193,7 @@ class Search:
     def by_order(
         self, orders: Sequence[int], shares: Shares, *, feedthrough: bool
     ) -> list[Candidate]:
-        """Fit rising orders until none is better any more."""
+        """Fit increasing orders until there is no more improvement."""
         fits: list[Candidate] = []
         for order in orders:
             try:
@@ -208,10 +210,10 @@ class Search:
         return self.converged(fits)
 
     def improved(self, best: Candidate, *, delays: bool, feedthrough: bool) -> Candidate:
-        """Change one thing at a time while that is better.
+        """Change one delay, the feedthrough or the order at a time, as long as this is better.
 
-        A delay by a sample where `delays` are free, the direct term where `feedthrough` is, and at
-        the end the order: with the right delays a smaller one may do.
+        A delay changes by a sample if `delays` are free, the feedthrough if `feedthrough` is, and
+        finally the order: with the right delays a lower one may suffice.
         """
         for _ in range(FARTHEST):
             shares = best.inputs, best.outputs
@@ -230,10 +232,10 @@ class Search:
         return best
 
     def lowered(self, best: Candidate, orders: Sequence[int], *, delays: bool) -> Candidate:
-        """Try lower orders behind the delays that were found.
+        """Try lower orders with the delays that were found.
 
-        With one input and output each of them finds its own from there: states that stand for
-        samples of the delay hold it where it is.
+        With one input and output, each of them then finds its own delay: states that model samples
+        of the delay would keep it too short.
         """
         for order in (n for n in orders if n < best.order):
             try:
@@ -248,9 +250,9 @@ class Search:
     def plausible(self, best: Candidate, independent: float) -> tuple[float, float]:
         """Dead times in samples, of one input and output, that the data do not rule out.
 
-        Those whose model of the same order has a criterion up to `RULED_OUT` larger, when
-        `independent` samples of the residual count as one. Behind a hold, the first sample of a
-        response without direct term says that the dead time ended within the sample before it.
+        Those whose model of the same order has a criterion at most `RULED_OUT` larger, if
+        `independent` samples of the residual count as one. With a hold and without feedthrough, the
+        first sample of a response shows that the dead time ended within the sample before it.
         """
         low, high = _within(best)
         for feedthrough in {best.feedthrough, False}:
@@ -281,7 +283,7 @@ class Search:
         return excited_directions(gram) == len(gram)
 
     def _kung(self, order: int, shares: Shares) -> Sections:
-        """Realize the scaled impulse response behind the delays; lower orders are parts of it."""
+        """Realize the scaled impulse response after the delays; lower orders are parts of it."""
         if shares not in self._starts:
             reach = np.add.outer(shares[1], shares[0])
             length = self._markov.shape[-1] - int(reach.max())
@@ -304,7 +306,7 @@ class Search:
         values = found.counts.sum() / p
         used = min(self._samples, self._enough)
         count = order * (p + m) + (p * m if feedthrough else 0)
-        # As if all delays left the same number of samples.
+        # As if the same number of samples remained for all delays.
         bic = 2 * found.loss * used / values + count * np.log(used)
         return Candidate(found, order, *shares, feedthrough, float(bic))
 

@@ -1,4 +1,4 @@
-"""State-space fits from one estimate of the impulse response after the other."""
+"""State-space fits starting from several estimates of the impulse response."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from .result import StateSpaceFit, fitted_system
 from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares
 
 LEVEL = 0.02
-"""Part of a channel's largest Markov parameter that counts as response, where delays are to be
-found: the search moves them further, and one that is too long costs more than one too short."""
+"""Threshold for a response when delays are to be found, relative to a channel's largest Markov
+parameter: the search refines them, and too long a delay costs more than too short a one."""
 STARTS: tuple[tuple[Start, Method], ...] = (
     ("unknown", "auto"),
     ("rest", "auto"),
     ("unknown", "okid"),
     ("rest", "okid"),
 )
-"""Estimates of the impulse response to start from: the next one where the residual of the best
-model so far still follows the input."""
+"""Estimates of the impulse response to start from: the next one is used if the residual of the best
+model so far is correlated with the input."""
 STILL = 10
-"""Samples that an input stands still at the start of a record for the plant to count as at rest."""
+"""Samples of constant input at the start of a record after which the plant is in steady state."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a start has come to: criterion, model, and whether all outputs showed a response."""
+    """Result from one start: criterion, model, and whether all outputs showed a response."""
 
     bic: float
     system: DelayedStateSpace
@@ -49,7 +49,7 @@ class Outcome:
 
     @property
     def fit(self) -> StateSpaceFit:
-        """How the model was fitted."""
+        """Result of the fit of the model."""
         return fit_of(self.system, StateSpaceFit)
 
 
@@ -62,7 +62,7 @@ def from_starts(
     most_starts: int = len(STARTS),
     enough: int = ENOUGH_SAMPLES,
 ) -> Outcome:
-    """Fit from one estimate of the impulse response after the other, until nothing is left."""
+    """Fit from one estimate of the impulse response after another, until the residual is clean."""
     best: Outcome | None = None
     refused: list[DataError] = []
     at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
@@ -75,7 +75,7 @@ def from_starts(
             continue
         if best is None or found.bic < best.bic:
             best = found
-        # An output that a start does not see gets a second one.
+        # An output without response in one start is tried again in the next.
         clear = best.seen or tried > 1
         if clear and all(check.independent for check in best.fit.checks):
             break
@@ -95,7 +95,7 @@ def _from_start(
     """Fit from one estimate of the impulse response."""
     start, method = way
     with warnings.catch_warnings():
-        # What the prior has filled in only serves as a start.
+        # Directions determined by the prior are used for starting only.
         warnings.simplefilter("ignore", DataWarning)
         impulse = impulse_from_io(group, method=method, start=start)
     markov = np.reshape(impulse.markov, (group[0].noutputs, group[0].ninputs, -1))
@@ -129,7 +129,7 @@ def _from_start(
 
 
 def _marginal(others: Sequence[Candidate]) -> tuple[Flag, ...]:
-    """Flag a choice so close that rounding may turn it."""
+    """Flag a choice so close that rounding may change it."""
     if not others:
         return ()
     one = others[0]
@@ -144,9 +144,9 @@ def _marginal(others: Sequence[Candidate]) -> tuple[Flag, ...]:
 
 
 def _silence(best: Candidate) -> tuple[Flag, ...]:
-    """Flag the outputs of which the model explains no more than its parameters would of noise."""
+    """Flag outputs of which the model explains no more than it would explain of noise."""
     found = best.found
-    # What belongs to one output: its C, the initial state, and its row of D.
+    # Parameters of one output: its row of C and D, and the initial state.
     count = 2 * best.order + best.found.model.D.shape[1] * best.feedthrough
     gain = found.counts * np.log(found.spread / found.variance)
     return tuple(
@@ -176,6 +176,6 @@ def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str
 
 
 def _split(delays: IntArray) -> Shares:
-    """Share delays out to inputs and outputs; channels without response follow the others."""
+    """Split delays into inputs and outputs; channels without response follow the others."""
     outputs, inputs = split_delays(delays, delays >= 0)[0]
     return tuple(int(d) for d in inputs), tuple(int(d) for d in outputs)

@@ -1,1 +1,1 @@
-"""How far a model can be trusted: residuals, prediction, bootstrap, independent delay estimates."""
+"""Validation of models: residuals, prediction, bootstrap, independent delay estimates."""

@@ -1,4 +1,4 @@
-"""How much a whole identification scatters when its noise is drawn again."""
+"""Bootstrap of a complete identification: how much it varies with the noise."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ Estimator: TypeAlias = Callable[[Any], DelayedStateSpace]
 _BLOCK_OVER_CORRELATION = 3
 _FEW_RECORDS = 5
 _LEAST_LEFT = 0.5
-"""Part of the variance of the noise below which its loss is no longer made up."""
+"""Least fraction of the noise variance for which its reduction is corrected."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bootstrap(Result):
-    """Models from the same data with the noise drawn again.
+    """Models from the same data with resampled noise.
 
-    ``dead_times[b]`` belongs to ``systems[b]``, and ``interval`` spans the middle 95 % of the
-    dead times. What a bootstrap cannot see is bias: an error that the method makes on every
-    record alike moves all models together, and so does the rounding of an output whose steps are
-    higher than its noise (flag ``"coarse_quantisation"``).
+    ``dead_times[b]`` belongs to ``systems[b]``, and ``interval`` spans the middle 95 % of the dead
+    times. A bootstrap cannot detect bias: an error of the method that is common to all records
+    shifts all models together, and so does quantisation coarser than the noise (flag
+    ``"coarse_quantisation"``).
 
     Attributes
     ----------
     system : DelayedStateSpace
-        Model of the data themselves.
+        Model of the original data.
     systems : tuple of DelayedStateSpace
-        Models of the draws, without their fits.
+        Models of the resampled data, without their fits.
     dead_times : ndarray, shape (B,)
         In s.
     kind : str
         ``"residuals"`` (blocks of the residual of one record) or ``"records"``.
     block : int
-        Length of the blocks in samples; 0 where records were drawn.
+        Length of the blocks in samples; 0 if records were resampled.
     failed : int
-        Draws for which the method gave an error.
+        Number of draws for which the method raised an error.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Bootstrap(Result):
 
     @property
     def flags(self) -> tuple[Flag, ...]:
-        """Whether draws failed, and whether the output's rounding hides from them."""
+        """Warnings about failed draws, and about quantisation, which draws do not contain."""
         found = []
         if self.failed:
             found.append(
@@ -110,7 +110,7 @@ class Bootstrap(Result):
         return tuple(found)
 
     def poles(self) -> list[Any]:
-        """Poles of every model in the z-plane, delays left out."""
+        """Poles of every model in the z-plane, without delays."""
         return [np.linalg.eigvals(s.delay_free.A) for s in self.systems]
 
     def step_band(self, samples: int, *, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
@@ -125,7 +125,7 @@ class Bootstrap(Result):
     def phase_band(self, omega: Any, *, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Band of the phases at frequencies (K,) in rad/s; in rad, delays included."""
         phase = np.unwrap(np.angle(self._response(omega)), axis=1)
-        # Unwrapping starts anywhere: whole turns are counted from the first model.
+        # Unwrapping may start anywhere: whole turns are counted relative to the first model.
         turns = np.round((phase[:, :1] - phase[:1, :1]) / (2 * np.pi))
         return _band(phase - 2 * np.pi * turns, level)
 
@@ -164,27 +164,27 @@ def bootstrap(
     seed: int = 0,
     n_jobs: int = 1,
 ) -> Bootstrap:
-    """Identify again and again with the noise drawn anew.
+    """Identify repeatedly with resampled noise.
 
-    With five records or more the records are drawn, with replacement; with fewer, blocks of the
-    residual are drawn and put on the model's response.
+    With five records or more the records are resampled, with replacement; with fewer, blocks of the
+    residual are resampled and added to the response of the model.
 
     Parameters
     ----------
     records : Record or sequence of Record
-        What `estimator` is given.
+        Argument of `estimator`.
     estimator : callable, optional
-        Any method that makes a `DelayedStateSpace` of them: `fit_output_error`, or for example
+        Any method that returns a `DelayedStateSpace`: `fit_output_error`, or for example
         ``functools.partial(identify, method="scan")``.
     repeats : int, optional
         Number of draws.
     block : int, optional
-        Length of the blocks in samples. Default: three times the correlation time of the
-        residual, so that coloured noise stays coloured.
+        Length of the blocks in samples. Default: three times the correlation time of the residual,
+        so that coloured noise stays coloured.
     seed : int, optional
-        Draws depend on nothing else, not on `n_jobs` either.
+        Seed or generator; the draws do not depend on `n_jobs`.
     n_jobs : int, optional
-        Processes (joblib); -1 is all.
+        Number of processes (joblib); -1 for all cores.
 
     Returns
     -------
@@ -193,18 +193,17 @@ def bootstrap(
     Raises
     ------
     OptionError, DataError
-        Unusable options; fewer than two draws that could be identified.
+        Invalid options, or fewer than two draws that could be identified.
 
     Notes
     -----
-    A residual is smaller than the noise, since the model has followed some of it, and blocks
-    that are drawn one by one forget what joined them. Both take away from slow noise, and the
-    residual is scaled up by what they take: with N samples and the correlation time T there are
-    n = N / T independent ones, p parameters (poles, gain, dead time, offset and slope) leave
-    ``(n - p) / n`` of the variance, and of the autocorrelation at lag k blocks of L samples keep
-    ``1 - k / L``.
+    A residual is smaller than the noise, because the model has fitted part of it, and separate
+    blocks lose the correlation between them. Both reduce slow noise, and the residual is scaled up
+    accordingly: with N samples and the correlation time T there are n = N / T independent ones, p
+    parameters (poles, gain, dead time, offset and slope) leave ``(n - p) / n`` of the variance, and
+    blocks of L samples keep ``1 - k / L`` of the autocorrelation at lag k.
 
-    Blocks of the residual as in [1]_, whole records as in [2]_.
+    Blocks of the residual follow [1]_, whole records [2]_.
 
     References
     ----------
@@ -277,10 +276,10 @@ def _band(values: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _middle(values: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
-    """Ends between which one more draw falls with `level`, at every place of the other axes.
+    """Interval that contains a further draw with probability `level`, along the other axes.
 
-    Of B draws the k-th has k / (B + 1) below it. Quantiles of the draws themselves would be too
-    near: between those of 50 fall 91 % of all draws.
+    Of B draws the k-th has k / (B + 1) of the distribution below it. Quantiles of the draws
+    themselves would be too narrow: for 50 draws they contain 91 % instead of 95 %.
     """
     ends = [(1 - level) / 2, (1 + level) / 2]
     low, high = np.quantile(values, ends, axis=0, method="weibull")
@@ -298,7 +297,7 @@ def _identified(estimator: Estimator, draw: Any) -> tuple[DelayedStateSpace, flo
 
 
 def _model_and_residual(system: DelayedStateSpace, record: Record) -> tuple[FloatArray, FloatArray]:
-    """Response of the model with the offset and slope that fit best, and what is left of it."""
+    """Response of the model with the best offset and slope, and the residual."""
     signal, output = np.ravel(record.input), np.ravel(record.output)
     response = np.ravel(system.simulate(signal - signal[0]))
     index = np.arange(output.size, dtype=np.float64)
@@ -319,10 +318,10 @@ def _block(parts: list[tuple[FloatArray, FloatArray]], block: int | None) -> int
 def _scaled(
     parts: list[tuple[FloatArray, FloatArray]], length: int, system: DelayedStateSpace
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Scale the residuals up by what model and blocks have taken from them."""
+    """Scale the residuals up for what model and blocks have removed."""
     samples = sum(residual.size / correlation_time(residual) for _, residual in parts)
     parameters = int(system.delay_free.nstates) + 2 + 2 * len(parts)
-    # As many parameters as samples would leave nothing to scale.
+    # With as many parameters as samples there would be nothing to scale.
     left = max(1 - parameters / samples, _LEAST_LEFT)
     return [
         (model, residual / np.sqrt(left * max(kept_in_blocks(residual, length), _LEAST_LEFT)))
@@ -333,7 +332,7 @@ def _scaled(
 def _redrawn(
     record: Record, model: FloatArray, residual: FloatArray, length: int, rng: np.random.Generator
 ) -> Record:
-    """Put blocks of the residual, drawn around the circle, on the model."""
+    """Add blocks of the residual, drawn circularly, to the model's response."""
     n = residual.size
     starts = rng.integers(n, size=-(-n // length))
     index = (starts[:, None] + np.arange(length)).ravel()[:n] % n

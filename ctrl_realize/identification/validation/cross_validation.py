@@ -31,16 +31,16 @@ def cross_validate(
     Parameters
     ----------
     systems : dict of str to control.StateSpace, or control.StateSpace
-        Models by name, or one; any that `analyse_residuals` takes.
+        Models by name, or a single one; any that `analyse_residuals` accepts.
     records : Record or sequence of Record
-        Best those that no model has seen. Of the same name the second gets a number.
+        Preferably records that no model was fitted to. Equal names are numbered.
     start : {"estimate", "rest"}
         As for `analyse_residuals`.
 
     Returns
     -------
     pandas.DataFrame
-        One row a model, one column a record; the mean over the outputs.
+        One row per model, one column per record; the mean over the outputs.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def cross_validate(
 
     Notes
     -----
-    Fit in percent is ``100 (1 - |y - ys| / |y - mean y|)`` of the simulated output ys [1]_.
+    The fit percentage is ``100 (1 - |y - ys| / |y - mean y|)`` of the simulated output ys [1]_.
 
     References
     ----------
@@ -91,5 +91,5 @@ def cross_validate(
 
 
 def _name(system: Any) -> str:
-    # of the caller: a system of python-control has a name, another model may have none
+    # a model of the caller: systems of python-control have a name, others may have none
     return str(getattr(system, "name", None) or "model")

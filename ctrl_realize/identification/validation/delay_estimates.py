@@ -23,15 +23,15 @@ from ..step.steps import unit_step
 from .delay_estimates_result import DelayComparison, DelayEstimate, common_dead_time
 
 TOP_BAND = 1 / 3
-"""Part of the band, from its upper end, where the slope of the phase is taken."""
+"""Upper part of the band in which the slope of the phase is estimated, as a fraction."""
 MOST_LAGS = 1000
-"""Lags up to which a cross-correlation is looked at."""
+"""Largest lag of the cross-correlation."""
 UNSEEN = 0.01
-"""Chance that a cross-correlation stands out where there is none."""
+"""Probability of a significant cross-correlation by chance."""
 NO_LEVEL = "its interval shows how flat the IAE curve is; it is not a confidence interval"
-"""What a scan leaves open on any record: its set holds the truth in fewer than half of them."""
+"""Doubt about any scan: its interval contains the true delay in fewer than half of all records."""
 DOUBTFUL = ("no_delay_resolved", "order_in_noise", "delay_at_bound", "phase_leads")
-"""Flags by which a method says that its data do not carry its answer."""
+"""Flags by which a method reports that its data do not support its estimate."""
 
 
 @single_threaded
@@ -42,12 +42,12 @@ def compare_delay_estimates(
     max_delay: int | None = None,
     order: int | None = None,
 ) -> DelayComparison:
-    """Estimate a delay in every way that the data allow, and compare.
+    """Estimate a delay by all methods that the data allow, and compare.
 
-    From a record: output-error fit (`fit_output_error`), the paper's scan (`estimate_delay`, on the
-    differentiated step or on `impulse_from_io`), visible onset after a step, and the onset of
-    the cross-correlation with a whitened input. From an FRF: fit with a free dead time
-    (`fit_frf`) and slope of the phase at the top of the band.
+    From a record: output-error fit (`fit_output_error`), the paper's scan (`estimate_delay`, from
+    the differentiated step or from `impulse_from_io`), visible onset after a step, and onset of the
+    cross-correlation with the prewhitened input. From an FRF: fit with continuous dead time
+    (`fit_frf`) and slope of the phase at the upper end of the band.
 
     Parameters
     ----------
@@ -56,8 +56,7 @@ def compare_delay_estimates(
     frf : MeasuredFRF, optional
         Of the same plant, one input, one output.
     max_delay : int, optional
-        Largest delay of the scan in samples. Default: the total delay of the fit, and ten
-        samples.
+        Largest delay of the scan in samples. Default: the total delay of the fit, and ten samples.
     order : int, optional
         Order of the scan; default: that of the output-error fit, at most 3.
 
@@ -68,19 +67,19 @@ def compare_delay_estimates(
     Raises
     ------
     DataError
-        Neither record nor FRF, or data from which no method finds anything.
+        Neither record nor FRF, or data for which every method fails.
 
     Notes
     -----
-    The scan has no confidence interval: its row shows the delays that fit about as well, with
-    one sample to both sides for the part of a sample that it cannot see. Where it says itself
-    that its data do not show whether there is a delay, or that its order is in the noise, it is in
-    doubt and does not count; nor does a fit to an FRF whose phase leads. The others have
-    intervals of 95 %, and the one to rely on is the narrowest. First motion, onset of
-    the correlation and slope of the phase cannot be before the dead time ends (but for noise),
-    and lie after it by part of the lags: they bound it from above.
+    The scan has no confidence interval: its row shows the delays that fit about as well, widened by
+    one sample on each side because it is limited to whole samples. If its flags state that the data
+    do not show whether there is a delay, or that its order is in the noise, it is in doubt and does
+    not count; nor does a fit to an FRF whose phase leads. The others have 95 % intervals, and the
+    one to rely on is the narrowest. Visible onset, onset of the correlation and slope of the phase
+    cannot be shorter than the dead time (except for noise), and exceed it by part of the lags: they
+    are upper bounds.
 
-    The ways belong to the classes of [1]_: explicit parameter, approximation (onset and
+    The methods belong to the classes of [1]_: explicit parameter, approximation (onset and
     correlation) and phase.
 
     References
@@ -148,7 +147,7 @@ def _from_record(
         )
         stepped = bool(np.isfinite(fit.onset))
         if stepped:
-            # Walked back to the last sample at rest; the motion began within the sample before.
+            # Back to the last sample at the baseline; the motion started within the sample before.
             first = max(fit.onset, 0.0)
             views.append(DelayEstimate("onset", "record", "upper bound", first, 0.0, first + dt))
         total, model_order = max(fit.total_delay, fit.dead_time), min(fit.order, 3)
@@ -171,7 +170,7 @@ def _from_correlation(
             Flag("no_correlation", f"cross-correlation: no significant peak up to lag {lags}")
         )
         return
-    # Behind a hold, what is seen at lag k for the first time came within the sample before.
+    # With a hold, the first visible response at lag k started within the sample before.
     value = seen.onset * record.dt
     views.append(DelayEstimate("cross-correlation", "record", "upper bound", value, 0.0, value))
 
@@ -198,12 +197,13 @@ def _scan(record: Record, stepped: bool, most: int, order: int, total: float) ->
 
 
 def _doubt(flags: tuple[Flag, ...]) -> str:
-    """Return what a method says against its own answer."""
+    """Return the reasons of a method to doubt its own estimate."""
     return "; ".join(str(flag) for flag in flags if flag.code in DOUBTFUL)
 
 
 def _from_frf(frf: MeasuredFRF, views: list[DelayEstimate], flags: list[Flag]) -> None:
-    # Not at the top: most checks have no FRF, and its fit is a large part of the package.
+    # Not imported at the top: most comparisons have no FRF, and its fit is a large part of the
+    # package.
     from ...frequency.fit_frf import fit_frf
     from ...frequency.frf_fit import FRFFit
 

@@ -20,22 +20,22 @@ Kind = Literal["dead time", "upper bound"]
 class DelayEstimate:
     """One delay estimate, in s.
 
-    ``low <= value <= high``. A view of kind ``"dead time"`` estimates the dead time itself; an
-    ``"upper bound"`` sees the dead time and part of the lags: the dead time is not above `high`.
-    A view with a `doubt` says of itself that its data do not carry it, or, as a scan, that its
-    interval claims no level; it is shown and does not count in the verdict.
+    ``low <= value <= high``. An estimate of kind ``"dead time"`` is one of the dead time itself; an
+    ``"upper bound"`` contains the dead time and part of the lags: the dead time is not above
+    `high`. An estimate with a `doubt` is not supported by its data or, for a scan, has no
+    confidence interval; it is shown but does not count.
 
     Attributes
     ----------
     method : str
-        How the delay was seen: ``"output error"``, for example.
+        Method, ``"output error"`` for example.
     source : str
-        What it was seen in: ``"record"`` or ``"FRF"``.
+        Data: ``"record"`` or ``"FRF"``.
     kind : {"dead time", "upper bound"}
     value, low, high : float
         Estimate and its interval.
     doubt : str
-        Why the view does not count; empty if it does.
+        Why the estimate does not count; empty if it does.
 
     Examples
     --------
@@ -56,12 +56,12 @@ class DelayEstimate:
 
 @dataclass(frozen=True, eq=False)
 class DelayComparison(Result):
-    """Delay estimates of several methods side by side.
+    """Comparison of the delay estimates of several methods.
 
-    `agree` is true when one dead time lies in the interval of every dead-time view that counts and
-    not above any upper bound; `common` is then the interval of such dead times. Otherwise `common`
-    is None and `conflicts` names the pairs that cannot both be right. Where every view is in
-    doubt, nothing is agreed on and there are no conflicts.
+    `agree` is true if one dead time lies in the interval of every estimate that counts and not
+    above any upper bound; `common` is then the interval of such dead times. Otherwise `common` is
+    None and `conflicts` lists the pairs that exclude each other. If every estimate is in doubt,
+    there is neither agreement nor conflict.
 
     Attributes
     ----------
@@ -71,12 +71,12 @@ class DelayComparison(Result):
         In s.
     conflicts : tuple of (str, str)
     rely_on : str or None
-        Method of the view to take the dead time from: the narrowest interval among those that
-        count. None where they do not agree, or none sees the dead time itself.
+        Method of the estimate to use: the narrowest interval among those that count. None if they
+        do not agree, or none estimates the dead time itself.
     dt : float or None
         Sample time of the record in s.
     flags : tuple of Flag
-        What could not be done, and why.
+        Methods that failed, with reasons.
 
     Examples
     --------
@@ -102,14 +102,14 @@ class DelayComparison(Result):
 
     @property
     def rely_on(self) -> str | None:
-        """Method whose interval of the dead time is the narrowest of those that count."""
+        """Method with the narrowest interval of the dead time among those that count."""
         times = [view for view in counted(self.estimates) if view.kind == "dead time"]
         if not self.agree or not times:
             return None
         return min(times, key=lambda view: view.high - view.low).method
 
     def table(self) -> pd.DataFrame:
-        """Tabulate the views, one row each, in s and in samples."""
+        """Tabulate the estimates, one per row, in s and in samples."""
         import pandas as pd
 
         rows = pd.DataFrame([vars(view) for view in self.estimates]).set_index("method")
@@ -149,14 +149,14 @@ class DelayComparison(Result):
 
 
 def counted(views: Sequence[DelayEstimate]) -> list[DelayEstimate]:
-    """Leave out the views in doubt."""
+    """Leave out the estimates in doubt."""
     return [view for view in views if not view.doubt]
 
 
 def common_dead_time(
     views: Sequence[DelayEstimate],
 ) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
-    """Find the dead times that no view rules out, or the pairs that rule each other out."""
+    """Find the dead times that no estimate rules out, or the pairs that exclude each other."""
     views = counted(views)
     times = [view for view in views if view.kind == "dead time"]
     bounds = [view for view in views if view.kind == "upper bound"]
@@ -171,5 +171,5 @@ def common_dead_time(
 
 
 def _apart(time: DelayEstimate, other: DelayEstimate) -> bool:
-    """Whether a dead time and another view cannot both be right."""
+    """Whether two estimates exclude each other."""
     return time.low > other.high or (other.kind == "dead time" and other.low > time.high)

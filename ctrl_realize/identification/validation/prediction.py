@@ -1,4 +1,4 @@
-"""Prediction of an output from its own past: a model, and an autoregression of what it leaves."""
+"""Prediction of an output from its past: a model, and an autoregressive model of the residual."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...numerics.signals.correlation import autoregression, fit_percent, predict
 from ...results import Result
 
 NOISE_ORDER = 20
-"""Highest order of the autoregression that predicts the residual."""
+"""Highest order of the autoregressive model of the residual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +25,8 @@ class Prediction(Result):
     """Output predicted `horizon` samples ahead.
 
     ``output[k]`` uses the input up to k and the measured output up to ``k - horizon``;
-    `fit_percent` compares it with the record. The model is the system plus an autoregression of its
-    residual of the order `noise_order`, per output.
+    `fit_percent` compares it with the record. The model is the system plus an autoregressive model
+    of its residual, of order `noise_order` for each output.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Prediction(Result):
     fit_percent : ndarray, shape (p,)
         ``100 (1 - |y - output| / |y - mean y|)`` of every output.
     horizon : int
-        Samples from the last measured output that was used to the one that is predicted.
+        Prediction horizon in samples.
     noise_order : tuple of int
-        Of every output; 0 where the residual is white.
+        Of every output; 0 for a white residual.
     record : Record
 
     Examples
@@ -86,7 +86,7 @@ def predict(
     system, record, start
         As for `analyse_residuals`.
     horizon : int
-        Samples ahead, at least 1.
+        Prediction horizon in samples, at least 1.
 
     Returns
     -------
@@ -95,15 +95,15 @@ def predict(
     Raises
     ------
     DataError, UnsuitableSystemError, OptionError
-        As for `analyse_residuals`; a horizon that is no whole number from 1 on.
+        As for `analyse_residuals`; a horizon that is not a whole number >= 1.
 
     Notes
     -----
-    The autoregression of the residual is fitted to the same record (order 0...20 by BIC), so that
-    `fit_percent` says how well this record is described, not how well the next one would be
-    predicted. Compare models at the same `horizon`.
+    The autoregressive model is fitted to the same record (order 0...20 by BIC), so `fit_percent`
+    shows how well this record is described, not how well another one would be predicted. Compare
+    models at the same `horizon`.
 
-    The predictor is that of [1]_ for the model ``y = G u + v``, v the autoregression.
+    The predictor is that of [1]_ for the model ``y = G u + v``, with the autoregression v.
 
     References
     ----------

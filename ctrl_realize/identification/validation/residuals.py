@@ -1,4 +1,4 @@
-"""Correlations of what a model leaves of a record, with itself and with the input."""
+"""Residual analysis: correlations of the residual with itself and with the input."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...results import Flag
 from .residuals_result import ResidualAnalysis
 
 EXACT = 1e-8
-"""Residual, as a part of the range of the output, below which a model counts as exact."""
+"""Residual relative to the range of the output below which a model counts as exact."""
 
 
 @single_threaded
@@ -31,23 +31,23 @@ def analyse_residuals(
     confidence: float = 0.99,
     start: Start = "estimate",
 ) -> ResidualAnalysis:
-    """Simulate a model with the input of a record and look at what is left.
+    """Simulate a model with the input of a record and analyse the residual.
 
-    On another record than the model was made from, this is its cross-validation.
+    For another record than the model was estimated from, this is cross-validation.
 
     Parameters
     ----------
     system : control.StateSpace
-        Discrete, with the sample time of the record; a `DelayedStateSpace` as well.
+        Discrete, with the sample time of the record; also a `DelayedStateSpace`.
     record : Record
     lags : int, default 25
         Largest lag of the correlations.
     confidence : float, default 0.99
         Level of bounds and tests.
     start : {"estimate", "rest"}
-        Where the simulation starts: with the offset, the state and the input within the dead
-        time before the record that fit best (a long dead time in 16 pieces of constant input), or
-        at rest with the first sample of the input and the offset that fits best.
+        Initial state of the simulation: ``"estimate"`` fits the offset, the state and the past
+        input within the dead time (16 constant pieces for a long dead time); ``"rest"`` is the
+        steady state for the first sample of the input, with the best offset.
 
     Returns
     -------
@@ -56,13 +56,13 @@ def analyse_residuals(
     Raises
     ------
     DataError
-        A record that does not fit the system, has missing samples, or is too short.
+        A record that does not match the system, has missing samples, or is too short.
     UnsuitableSystemError
-        A system that is continuous or unstable.
+        A continuous or unstable system.
 
     Notes
     -----
-    Tests of whiteness and of independence from the input as in [1]_, with the statistic of [2]_.
+    Tests of whiteness and of independence from the input follow [1]_, with the statistic of [2]_.
 
     References
     ----------
@@ -95,14 +95,14 @@ def analyse_residuals(
             f"lags={count} needs {3 * count} samples, the record has {record.n_samples}"
         )
     e = y - simulated
-    # What rounding leaves says nothing about the model.
+    # A residual of rounding errors has no information about the model.
     e[np.abs(e).max(axis=1) <= EXACT * np.ptp(y, axis=1)] = 0.0
     own = np.stack([correlation(row, row, count) for row in e])
     cross = np.stack([[_two_sided(row, drive, count) for drive in u] for row in e])
     bounds = np.array([[cross_bound(row, drive, count, level) for drive in u] for row in e])
     probability = np.array([whiteness(rho[1:], record.n_samples) for rho in own])
     outside = _outside(cross, bounds, level)
-    # What a plant without direct term shows at lag 0, a controller has put there.
+    # For a plant without feedthrough, a correlation at lag 0 is caused by a controller.
     direct = _first_response(system) != 0
     later, earlier = outside[:, :, count:].copy(), outside[:, :, : count + 1].copy()
     later[:, :, 0] &= direct
@@ -127,7 +127,7 @@ def analyse_residuals(
 def _outside(cross: FloatArray, bounds: FloatArray, level: float) -> BoolArray:
     """Mark the correlations beyond one bound for all lags together.
 
-    The chance of any alarm at one input and output is ``1 - level``.
+    The probability of a false alarm for one input and output is ``1 - level``.
     """
     family = 1 - (1 - level) / cross.shape[-1]
     wider = float(ndtri((1 - family) / 2) / ndtri((1 - level) / 2))
@@ -135,7 +135,7 @@ def _outside(cross: FloatArray, bounds: FloatArray, level: float) -> BoolArray:
 
 
 def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> tuple[Flag, ...]:
-    """Say what stands out: `later` belongs to `cross` at lags 0...L, `earlier` to -L...0."""
+    """Flag significant correlations: `later` is `cross` at lags 0...L, `earlier` at -L...0."""
     flags = []
     if later.any():
         size = np.where(later, np.abs(cross), 0.0)
@@ -159,21 +159,21 @@ def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> tuple[Fla
 
 
 def _first_response(system: ct.StateSpace) -> FloatArray:
-    """Return the Markov parameter at lag 0, shape (p, m), without forming chains of delays."""
+    """Return the Markov parameter at lag 0, shape (p, m), without the augmented matrices."""
     if isinstance(system, DelayedStateSpace):
         return system.markov(1).reshape(system.noutputs, system.ninputs)
     return np.asarray(system.D)
 
 
 def _two_sided(residual: FloatArray, drive: FloatArray, lags: int) -> FloatArray:
-    """Correlate at lags -lags...lags; at positive ones the residual comes later."""
+    """Correlation at lags -lags...lags; at positive lags the residual comes later."""
     before = correlation(drive, residual, lags)[:0:-1]
     return np.concatenate([before, correlation(residual, drive, lags)])
 
 
 def _level(confidence: float) -> float:
     level = real(confidence, "confidence", "a probability between 0 and 1")
-    # beyond, 1 - confidence is lost among the digits, or the bound is zero
+    # beyond it, 1 - confidence is lost in rounding, or the bound is zero
     if not 1e-12 <= level <= 1 - 1e-12:
         raise OptionError(f"confidence={confidence!r}; expected a number between 0 and 1")
     return level

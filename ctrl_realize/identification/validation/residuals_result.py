@@ -1,4 +1,4 @@
-"""What a model leaves of a record, and whether the input is still in it."""
+"""Result of a residual analysis."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ...results import Flag, Result
 
 @dataclass(frozen=True, eq=False)
 class ResidualAnalysis(Result):
-    """Residual of a simulated model against a record.
+    """Residual of a simulated model, with its correlations.
 
-    ``residual == record.output - simulated``. A model that has taken all from the input leaves a
-    residual that is not correlated with its past: ``|cross| <= cross_bound`` at lags > 0 (and at 0
-    where the model has a direct term), but for a share ``1 - confidence`` of them. Correlation at
-    the lags before is feedback. Whiteness asks more than an output-error model promises: sensor
-    noise may well be coloured.
+    ``residual == record.output - simulated``. The residual of a model that explains the whole
+    effect of the input is not correlated with past inputs: ``|cross| <= cross_bound`` at lags > 0
+    (and at 0 for a model with feedthrough), except for a fraction ``1 - confidence`` of them.
+    Correlation at negative lags indicates feedback. An output-error model need not have a white
+    residual: sensor noise may be coloured.
 
     Attributes
     ----------
@@ -32,13 +32,13 @@ class ResidualAnalysis(Result):
     cross : ndarray, shape (p, m, 2 L + 1)
         Of ``residual[k + i]`` with ``u[k]`` at lags i = -L...L.
     bound : float
-        Bound of the autocorrelation of white noise.
+        Bound of the autocorrelation for white noise.
     cross_bound : ndarray, shape (p, m)
     whiteness : ndarray, shape (p,)
-        Probability that white noise looks less white (Ljung-Box).
+        P-value of the Ljung-Box test of whiteness.
     white, independent : bool
-        No doubt about whiteness, or about freedom from the input, at `confidence` over all lags
-        together.
+        Whether whiteness, or independence from the input, is not rejected at `confidence` over all
+        lags together.
     confidence : float
     record : Record
     flags : tuple of Flag
