@@ -28,8 +28,9 @@ from .switches import MODES, SWITCHES, Switch
 from .touched import watched
 
 PAGE = Path(__file__).parents[2] / "docs" / "ablation_table.md"
-MOST = 6
-"""Records of a kind on which a rule is tried, evenly among those that it touches."""
+MOST, FEW = 6, 12
+"""Records of a kind on which a rule is tried, evenly among those that it touches; where these are
+few, all of them."""
 BASE = SWITCHES[0]
 
 
@@ -87,9 +88,9 @@ def pairs(
                 for case in every
                 if case.kind == kind and rule.name in seen[BASE.name, case.name].touched
             ]
-            few = np.unique(np.linspace(0, len(touched) - 1, MOST).round().astype(int))
-            for name in (touched[i] for i in few) if touched else ():
-                tried[name].append(rule)
+            count = len(touched) if len(touched) <= FEW else MOST
+            for i in np.linspace(0, len(touched) - 1, count).round().astype(int):
+                tried[touched[i]].append(rule)
     for case in in_turn(every):
         yield from ((case, rule) for rule in tried[case.name])
 

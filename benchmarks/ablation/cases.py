@@ -17,6 +17,8 @@ from benchmarks.worlds import described, driven, sensors, steps
 from benchmarks.worlds.simulation import World
 from tests import rigs
 
+from . import rare
+
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 LAGS = (("white", 0.005), ("coloured", 0.02), ("quantised", 0.02))
 DRIVEN: tuple[World, ...] = (
@@ -45,8 +47,8 @@ def cases(seeds: int) -> Iterator[Case]:
     They were chosen by kind, before any of the results was known: the plants that the model
     describes, in three kinds of noise, for what a rule may cost where it is not needed; and all
     worlds of the table of worlds but loops (of the driven ones every second), structures that the
-    model does not have, and measured
-    plants, for what it was made for.
+    model does not have, and measured plants, for what it was made for. The rare ones are worlds of
+    rules that touch hardly any of these.
     """
     for seed in range(seeds):
         for kind, noise in LAGS:
@@ -67,6 +69,11 @@ def cases(seeds: int) -> Iterator[Case]:
         for core, noise in ((None, 0.02), (TWO_MODES, 0.05), (MANY_LAGS, 0.01)):
             for kind in ("white", "coloured"):
                 yield _driven(kind, noise, seed, core)
+    for seed in range(2 * seeds):
+        for world in rare.WORLDS:
+            yield _of_world("rare", world, seed)
+        for plant in WRONG[:3] + MORE_WRONG:
+            yield _step("rare", "wrong structure", plant, (0.001, 0.02)[seed % 2], seed)
     for one in peers.records(DATA) if DATA.is_dir() else ():
         dt = one.task.record.dt
         band = one.band[0] * dt, one.band[1] * dt

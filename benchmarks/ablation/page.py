@@ -12,7 +12,7 @@ import scipy
 
 import ctrl_realize as cr
 
-KINDS = ("lags", "wrong", "disturbed", "driven", "measured")
+KINDS = ("lags", "wrong", "disturbed", "driven", "rare", "measured")
 
 
 @dataclass(frozen=True)

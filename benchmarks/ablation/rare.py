@@ -1,0 +1,100 @@
+"""Worlds in which rules matter that touch hardly any of the other records. All simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.worlds.simulation import (
+    Case,
+    coloured,
+    drawn,
+    levels,
+    noisy,
+    record,
+    step,
+    stepped,
+)
+
+Rng = np.random.Generator
+
+
+def tanks_in_a_row(rng: Rng) -> Case:
+    """Six to twelve lags that differ by a tenth, 0.2 % noise."""
+    count, lag = int(rng.integers(6, 13)), float(rng.uniform(0.04, 0.1))
+    plant = drawn(rng, ((0.95 * lag, 1.05 * lag),) * count)
+    u = step()
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 0.002)))
+
+
+def settling_in_a_long_rest(rng: Rng) -> Case:
+    """The input had moved 0.3 to 1 s before the record; the step comes 1 to 3 s after its start."""
+    plant = drawn(rng, ((0.1, 0.25), (0.4, 1.0)))
+    before, rest = int(rng.uniform(30, 100)), int(rng.uniform(100, 300))
+    u = step(500 + before + rest, before + rest)
+    u[:1] = float(rng.choice([-1.0, 1.0]))
+    y = noisy(rng, stepped(rng, plant, u), 0.002)
+    return plant.case(record(u[before:], y[before:]))
+
+
+def little_step_in_noise(rng: Rng) -> Case:
+    """Noise of 20 to 40 % of the step."""
+    plant, u = drawn(rng), step(1500, 300)
+    part = float(rng.uniform(0.2, 0.4))
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u), part)))
+
+
+def humming(rng: Rng) -> Case:
+    """A line of 3 to 10 % of the step at any frequency."""
+    plant, u = drawn(rng), step(600, 150)
+    y = noisy(rng, stepped(rng, plant, u))
+    turns = float(rng.uniform(0.03, 0.45)) * np.arange(u.size) + rng.uniform()
+    return plant.case(record(u, y + rng.uniform(0.03, 0.1) * np.ptp(y) * np.sin(2 * np.pi * turns)))
+
+
+def slow_noise_in_a_short_rest(rng: Rng) -> Case:
+    """AR(1) noise with a pole at 0.98 and 2 % of the step; 25 to 60 samples of rest."""
+    plant, u = drawn(rng), step(800, int(rng.integers(25, 61)))
+    y = stepped(rng, plant, u)
+    return plant.case(record(u, y + 0.02 * np.ptp(y) * coloured(rng, u.size, 0.98)))
+
+
+def steps_of_a_converter(rng: Rng) -> Case:
+    """A converter of 10 to 40 steps over the range, hardly any noise."""
+    plant, u = drawn(rng), step()
+    y = noisy(rng, stepped(rng, plant, u), 0.001)
+    quantum = float(np.ptp(y) / rng.uniform(10, 40))
+    return plant.case(record(u, quantum * np.round(y / quantum + rng.uniform(-0.5, 0.5))))
+
+
+def unequal_sensors(rng: Rng) -> Case:
+    """Three records of random levels with noise of 0.3, 1 and 5 %."""
+    plant = drawn(rng)
+    several = []
+    for part in (0.003, 0.01, 0.05):
+        u = levels(rng, (-1.0, 0.0, 1.0), 400)
+        y = noisy(rng, stepped(rng, plant, u), part)
+        several.append(record(u, y))
+    return Case(tuple(several), plant.dead_time, plant.gain, plant.total_delay)
+
+
+def waves_on_a_canal(rng: Rng) -> Case:
+    """Noise that rings with a period of 50 to 100 samples, 1 % of the step, behind a long rest."""
+    plant, u = drawn(rng), step(1000, 400)
+    y, angle = stepped(rng, plant, u), 2 * np.pi / float(rng.uniform(50, 100))
+    noise, e = np.zeros(u.size + 300), rng.standard_normal(u.size + 300)
+    for k in range(2, noise.size):
+        noise[k] = 1.94 * np.cos(angle) * noise[k - 1] - 0.97**2 * noise[k - 2] + e[k]
+    noise = noise[300:] / float(np.std(noise[300:]))
+    return plant.case(record(u, y + 0.01 * np.ptp(y) * noise))
+
+
+WORLDS = (
+    tanks_in_a_row,
+    settling_in_a_long_rest,
+    little_step_in_noise,
+    humming,
+    slow_noise_in_a_short_rest,
+    steps_of_a_converter,
+    unequal_sensors,
+    waves_on_a_canal,
+)
