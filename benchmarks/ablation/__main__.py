@@ -118,6 +118,10 @@ def judged(rule: Switch, case: Case) -> Seen:
         except cr.CtrlRealizeError as error:
             refused = str(error)
             return Seen(rule.name, case.name, case.kind, refused=refused, touched=touched.names)
+        except Exception as error:  # what stands on a rule may break without it
+            if not rule.changes:
+                raise
+            return Seen(rule.name, case.name, case.kind, refused=f"breaks: {error!r}")
         cpu = time.process_time() - start - touched.spent
     fit = system.fit
     outside = min(fit.dead_time - low, 0.0) + max(fit.dead_time - high, 0.0)

@@ -37,9 +37,9 @@ def settling_in_a_long_rest(rng: Rng) -> Case:
 
 
 def little_step_in_noise(rng: Rng) -> Case:
-    """Noise of 20 to 40 % of the step."""
+    """Noise of 40 to 80 % of the step."""
     plant, u = drawn(rng), step(1500, 300)
-    part = float(rng.uniform(0.2, 0.4))
+    part = float(rng.uniform(0.4, 0.8))
     return plant.case(record(u, noisy(rng, stepped(rng, plant, u), part)))
 
 
@@ -71,7 +71,7 @@ def unequal_sensors(rng: Rng) -> Case:
     plant = drawn(rng)
     several = []
     for part in (0.003, 0.01, 0.05):
-        u = levels(rng, (-1.0, 0.0, 1.0), 400)
+        u = levels(rng, (-1.0, 0.0, 1.0), 600, 15)
         y = noisy(rng, stepped(rng, plant, u), part)
         several.append(record(u, y))
     return Case(tuple(several), plant.dead_time, plant.gain, plant.total_delay)

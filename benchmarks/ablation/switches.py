@@ -113,7 +113,9 @@ def _least_squares(fit: Any) -> Any:
 
 
 def _best_alone(_: Any) -> Any:
-    return lambda candidates, charged, variance, best, level, slack=0.0: [best.structure]
+    return lambda candidates, charged, variance, best, level, slack=0.0: [
+        structure for structure, candidate in candidates.items() if candidate is best
+    ]
 
 
 def _by_criterion(_: Any) -> Any:
