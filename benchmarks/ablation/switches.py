@@ -200,11 +200,6 @@ SWITCHES = (
         called=True,
     ),
     Switch("chains of equal lags", {f"{FITS}.selection:fit_chains": giving([])}),
-    Switch(
-        "uneven lags",
-        {f"{SEPARABLE}.lag_chains:_UNEVEN": value(0.0)},
-        (f"{FITS}.selection:fit_chains", f"{FITS}.selection:fit_diffusion"),
-    ),
     Switch("chains that still improve", {f"{FITS}.interval:still_improving": giving(False)}),
     Switch("modes of diffusion", {f"{FITS}.selection:fit_diffusion": giving([])}),
     Switch(

@@ -4,8 +4,6 @@ A response that many lags have smoothed is imitated by fewer lags and a longer d
 structures end at five poles; the chain goes on, because its rates follow a law. In a row of tanks
 they are nearly equal, as in Strejc's evaluation of step responses: here, spread evenly around one
 rate. Where heat or matter diffuses they grow as (k - c)^2, c between 0 and 1/2 by the boundaries.
-That real lags do not keep to such a law is in the error of the dead time: without it, its interval
-would be narrower than anything that is known.
 
 Tanks after [1]_, diffusion after [2]_ (eigenvalues of a slab), steps after [3]_; the spread of the
 rates and the charge of a kind of chain are our own.
@@ -41,8 +39,7 @@ FREE_IN_A_CHAIN = 2
 
 _DIFFUSION_CHARGE = 8.0
 """Two lags far apart look like diffusion, and are more common. Ablation: charge for diffusion."""
-_UNEVEN = 0.15  # by which real lags are taken to stray from the law; ablation: uneven lags
-_ITERATIONS = 60
+_ITERATIONS = 60  # at most
 _CONVERGED = 1e-13  # gain over the cost at which a fit ends, as rounding allows
 _GIVEN_UP = 1e9  # damping
 _SMALL = 1e-4  # step of the numerical derivatives of pole parameters
@@ -246,20 +243,14 @@ def _fit(
 def _error(
     problem: Problem, candidate: Candidate, law: _Law, x: FloatArray, variance: float
 ) -> float:
-    """Standard error of the dead time: what noise does to it, and what uneven lags do."""
-    order = candidate.structure.order
-    state = evaluate(problem, candidate.structure, candidate.parameters[None])
+    """Standard error of the dead time."""
     jacobian = _evaluate(problem, candidate.structure, law, x)[2]
     size = np.sqrt((jacobian**2).sum(axis=0))
     if size[0] == 0:
         return float("inf")
     size[size == 0] = 1.0
     on_dead_time = np.linalg.pinv(jacobian / size)[0] / size[0]
-    uneven = law.rates(order, x[2]) * np.exp(_SMALL * np.eye(order) - x[1])
-    moves = np.stack([_parameters(rates) for rates in uneven], axis=1)
-    moves = (moves - candidate.parameters[1:, None]) * (_UNEVEN / _SMALL)
-    by_lags = on_dead_time @ state.jacobian[0][:, 1:] @ moves
-    return float(np.sqrt(variance * (on_dead_time @ on_dead_time) + by_lags @ by_lags))
+    return float(np.sqrt(variance * (on_dead_time @ on_dead_time)))
 
 
 def _evaluate(
