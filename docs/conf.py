@@ -64,6 +64,7 @@ TABLES = {
     "honesty": ("docs/honesty_table.md", "python -m benchmarks.honesty"),
     "worlds": ("docs/worlds_table.md", "python -m benchmarks.worlds"),
     "kernels": ("docs/kernels_table.md", "python -m benchmarks.kernels"),
+    "ablation": ("docs/ablation_table.md", "python -m benchmarks.ablation"),
     "campaign": (
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",
