@@ -59,7 +59,7 @@ class Scales:
 
     `onset` is when it starts to move, `rise` the time from there to 63 % of its excursion,
     `length` the time that was recorded after the input moved, `dt` the sample time. `latest`
-    and `earliest` bound the dead time; `ringing` is an angular frequency seen in it, or 0.
+    and `earliest` bound the dead time.
     """
 
     onset: float
@@ -68,7 +68,6 @@ class Scales:
     dt: float
     latest: float
     earliest: float = 0.0
-    ringing: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +103,7 @@ def search(
 ) -> dict[Structure, Candidate]:
     """Find the best fit of every structure.
 
-    Each is started from two dead times for every one of up to five patterns of poles, and from the
+    Each is started from two dead times for every one of up to four patterns of poles, and from the
     optima of the structures next to it (one zero less, one pole less).
 
     Parameters
@@ -255,7 +254,7 @@ def pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
 
 
 def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
-    """Equal lags; one slow; one very slow; a ringing pair; a pair at the frequency seen."""
+    """Equal lags; one slow; one very slow; a ringing pair."""
     rise = 1.0 / scales.rise
     patterns = [
         -np.linspace(0.8, 1.2, order) * order * rise,
@@ -267,9 +266,6 @@ def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
         rest = -np.geomspace(3, 5, order - 2) * rise
         pair = 1.3 * rise * np.array([-0.2 + 0.98j, -0.2 - 0.98j])
         found.append(np.concatenate([pair, rest]))
-        if scales.ringing > 0:
-            pair = scales.ringing * np.array([-0.1 + 0.995j, -0.1 - 0.995j])
-            found.append(np.concatenate([pair, rest]))
     return found
 
 
