@@ -11,9 +11,14 @@ import pytest
 from benchmarks.honesty import runs
 
 RESULTS = ("fit_output_error", "estimate_delay", "realize", "identify_campaign", "bootstrap")
+MOVING = "fit_output_error, moving input"
+SMALLER = {(f"{MOVING}s", "gains_differ"), (MOVING, "cut")}
+"""Raised and not raised on smaller records in identification/output_error."""
+FIRST = {(MOVING, "integrating"): 2, ("fit_output_error", "estimates_disagree"): 1}
+"""First record of a world in which the flag is raised, where it is not that of seed 0."""
 CASES = {}
 for case in runs.FLAG_CASES:
-    if case.result.startswith(RESULTS):
+    if case.result.startswith(RESULTS) and (case.result, case.code) not in SMALLER:
         CASES.setdefault((case.result, case.code), case)
 QUIET = {(case.result, case.not_due): case for case in CASES.values()}
 
@@ -21,7 +26,8 @@ QUIET = {(case.result, case.not_due): case for case in CASES.values()}
 @pytest.mark.parametrize("key", CASES, ids=": ".join)
 def test_a_flag_is_raised_where_it_is_due(key):
     # a flag that is rarely due in its world is in one of eight records
-    assert any(key[1] in CASES[key].raising(seed) for seed in range(8)), CASES[key].due
+    seeds = sorted(range(8), key=lambda seed: seed != FIRST.get(key, 0))
+    assert any(key[1] in CASES[key].raising(seed) for seed in seeds), CASES[key].due
 
 
 @pytest.mark.parametrize("key", QUIET, ids=": ".join)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import ast
+import os
 import re
+import warnings
 from pathlib import Path
 
+import matplotlib as mpl
+import matplotlib.pyplot as plt
 import nbformat
 import pytest
 from nbclient import NotebookClient
@@ -26,14 +31,39 @@ def outputs(cell) -> list[str]:
     return ["".join(text) for text in shown]
 
 
+def run(source: str, scope: dict) -> None:
+    """Run a cell as a kernel does: figures are drawn, the value of the last line is shown."""
+    tree = ast.parse(source)
+    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    exec(compile(tree, "cell", "exec"), scope)
+    if last is not None:
+        value = eval(compile(ast.Expression(last.value), "cell", "eval"), scope)
+        repr(value)
+        getattr(value, "_repr_html_", str)()
+    for number in plt.get_fignums():
+        plt.figure(number).canvas.draw()
+    plt.close("all")
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs_and_its_numbers_hold(path: Path, monkeypatch: pytest.MonkeyPatch):
+    """In this process; that they run in a kernel is seen where they are stored, and below."""
     if "shared/data" in path.read_text() and not SHARED_DATA.is_dir():
         pytest.skip("measured records are not beside the project")
+    monkeypatch.chdir(path.parent)
+    scope: dict = {"__name__": "__main__"}
+    with mpl.rc_context(), warnings.catch_warnings():
+        warnings.simplefilter("default")  # as in a kernel
+        for cell in nbformat.read(path, as_version=4).cells:
+            if cell.cell_type == "code":
+                run(cell.source, scope)
+
+
+def test_a_notebook_runs_in_a_kernel(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
     monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
-    notebook = nbformat.read(path, as_version=4)
-    resources = {"metadata": {"path": str(path.parent)}}
+    notebook = nbformat.read(NOTEBOOKS[0], as_version=4)
+    resources = {"metadata": {"path": os.fspath(NOTEBOOKS[0].parent)}}
     NotebookClient(notebook, timeout=240, resources=resources).execute()
 
 
