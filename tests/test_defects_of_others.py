@@ -1,4 +1,4 @@
-"""Ten defects that were seen in public tools for the same job, none of which is here.
+"""Defects that were seen in public tools for the same job, none of which is here.
 
 Each test is the defect turned round, so that it would fail if we had it too.
 """
@@ -44,7 +44,7 @@ def record():
     return step_record(noise=1e-3, seed=4)
 
 
-# 1. The default call on oversampled data gives an unstable model.
+# The default call on oversampled data gives an unstable model.
 
 
 @pytest.mark.parametrize("noise", [1e-4, 5e-3])
@@ -56,13 +56,7 @@ def test_oversampled_data_give_a_stable_model_by_default(noise):
         assert_allclose(model.dcgain(), 1, rtol=0.1)
 
 
-# 2. The delay is off by one.
-
-
-# 3. The direct term is scaled with the sample time.
-
-
-# 4. The caller's arrays are changed.
+# The caller's arrays are changed.
 
 
 def test_the_callers_arrays_are_not_changed(record):
@@ -82,13 +76,7 @@ def test_the_callers_arrays_are_not_changed(record):
         assert array.flags.writeable
 
 
-# 5. Something is printed, or asked at the keyboard.
-
-
-# 6. The interpreter is left.
-
-
-# 7. Global state is changed.
+# Global state is changed.
 
 GLOBAL_STATE = """
 import locale, logging, os, random, signal, sys, threading, warnings
@@ -151,10 +139,7 @@ def test_neither_import_nor_work_changes_global_state(tmp_path):
     assert done.stderr == ""
 
 
-# 8. A file can only be imported from its own folder.
-
-
-# 9. Results are random where no seed was given.
+# Results are random where no seed was given.
 
 
 def test_results_do_not_depend_on_any_random_state(record):
@@ -167,9 +152,6 @@ def test_results_do_not_depend_on_any_random_state(record):
         if isinstance(a, cr.DelayedStateSpace):
             for letter in "ABCD":
                 assert_array_equal(getattr(a, letter), getattr(b, letter))
-
-
-# 10. A bound whose two sides scale differently.
 
 
 # And from the habits that others' tests taught.

@@ -14,7 +14,11 @@ RESULTS = ("fit_output_error", "estimate_delay", "realize", "identify_campaign",
 MOVING = "fit_output_error, moving input"
 SMALLER = {(f"{MOVING}s", "gains_differ"), (MOVING, "cut")}
 """Raised and not raised on smaller records in identification/output_error."""
-FIRST = {(MOVING, "integrating"): 2, ("fit_output_error", "estimates_disagree"): 1}
+FIRST = {
+    (MOVING, "integrating"): 2,
+    (MOVING, "cancelled_pair"): 5,
+    ("fit_output_error", "estimates_disagree"): 1,
+}
 """First record of a world in which the flag is raised, where it is not that of seed 0."""
 CASES = {}
 for case in runs.FLAG_CASES:

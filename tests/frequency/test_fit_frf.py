@@ -68,8 +68,13 @@ def test_model_is_the_continuous_fit_behind_a_hold_with_its_fractional_delay():
     assert_allclose(model.fit.response(omega), by_hand, rtol=1e-12)
 
 
-def test_dead_times_scatter_as_the_stated_deviation_and_are_covered():
-    fits = [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(50)]
+@pytest.fixture(scope="module")
+def fifty():
+    return [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(50)]
+
+
+def test_dead_times_scatter_as_the_stated_deviation_and_are_covered(fifty):
+    fits = fifty
     error = np.array([fit.dead_time - 0.04 for fit in fits])
     std = np.array([fit.std_given_structure for fit in fits])
     # Standard deviation of 50 runs is known to 10 %; three of them.
@@ -98,19 +103,18 @@ def bound_of(level):
     return np.sqrt(np.diag(np.linalg.inv(information)))[1:]
 
 
-def test_stated_deviations_are_the_cramer_rao_bounds():
-    fit = cr.fit_frf(noisy(3), 2, relative_degree=2, dt=1e-3).fit
+def test_stated_deviations_are_the_cramer_rao_bounds(fifty):
+    fit = fifty[3]
     # The misfit of 76 degrees of freedom scales them: 8 % above at most here. The poles' are
     # taken where the fit is, not at the truth.
     assert [fit.std_given_structure, *fit.pole_std] == pytest.approx(bound_of(0.01), rel=0.15)
 
 
-def test_delay_and_poles_reach_their_cramer_rao_bounds():
-    fits = [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(60)]
+def test_delay_and_poles_reach_their_cramer_rao_bounds(fifty):
     truth = np.array([0.04, -4 * np.pi, -10 * np.pi])
-    found = np.array([[fit.dead_time, *fit.poles.real] for fit in fits])
+    found = np.array([[fit.dead_time, *fit.poles.real] for fit in fifty])
     rms = np.sqrt(np.mean((found - truth) ** 2, axis=0))
-    # The rms of 60 runs is known to 9 %: three of them.
+    # The rms of 50 runs is known to 10 %: nearly three of them.
     assert rms / bound_of(0.01) == pytest.approx(np.ones(3), abs=0.27)
 
 
@@ -118,7 +122,7 @@ def test_poles_know_their_error_where_the_noise_is_not_told():
     """Noise that is ten times stronger below 1 Hz than the weights suppose."""
     share = np.where(F < 1, 0.1, 0.01)
     errors, stated = [], []
-    for seed in range(40):
+    for seed in range(25):
         rng = np.random.default_rng(seed)
         noise = share * (rng.standard_normal(F.size) + 1j * rng.standard_normal(F.size))
         frf = cr.MeasuredFRF(second_order(S) * (1 + noise / np.sqrt(2)), F)
@@ -126,17 +130,16 @@ def test_poles_know_their_error_where_the_noise_is_not_told():
         errors.append(fit.poles.real - np.array([-4, -10]) * np.pi)
         stated.append(fit.pole_std)
     rms = np.sqrt(np.mean(np.square(errors), axis=0))
-    # Rms of 40 runs: 11 %, and a deviation from 80 residuals is itself rough.
+    # Rms of 25 runs: 14 %, and a deviation from 80 residuals is itself rough.
     assert rms / np.sqrt(np.mean(np.square(stated), axis=0)) == pytest.approx(1, abs=0.4)
 
 
 def test_structure_is_found_from_the_data():
-    right = 0
-    for seed in range(4):
+    # a superfluous parameter must gain 5 in BIC: 2 % of runs
+    for seed in range(2):
         fit = cr.fit_frf(noisy(seed), dt=1e-3).fit
-        right += (fit.order, fit.relative_degree) == (2, 2)
+        assert (fit.order, fit.relative_degree) == (2, 2)
         assert fit.interval[0] <= 0.04 <= fit.interval[1]
-    assert right >= 3  # a superfluous parameter must gain 5 in BIC: 2 % of runs
 
 
 def test_what_is_no_noise_does_not_buy_orders():
@@ -164,10 +167,9 @@ def test_structures_disagree_is_said_where_they_do_by_a_tenth_of_the_dead_time(t
         return second_order(s) / (fast if told else 1)
 
     f = np.geomspace(0.1, top, 60)
-    for seed in range(3):
-        fit = cr.fit_frf(noisy(seed, f=f, level=level, plant=plant), dt=1e-3).fit
-        assert ("structures_disagree" in {flag.code for flag in fit.flags}) is told
-        assert fit.interval[0] <= 0.04 <= fit.interval[1]
+    fit = cr.fit_frf(noisy(0, f=f, level=level, plant=plant), dt=1e-3).fit
+    assert ("structures_disagree" in {flag.code for flag in fit.flags}) is told
+    assert fit.interval[0] <= 0.04 <= fit.interval[1]
 
 
 @settings(max_examples=6)
