@@ -1,4 +1,4 @@
-"""Simulated set-ups with known truth. Nothing here is measured."""
+"""Simulated set-ups with known parameters. Nothing here is measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A control valve with its instruments, simulated."""
+"""Simulated control valve with its instruments."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .truth import ValveTruth
 Seed: TypeAlias = np.random.Generator | int | None
 
 _REST_MM = 0.27
-"""Displacement that is shown at rest, at 4 mA."""
+"""Displacement at rest, at 4 mA."""
 _MOST_MA = 25.0
-"""Largest current that the drive can give."""
+"""Largest current of the drive."""
 _OVERSAMPLING = 8
-"""Steps within a sample in which friction is simulated."""
+"""Steps within a sample for the simulation of friction."""
 _SINE_SAMPLES = 640
 _SINE_MEAN_MA = 12.0
 
@@ -35,12 +35,11 @@ _SINE_MEAN_MA = 12.0
 class Valve:
     """A simulated control valve with its instruments; made by `valve`.
 
-    Every record is a simulation, and is named so. The linear part is simulated without
-    integration error, also for dead times that are no multiple of the sample time. The input
-    of a record is the current that was asked for, held over each sample, with small noise,
-    the spikes of the drive and the rounding of the converter; the spikes are too short to move
-    the valve. The output is the displacement that the LVDT shows. Attributes that are not listed
-    here are the arguments of `valve`.
+    Every record is a simulation, as its name states. The linear part is simulated without
+    integration error, for any dead time. The input of a record is the set-point of the current,
+    held over each sample, with small noise, the spikes of the drive and the rounding of the
+    converter; the spikes are too short to move the valve. The output is the displacement measured
+    by the LVDT. Further attributes are the arguments of `valve`.
 
     Attributes
     ----------
@@ -87,7 +86,7 @@ class Valve:
         amplitude : float, default 16
             Step in mA, from 4 mA up; at most 16.
         rng : numpy.random.Generator or int, optional
-            Generator or seed of everything random; without it, each call differs.
+            Generator or seed; without it, each call differs.
         name : str, optional
             Default: ``valve_16mA``, with the amplitude.
 
@@ -99,7 +98,7 @@ class Valve:
         Raises
         ------
         OptionError
-            A step that is zero or leaves the range of 4-20 mA.
+            A step that is zero or exceeds the range of 4-20 mA.
 
         Examples
         --------
@@ -135,7 +134,7 @@ class Valve:
         amplitudes : sequence of float
             Steps in mA.
         repeats : int, default 10
-            Records of each.
+            Number of records of each.
 
         Returns
         -------
@@ -179,7 +178,7 @@ class Valve:
         Raises
         ------
         DataError
-            Not a vector of finite numbers inside 0-25 mA.
+            Not a vector of finite numbers within 0-25 mA.
 
         Examples
         --------
@@ -239,25 +238,24 @@ class Valve:
         amplitude : float, default 2
             Amplitude of the current in mA, about 12 mA.
         periods : float, default 4
-            Periods to record, at least.
+            Smallest number of periods to record.
         settle : float, default 1
-            Time in s that is recorded before those periods; the sine starts at t = 0, so that
-            the transient is in the record.
+            Time in s recorded before those periods; the sine starts at t = 0, so that the record
+            contains the transient.
         frequency_error_hz : float, default 0.1
-            Each frequency is off by up to this much, but by no more than 1 %: the printed
-            0.1 Hz cannot hold at 0.1 Hz.
+            Largest frequency error, at most 1 %: the printed 0.1 Hz cannot apply at 0.1 Hz.
 
         Returns
         -------
         tuple of tuples of Record
-            For each frequency its repeats, as `stepped_sine_frf` takes them. The analyser
-            samples slow sines more slowly: all records have 640 samples.
+            For each frequency its repeats, as for `stepped_sine_frf`. The analyser uses a lower
+            sample rate for slow sines: all records have 640 samples.
 
         Raises
         ------
         OptionError
-            Frequencies, counts or an amplitude that make no sense, or a valve with friction
-            (`slew_limit`, `hysteresis`), which `record` simulates with any input.
+            Invalid frequencies, counts or amplitude, or a valve with friction (`slew_limit`,
+            `hysteresis`), for which `record` simulates any input.
 
         Examples
         --------
@@ -297,7 +295,7 @@ class Valve:
         return tuple(sweep)
 
     def _sine_time(self, frequency_hz: float, span: float) -> FloatArray:
-        """Sample a sine so slowly that the analyser's samples last for `span` s."""
+        """Sample a sine at such a rate that the analyser's samples last for `span` s."""
         dt = self.dt * max(1, int(np.ceil(span / (self.dt * _SINE_SAMPLES))))
         if frequency_hz > 0.4 / dt:
             raise OptionError(
@@ -315,7 +313,7 @@ class Valve:
             stem = slew_limited(stem, self.slew_limit * STROKE_MM, fine)
         if self.hysteresis:
             stem = with_play(stem, self.hysteresis * STROKE_MM)
-        # Mean of neighbours: a held input with the area of the straight line between them.
+        # Mean of neighbours: a held input with the same area as linear interpolation.
         lines = np.append(0.5 * (stem[1:] + stem[:-1]), stem[-1])
         lines[0] = stem[0]
         return response_to_held_input(self._after_stem, lines, fine, 0.0)[::_OVERSAMPLING]

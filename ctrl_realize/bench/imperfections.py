@@ -1,4 +1,4 @@
-"""What keeps measured records from being clean: noise, spikes, rounding, friction."""
+"""Imperfections of measured records: noise, spikes, rounding, friction."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..numerics.arrays import FloatArray
 def band_limited_noise(
     n_samples: int, std: float, rng: np.random.Generator, *, limited: bool
 ) -> FloatArray:
-    """Draw Gaussian noise, behind the anti-aliasing filter if `limited`.
+    """Draw Gaussian noise, filtered by the anti-aliasing filter if `limited`.
 
-    The filter is flat up to 1/2.56 of the sample rate, as those of FFT analysers are; it is
-    linear-phase, and the analyser takes its delay out. `std` is that of the noise in the record.
+    The filter is flat up to 1/2.56 of the sample rate, as in FFT analysers; it is linear-phase, and
+    its delay is compensated. `std` is that of the noise in the record.
     """
     if std == 0.0:
         return np.zeros(n_samples)
@@ -29,7 +29,7 @@ def band_limited_noise(
 
 @cache
 def _anti_aliasing_taps() -> FloatArray:
-    """Return a linear-phase low-pass that leaves white noise its variance."""
+    """Return a linear-phase low-pass that preserves the variance of white noise."""
     taps = firwin(101, 2 / 2.56, window=("kaiser", 6.0))
     return np.asarray(taps / np.sqrt(np.sum(taps**2)))
 
@@ -37,7 +37,7 @@ def _anti_aliasing_taps() -> FloatArray:
 def drive_spikes(
     n_samples: int, mean_count: float, height: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Draw short sharp peaks, one or two samples long, of either sign and up to `height`."""
+    """Draw short peaks, one or two samples long, of either sign and up to `height`."""
     spikes = np.zeros(n_samples)
     for start in rng.integers(0, n_samples, size=rng.poisson(mean_count)):
         length = int(rng.integers(1, 3))
@@ -46,7 +46,7 @@ def drive_spikes(
 
 
 def converted(volts: FloatArray, bits: int | None, full_scale: float) -> FloatArray:
-    """Pass volts through an AD converter of `bits` over -+ `full_scale`; None rounds nothing."""
+    """Quantise volts by an AD converter of `bits` over -+ `full_scale`; None does not round."""
     if bits is None:
         return volts
     step = 2 * full_scale / 2**bits
@@ -54,7 +54,7 @@ def converted(volts: FloatArray, bits: int | None, full_scale: float) -> FloatAr
 
 
 def slew_limited(position: FloatArray, limit: float, dt: float) -> FloatArray:
-    """Follow `position` no faster than `limit` per second."""
+    """Follow `position` with at most `limit` per second."""
     largest = limit * dt
     out = np.empty_like(position)
     current = float(position[0])

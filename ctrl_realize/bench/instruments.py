@@ -1,4 +1,4 @@
-"""Sensor, converter and recorder between the simulated valve and its records."""
+"""Sensor, converter and recorder of the simulated valve."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VOLT_PER_MA = 0.25
 
 
 class Disturbances(Protocol):
-    """What `recorded` has to know of a simulated set-up; see `Valve`."""
+    """Properties of a simulated set-up for `recorded`; see `Valve`."""
 
     @property
     def anti_aliasing(self) -> object:
@@ -45,7 +45,7 @@ class Disturbances(Protocol):
 
     @property
     def bits(self) -> int | None:
-        """Of the converter; None for one without steps."""
+        """Of the converter; None for no rounding."""
 
 
 def recorded(
@@ -58,7 +58,7 @@ def recorded(
     *,
     spikes: bool = True,
 ) -> Record:
-    """Pass signals through sensor, converter and everything that disturbs them."""
+    """Pass signals through sensor, converter and all disturbances."""
     n = time.size
     limited = valve.anti_aliasing is not None
     shown = displacement + band_limited_noise(n, valve.noise * STROKE_MM, rng, limited=limited)

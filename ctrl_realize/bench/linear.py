@@ -28,7 +28,7 @@ def second_order_lag(frequency_hz: float, damping: float) -> Core:
 
 
 def butterworth(order: int, cutoff_hz: float) -> list[Core]:
-    """Return an analog Butterworth low-pass as a chain of sections."""
+    """Return an analog Butterworth low-pass as a cascade of sections."""
     poles = buttap(order)[1]
     sections = [
         second_order_lag(cutoff_hz, -float(p.real)) for p in poles if p.imag > 1e-9 * abs(p)
@@ -60,7 +60,7 @@ def response_to_held_input(core: Core, held: FloatArray, dt: float, dead_time: f
     ----------
     core : (A, B, C, D)
     held : ndarray, shape (N,)
-        Input; its first value is taken to have stood there for ever.
+        Input; before the record it is constant at its first value.
     dt, dead_time : float
         In s; the dead time need not be a multiple of `dt`.
 
@@ -79,7 +79,7 @@ def response_to_held_input(core: Core, held: FloatArray, dt: float, dead_time: f
 def response_to_started_sine(
     core: Core, omega: float, time: FloatArray, dead_time: float
 ) -> FloatArray:
-    """Compute the response to ``sin(omega t)``, switched on at t = 0 from rest, exactly.
+    """Compute the response to ``sin(omega t)``, switched on at t = 0, exactly.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def response_to_started_sine(
     """
     A, B, C, _ = core
     n = A.shape[0]
-    # Steady state X exp(j omega t), and a free motion that starts at -imag(X).
+    # Steady state X exp(j omega t), and a free response that starts at -imag(X).
     steady = solve(1j * omega * np.eye(n) - A, B.astype(complex))[:, 0]
     local = time - dead_time
     first = int(np.searchsorted(local, 0.0))
@@ -108,7 +108,7 @@ def response_to_started_sine(
     acting = local[first:]
     free = expm(A * acting[0]) @ -steady.imag[:, None]
     power = expm(A * (time[1] - time[0]))
-    # Columns x, Mx, M^2 x, ... by doubling: no eigenvectors, so equal poles are fine.
+    # Columns x, Mx, M^2 x, ... by doubling: without eigenvectors, for equal poles, too.
     while free.shape[1] < acting.size:
         free = np.hstack([free, power @ free])
         power = power @ power

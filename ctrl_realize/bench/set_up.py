@@ -1,4 +1,4 @@
-"""The valve set-up of the paper, put together from its parts."""
+"""The valve set-up of the paper."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def valve(
 ) -> Valve:
     """Set up the simulated valve of the paper's sections 2.2 and 3.1.
 
-    Current converter (10 kHz), dead time, actuator (a real pole and a pair, -3 dB at 2.2 Hz),
-    LVDT (30 Hz, 0.39 mm/V, range 2.54 mm), anti-aliasing filter at 1/2.56 of the sample rate,
-    16-bit converters. The dynamics are ours: the paper prints only a bandwidth of about 2 Hz.
+    Current converter (10 kHz), dead time, actuator (a real pole and a pair, -3 dB at 2.2 Hz), LVDT
+    (30 Hz, 0.39 mm/V, range 2.54 mm), anti-aliasing filter at 1/2.56 of the sample rate, 16-bit
+    converters. The dynamics are our choice: the paper only gives a bandwidth of about 2 Hz.
 
     Parameters
     ----------
@@ -51,20 +51,20 @@ def valve(
     lvdt_hz : float or None, default 30
         Cut-off of the displacement sensor; None for an ideal one.
     noise : float, default 1e-3
-        Standard deviation of the output noise, as a fraction of the stroke of 2 mm (16 mA).
-        With 4e-4 the printed method scatters as the paper's Table 1 does: variances of 1.2 to
-        2.0 in four campaigns, printed is 2.
+        Standard deviation of the output noise, as a fraction of the stroke of 2 mm (16 mA). With
+        4e-4 the delays of the paper's method scatter as in its Table 1: variances of 1.2 to 2.0 in
+        four campaigns, printed is 2.
     input_noise : float, default 2e-4
         The same of the measured current, as a fraction of 16 mA.
     spikes : float, default 6
         Mean number of drive spikes in a record.
     bits : int or None, default 16
-        Word length of the AD converters (-+10 V); None rounds nothing.
+        Word length of the AD converters (-+10 V); None does not round.
     anti_aliasing : {"linear-phase", "analog", None}
-        "linear-phase": the digital filter of an FFT analyser, whose delay it takes out; the
-        motion of the valve passes unchanged, the noise is band-limited. "analog": a
-        fourth-order Butterworth filter on the output, whose lag of 1.06 samples is then
-        part of the truth.
+        "linear-phase": the digital filter of an FFT analyser, whose delay is compensated; the
+        motion of the valve is not changed, the noise is band-limited. "analog": a fourth-order
+        Butterworth filter on the output, whose lag of 1.06 samples is then part of the true
+        dynamics.
     drift : float, default 0
         Drift of the output per second, as a fraction of the stroke.
     hum : float, default 0
@@ -74,12 +74,12 @@ def valve(
     hysteresis : float, default 0
         Backlash of the stem, as a fraction of the stroke.
     dead_time_scatter : float, default 0
-        Standard deviation in s by which the dead time differs from record to record, as that of
-        a pneumatic drive may; `truth` holds the mean.
+        Standard deviation in s of the dead time between records, as for a pneumatic drive; `truth`
+        contains the mean.
     dt : float
         Sample time in s, 1/1280 by default.
     pre_step_time, hold : float
-        Seconds before and after a step.
+        Time in s before and after a step.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def valve(
     Raises
     ------
     OptionError
-        An argument that makes no sense.
+        An invalid argument.
 
     References
     ----------
@@ -141,7 +141,7 @@ def valve(
     if anti_aliasing == "analog":
         after += butterworth(4, 1 / (2.56 * dt))
     gain = STROKE_MM / (paper.SETUP.current_range[1] - paper.SETUP.current_range[0])
-    # An ideal sensor still needs a state; this one is beyond anything that is sampled.
+    # An ideal sensor still needs a state; this one is faster than anything that is sampled.
     sensed = after or [lag(1e3 / dt)]
     return Valve(
         truth=ValveTruth(

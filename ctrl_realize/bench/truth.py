@@ -1,4 +1,4 @@
-"""What a simulated set-up is made of: the answer that an estimate can be held against."""
+"""True parameters of a simulated set-up, for comparison with estimates."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from .linear import Core, dc_gain
 class ValveTruth(Result):
     """The linear part of a simulated valve, from drive current to measured displacement.
 
-    ``response(omega) == C (j omega I - A)^-1 B exp(-j omega dead_time)`` with the matrices of
-    the continuous `core`; `sampled` is its exact model behind a zero-order hold.
-    Friction, slew limits and everything random is not in it.
+    ``response(omega) == C (j omega I - A)^-1 B exp(-j omega dead_time)`` with the matrices of the
+    continuous `core`; `sampled` is its exact model with a zero-order hold. Friction, slew limits
+    and random effects are not included.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class ValveTruth(Result):
 
     @property
     def delay(self) -> float:
-        """Transport delay in samples; need not be whole."""
+        """Transport delay in samples; not necessarily whole."""
         return self.dead_time / self.dt
 
     @property

@@ -20,9 +20,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0: done. 1: done, but some records or the report failed. 2: wrong usage or unusable input;
-        nothing was written. 3: a defect of this program, with its traceback. 130: interrupted.
-        143: terminated by the system.
+        0: success. 1: success, but some records or the report failed. 2: wrong usage or unusable
+        input; nothing was written. 3: a defect of this program, with its traceback. 130:
+        interrupted. 143: terminated by the system.
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     stopped = []
@@ -31,8 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stopped.append(number)
         raise KeyboardInterrupt
 
-    # Loading takes a second or more. An interruption in compiled code that is being loaded comes
-    # out as any error, or as none.
+    # Loading takes a second or more. An interruption while compiled code is loaded may show as any
+    # error, or as none.
     ours = (
         threading.current_thread() is threading.main_thread()
         and signal.getsignal(signal.SIGINT) is signal.default_int_handler

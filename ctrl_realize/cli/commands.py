@@ -1,4 +1,4 @@
-"""The commands put together, and how each of their ends becomes an exit code."""
+"""The commands, and their exit codes."""
 
 from __future__ import annotations
 
@@ -57,36 +57,36 @@ _SIGNALS = ("SIGTERM", "SIGHUP")
 
 
 class Stopped(KeyboardInterrupt):
-    """The system asks the process to end: cleaned up after as after Ctrl-C."""
+    """The system terminates the process: cleaned up as after Ctrl-C."""
 
 
 class Ending:
-    """How the run ended, as an exit code; None as long as nobody stopped it."""
+    """How the run ended, as an exit code; None while it was not stopped."""
 
     code: int | None = None
 
 
 @contextmanager
 def stopped_by_signals() -> Iterator[Ending]:
-    """Let SIGTERM and SIGHUP raise `Stopped` in the block, once; handlers are put back after it.
+    """Raise `Stopped` on SIGTERM and SIGHUP in the block, once; handlers are restored afterwards.
 
-    Python ends at once at these signals, without cleaning up: folders half written would stay,
-    and workers go on.
+    By default Python ends at once at these signals, without cleaning up: incomplete folders would
+    remain, and workers would continue.
     """
     ending = Ending()
     if threading.current_thread() is not threading.main_thread():
         yield ending  # only the main thread may handle signals
         return
-    # which signals there are depends on the operating system
+    # the available signals depend on the operating system
     known = [getattr(signal, name) for name in _SIGNALS if hasattr(signal, name)]
 
     def stop(number: int, frame: FrameType | None) -> None:
         for one in known:
-            signal.signal(one, signal.SIG_IGN)  # what is cleaned up now takes a moment
+            signal.signal(one, signal.SIG_IGN)  # cleaning up takes a moment
         ending.code = 128 + number
         raise Stopped
 
-    # one that is ignored (nohup), or not Python's, stays as it is
+    # a signal that is ignored (nohup), or handled by other code, is left unchanged
     before = {one: signal.getsignal(one) for one in known}
     mine = [one for one, handler in before.items() if handler is signal.SIG_DFL]
     try:
@@ -100,15 +100,15 @@ def stopped_by_signals() -> Iterator[Ending]:
 
 @functools.cache
 def _command() -> Any:
-    """Build the commands once, also where a program calls `main` again and again."""
+    """Build the commands once, also if a program calls `main` repeatedly."""
     return get_command(app)
 
 
 def run(words: Sequence[str]) -> int:
     """Run a command and return its exit code."""
     command = _command()
-    # Our matrices are small: on a busy machine BLAS threads that wait for each other cost ten
-    # times what they save. Processes are what --jobs is for.
+    # The matrices are small: on a busy machine, BLAS threads waiting for each other cost ten times
+    # what they save. Use processes instead (--jobs).
     with threadpool_limits(limits=1), warnings.catch_warnings(), stopped_by_signals() as ending:
         warnings.showwarning = plain_warning
         try:
@@ -124,7 +124,7 @@ def run(words: Sequence[str]) -> int:
             complain(f"out of memory: {one_line(error) or 'no details'}")
             return 2
         except Exception as error:
-            # Typer's errors of usage: which package they come from depends on its version.
+            # Typer's usage errors: the package that defines them depends on its version.
             if not hasattr(error, "format_message"):
                 complain("".join(traceback.format_exception(error)))
                 complain("this is a bug in the program; please report it with the lines above")

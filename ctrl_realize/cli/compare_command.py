@@ -1,4 +1,4 @@
-"""``ctrl-realize compare``: a model beside a measured frequency response."""
+"""``ctrl-realize compare``: a model and a measured frequency response."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OPTION = typer.Option
 
 
 class Hold(str, Enum):  # noqa: UP042  # typer shows the values of a plain str Enum
-    """What becomes of the model's zero-order hold."""
+    """Treatment of the model's zero-order hold."""
 
     auto = "auto"
     zoh = "zoh"
@@ -58,8 +58,8 @@ def compare(
 ) -> int:
     """Compare a model with a measured frequency response.
 
-    Gain and phase errors are those in the band that can be trusted: by coherence, by standard
-    deviation, or as given.
+    Gain and phase errors are those in the trusted band: by coherence, by standard deviation, or as
+    given.
 
     \b
     Examples:

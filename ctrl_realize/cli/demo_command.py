@@ -1,4 +1,4 @@
-"""``ctrl-realize demo``: the paper from end to end, on the simulated valve."""
+"""``ctrl-realize demo``: the paper from start to end, on the simulated valve."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def demo(
         bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
     ] = False,
 ) -> int:
-    """Do the paper from end to end, on simulated data.
+    """Reproduce the paper from start to end, on simulated data.
 
-    Forty steps and a stepped sine of 500 x 5 points are simulated on a valve with a known dead
-    time of 37 samples. The paper's method gives Table 1, Figs. 2-8 and its final model; the
-    output-error fit of all records together gives a better one. Written are report.html,
-    model.json, table_1.csv, figures/ and more.
+    Forty steps and a stepped sine of 500 x 5 points are simulated on a valve with a known dead time
+    of 37 samples. The paper's method gives Table 1, Figs. 2-8 and its final model; the output-error
+    fit of all records together gives a better one. The output contains report.html, model.json,
+    table_1.csv, figures/ and more.
 
     \b
     Examples:

@@ -25,7 +25,7 @@ _TITLE = "A control valve with dead time, identified"
 
 
 def write_demo_files(folder: Path, result: DemoResult) -> list[str]:
-    """Write everything and return the names, for people to find it."""
+    """Write all files; return their names."""
     note = "simulated valve, not measured"
     settings = {"seed": result.seed, "simulated": True}
     save_model(folder / "model.json", result.fitted, settings=settings, note=note)
@@ -65,7 +65,7 @@ def _write_tables(folder: Path, result: DemoResult) -> None:
 
 
 def demo_sketches(result: DemoResult) -> list[Sketch]:
-    """List the paper's Figs. 2-8 on simulated data, and what goes beyond them."""
+    """List the paper's Figs. 2-8 for simulated data, and further ones."""
     record = result.records[shown(result)]
     row = result.campaign.rows[shown(result)].system
     assert row is not None

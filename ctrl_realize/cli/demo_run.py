@@ -1,4 +1,4 @@
-"""The paper from end to end on the simulated valve: what the demo computes."""
+"""Computations of the demo: the paper from start to end on the simulated valve."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .terminal import progress
 
 @dataclass(frozen=True, eq=False)
 class DemoResult:
-    """Everything that the demo found; all data are simulated.
+    """Results of the demo; all data are simulated.
 
     Attributes
     ----------
     valve : Valve
-        The simulated set-up, with its truth.
+        The simulated set-up, with its true parameters.
     records : tuple of Record
         Forty step records.
     frf : MeasuredFRF
@@ -36,15 +36,15 @@ class DemoResult:
     campaign : Campaign
         The paper's method on every record.
     printed : DelayedStateSpace
-        Final model as the paper makes it, the filter's lag in it.
+        Final model of the paper's method, including the filter's lag.
     unfiltered : FrequencyResponseData
-        The same model, the filter divided out of its frequency response.
+        The same model, with the filter divided out of its frequency response.
     fitted : DelayedStateSpace
         Output-error fit of all records together.
     comparisons : dict of str to FRFComparison
         Of ``"printed"``, ``"unfiltered"`` and ``"fitted"`` with the stepped sine.
     seconds : float
-        Time that simulation and identification took.
+        Computing time of simulation and identification.
     """
 
     valve: bench.Valve
@@ -95,7 +95,7 @@ def _stages(seed: int, jobs: int) -> Iterator[DemoResult | None]:
 
 
 def _without_filter(system: DelayedStateSpace, frf: MeasuredFRF) -> ct.FrequencyResponseData:
-    """Divide the filter that is left in the data out of a model's frequency response."""
+    """Divide the filter in the data out of a model's frequency response."""
     omega = 2 * np.pi * frf.frequency_hz
     response = np.asarray(system(np.exp(1j * omega * system.dt)))
     left = fit_of(system, Realization).impulse.filter
@@ -104,7 +104,7 @@ def _without_filter(system: DelayedStateSpace, frf: MeasuredFRF) -> ct.Frequency
 
 
 def shown(result: DemoResult) -> int:
-    """Return the position of the record that the paper shows in Figs. 5-7."""
+    """Return the position of the record in the paper's Figs. 5-7."""
     amplitude, number = paper.SHOWN_RECORD
     sizes = list(paper.SETUP.step_sizes_ma)
     return sizes.index(amplitude) * paper.SETUP.records_per_size + number - 1

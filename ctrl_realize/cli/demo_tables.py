@@ -1,4 +1,4 @@
-"""The tables of the demo: simulated delays beside the printed ones, and what came out."""
+"""Tables of the demo: simulated and printed delays, and the results."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ OUTCOME = ("", "printed", "paper's method", "all records together", "truth (simu
 
 
 def simulated_table(result: DemoResult) -> FloatArray:
-    """Return the delays in samples as the paper's Table 1 has them, record x step size."""
+    """Return the delays in samples as in the paper's Table 1, record x step size."""
     delays = np.array([row.delay for row in result.campaign.rows])
     return delays.reshape(len(paper.SETUP.step_sizes_ma), -1).T
 
@@ -37,12 +37,12 @@ def table_1_columns(between: str = "") -> list[str]:
 
 
 def table_1(result: DemoResult) -> str:
-    """Lay out Table 1 for the terminal."""
+    """Format Table 1 for the terminal."""
     return table(table_1_columns("| "), table_1_rows(result), numbers=range(9))
 
 
 def outcome_rows(result: DemoResult) -> list[tuple[str, ...]]:
-    """List what came out: printed, the paper's way, the better way, truth."""
+    """List the results: printed, by the paper's method, by the output-error fit, true values."""
     mine, theirs = result.campaign.statistics(paper.SETTINGS.trim), paper.table_1_statistics()
     fit, truth = fit_of(result.fitted, OutputErrorFit), result.valve.truth
     left = fit_of(result.printed, Realization).impulse.filter
@@ -82,5 +82,5 @@ def outcome_rows(result: DemoResult) -> list[tuple[str, ...]]:
 
 
 def outcome_table(result: DemoResult) -> str:
-    """Lay out what came out for the terminal."""
+    """Format the results for the terminal."""
     return table(OUTCOME, outcome_rows(result), numbers=range(1, 5))

@@ -32,7 +32,7 @@ from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say
 
 _MANY = 12
-"""Records from which on all cores are used."""
+"""Number of records from which on all cores are used."""
 _OPTION = typer.Option
 
 
@@ -93,10 +93,11 @@ def identify(
 ) -> int:
     """Identify a model with dead time from one record, or from many of one plant.
 
-    One record gives model.json, report.html and figures/. Several records of one plant make a
-    campaign: a table of their delays as well (records.csv), a model for each (models/) and a
-    final one. A record that fails is a row of the table with its error. If a campaign is stopped,
-    the finished records are kept in rows/, and the same command goes on from there.
+    One record gives model.json, report.html and figures/. Several records of one plant are a
+    campaign: the output also contains a table of their delays (records.csv), a model for each
+    (models/) and a final model. A record that fails becomes a row of the table with its error. If a
+    campaign is interrupted, the finished records are kept in rows/, and the same command resumes
+    from there.
 
     \b
     Examples:
@@ -143,7 +144,7 @@ def _one(
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
 ) -> bool:
-    """Identify one file into a folder; tell whether its report is there."""
+    """Identify one file into a folder; return whether its report was written."""
     record = how.source(file)()
     system = identify_record(record, method=settings.method, **settings.options)
     comparison = None if frf is None else compare_frf(system, frf)
@@ -201,7 +202,7 @@ def _many(
 
 
 def _refuse_useless(campaign: Campaign) -> None:
-    """Stop where nothing common can be said of the records."""
+    """Raise an error if the records have no common result."""
     if not campaign.good:
         for row in campaign.rows:
             complain(printable(f"{row.name}: {row.error}"))
@@ -221,7 +222,7 @@ def _each_alone(
     words: list[str],
     run: Run,
 ) -> int:
-    """Identify each file into a folder of its own; failures do not stop the rest."""
+    """Identify each file into its own folder; failures do not stop the rest."""
     refuse_a_file(output)
     failed = 0
     names = unique_names([folder_name(file) for file in files])
@@ -229,7 +230,7 @@ def _each_alone(
         refuse_other_results(output / name, run)
     for file, name in progress(zip(files, names, strict=True), len(files), "identify"):
         try:
-            # each appears as it is finished, so that an interruption loses no other
+            # each folder appears as soon as it is finished, so that an interruption loses no other
             with appearing(output / name, run) as folder:
                 calls = calls_again([file], settings, how, words)
                 failed += not _one(file, folder, settings, how, frf, calls)
@@ -244,12 +245,12 @@ def _each_alone(
 
 
 def folder_name(file: Path) -> str:
-    """Name of a record's folder: the file's without its ending, and never "." or ".."."""
+    """Name of a record's folder: that of the file without extension, and never "." or ".."."""
     return file.stem if file.stem.strip(".") else "record"
 
 
 def unique_names(names: list[str]) -> list[str]:
-    """Number names that come twice."""
+    """Number names that occur twice."""
     seen: dict[str, int] = {}
     out = []
     for name in names:

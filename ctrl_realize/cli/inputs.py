@@ -1,4 +1,4 @@
-"""Files that the commands read, and how their options say what is in them."""
+"""Input files of the commands, and the options for reading them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Settings:
 
     @property
     def options(self) -> IdentifyOptions:
-        """What was given beside the method."""
+        """Given arguments except the method."""
         options: IdentifyOptions = {}
         if self.order is not None:
             options["order"] = self.order
@@ -60,7 +60,7 @@ class Settings:
 
     @property
     def given(self) -> dict[str, object]:
-        """Names and values of what was given, for files and reports."""
+        """Names and values of the given arguments, for files and reports."""
         return {"method": self.method, **self.options}
 
 
@@ -100,17 +100,17 @@ def reading(
 
 
 def selector(text: str | None) -> str | int | None:
-    """Read a column as a number where it is one; ``=2`` names the column "2"."""
+    """Convert a column to a number if it is one; ``=2`` is the column named "2"."""
     if text is None or text == "":
         return None
     if text.startswith("="):
         return text[1:]
-    # "²" is a digit, and no number
+    # "²" is a digit but not a number
     return int(text) if text.isdecimal() and text.isascii() else text
 
 
 def check_files(paths: Sequence[Path]) -> None:
-    """Refuse files that are not there before any work is done.
+    """Refuse files that do not exist before any work is done.
 
     Raises
     ------
@@ -124,12 +124,12 @@ def check_files(paths: Sequence[Path]) -> None:
 
 
 def typed_call(command: str, words: Sequence[str]) -> str:
-    """Write a command line that can be typed again."""
+    """Return a command line that can be typed again."""
     return shlex.join(["ctrl-realize", command, *words])
 
 
 def python_keywords(keywords: Mapping[str, object]) -> str:
-    """Write keyword arguments as Python text."""
+    """Return keyword arguments as Python text."""
     return "".join(f", {name}={value!r}" for name, value in keywords.items())
 
 
@@ -140,7 +140,7 @@ def words_again(
     frf: Path | None,
     separate: bool,
 ) -> list[str]:
-    """Write down the command line that does the same again, apart from the folder."""
+    """Return the arguments that reproduce a run, without the output folder."""
     words = [*map(str, files)]
     for name, value in settings.given.items():
         words += [f"--{name.replace('_', '-')}", str(value)]
@@ -149,7 +149,7 @@ def words_again(
     if separate:
         words.append("--separate")
     for name, value in how.keywords.items():
-        # --output is the folder, so the output column has another name here
+        # --output is the folder, so the output column has another option
         option = "--response" if name == "output" else f"--{name.replace('_', '-')}"
         if value is True:
             words.append(option)
@@ -161,7 +161,7 @@ def words_again(
 def calls_again(
     files: list[Path], settings: Settings, how: Reading, words: list[str]
 ) -> list[tuple[str, str]]:
-    """Write down how to do it again, in a terminal and in Python."""
+    """Return the commands that reproduce a run, for a terminal and in Python."""
     keywords = python_keywords(how.keywords)
     chosen = python_keywords(settings.given)
     if len(files) == 1:

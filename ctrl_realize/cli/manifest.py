@@ -1,4 +1,4 @@
-"""Which run made the results in a folder, so that those of two runs are never mixed."""
+"""Record of the run behind the results in a folder, so that results are never mixed."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _RESULTS = (
     "model_paper.json", "frf_simulated.csv", "record_simulated.csv", "models/*.json",
     "figures/*.png",
 )  # fmt: skip
-"""What results are called where no manifest lists them."""
+"""Names of results if there is no manifest."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a command: what was typed, apart from the folder, and the files that went in."""
+    """A run of a command: its arguments, without the folder, and the input files."""
 
     command: str
     inputs: tuple[Path, ...] = ()
@@ -36,7 +36,7 @@ class Run:
 
 
 def refuse_other_results(folder: Path, run: Run) -> None:
-    """Refuse a folder that holds the results of another run, before any work is done.
+    """Refuse a folder with the results of another run, before any work is done.
 
     The same command may replace its own results.
 
@@ -60,7 +60,7 @@ def refuse_other_results(folder: Path, run: Run) -> None:
 
 
 def result_files(folder: Path) -> list[Path]:
-    """List the files in a folder that a run has made, by its manifest or by their names."""
+    """List the files of a run in a folder, by its manifest or by their names."""
     manifest = _manifest(folder)
     if manifest is None:
         found = [path for pattern in _RESULTS for path in sorted(folder.glob(pattern))]
@@ -70,7 +70,7 @@ def result_files(folder: Path) -> list[Path]:
 
 
 def write_manifest(folder: Path, run: Run) -> None:
-    """Write down which run made the files of a folder."""
+    """Write the manifest of a folder: which run made its files."""
     files = sorted(path.relative_to(folder).as_posix() for path in _files_below(folder))
     content = {
         "format": FORMAT,
@@ -89,13 +89,13 @@ def _files_below(folder: Path) -> list[Path]:
 
 
 def _checksum(path: Path) -> str | None:
-    with suppress(MissingFileError):  # it was there when it was read
+    with suppress(MissingFileError):  # it existed when it was read
         return file_sha256(path)
     return None
 
 
 def _manifest(folder: Path) -> dict[str, Any] | None:
-    """Return what a folder's manifest says; None without one, or where it is none of ours."""
+    """Return the content of a folder's manifest; None if there is none, or it is not ours."""
     try:
         file = usable_file(folder / NAME, _MOST_BYTES)
         content = json.loads(file.read_text(encoding="utf-8"))
@@ -109,6 +109,6 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
 
 
 def _is_inside(name: str) -> bool:
-    """Tell whether a name stays in its folder, whoever has written the manifest."""
+    """Whether a name stays within its folder, whoever has written the manifest."""
     path = PurePosixPath(name)
     return not path.is_absolute() and ".." not in path.parts and "\\" not in name

@@ -1,4 +1,4 @@
-"""The files that the commands write, and the tables that they show."""
+"""Output files and tables of the commands."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def write_record_files(
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
 ) -> bool:
-    """Write model, report and figures of one record; tell whether the report is there."""
+    """Write model, report and figures of one record; return whether the report was written."""
     save_model(folder / "model.json", system, settings=settings, note=f"from {file.name}")
     if comparison is not None:
         write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
@@ -64,7 +64,7 @@ def write_campaign_files(
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
 ) -> bool:
-    """Write table, models, report and figures of many records; tell whether the report is there."""
+    """Write table, models, report and figures of many records; return if the report was written."""
     system = campaign.system
     note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
     save_model(folder / "model.json", system, settings=settings, note=note)
@@ -90,11 +90,11 @@ def write_campaign_files(
 
 @contextmanager
 def told_if_it_fails(folder: Path, result: str) -> Iterator[list[str]]:
-    """Let the writing of a report fail without costing the result: the list then stays empty."""
+    """Report an error while a report is written, but keep the results: the list stays empty."""
     written: list[str] = []
     try:
         yield written
-    except Exception as error:  # whatever it is: a defect of ours, a full disk
+    except Exception as error:  # for instance a defect of this program, or a full disk
         shutil.rmtree(folder / "figures", ignore_errors=True)
         complain(
             f"the report could not be written ({type(error).__name__}: {one_line(error)}); "
@@ -114,13 +114,13 @@ def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -
 
 
 def file_name(name: str) -> str:
-    """Make a name safe for a file of any system, most of which count 255 bytes."""
+    """Make a name safe for files on any system, most of which allow 255 bytes."""
     safe = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)
     return safe[:80].encode()[:200].decode(errors="ignore") or "record"
 
 
 def campaign_table(campaign: Campaign) -> str:
-    """Lay out a campaign for the terminal: one line for each record."""
+    """Format a campaign for the terminal: one line for each record."""
     scale, unit = time_unit(float(np.median([row.dead_time for row in campaign.good])))
     rows = []
     for row in campaign.rows:

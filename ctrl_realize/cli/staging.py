@@ -1,4 +1,4 @@
-"""A folder of results that appears whole or not at all."""
+"""Folders of results that appear as a whole."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from .manifest import Run, refuse_other_results, result_files, write_manifest
 from .terminal import complain, printable
 
 ROWS = "rows"
-"""Folder of finished records in that of the results, while a campaign runs."""
+"""Folder of finished records within that of the results, while a campaign runs."""
 
 
 @contextmanager
 def appearing(folder: Path, run: Run | None = None) -> Iterator[Path]:
-    """Give a temporary folder whose files move into `folder` when the block ends well.
+    """Provide a temporary folder whose files are moved into `folder` at the end of the block.
 
-    If `folder` is there already, the results of an earlier run are replaced and other files stay,
-    and nothing outside it is touched: it may be on a disk of its own. If the block raises, nothing
+    If `folder` exists, the results of an earlier run are replaced and other files are kept; nothing
+    outside it is touched, because it may be on another disk. If the block raises an error, nothing
     in `folder` has changed.
 
     Parameters
     ----------
     folder : pathlib.Path
     run : Run, optional
-        The run whose results they are; a manifest beside them says so.
+        The run of these results, for the manifest.
 
     Raises
     ------
     OptionError
-        `folder` is a file, or holds the results of another run.
+        `folder` is a file, or contains the results of another run.
     OSError
-        It cannot be made or written.
+        It cannot be created or written.
 
     Examples
     --------
@@ -78,11 +78,11 @@ def appearing(folder: Path, run: Run | None = None) -> Iterator[Path]:
 
 @contextmanager
 def kept_rows(output: Path) -> Iterator[CampaignStore]:
-    """Give a store in `output` for the records of a campaign, gone when the results are there.
+    """Provide a store in `output` for the records of a campaign; removed when the results exist.
 
-    Where the process is killed or interrupted, or the disk is full, the finished records stay,
-    and the same command goes on from them. An error of ours, such as records that do not belong
-    together, leaves nothing.
+    If the process is killed or interrupted, or the disk is full, the finished records are kept, and
+    the same command resumes from them. After other errors, such as records that do not belong
+    together, nothing is kept.
     """
     refuse_a_file(output)
     made = _missing_parents(output)
@@ -106,13 +106,13 @@ def kept_rows(output: Path) -> Iterator[CampaignStore]:
 
 
 def refuse_a_file(output: Path) -> None:
-    """Refuse a file where a folder is needed, before any work is done."""
+    """Refuse a file in place of a folder, before any work is done."""
     if output.exists() and not output.is_dir():
         raise OptionError(f"{output} is a file; --output needs a folder")
 
 
 def _remove_rows(store: CampaignStore, made: Sequence[Path]) -> None:
-    """Remove the rows of a store, and of the folders made for it those that are empty."""
+    """Remove the rows of a store, and the folders created for it if they are empty."""
     store.forget_attempts()
     for path in store.folder.glob("row-*.json"):
         path.unlink(missing_ok=True)
@@ -121,7 +121,7 @@ def _remove_rows(store: CampaignStore, made: Sequence[Path]) -> None:
 
 
 def _missing_parents(folder: Path) -> list[Path]:
-    """List the folders that are not there yet, the innermost first."""
+    """List the folders that do not exist yet, the innermost first."""
     return [parent for parent in (folder, *folder.parents) if not parent.exists()]
 
 
@@ -131,11 +131,11 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _move_into(staged: Path, target: Path, old: Sequence[Path]) -> None:
-    """Move new results into a folder, in place of the old ones."""
+    """Move new results into a folder, replacing the old ones."""
     for path in staged.rglob("*"):
         if path.is_file():
             refuse_irregular(target / path.relative_to(staged))
-    # Without a manifest, if this is cut off, results are taken for those of another run.
+    # If this is interrupted there is no manifest, and the results count as those of another run.
     for path in (target / MANIFEST, *old):
         if path.is_file() or path.is_symlink():
             path.unlink()

@@ -1,4 +1,4 @@
-"""What the command line writes to the terminal: tables on stdout, everything else on stderr."""
+"""Output to the terminal: tables on stdout, everything else on stderr."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EXIT_CODES = (
 
 
 def say(text: str = "") -> None:
-    """Write to stdout; a reader that has gone (``| head``) costs nothing but its reading."""
+    """Write to stdout; a closed pipe (``| head``) is not an error."""
     _write(text, to_stderr=False)
 
 
@@ -26,12 +26,12 @@ def complain(text: str) -> None:
 
 
 def _write(text: str, *, to_stderr: bool) -> None:
-    # names of records and files stand in most texts, and must not steer the terminal
+    # most texts contain names of records and files, which must not control the terminal
     lines = "\n".join(printable(line) for line in text.split("\n"))
     try:
         typer.echo(lines, err=to_stderr)
     except BrokenPipeError:
-        # what is in the buffer, and all that follows, goes nowhere
+        # the buffer, and everything that follows, is discarded
         stream = sys.stderr if to_stderr else sys.stdout
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -39,7 +39,7 @@ def _write(text: str, *, to_stderr: bool) -> None:
 
 
 def one_line(problem: object) -> str:
-    """Put the message of a problem into one line."""
+    """Convert the message of an error to one line."""
     if isinstance(problem, OSError) and problem.strerror and not _is_ours(problem):
         text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
     else:
@@ -59,12 +59,12 @@ def plain_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Show a warning as one line on stderr; stands in for `warnings.showwarning`."""
+    """Show a warning as one line on stderr; replaces `warnings.showwarning`."""
     complain(f"warning: {one_line(message)}")
 
 
 def progress(items: Iterable[Any], total: int, label: str) -> Iterable[Any]:
-    """Show a bar on stderr while items are gone through, where somebody can see it."""
+    """Show a progress bar on stderr for an iteration, if it is a terminal."""
     from tqdm import tqdm
 
     bar: Iterable[Any] = tqdm(items, total=total, desc=label, disable=None, file=sys.stderr)
@@ -72,7 +72,7 @@ def progress(items: Iterable[Any], total: int, label: str) -> Iterable[Any]:
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int]) -> str:
-    """Lay out a table; the columns in `numbers` are aligned to the right.
+    """Format a table; the columns in `numbers` are right-aligned.
 
     Examples
     --------
@@ -99,5 +99,5 @@ def _aligned(cells: Sequence[str], widths: Sequence[int], numbers: Sequence[int]
 
 
 def printable(text: str) -> str:
-    """Keep names of files and records from steering the terminal."""
+    """Remove control characters from names of files and records."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -1,4 +1,4 @@
-"""Files in and out: records, frequency responses, models."""
+"""Files: records, frequency responses, models."""
 
 from .frf import read_frf
 from .models import load_model, save_model

@@ -1,4 +1,4 @@
-"""Write files whole or not at all."""
+"""Write files atomically."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from pathlib import Path
 
 @contextmanager
 def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path that takes the place of `path` when the block ends well.
+    """Provide a temporary path that replaces `path` when the block ends without an error.
 
-    The temporary file lies in the same folder, so the replacement is one step of the
-    file system: a reader sees the old file or the new one, never a part. If the block
-    raises, or the process is interrupted in it, `path` is as it was and the temporary
-    file is gone.
+    The temporary file is in the same folder, so the replacement is atomic: a reader sees the old
+    file or the new one, never a part. If the block raises an error or is interrupted, `path` is
+    unchanged and the temporary file is removed.
 
     Parameters
     ----------
     path : path-like
-        File to write. A symbolic link is followed, so that the link stays.
+        File to write. A symbolic link is followed, and remains.
 
     Yields
     ------
@@ -53,7 +52,7 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
         # a NUL character in the name
         raise OSError(errno.EINVAL, str(error), os.fspath(path)) from error
     refuse_irregular(target)
-    # Created by hand, not by tempfile, so that the file gets the permissions of any new file.
+    # Created directly, not by tempfile, so that the file gets the permissions of any new file.
     temporary = target.with_name(f".{target.name[:40]}-{secrets.token_hex(8)}.tmp")
     os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     try:
@@ -70,9 +69,9 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def refuse_irregular(path: Path) -> None:
-    """Refuse to replace what is there and is no regular file.
+    """Refuse to replace anything but a regular file.
 
-    Who may do everything could put a file in the place of a device, which all programs use.
+    A user with all permissions could replace a device by a file.
 
     Raises
     ------
@@ -91,13 +90,13 @@ def refuse_irregular(path: Path) -> None:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` as UTF-8 with plain line ends, whole or not at all.
+    """Write `text` as UTF-8 with plain line ends, atomically.
 
     Raises
     ------
     OSError
-        As for `replaced_when_complete`; `path` is then as it was.
+        As for `replaced_when_complete`; `path` is then unchanged.
     """
     with replaced_when_complete(path) as temporary:
-        # names of files that are no UTF-8 are spelled out
+        # file names that are not UTF-8 are escaped
         temporary.write_bytes(text.encode("utf-8", "backslashreplace"))

@@ -1,4 +1,4 @@
-"""Lines of a text table, cut into cells, and what a cell looks like."""
+"""Lines of a text table split into cells, and the kinds of cells."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..errors import FileFormatError
 
 DELIMITERS = ("\t", ";", "|", ",", " ")
 NUMBER = {
-    # one way only to match any text: two ways make the time grow with the square of its length
+    # Each text matches in one way only: with two ways, time grows with the square of its length.
     ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
@@ -24,7 +24,7 @@ FILLED = ("number", "time")
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Cells of a line; a quoted cell may hold the delimiter, runs of blanks are one delimiter."""
+    """Cells of a line; a quoted cell may contain the delimiter; runs of blanks are one."""
     if delimiter == " ":
         return line.split()
     if '"' not in line:
@@ -32,17 +32,17 @@ def split_line(line: str, delimiter: str) -> list[str]:
     try:
         (cells,) = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
     except (csv.Error, ValueError):
-        # a stray quote or a cell longer than csv's limit: not a line of numbers anyway
+        # a stray quote or a cell longer than csv's limit: not a line of numbers
         return line.split(delimiter)
     return [cell.strip() for cell in cells]
 
 
 def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str) -> None:
-    """Refuse a file whose commas may divide thousands as well as mark decimals.
+    """Refuse a file whose commas may be thousands separators as well as decimal signs.
 
-    ``1,234`` is 1.234 where each cell of its column is written with as many decimals, and 1234 in
-    ``"1,234"`` between commas, or beside ``999`` in its column: then nobody can tell. One cell such
-    as ``0,123``, ``12,5`` or ``1234,567`` anywhere settles it: they are decimals.
+    ``1,234`` is 1.234 if each cell of its column has the same number of decimals, and 1234 for
+    ``"1,234"`` between commas, or together with ``999`` in its column: this is ambiguous. One cell
+    like ``0,123``, ``12,5`` or ``1234,567`` anywhere shows that they are decimals.
     """
     numbers = [[cell for cell in row if NUMBER[","].fullmatch(cell)] for row in rows]
     commas = [cell for row in numbers for cell in row if "," in cell]
@@ -63,7 +63,7 @@ def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str) -> None:
 
 
 def kind_of(cell: str, decimal: str) -> Literal["number", "time", "missing", "text"]:
-    """Tell what a cell looks like."""
+    """Return the kind of a cell."""
     if NUMBER[decimal].fullmatch(cell):
         return "number"
     if cell.lower() in _NOT_NAMES:

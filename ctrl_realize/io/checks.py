@@ -1,4 +1,4 @@
-"""What is asked of any file before it is opened: it exists, is a file, is not too large."""
+"""Checks of a file before it is opened: it exists, is regular, and is not too large."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ..errors import FileFormatError, MissingFileError, OptionError
 
 MAX_COLUMNS = 10_000
 MAX_NAME = 200
-"""Letters of a column's name that are kept."""
+"""Number of characters of a column's name that are kept."""
 MAX_BYTES = 2 * 2**30
-"""Largest data file that is read unless the caller says more."""
+"""Default limit of the size of a data file."""
 
 
 def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
@@ -22,9 +22,9 @@ def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
     Raises
     ------
     MissingFileError
-        If there is nothing at `path`, or it may not be read.
+        There is nothing at `path`, or it may not be read.
     FileFormatError
-        If it is a folder, a device or a pipe (which might never end), empty, or too large.
+        It is a folder, a device or a pipe (which might never end), empty, or too large.
     """
     if not isinstance(max_bytes, Real) or not max_bytes > 0:
         raise OptionError(f"max_bytes={max_bytes!r} must be a positive number")
@@ -52,7 +52,7 @@ def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
 
 
 def check_size(path: Path, n_bytes: int, max_bytes: float, what: str = "") -> None:
-    """Refuse what is larger than `max_bytes`, before memory is given to it."""
+    """Refuse sizes above `max_bytes`, before memory is allocated."""
     if n_bytes > max_bytes:
         raise FileFormatError(
             f"{path}{what} is {n_bytes / 2**20:.4g} MiB, "

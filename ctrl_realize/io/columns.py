@@ -1,4 +1,4 @@
-"""Decide which column is what: by the caller's choice, or by the names in the file."""
+"""Assignment of columns to signals: as requested, or by their names."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ _FAMILY = re.compile(r"^(.*?)[\s_]*(\[\d+\]|\(\d+\)|\d+)$")
 
 
 def plain_name(name: str) -> str:
-    """Reduce a column's name to what is looked up: ``"run.Input_Signal [V]" -> "input signal"``."""
+    """Reduce a column's name for comparison: ``"run.Input_Signal [V]" -> "input signal"``."""
     base = split_unit(name)[0].rpartition(".")[2] or name
     return re.sub(r"[\s_\-]+", " ", base).strip().lower()
 
 
 def family(name: str) -> str:
-    """Plain name without a channel number: ``"output_2"`` and ``"y[1]"`` are families."""
+    """Plain name without a channel number, for names like ``"output_2"`` and ``"y[1]"``."""
     plain = plain_name(name)
     numbered = _FAMILY.match(plain)
     return numbered[1].strip() if numbered and numbered[1].strip() else plain
 
 
 def find_columns(table: Table, wanted: Selector, argument: str) -> list[int]:
-    """Return the positions of the columns that the caller asks for.
+    """Return the positions of the requested columns.
 
     Raises
     ------
     OptionError
-        If there is no such column, or several with that name; the columns are listed.
+        There is no such column, or there are several with that name; the columns are listed.
     """
     if isinstance(wanted, str | int | np.integer):
         return _one_choice(table, wanted, argument)
@@ -50,7 +50,7 @@ def find_columns(table: Table, wanted: Selector, argument: str) -> list[int]:
 
 
 def find_column(table: Table, wanted: str | int, argument: str) -> int:
-    """Return the position of the one column that the caller asks for."""
+    """Return the position of the one requested column."""
     chosen = find_columns(table, wanted, argument)
     if len(chosen) != 1:
         raise OptionError(f"{argument}={wanted!r} selects {len(chosen)} columns, expected one")
@@ -89,7 +89,7 @@ def _one_choice(table: Table, wanted: object, argument: str) -> list[int]:
 
 
 def named(table: Table, names: Iterable[str], taken: Iterable[int] = ()) -> list[int]:
-    """Positions of the columns whose family is one of `names`."""
+    """Positions of the columns whose plain name is one of `names`."""
     wanted, used = set(names), set(taken)
     return [
         k
@@ -99,7 +99,7 @@ def named(table: Table, names: Iterable[str], taken: Iterable[int] = ()) -> list
 
 
 def holds_numbers(table: Table, index: int) -> bool:
-    """Tell whether a column is meant to hold numbers, even if some cells are bad."""
+    """Whether a column contains numbers, even if some cells are bad."""
     cells = table.columns[index].first(10)
     if cells.dtype.kind in "biufc":
         return True
@@ -108,7 +108,7 @@ def holds_numbers(table: Table, index: int) -> bool:
 
 
 def has_header(table: Table) -> bool:
-    """Tell whether the columns have names."""
+    """Whether the columns have names."""
     return any(column.name for column in table.columns)
 
 

@@ -62,19 +62,19 @@ def read_frf(
 ) -> MeasuredFRF:
     r"""Read a measured frequency response from a CSV, TSV, ``.npz``, ``.mat`` or Parquet file.
 
-    Columns are found by their names (``frequency_hz``, ``omega``, ``magnitude_db``,
-    ``phase [rad]``, ``real``, ``imag``, ``coherence``, ``std``); without a header, three columns
-    are frequency, magnitude and phase. Units are taken from the header; where it has none,
-    frequency is in Hz (``omega``: rad/s), magnitude a ratio and phase in degrees, unless the
-    values speak against it, which is an error.
+    Columns are identified by their names (``frequency_hz``, ``omega``, ``magnitude_db``, ``phase
+    [rad]``, ``real``, ``imag``, ``coherence``, ``std``); without a header, three columns are
+    frequency, magnitude and phase. Units are taken from the header; default: frequency in Hz
+    (``omega``: rad/s), magnitude as a ratio and phase in degrees. If the values contradict this, it
+    is an error.
 
     Parameters
     ----------
     path : path-like
-        The file; its first bytes tell of what kind it is.
+        The file; its type is determined from its first bytes.
     frequency, magnitude, phase, real, imag, response, coherence, std : str or int, optional
-        Columns, by name or by number from 0. The response is magnitude and phase, or real and
-        imaginary part, or one complex array. `std` is the standard deviation of the complex
+        Columns, by name or by number from 0. The response is given by magnitude and phase, by real
+        and imaginary part, or by one complex array. `std` is the standard deviation of the complex
         response, in its unit.
     frequency_unit : str, optional
         ``"Hz"``, ``"kHz"``, ``"MHz"`` or ``"rad/s"``.
@@ -99,7 +99,7 @@ def read_frf(
     Warns
     -----
     DataWarning
-        The last line was cut off while it was written; it is left out.
+        The last line is incomplete, as if writing was interrupted; it is left out.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def read_frf(
 
 @dataclass(frozen=True)
 class _Units:
-    """What the caller says; None is found out."""
+    """Options of the caller; None is determined from the file."""
 
     frequency: str | None
     magnitude: str | None
@@ -165,7 +165,7 @@ def _checked_unit(unit: str, argument: str, known: Iterable[str]) -> str | None:
 
 
 def _columns(table: Table, asked: dict[str, str | int | None]) -> dict[str, int]:
-    """Position of each part that is there."""
+    """Position of each part that is present."""
     columns = {
         part: find_column(table, wanted, part)
         for part, wanted in asked.items()
@@ -184,7 +184,7 @@ def _columns(table: Table, asked: dict[str, str | int | None]) -> dict[str, int]
         if found:
             columns[part] = found[0]
     forms = [("response",), ("real", "imag"), ("magnitude", "phase")]
-    # what the caller named counts before what was found by name
+    # columns given by the caller have priority over those found by name
     forms.sort(key=lambda form: -len(given.intersection(form)))
     complete = [form for form in forms if all(part in columns for part in form)]
     if "frequency" not in columns or not complete:

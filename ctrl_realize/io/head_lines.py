@@ -1,4 +1,4 @@
-"""The first lines of a text table, as a parser that knows quotes counts them."""
+"""The first lines of a text table, counted with regard to quotes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .cells import DELIMITERS
 HEAD_BYTES = 1 << 18
 MAX_HEAD_LINES = 1000
 _MOST_JOINED = 10
-"""Lines of a cell between quotes; a quote that is not closed by then is a stray one."""
+"""Largest number of lines of a quoted cell; a quote that is not closed by then is a stray one."""
 
 _LINE = re.compile(r"([^\r\n]*)(\r\n|\n|\r|$)")
 _STARTERS = frozenset(DELIMITERS) - {" "}
@@ -21,7 +21,7 @@ _STARTERS = frozenset(DELIMITERS) - {" "}
 
 @dataclass(frozen=True)
 class Line:
-    """A line and where it is: ``number`` counts line ends before it, ``start`` characters."""
+    """A line and its position: ``number`` counts line ends before it, ``start`` characters."""
 
     text: str
     number: int
@@ -29,20 +29,20 @@ class Line:
 
 
 def head_lines(path: Path, head: bytes, encoding: str, skip: int) -> list[Line]:
-    """Complete lines of the first bytes of a file; a quoted cell with line ends is in one line.
+    """Complete lines at the start of a file; a quoted cell with line ends is in one line.
 
-    The first `skip` lines are not looked into for quotes.
+    Quotes in the first `skip` lines are ignored.
     """
     try:
         text = codecs.getincrementaldecoder(encoding)("replace").decode(head)
     except (UnicodeError, ValueError) as error:
         raise FileFormatError(f"{path} is not text in {encoding}: {error}") from error
     found = list(_LINE.finditer(text))
-    # the last match is empty, behind the last line end, or a line without one
+    # the last match is empty, after the last line end, or a line without one
     lines = [Line(one[1], number, one.start()) for number, one in enumerate(found[:-1])]
     if len(head) == HEAD_BYTES:
         if lines and found[len(lines) - 1][2] == "":
-            lines.pop()  # cut off by us
+            lines.pop()  # incomplete
         if not lines:
             raise FileFormatError(
                 f"the first line of {path} is longer than {HEAD_BYTES} bytes; expected a "
@@ -52,7 +52,7 @@ def head_lines(path: Path, head: bytes, encoding: str, skip: int) -> list[Line]:
 
 
 def _joined(lines: list[Line], skip: int, text: str) -> list[Line]:
-    """Put lines together that are one cell."""
+    """Join lines that are one cell."""
     if not any('"' in line.text for line in lines[skip:]):
         return lines
     out = lines[:skip]
@@ -72,11 +72,11 @@ def _joined(lines: list[Line], skip: int, text: str) -> list[Line]:
 
 
 def _stays_open(line: str) -> bool:
-    """Tell whether a quote that begins a cell is not closed in a line."""
+    """Whether a quoted cell is not closed within a line."""
     inside, begins = False, True
     for place, letter in enumerate(line):
         if letter == '"':
-            # a quote in a cell is written twice, and one amid a bare cell is a letter
+            # a quote inside a cell is doubled, and one in an unquoted cell is a character
             inside = not inside and (begins or line[place - 1 : place] == '"')
             begins = False
         elif not inside:

@@ -1,4 +1,4 @@
-"""Take values out of parsed JSON that may hold anything."""
+"""Read values from parsed JSON with unknown content."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_TEXT = 1000
 
 
 def field(content: Mapping[str, Any], key: str, kind: Any) -> Any:
-    """Return ``content[key]`` if it is of the kind asked for."""
+    """Return ``content[key]`` if it has the requested type."""
     value = content.get(key)
     if not isinstance(value, kind) or (isinstance(value, str) and not _is_text(value)):
         raise FileFormatError(f"{key!r} is missing or has the wrong type")
@@ -23,14 +23,14 @@ def field(content: Mapping[str, Any], key: str, kind: Any) -> Any:
 
 
 def boolean_free(content: Mapping[str, Any], key: str, kind: Any) -> Any:
-    """Return a number; in Python true and false are numbers too, here they are not."""
+    """Return a number; true and false, numbers in Python, are refused."""
     if isinstance(content.get(key), bool):
         raise FileFormatError(f"{key!r} is true or false; expected a number")
     return field(content, key, kind)
 
 
 def texts(content: Mapping[str, Any], key: str) -> list[str]:
-    """Return a list of different texts."""
+    """Return a list of distinct texts."""
     values: list[str] = field(content, key, list)
     if not all(isinstance(value, str) and _is_text(value) for value in values):
         raise FileFormatError(f"{key!r} contains something that is not text")
@@ -65,10 +65,10 @@ def _is_finite(value: int | float) -> bool:
     try:
         return math.isfinite(value)
     except OverflowError:
-        # a whole number beyond the doubles
+        # a whole number beyond the range of doubles
         return False
 
 
 def _is_text(value: str) -> bool:
-    """No endless names, and no half characters, which could not be printed or written."""
+    """Refuse very long names, and lone surrogates, which cannot be printed or written."""
     return len(value) <= MAX_TEXT and not any("\ud800" <= letter <= "\udfff" for letter in value)

@@ -1,4 +1,4 @@
-"""Models as JSON files: exact, checked on the way back in, and without code in them."""
+"""Models as JSON files: exact, verified on loading, and without code."""
 
 from __future__ import annotations
 
@@ -39,9 +39,8 @@ def save_model(
     """Write a model to a JSON file.
 
     Core matrices, delays, sample time, names and labels are stored exactly; of `system.fit` its
-    report, flags and main numbers are. Versions of the packages are noted, and the SHA-256 of
-    all of it, so that a damaged or edited file is recognised. The file is written whole or not
-    at all.
+    report, flags and main numbers. Package versions and a SHA-256 checksum are included, so that a
+    damaged or edited file is recognised. The file is written atomically.
 
     Parameters
     ----------
@@ -50,9 +49,9 @@ def save_model(
     system : DelayedStateSpace or control.StateSpace
         Discrete model with a sample time; a plain one is stored with delay 0.
     created : str, optional
-        Date to note; by default none, so that equal models make equal files.
+        Date to store; default: none, so that equal models give equal files.
     settings : mapping, optional
-        Numbers, text and lists of them to note, such as how the model was found.
+        Numbers, text and lists of them to store, such as how the model was found.
     note : str, optional
         Free text.
 
@@ -61,7 +60,7 @@ def save_model(
     UnsuitableSystemError
         A system that is not a discrete state-space model with a sample time.
     OptionError
-        Settings that are no plain numbers and text, or matrices that are not finite.
+        Settings other than plain numbers and text, or matrices that are not finite.
     OSError
         The folder is missing or cannot be written.
 
@@ -83,22 +82,21 @@ def save_model(
 def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -> DelayedStateSpace:
     """Read a model that `save_model` wrote.
 
-    Reading runs no code from the file. What is truncated, edited, of a later version or not a
-    model at all is refused.
+    No code from the file is executed. A file that is truncated, edited, of a later version or not a
+    model is refused.
 
     Parameters
     ----------
     path : path-like
     max_states : int, optional
-        Largest number of states, delays included, that is accepted; by default what a
-        `DelayedStateSpace` takes. A long delay costs nothing until a function of python-control
-        asks for the matrices, which hold the square of the number of states.
+        Largest number of states, delays included; default: the limit of `DelayedStateSpace`. A long
+        delay takes no memory until a function of python-control needs the matrices, which grow with
+        the square of the number of states.
 
     Returns
     -------
     DelayedStateSpace
-        As it was saved. Its `fit` is a `FitSummary` (report, flags and main numbers) if the
-        saved model had one.
+        As it was saved. If it had a `fit`, this is a `FitSummary` (report, flags and main numbers).
 
     Raises
     ------
@@ -140,10 +138,10 @@ def model_to_text(
     settings: Mapping[str, Any] | None = None,
     note: str = "",
 ) -> str:
-    """Lay out a model as the text that `save_model` writes."""
+    """Return a model as the text that `save_model` writes."""
     model = system
     if not isinstance(system, DelayedStateSpace):
-        # what is no system at all is refused by DelayedStateSpace
+        # anything but a system is refused by DelayedStateSpace
         name = system.name if isinstance(system, ct.InputOutputSystem) else None
         model = DelayedStateSpace(system, name=name)
     content = {
@@ -169,7 +167,7 @@ def model_to_text(
 
 
 def model_from_text(text: str, *, max_states: int | None = None) -> DelayedStateSpace:
-    """Build a model from the text that `save_model` wrote; see `load_model`."""
+    """Make a model from the text that `save_model` has written; see `load_model`."""
     try:
         content = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
@@ -179,7 +177,7 @@ def model_from_text(text: str, *, max_states: int | None = None) -> DelayedState
         return _model_from(content, max_states=max_states)
     except FileFormatError:
         raise
-    # TypeError, KeyError, ...: what python-control says to names and shapes that make no sense
+    # TypeError, KeyError, ...: python-control's errors for invalid names and shapes
     except (CtrlRealizeError, ValueError, TypeError, OverflowError, RecursionError) as error:
         raise FileFormatError(str(error)) from error
 
@@ -246,7 +244,7 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> De
 
 
 def _check_origin(content: object) -> None:
-    """Refuse foreign, later and edited files, and say which it is."""
+    """Refuse other, later and edited files, each with its reason."""
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise FileFormatError(f"not a model file of ctrl_realize (expected the format {FORMAT!r})")
     schema = content.get("schema")
@@ -265,7 +263,7 @@ def _check_origin(content: object) -> None:
 
 
 def _checksum(content: Mapping[str, Any]) -> str:
-    """SHA-256 of the content in one canonical spelling, without the checksum itself."""
+    """SHA-256 of the content in a canonical form, without the checksum itself."""
     rest = {key: value for key, value in content.items() if key != "sha256"}
     canonical = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode("ascii")).hexdigest()
@@ -273,7 +271,7 @@ def _checksum(content: Mapping[str, Any]) -> str:
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    """Versions of what computed; asked once, as a campaign writes thousands of models."""
+    """Versions of the packages used; determined once per process."""
     versions = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:

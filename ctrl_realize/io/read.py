@@ -1,4 +1,4 @@
-"""Columns from files of any kind, before anybody knows what they mean."""
+"""Columns from files of any type, before they are assigned to signals."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def read_table(
 ) -> Table:
     """Read the columns of a text table, ``.npz``, ``.mat`` or Parquet file.
 
-    What kind of file it is, is told by its first bytes; the ending of its name only matters for
-    the oldest ``.mat`` files, which have no such mark.
+    The type is determined from the first bytes; the file name only matters for the oldest ``.mat``
+    files, which have no signature.
 
     Parameters
     ----------
     path : path-like
     options : TextOptions
-        How text is written.
+        Format of text.
     variable : str or None
-        The variable of a ``.mat`` or ``.npz`` file (a matrix or a struct) to use alone.
+        The only variable of a ``.mat`` or ``.npz`` file (a matrix or a struct) to use.
     max_bytes : float
         Largest size, in the file and unpacked.
 
@@ -48,7 +48,7 @@ def read_table(
     ------
     MissingFileError, FileFormatError, DataError
     """
-    # each reader brings its own heavy library; none is loaded before it is needed
+    # each reader needs its own heavy library, which is loaded on demand
     file = usable_file(path, max_bytes)
     head = read_head(file, 128)
     for mark, what in _NOT_READABLE.items():

@@ -1,4 +1,4 @@
-"""Read a measured experiment from a file."""
+"""Read a measured record from a file."""
 
 from __future__ import annotations
 
@@ -70,40 +70,40 @@ def read_record(
     name: str | None = None,
     max_bytes: float = MAX_BYTES,
 ) -> Record:
-    r"""Read a measured experiment from a CSV, TSV, ``.npz``, ``.mat`` or Parquet file.
+    r"""Read a measured record from a CSV, TSV, ``.npz``, ``.mat`` or Parquet file.
 
-    Columns are found by their names (``time_s``, ``t``, ``Zeit [ms]``; ``input``, ``u``;
-    ``output``, ``y``; numbered ones are channels). Without a header, three columns are time,
-    input and output, and two with `dt` are input and output. Whatever is less clear is an error
-    that lists the columns.
+    Columns are identified by their names (``time_s``, ``t``, ``Zeit [ms]``; ``input``, ``u``;
+    ``output``, ``y``; numbered ones are channels). Without a header, three columns are time, input
+    and output, and two with `dt` are input and output. Ambiguous columns are an error that lists
+    them.
 
     Parameters
     ----------
     path : path-like
-        The file; its first bytes tell of what kind it is.
+        The file; its type is determined from its first bytes.
     time : str or int, optional
         Time column, by name or by number from 0: numbers, ISO dates or times of day.
     input, output : str, int or sequence of them, optional
         Columns of the signals; several make a record of several channels.
     dt : float, optional
-        Sample time in s, in place of a time column.
+        Sample time in s, instead of a time column.
     time_unit : str, optional
-        ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``; ``"auto"``: the
-        header's, or s. Of a clock such as ``12:34`` it is the unit of the first number.
+        ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``; ``"auto"``: that of
+        the header, or s. For a clock such as ``12:34`` it is the unit of the first number.
     time_format : str, optional
-        How dates are written, as for `datetime.strptime`, where they are not ISO 8601.
+        Format of dates, as for `datetime.strptime`, if it is not ISO 8601.
     delimiter, decimal, encoding, comment : str, optional
-        How text is written; ``"auto"``: found out from the first lines.
+        Format of text; ``"auto"``: determined from the first lines.
     header : bool or "auto", optional
-        Whether the first line has the names.
+        Whether the first line contains the names.
     skip_rows : int, optional
-        Lines of text to leave out at the start.
+        Number of lines to skip at the start.
     variable : str, optional
-        Matrix or struct of a ``.mat`` or ``.npz`` file to look into.
+        Matrix or struct of a ``.mat`` or ``.npz`` file to use.
     missing : {"refuse", "keep"}, optional
-        What to do with empty cells and ``NaN`` in input and output; see `Record`.
+        Treatment of empty cells and ``NaN`` in input and output; see `Record`.
     resample : bool, optional
-        Put samples that jitter onto a uniform time axis, see `Record.resampled`.
+        Resample samples with time jitter onto a uniform time axis, see `Record.resampled`.
     name : str, optional
         Name of the record; default: the file's, without its ending.
     max_bytes : float, optional
@@ -118,18 +118,18 @@ def read_record(
     MissingFileError
         There is no such file, or no permission to read it.
     FileFormatError
-        The file is empty, too large, damaged, or no table of numbers.
+        The file is empty, too large, damaged, or not a table of numbers.
     DataError
-        A cell is no finite number: its line is named.
+        A cell is not a finite number; the message gives its line.
     TimeAxisError
-        Time jitters, has gaps, repeats or runs back.
+        Time jitters, has gaps, repeats or decreases.
     OptionError
-        The columns are not clear, or the asked ones are not there.
+        The columns are ambiguous, or the requested ones do not exist.
 
     Warns
     -----
     DataWarning
-        The last line was cut off while it was written; it is left out.
+        The last line is incomplete, as if writing was interrupted; it is left out.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def read_record(
     except TimeAxisError as error:
         row = re.search(r"row (\d+)", str(error))
         place = f" ({table.place(int(row[1]))})" if row else ""
-        # many stamps twice over: samples that came faster than their clock ticks
+        # many repeated time stamps: the samples are faster than the resolution of the clock
         coarse = np.mean(np.diff(stamps) == 0) > 0.2
         advice = "; the clock is coarser than the sample time, give dt= instead" if coarse else ""
         raise TimeAxisError(f"{table.path}{place}: {error}{advice}") from error
@@ -182,7 +182,7 @@ def read_record(
 
 @dataclass(frozen=True)
 class _Parts:
-    """Positions of the columns; ``dt`` counts where there is no time column."""
+    """Positions of the columns; ``dt`` is used if there is no time column."""
 
     time: int | None
     dt: float
@@ -231,7 +231,7 @@ def _parts(
 
 
 def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, float | None]:
-    """Time column by its name, else the sample time beside the arrays, else the first column."""
+    """Time column by name, otherwise the sample time in the file, otherwise the first column."""
     clocks = named(table, TIME_NAMES, taken)
     if len(clocks) == 1:
         return clocks[0], None

@@ -1,4 +1,4 @@
-"""Finished rows of a campaign in a folder, so that a stopped run can go on."""
+"""Folder with the finished rows of a campaign, so that an interrupted run can be resumed."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ _INTERVALS = ("interval", "total_delay_interval")
 _NUMBERS = ("amplitude", "delay", "dead_time", "residual", "gain", "gain_std", "total_delay")
 
 MOST_TRIES = 2
-"""Times that a process may die over a record."""
+"""Number of times that a process may be killed over a record."""
 
 
 class CampaignStore:
-    """Folder that keeps the result of each record of a campaign as it is finished.
+    """Folder in which the result of each record of a campaign is stored as soon as it is finished.
 
-    Each row is one JSON file, written whole or not at all, named by the SHA-256 of the record's
-    samples, of the settings and of the versions of this package, NumPy and SciPy, and holding that
-    of its own content; processes and machines that share the folder can write to it at once. What
-    another version has made, or a file that is damaged, is not taken: the record is identified
-    anew. Only this package's files are ever read, and no row is deleted. A record over which the
-    process was killed twice is not tried again: its row says so.
+    Each row is a JSON file, written atomically, named by the SHA-256 of the record's samples, the
+    settings and the versions of this package, NumPy and SciPy, with a checksum of its content;
+    processes and machines that share the folder can write to it at the same time. Rows of other
+    versions and damaged files are not used: the record is identified again. Only files of this
+    package are read, and no row is deleted. A record over which the process was killed twice is not
+    tried again: its row has that error.
 
     Parameters
     ----------
     folder : path-like
-        Made if it is not there.
+        Created if it does not exist.
 
     Raises
     ------
@@ -77,18 +77,18 @@ class CampaignStore:
         return self.folder / f"row-{key}.json"
 
     def load(self, key: str) -> CampaignRow | None:
-        """Return the row kept under `key`; None if there is none, or its file is damaged."""
+        """Return the row stored under `key`; None if there is none, or its file is damaged."""
         path = self._path(key)
         try:
-            # what it holds may be the work of others: a pipe would never end
+            # the content may come from others: a pipe would never end
             file = usable_file(path, 2 * MAX_MODEL_BYTES)
             return _row_from(json.loads(file.read_text(encoding="utf-8")), key)
         except (OSError, ValueError, TypeError, RecursionError):
-            # FileFormatError is a ValueError: whatever is wrong, the record is identified anew.
+            # FileFormatError is a ValueError: for any error the record is identified again
             return None
 
     def save(self, key: str, row: CampaignRow) -> CampaignRow:
-        """Keep a row that has a model; return it as `load` will, with a summary for its fit."""
+        """Store a row with a model; return it as `load` would, with a summary of its fit."""
         system = row.system
         assert system is not None
         content = {
@@ -97,7 +97,7 @@ class CampaignStore:
             "key": key,
             "versions": versions(),
             "name": row.name,
-            # Infinity and NaN have no place in JSON; their text has.
+            # JSON has no infinity or NaN; they are stored as text
             "numbers": {
                 "amplitude": repr(float(row.amplitude)),
                 "delay": repr(float(row.delay)),
@@ -119,15 +119,15 @@ class CampaignStore:
 
     @contextmanager
     def attempt(self, key: str) -> Iterator[None]:
-        """Note that the record with this key is being identified, as long as the block lasts.
+        """Mark the record with this key as being identified, for the duration of the block.
 
-        A process that is killed in the block leaves the note, so that a record which exhausts the
-        memory is not tried for ever.
+        If the process is killed within the block the mark remains, so that a record that exhausts
+        the memory is not tried endlessly.
 
         Raises
         ------
         DataError
-            The process has died twice over this record.
+            The process was killed twice over this record.
         """
         path = self.folder / f"tried-{key}.txt"
         count = _count(path)
@@ -136,7 +136,7 @@ class CampaignStore:
                 f"the process was killed {count} times while it identified this record "
                 f"(usually lack of memory); remove {path} to try again"
             )
-        with suppress(OSError):  # a full disk costs the note, not the result
+        with suppress(OSError):  # a full disk prevents the mark, not the result
             write_text(path, f"{count + 1}\n")
         try:
             yield
@@ -145,13 +145,13 @@ class CampaignStore:
                 path.unlink()
 
     def forget_attempts(self) -> None:
-        """Remove the notes of records under way: a caller who stops a run has killed nobody."""
+        """Remove the marks of running records, when the caller stops the run."""
         for path in self.folder.glob("tried-*.txt"):
             path.unlink(missing_ok=True)
 
 
 def _count(path: Path) -> int:
-    """Number in a note; none in one that is damaged or not there."""
+    """Number in a mark; zero if it is damaged or does not exist."""
     try:
         return int(usable_file(path, 100).read_text(encoding="ascii"))
     except (OSError, ValueError):
@@ -191,6 +191,6 @@ def _row_from(content: Any, key: str) -> CampaignRow:
 
 
 def _checksum(content: dict[str, Any]) -> str:
-    """SHA-256 of a row in one canonical spelling, without the checksum itself."""
+    """SHA-256 of a row in a canonical form, without the checksum itself."""
     rest = {name: value for name, value in content.items() if name != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode("ascii")).hexdigest()

@@ -1,4 +1,4 @@
-"""What stays of a fit in a model file."""
+"""Summary of a fit in a model file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KEPT = (
     "total_delay", "total_delay_interval", "gain", "gain_interval", "gain_std_given_structure",
     "onset", "interval_kind", "residual_std", "sampling",
 )  # fmt: skip
-"""What is kept of every fit that has it."""
+"""Attributes that are stored if the fit has them."""
 _MAX_ROWS = 200
 
 Value = TypeVar("Value")
@@ -38,12 +38,12 @@ def _text(value: Plain) -> str | None:
 
 
 def _number(value: Plain) -> float | None:
-    """Take a number of either sign, which stands in a file as text where it is not finite."""
+    """Accept a number of either sign; one that is not finite is stored as text."""
     if isinstance(value, str):
         return float(value) if value in ("inf", "-inf", "nan") else None
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    # a whole number in a file may be larger than that
+    # a whole number in a file may exceed the range of doubles
     return float(value) if abs(value) <= sys.float_info.max else None
 
 
@@ -52,7 +52,7 @@ def _count(value: Plain) -> int | None:
 
 
 def _time(value: Plain) -> float | None:
-    """Tell a time from whatever else a file may hold in its place."""
+    """Accept a time; anything else in its place gives None."""
     time = _number(value)
     return time if time is not None and 0 <= time < math.inf else None
 
@@ -66,7 +66,7 @@ def _pair(value: Plain) -> tuple[float, float] | None:
 
 
 def _times(value: Plain) -> tuple[float, float] | None:
-    """Take an interval of times, which may be open."""
+    """Accept an interval of times, which may be infinite."""
     ends = _pair(value)
     if ends is None or any(-math.inf < end < 0 for end in ends) or not ends[0] <= ends[1]:
         return None
@@ -79,7 +79,7 @@ def _closed(value: Plain) -> tuple[float, float] | None:
 
 
 def _kept(key: str, read: Callable[[Plain], Value], meaning: str) -> Value:
-    """Make a property of what is kept under a key, where it is what it has to be."""
+    """Make a property of the value stored under a key, if it is valid."""
 
     def value(summary: FitSummary) -> Value:
         return read(summary._value(key))
@@ -89,11 +89,11 @@ def _kept(key: str, read: Callable[[Plain], Value], meaning: str) -> Value:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FitSummary(ModelFit):
-    """Report of a fit, without its curves, as a model file keeps it.
+    """Report of a fit without its curves, as stored in a model file.
 
-    ``summary[key]`` is what ``fit.key`` was, for the main numbers of a fit (`delay`, `order`,
-    `dead_time`, `interval`, ...) that are there; what all fits have in common is there as
-    attributes as well, but for the records. ``report()`` is the text that the fit had.
+    ``summary[key]`` is the stored ``fit.key``, for the main numbers of a fit (`delay`, `order`,
+    `dead_time`, `interval`, ...); the common attributes of all fits are attributes as well, except
+    the records. ``report()`` is the text of the original fit.
 
     Attributes
     ----------
@@ -157,13 +157,13 @@ class FitSummary(ModelFit):
 
     @property
     def interval_kind(self) -> IntervalKind | None:
-        """What `interval` is; None where the file does not tell."""
+        """Kind of `interval`; None if the file does not contain it."""
         value = self._value("interval_kind")
         return next((kind for kind in get_args(IntervalKind) if kind == value), None)
 
     @property
     def interval_label(self) -> str:
-        """What `interval` is, in words."""
+        """Kind of `interval`, in words."""
         if self.interval_kind is None and self.kind == "DelayScan":  # of an older file
             return INTERVAL_LABELS["flatness"]
         return super().interval_label
@@ -205,7 +205,7 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
 
 
 def summary_to_json(summary: FitSummary | None) -> dict[str, Any] | None:
-    """Lay out a summary for JSON."""
+    """Convert a summary for JSON."""
     if summary is None:
         return None
     return {
@@ -219,7 +219,7 @@ def summary_to_json(summary: FitSummary | None) -> dict[str, Any] | None:
 
 
 def summary_from_json(content: Any) -> FitSummary | None:
-    """Build a summary from parsed JSON that may hold anything.
+    """Make a summary from parsed JSON with unknown content.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def _pairs(content: Mapping[str, Any], key: str) -> tuple[tuple[str, str], ...]:
 
 
 def _texts(content: Mapping[str, Any], key: str) -> tuple[str, ...]:
-    """Texts that an older file does not have."""
+    """Texts that are missing in an older file."""
     rows = field(content, key, list) if key in content else []
     if len(rows) > _MAX_ROWS or any(not isinstance(text, str) for text in rows):
         raise FileFormatError(f"{key!r} must hold texts, at most {_MAX_ROWS}")
@@ -260,7 +260,7 @@ def _texts(content: Mapping[str, Any], key: str) -> tuple[str, ...]:
 
 
 def _plain(value: Any) -> Plain:
-    """Numbers and text as Python's own; None for what is neither."""
+    """Numbers and text as Python's own; None for anything else."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, np.ndarray) and value.size <= 100:
@@ -268,7 +268,7 @@ def _plain(value: Any) -> Plain:
     if isinstance(value, list | tuple):
         return tuple(_plain(entry) for entry in value)
     if isinstance(value, float):
-        # JSON has no infinity; an open interval is kept as text
+        # JSON has no infinity; an infinite interval is stored as text
         return value if math.isfinite(value) else str(value)
     return value if isinstance(value, int | str | bool) else None
 

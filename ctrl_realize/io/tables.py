@@ -1,4 +1,4 @@
-"""Columns from files of any kind, before anybody knows what they mean."""
+"""Columns from files of any type, before they are assigned to signals."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from .cells import MISSING, NUMBER
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One column as it stands in the file.
+    """One column of a file.
 
     Attributes
     ----------
     name : str
-        Name in the file, empty without a header.
+        Name in the file; empty without a header.
     unit : str
         Unit in the file, in plain spelling, or empty.
     cells : ndarray, shape (N,)
-        Numbers, or text where at least one cell is no number.
+        Numbers, or text if at least one cell is not a number.
     """
 
     name: str
@@ -39,18 +39,18 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns of a file, with what is needed to complain about them well.
+    """Columns of a file, with the information needed for error messages.
 
     Attributes
     ----------
     path : pathlib.Path
     columns : tuple of Column
     constants : mapping of str to float
-        Single numbers that lie beside the columns (``dt`` in ``.npz`` and ``.mat``).
+        Single numbers beside the columns (``dt`` in ``.npz`` and ``.mat``).
     decimal : str
         Decimal sign of cells that are still text.
     place : callable
-        Turns a row index into words for a message: ``"line 17"``.
+        Describes a row for a message: ``"line 17"``.
     """
 
     path: Path
@@ -60,12 +60,12 @@ class Table:
     place: Callable[[int], str] = "row {}".format
 
     def title(self, index: int) -> str:
-        """Name a column for a message: its name, or its number without a header."""
+        """Name of a column for a message, or its number without a header."""
         name = self.columns[index].name
         return f"column {name!r}" if name else f"column {index}"
 
     def listing(self) -> str:
-        """List the columns for a message, at most twenty of them."""
+        """List of the columns for a message, at most twenty."""
         names = [f"{k} {column.name!r}" for k, column in enumerate(self.columns) if column.name]
         if not names:
             return f"{len(self.columns)} columns without a header (0...{len(self.columns) - 1})"
@@ -73,12 +73,12 @@ class Table:
         return "columns " + ", ".join(names[:20]) + more
 
     def numbers(self, index: int, *, keep_missing: bool = False) -> FloatArray:
-        """Return a column as finite real numbers; missing ones are refused, or kept as NaN.
+        """Return a column as finite real numbers; missing ones are refused, or become NaN.
 
         Raises
         ------
         DataError
-            If a cell is not a finite number; the first one is named.
+            A cell is not a finite number; the message names the first one.
         """
         values = self.values(index, keep_missing=keep_missing)
         if np.iscomplexobj(values):

@@ -1,4 +1,4 @@
-"""What a caller can say about a text table."""
+"""Options for reading a text table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _IN_NUMBERS = {"delimiter": frozenset("0123456789eE"), "comment": frozenset("012
 
 @dataclass(frozen=True)
 class TextOptions:
-    """What the caller says about a text table; ``"auto"`` is found out."""
+    """Options for reading a text table; ``"auto"`` is determined from the file."""
 
     delimiter: str = "auto"
     decimal: str = "auto"
@@ -45,7 +45,7 @@ class TextOptions:
         whole(self.skip_rows, "skip_rows", 0)
         if self.encoding != "auto":
             try:
-                # also refuses the codecs of Python that are no encodings of text: zlib, rot13
+                # also refuses Python's codecs other than text encodings: zlib, rot13
                 b"1".decode(self.encoding)
             except UnicodeError:
                 pass

@@ -13,12 +13,12 @@ from .columns import holds_numbers
 from .tables import Table
 from .units import checked_time_unit, plain_unit, to_seconds
 
-# from here on neighbouring integers are one double
+# from here on neighbouring integers are the same double
 _EXACT_INTEGERS = 2**53
-# in s since 1970; a clock of seconds needs no check, for it is taken for what it is
+# in s since 1970; a clock in seconds needs no check
 _YEAR_1990, _YEAR_2100 = 6.3e8, 4.1e9
 _TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
-# years 2000 to 2060 in days, as Excel and as MATLAB's datenum count them
+# years 2000 to 2060 in days, as counted by Excel and by MATLAB's datenum
 _DAY_COUNTS = ((36526.0, 58440.0), (730486.0, 752400.0))
 # 12:34, 12:34.5, 12:34:56 and 12:34:56.789
 _CLOCK = r"(\d{1,3}):(\d{2}(?:\.\d*)?)(?::(\d{2}(?:\.\d*)?))?"
@@ -29,7 +29,7 @@ _HALF_AN_HOUR = 1 / 48
 
 
 def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None) -> FloatArray:
-    """Return the time column in s; dates and times of day count from the first row.
+    """Return the time column in s; dates and times of day are relative to the first row.
 
     Parameters
     ----------
@@ -37,16 +37,16 @@ def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None
     index : int
         Position of the time column.
     unit : str
-        Unit of numbers, or ``"auto"``: the one in the header, else s.
+        Unit of numbers, or ``"auto"``: that of the header, otherwise s.
     time_format : str or None
-        How dates are written (as for `datetime.strptime`), where it is not ISO 8601.
+        Format of dates (as for `datetime.strptime`), if it is not ISO 8601.
 
     Raises
     ------
     DataError
-        A cell that is no time.
+        A cell is not a time.
     OptionError
-        A unit that is not one of time.
+        Not a unit of time.
     """
     cells = table.columns[index].cells
     if cells.dtype.kind in "mM":
@@ -59,7 +59,7 @@ def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None
         _check_epoch(table, index, cells)
     unit = checked_time_unit((table.columns[index].unit or "s") if unit == "auto" else unit)
     if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
-        # nanoseconds since 1970 do not fit into a double, their differences do
+        # nanoseconds since 1970 do not fit into a double, but their differences do
         return to_seconds((cells - cells[0]).astype(np.float64), unit)
     values = table.numbers(index)
     if untold:
@@ -68,11 +68,11 @@ def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None
 
 
 def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
-    """Refuse a clock of ms or finer since 1970 that would be taken for one of seconds."""
+    """Refuse a clock in ms or finer since 1970 that would be taken for seconds."""
     try:
         first = float(cells[0])
     except (ValueError, TypeError, OverflowError):
-        return  # told with its line, when the whole column is read
+        return  # reported with its line when the whole column is read
     units = [unit for unit, ticks in _TICKS.items() if _YEAR_1990 <= first / ticks < _YEAR_2100]
     if units:
         raise OptionError(
@@ -83,9 +83,9 @@ def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
 
 
 def _check_day_count(table: Table, index: int, values: FloatArray) -> None:
-    """Refuse dates as a spreadsheet counts them, which would be taken for seconds.
+    """Refuse dates in days, as in a spreadsheet, that would be taken for seconds.
 
-    A clock of seconds may show such a number too, but then its steps are round.
+    A clock in seconds may have such numbers too, but then its steps are round.
     """
     if not any(low <= values[0] < high for low, high in _DAY_COUNTS):
         return
@@ -139,9 +139,9 @@ def _parsed_dates(
 def _parsed_times_of_day(
     table: Table, index: int, cells: list[str], unit: str
 ) -> np.ndarray[Any, Any]:
-    """Times as 12:34:56 or 12:34:56.789, on one day or over midnights, or as `unit` says.
+    """Times as 12:34:56 or 12:34:56.789, on one day or across midnight, or as `unit` says.
 
-    ``12:34`` may be hours and minutes, or minutes and seconds: the unit is that of the first.
+    ``12:34`` may be hours and minutes, or minutes and seconds: `unit` is that of the first number.
     """
     parts = [re.fullmatch(_CLOCK, cell) for cell in cells]
     for row, part in enumerate(parts):
@@ -165,7 +165,7 @@ def _parsed_times_of_day(
             f"{table.path}: {table.title(index)} mixes times with two and three fields, such "
             f"as {cells[short]!r}"
         )
-    # in whole nanoseconds, for 0.1 s is no binary fraction
+    # in whole nanoseconds, because 0.1 s is not a binary fraction
     stamps = np.array(
         [
             sum(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
 
-# Scale as (multiplier, divisor): t / 1000 is the double nearest to the decimal number that the
-# file means, t * 0.001 often is its neighbour.
+# Scale as (multiplier, divisor): t / 1000 is the double nearest to the decimal number in the file,
+# t * 0.001 often is not.
 TIME_UNITS: dict[str, tuple[float, float]] = {
     "s": (1.0, 1.0),
     "ms": (1.0, 1e3),
@@ -14,7 +14,7 @@ TIME_UNITS: dict[str, tuple[float, float]] = {
     "ns": (1.0, 1e9),
     "min": (60.0, 1.0),
     "h": (3600.0, 1.0),
-    # not "d": a column u_d is a disturbance before it is u in days
+    # not "d": a column u_d is more likely a disturbance than u in days
     "day": (86400.0, 1.0),
 }
 
@@ -41,14 +41,14 @@ _CLOSING = "])}>"
 
 
 def plain_unit(text: str) -> str:
-    """Spell a unit in one way: ``"Sec" -> "s"``, ``"µs" -> "us"``, ``"Degrees" -> "deg"``."""
-    # MHz is the one unit here whose meaning is in its capital letter, and mHz is not in use
+    """Normalise a unit: ``"Sec" -> "s"``, ``"µs" -> "us"``, ``"Degrees" -> "deg"``."""
+    # MHz is the only unit here that depends on its capital letter, and mHz is not in use
     lower = text.strip().strip("[](){}<>").strip().lower()
     return _SPELLINGS.get(lower, lower)
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Split a column's name into what it is and its unit.
+    """Split a column's name into name and unit.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def is_units_line(cells: list[str]) -> bool:
-    """Tell whether the cells below a header are units and not names or numbers."""
+    """Whether the cells below a header are units, not names or numbers."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     bracketed = [cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled]
     known = [plain_unit(cell) in _KNOWN for cell in filled]
@@ -87,7 +87,7 @@ def to_seconds(values: FloatArray, unit: str) -> FloatArray:
 
 
 def checked_time_unit(unit: str) -> str:
-    """Return the plain spelling of a unit of time, or say which ones there are."""
+    """Return the plain spelling of a unit of time, or raise an error that lists them."""
     plain = plain_unit(unit) if isinstance(unit, str) else None
     if plain not in TIME_UNITS:
         raise OptionError(

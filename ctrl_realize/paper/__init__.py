@@ -1,8 +1,8 @@
-"""Every number that the paper prints, with its place.
+"""Every number printed in the paper, with its place.
 
-J. van Helvoirt et al., *Approximate realization of valve dynamics with time delay*, IFAC 2005. A
-name below is followed by the section, figure or table where its number stands. Misprints are
-listed in `ERRATA`.
+J. van Helvoirt et al., *Approximate realization of valve dynamics with time delay*, IFAC 2005. Each
+name below is followed by the section, figure or table of its number. Misprints are listed in
+`ERRATA`.
 
 Examples
 --------
@@ -66,13 +66,14 @@ DEAD_TIME = DELAY * SETTINGS.sample_time
 """The same delay in s: 28.9 ms."""
 
 TRUSTED_BAND_HZ = (0.1, 13.0)
-"""Where the model is good (section 3.2, figure 8); printed as 0.01-13 Hz, see `ERRATA`, E13."""
+"""Band in which the model is good (section 3.2, figure 8); printed as 0.01-13 Hz, see `ERRATA`,
+E13."""
 
 SHOWN_RECORD = (16.0, 5)
 """Step size in mA and number of the record of figures 6 and 7."""
 
 FINAL_RECORD = (16.0, 2)
-"""Step size in mA and number of the record of least IAE, which gave the final model."""
+"""Step size in mA and number of the record with the smallest IAE, which gave the final model."""
 
 TABLE_1 = table_1.DELAYS
 """Estimated delays in samples: record 1-10 x step size 16, 12, 8, 4 mA (Table 1).
@@ -102,12 +103,12 @@ Examples
 
 
 def table_1_statistics(*, ddof: int = 1) -> TrimmedStatistics:
-    """Summarize Table 1 as section 3.2 says: without the three smallest and highest values.
+    """Summarize Table 1 as in section 3.2: without the three smallest and largest values.
 
     Parameters
     ----------
     ddof : int, default 1
-        Divisor of the variance is the number of values left minus this.
+        Divisor of the variance is the number of values minus this.
 
     Returns
     -------

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Erratum:
-    """A misprint or an open point of the paper, and what this toolbox does about it.
+    """A misprint or an open point of the paper, and its treatment in this toolbox.
 
     Parameters
     ----------
     code : str
         E1 ... E17.
     place : str
-        Where it stands.
+        Place in the paper.
     printed : str
-        What is printed, or left unsaid.
+        What is printed, or missing.
     read_as : str
         What is implemented.
 

@@ -1,4 +1,4 @@
-"""What the paper set and what it measured with."""
+"""Settings and set-up of the paper."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the method, as section 3.2 prints them.
+    """Settings of the method, as printed in section 3.2.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class Settings:
     cutoff_hz : float
         Its cut-off.
     zero_phase : bool
-        The paper does not say; False is the literal reading, "filtered through".
+        The paper does not state it; False is the literal reading, "filtered through".
     order : int
         Order rho of the realization, found by trial and error in `orders_tried`.
     samples : int

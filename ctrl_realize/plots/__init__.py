@@ -1,4 +1,4 @@
-"""Plots of results; each returns a `control.ControlPlot` and never calls show."""
+"""Plots of results; each returns a `control.ControlPlot` and does not call show."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The delays of many records in one picture."""
+"""Plot of the delays of many records."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def campaign_plot(
 ) -> ct.ControlPlot:
     """Draw the delay of every record with its interval, and their trimmed mean (Table 1).
 
-    Records are grouped by the height of their step where several share one; few or all different
-    ones are listed by name.
+    Records are grouped by the height of their step if several have the same one; otherwise, or if
+    they are few, they are listed by name.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def campaign_plot(
     trim : int, optional
         Values left out at each end of the mean, see `Campaign.statistics`.
     truth : float, optional
-        Known delay in samples, of a simulation.
+        Known delay in samples, for simulated data.
     **kwargs
         Line properties of the points.
 
@@ -76,7 +76,7 @@ def campaign_plot(
         room = _room_for_legend(axes, 1 if truth is None else 2)
         along = axes.axvline if listed else axes.axhline
         band = axes.axvspan if listed else axes.axhspan
-        # Lines across the names end below the legend; those across the heights pass it by.
+        # Lines across the names end below the legend; those across the heights pass beside it.
         reach = {"ymax": 1 - room} if listed else {}
         if np.isfinite(summary.std_error):
             band(*summary.interval, color=style.BAND, alpha=0.25, linewidth=0, **reach)
@@ -93,7 +93,7 @@ def campaign_plot(
 
 
 def _groups(campaign: Campaign) -> dict[float, list[CampaignRow]] | None:
-    """Group by step height; None where that shows less than the names do."""
+    """Group by step height; None if this shows less than the names."""
     if not campaign.good:
         raise DataError("no record of the campaign was identified; there is nothing to plot")
     groups: dict[float, list[CampaignRow]] = {}
@@ -138,7 +138,7 @@ def _by_name(
 
 
 def _room_for_legend(axes: Axes, lines: int) -> float:
-    """Leave the top of the axes to the legend, so that it hides no record; return its share."""
+    """Reserve the top of the axes for the legend; return its fraction."""
     tall = axes.get_window_extent().height * 72 / axes.figure.dpi
     share = min(1.7 * mpl.rcParams["legend.fontsize"] * lines / max(tall, 1.0), 0.5)
     low, high = axes.get_ylim()  # names are listed downwards

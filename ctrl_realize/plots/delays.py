@@ -1,4 +1,4 @@
-"""Plots of dead times: estimates side by side, their distributions, and their course."""
+"""Plots of dead times: estimates, their distribution, and their history."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .style import axis_time_unit
 
 
 def estimate_of(system: DelayedStateSpace) -> float:
-    """Return the dead time in s: that of the fit, which may be no whole number of samples."""
+    """Return the dead time in s: that of the fit, which need not be a whole number of samples."""
     fitted = None if system.fit is None else system.fit.dead_time
     return float(np.max(system.dead_time)) if fitted is None else fitted
 
 
 def interval_of(system: DelayedStateSpace) -> tuple[float, float] | None:
-    """Return the interval of a model's dead time in s, None where its fit knows none."""
+    """Return the interval of a model's dead time in s; None if its fit has none."""
     interval = None if system.fit is None else system.fit.dead_time_interval
     if interval is None:
         return None
@@ -35,7 +35,7 @@ def interval_of(system: DelayedStateSpace) -> tuple[float, float] | None:
 
 
 def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None:
-    """Draw the dead time as a line, its interval as a band; `factor` is in units per s."""
+    """Draw the dead time as a line and its interval as a band; `factor` is the unit in 1/s."""
     wait = estimate_of(system)
     interval = interval_of(system)
     text = f"dead time\n{in_time(wait)} = {wait / system.dt:.3g} samples"
@@ -58,7 +58,7 @@ def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None
 def delay_comparison_plot(
     check: DelayComparison, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
-    """Draw the intervals of a delay that was seen in several ways, and what they agree on.
+    """Draw the delay estimates of several methods with their intervals, and the common interval.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def bootstrap_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw the dead times of all draws and the band of their unit step responses.
+    """Draw the dead times of all draws, and the band of their unit step responses.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def bootstrap_plot(
     samples : int, optional
         Length of the step responses; default: until the model has settled.
     **kwargs
-        Line properties of the step response of the data's own model.
+        Line properties of the step response for the original data.
 
     Examples
     --------
@@ -173,7 +173,7 @@ def _settled(result: Bootstrap) -> int:
 def track_plot(
     track: TrackHistory, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
-    """Draw the course of a tracked dead time and gain; where nothing is claimed, a gap.
+    """Draw the history of a tracked dead time and gain; with gaps where it is not resolved.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which function draws which kind of result."""
+"""Selection of the plot for each kind of result."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
 @singledispatch
 @documented()
 def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
-    """Draw any result with the function that is made for its kind.
+    """Draw any result by the function for its kind.
 
     ``result.plot(**kwargs)`` does the same.
 
@@ -46,7 +46,7 @@ def draw(result: Any, **kwargs: Any) -> ct.ControlPlot:
     Raises
     ------
     OptionError
-        There is no picture of such a thing.
+        There is no plot for this kind of object.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def _no_curves(result: FitSummary, **kwargs: Any) -> ct.ControlPlot:
     )
 
 
-# the function's first annotation names the kind of result
+# the annotation of the first argument is the kind of result
 for _plot in (
     bootstrap_plot,
     campaign_plot,
@@ -98,7 +98,7 @@ for _plot in (
 ):
     draw.register(_plot)
 
-# of functions that take more than one kind
+# for functions with more than one kind
 draw.register(OutputErrorFit, fit_plot)
 draw.register(DelayScan, delay_plot)
 draw.register(MeasuredFRF, frf_plot)

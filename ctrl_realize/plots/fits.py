@@ -1,4 +1,4 @@
-"""Plots of an output-error fit: data, model, what is left, and where the dead time can be."""
+"""Plots of an output-error fit: data, model, residual, and dead times of all structures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .shared_docs import documented
 from .style import axis_time_unit
 
 _RULED_OUT = 10.0
-"""Structures with a larger excess are not drawn."""
+"""Structures with a larger difference of the criterion are not drawn."""
 _MOST_STRUCTURES = 8
 _MOST_RECORDS = 40  # drawn behind their mean
 
@@ -33,9 +33,9 @@ def fit_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw the fitted record, the model, what is left, and where the dead time can be.
+    """Draw the fitted record, the model, the residual, and the dead times of all structures.
 
-    Of several step records the mean is drawn, with each of them behind it.
+    For several step records, their mean and the individual records are drawn.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def fit_plot(
     Raises
     ------
     OptionError
-        A model that was not found by an output-error fit.
+        The model was not found by an output-error fit.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def dead_time_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw where the dead time can be, as every structure and view sees it.
+    """Draw the dead times with intervals of all structures and other estimates.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def dead_time_plot(
     Raises
     ------
     OptionError
-        A model that was not found by an output-error fit.
+        The model was not found by an output-error fit.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def _data_and_model(
 
 
 def _each_record(axes: Axes, result: OutputErrorFit, factor: float) -> list[Line2D]:
-    """Draw every record behind their mean, each per unit of its own step."""
+    """Draw every record behind their mean, scaled to a unit step."""
     lines: list[Line2D] = []
     every = max(1, -(-len(result.records) // _MOST_RECORDS))
     for record in result.records[::every]:
@@ -166,19 +166,19 @@ def _each_record(axes: Axes, result: OutputErrorFit, factor: float) -> list[Line
 
 
 def _first_motion(result: OutputErrorFit) -> int:
-    """Start the picture a little before the model moves."""
+    """Start the plot slightly before the response of the model."""
     moved = np.abs(result.fitted - result.fitted[0]) > 0.01 * float(np.ptp(result.fitted))
     first = int(np.argmax(moved)) if moved.any() else 0
     return max(0, first - max((result.time.size - first) // 8, round(1.5 * result.delay)))
 
 
 def _averaged(result: OutputErrorFit) -> bool:
-    """Steps are averaged; records of other inputs have no first motion and follow each other."""
+    """Whether steps were averaged; records with other inputs are concatenated and have no onset."""
     return len(result.records) > 1 and not np.isnan(result.onset)
 
 
 def _output_label(result: OutputErrorFit) -> str:
-    if _averaged(result):  # records of different steps are scaled before they are averaged
+    if _averaged(result):  # records with different steps were scaled before they were averaged
         return "unit step\nresponse"
     label = result.records[0].output_labels[0] if result.records else "y"
     return "output" if label == "y" else wrapped(label, 18)
@@ -192,7 +192,7 @@ def evidence_height(result: OutputErrorFit) -> float:
 def _evidence_rows(
     result: OutputErrorFit,
 ) -> list[tuple[str, float, tuple[float, float] | None, str]]:
-    """List who sees which dead time, with which interval: structures not ruled out, then views."""
+    """List dead times with intervals: structures not ruled out, then other estimates."""
     rows: list[tuple[str, float, tuple[float, float] | None, str]] = []
     for line in result.structures:
         if line.interval is not None and line.delta_bic <= _RULED_OUT:
@@ -204,7 +204,7 @@ def _evidence_rows(
 
 
 def _evidence(axes: Axes, result: OutputErrorFit, **kwargs: Any) -> list[Line2D]:
-    """Draw one row for each structure that is not ruled out, and one for each view."""
+    """Draw one row for each structure that is not ruled out, and one for each other estimate."""
     rows = _evidence_rows(result)
     low, high = result.interval
     factor, unit = axis_time_unit(max(high, *(seen for _, seen, _, _ in rows)), axes)

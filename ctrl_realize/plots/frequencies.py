@@ -1,4 +1,4 @@
-"""Plots of frequency responses: measured with their coherence, models on top."""
+"""Plots of frequency responses: measured ones with coherence, and models."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .shared_docs import documented
 from .style import decibel, frequency_axis, phase_ticks
 
 _FEW_POINTS = 60
-"""So few measured points are drawn as dots as well: what lies between them is not known."""
+"""Number of measured points up to which they are drawn as dots, too."""
 
 
 @documented("sequence of two Axes, or of three with a coherence,")
@@ -34,29 +34,29 @@ def frf_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw measured frequency responses and models on top of them (figures 2 and 8).
+    """Draw measured frequency responses and models (figures 2 and 8).
 
-    Gain in dB and phase in degrees; where a measurement has a coherence, that too, and points
-    with a coherence below 0.95 are drawn pale. Phases are unwrapped with the dead time of the
-    model taken out first, so they are right at any delay.
+    Gain in dB and phase in degrees; if a measurement has a coherence, it is drawn as well, and
+    points with a coherence below 0.95 are pale. Phases are unwrapped after removing the dead time
+    of the model, so they are correct at any delay.
 
     Parameters
     ----------
     sysdata : system or FRF, or sequence of them
-        Anything python-control takes for a frequency response, one input and one output:
-        `MeasuredFRF` or other frequency response data, discrete or continuous systems.
+        Frequency responses with one input and one output: `MeasuredFRF` or other frequency response
+        data, discrete or continuous systems.
     frequency_hz : array_like, optional
-        Frequencies for the models in Hz. Default: the span of the measurements.
+        Frequencies for the models in Hz. Default: the range of the measurements.
     dead_time : float, optional
-        Delay in s whose phase is taken out before unwrapping. Default: that of the first model
-        that has one.
+        Delay in s whose phase is removed before unwrapping. Default: that of the first model that
+        has one.
     **kwargs
         Line properties of all curves.
 
     Raises
     ------
     UnsuitableSystemError
-        Something that is no system, or one with several inputs or outputs.
+        Not a system, or one with several inputs or outputs.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def frf_plot(
 
 @documented("sequence of two Axes")
 def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
-    """Draw a fitted frequency response over the measured one.
+    """Draw a fitted and the measured frequency response.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def _looks(curve: Curve, models: int) -> dict[str, Any]:
 
 
 def _draw(axes: Axes, curve: Curve, values: FloatArray, looks: dict[str, Any]) -> list[Line2D]:
-    """Draw the good points as `looks` says, and the others pale behind them."""
+    """Draw the good points with the properties `looks`, and the others pale behind them."""
     if not curve.good.all():
         axes.plot(curve.frequency_hz, values, **{**looks, "alpha": 0.35, "linewidth": 0.8})
         values = np.where(curve.good, values, np.nan)
@@ -168,7 +168,7 @@ def _draw(axes: Axes, curve: Curve, values: FloatArray, looks: dict[str, Any]) -
 
 
 def _focus(axes: Axes, drawn: Sequence[tuple[Curve, FloatArray]]) -> None:
-    """Choose the y axis by what can be trusted; noise may leave it."""
+    """Choose the range of the y axis from the trusted points; noise may exceed it."""
     if all(curve.coherence is None for curve, _ in drawn):
         return
     shown = np.concatenate([values[curve.good] for curve, values in drawn if curve.measured])

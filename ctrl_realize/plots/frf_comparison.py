@@ -1,4 +1,4 @@
-"""A model beside a measured frequency response."""
+"""Plots of a model and a measured frequency response."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from .shared_docs import documented
 from .style import frequency_axis
 
 TRUSTED_COHERENCE = 0.95
-"""Points of less coherence are drawn pale."""
+"""Points with a lower coherence are drawn pale."""
 _POINTS = 600
-"""Frequencies at which a model is drawn."""
+"""Number of frequencies at which a model is drawn."""
 FITTED = "fit, order"
-"""How the name of a fitted response begins."""
+"""Beginning of the name of a fitted response."""
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One frequency response, ready to draw."""
+    """One frequency response, prepared for drawing."""
 
     label: str
     frequency_hz: FloatArray
@@ -42,7 +42,7 @@ class Curve:
 
     @property
     def good(self) -> BoolArray:
-        """Which points are coherent; all of them where none is, or where nobody knows."""
+        """Coherent points; all of them if none is, or if the coherence is not known."""
         if self.coherence is None:
             return np.ones(self.frequency_hz.size, dtype=np.bool_)
         good = self.coherence >= TRUSTED_COHERENCE
@@ -52,7 +52,7 @@ class Curve:
 def curves_of(
     items: Sequence[Any], frequency_hz: Sequence[float] | None, dead_time: float | None
 ) -> list[Curve]:
-    """Evaluate systems and FRFs, with phases that agree; `dead_time` is taken out to unwrap."""
+    """Evaluate systems and FRFs with consistent phases; `dead_time` is removed for unwrapping."""
     for item in items:
         if not isinstance(item, ct.LTI):
             raise UnsuitableSystemError(
@@ -69,14 +69,14 @@ def curves_of(
     delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
     curves = [_curve(item, grid, delay) for item in items]
     nameless = [curve for curve in curves if re.fullmatch(r"sys\[\d+\]", curve.label)]
-    if len(nameless) == 1:  # python-control's own name says nothing
+    if len(nameless) == 1:  # python-control's default name
         place = curves.index(nameless[0])
         curves[place] = replace(nameless[0], label="model")
     return _aligned(curves)
 
 
 def _grid(items: Sequence[Any], data: Sequence[Any]) -> FloatArray:
-    """Span the measurements; without any, three decades up to where the models end."""
+    """Range of the measurements; without any, three decades up to the upper end of the models."""
     if data:
         ends = np.concatenate([np.asarray(one.omega) for one in data]) / (2 * np.pi)
         positive = ends[ends > 0]
@@ -100,7 +100,7 @@ def _curve(item: Any, grid: FloatArray, delay: float) -> Curve:
         response = np.asarray(item(_points(frequency, step))).reshape(-1)
         coherence = None
     phase = np.degrees(unwrapped_phase(response, 2 * np.pi * frequency, delay))
-    # A fitted curve is a model, though only its response may be known.
+    # A fitted curve is a model, even if only its response is known.
     measured = isinstance(item, ct.FrequencyResponseData) and not item.name.startswith(FITTED)
     return Curve(item.name or "measured", frequency, response, phase, coherence, measured)
 
@@ -111,7 +111,7 @@ def _points(frequency_hz: FloatArray, step: float) -> ComplexArray:
 
 
 def _aligned(curves: list[Curve]) -> list[Curve]:
-    """Move phases by whole turns, so that they agree with the first model's where it is good."""
+    """Shift phases by whole turns to match that of the first model where it is good."""
     reference = next((curve for curve in curves if not curve.measured), curves[0])
     moved = []
     for curve in curves:
@@ -131,7 +131,7 @@ def comparison_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw how far a model's gain and phase are from the measured ones, and the trusted band.
+    """Draw the gain and phase errors of a model, and the trusted band.
 
     Parameters
     ----------

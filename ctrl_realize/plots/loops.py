@@ -34,7 +34,7 @@ def margins_plot(
 ) -> ct.ControlPlot:
     """Draw gain, phase and Nyquist curve of a loop with its margins marked.
 
-    The phase is that of the curve as the count followed it: unwrapped right at any delay.
+    The phase is that of the curve along the Nyquist count: correctly unwrapped at any delay.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def margins_plot(
 def _shown_band(result: Margins) -> tuple[float, float]:
     """Choose the frequencies to show in rad/s.
 
-    Far above the crossovers the delay turns on and on; the picture is about the rest.
+    Far above the crossovers the phase of the delay keeps turning, which is left out.
     """
     omega = result.response[0]
     ends = np.array([result.gain_crossover, result.phase_crossover, result.modulus_crossover])
@@ -93,7 +93,7 @@ def _shown_band(result: Margins) -> tuple[float, float]:
 
 
 def _three(ax: style.AxesLike) -> list[Axes]:
-    """Put gain above phase and the Nyquist curve beside them; axes that are given stay."""
+    """Arrange gain above phase, with the Nyquist curve beside them; given axes are kept."""
     if ax is not None and not isinstance(ax, FigureBase):
         return style.axes_for(ax, 3)
     figure = plt.figure(figsize=(9.6, 5.4), layout="constrained") if ax is None else ax
@@ -159,10 +159,10 @@ def closed_loop_plot(
     ----------
     plant : DelayedStateSpace
     controllers : mapping of str to system
-        Name -> controller of the plant's sample time; each must make a stable loop.
+        Name -> controller with the plant's sample time; each must give a stable loop.
     span : float, optional
-        Time to show in s. Default: a quarter more than all responses take to stay within 2 % of
-        where they end.
+        Time to show in s. Default: 1.25 times the time until all responses stay within 2 % of their
+        final values.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def closed_loop_plot(
     if span is None:
         span = _span(plant, controllers)
     count = int(np.ceil(positive(span, "span", "time in s") / plant.dt)) + 1
-    # Twice the span is computed: what wraps around shows at the end.
+    # Twice the span is computed: circular wrap-around shows at the end.
     length = 2 ** int(np.ceil(np.log2(2 * count)))
     drawn: list[list[Any]] = [[], []]
     with style.canvas(ax, 2, title=title, default_title="Closed loop", size=(8.0, 6.5)) as axes:
@@ -205,7 +205,7 @@ def closed_loop_plot(
 
 
 def _span(plant: DelayedStateSpace, controllers: Mapping[str, Any]) -> float:
-    """Time in s until the slowest of the loops has settled, and a quarter more."""
+    """1.25 times the time in s until the slowest loop has settled."""
     samples = 8
     for name, controller in controllers.items():
         time = loop_time(plant, controller, name)

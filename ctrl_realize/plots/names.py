@@ -1,4 +1,4 @@
-"""Names that came with the data, made safe to draw."""
+"""Names from the data, made safe for drawing."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 
 
 def plain(text: str, longest: int = 80) -> str:
-    r"""Make a name that came with the data safe to draw.
+    r"""Make a name from the data safe for drawing.
 
-    Dollar signs and a leading underscore are instructions to matplotlib; control characters have
-    no glyph, nor have letters that the user's fonts do not know. `longest` counts letters of
-    ordinary width: a row of "W" is cut sooner, before it leaves no room for the axes.
+    Dollar signs and a leading underscore have a meaning for matplotlib; control characters and
+    letters that the user's fonts do not contain have no glyph. `longest` counts letters of ordinary
+    width: a row of "W" is shortened further, so that the axes keep their space.
 
     Examples
     --------
@@ -30,7 +30,7 @@ def plain(text: str, longest: int = 80) -> str:
 
 
 def _shown(text: str, longest: int) -> str:
-    """Return the letters of a name that can be drawn, at most so many."""
+    """Return the drawable letters of a name, at most `longest`."""
     known = _letters(tuple(mpl.rcParams["font.family"]), tuple(mpl.rcParams["font.sans-serif"]))
     shown = "".join(
         letter if letter.isprintable() and ord(letter) in known else "?"
@@ -44,10 +44,10 @@ def _shown(text: str, longest: int) -> str:
 
 @cache
 def _letters(families: tuple[str, ...], sans: tuple[str, ...]) -> frozenset[int]:
-    """Code points that the fonts of these families can draw."""
+    """Code points that the fonts of these families contain."""
     found: set[int] = set()
     for family in (name for one in families for name in (sans if one == "sans-serif" else (one,))):
-        with suppress(ValueError):  # a font that is not on this machine
+        with suppress(ValueError):  # a font that is not installed
             path = findfont(FontProperties(family=family), fallback_to_default=False)
             found.update(get_font(path).get_charmap())
     return frozenset(found)
@@ -61,6 +61,6 @@ def _width(letter: str) -> float:
 
 def wrapped(text: str, width: int) -> str:
     """Break a name into at most three short lines."""
-    # the dollar signs last: between one and its backslash no line may end
+    # dollar signs last: a line must not end between one and its backslash
     lines = wrap(_shown(text, 80), width)[:3] or ["signal"]
     return "\n".join(lines).replace("$", r"\$")

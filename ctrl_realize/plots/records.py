@@ -1,4 +1,4 @@
-"""Plots of what was measured in time: records, step responses and their onset."""
+"""Plots of time signals: records, step responses and their onset."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from .shared_docs import documented
 from .style import axis_time_unit
 
 _FEW_SAMPLES = 60
-"""So few samples are drawn as points as well: what lies between them is not known."""
+"""Number of samples up to which they are drawn as points, too."""
 
 _SHOWN_BEFORE = 0.35
-"""Time shown before a step, as a share of what is shown after it."""
+"""Time shown before a step, as a fraction of that after it."""
 
 UNIT_STEP = "unit step response\n[output / input]"
 
@@ -75,12 +75,12 @@ def step_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw responses to a unit step, and a model's on top.
+    """Draw responses to a unit step, with that of a model.
 
     Parameters
     ----------
     step : Record or StepResponse, or sequence of them
-        Records are cut and scaled by `unit_step`.
+        Records are converted by `unit_step`.
     system : DelayedStateSpace, optional
         Model, drawn dashed.
     **kwargs
@@ -116,17 +116,17 @@ def onset_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw the first moments after a step, with the dead time of a model (figure 4).
+    """Draw the start of step responses, with the dead time of a model (figure 4).
 
     Parameters
     ----------
     step : Record or StepResponse, or sequence of them
-        Records are cut and scaled by `unit_step`.
+        Records are converted by `unit_step`.
     system : DelayedStateSpace, optional
-        Model, whose response, dead time and interval are drawn.
+        Model, drawn with its response, dead time and interval.
     span : float, optional
-        Time after the step to show, in s. Default: three dead times, and enough to see the
-        response rise.
+        Time after the step to show, in s. Default: three dead times, and enough to show the rise of
+        the response.
     **kwargs
         Line properties of the measured responses.
 
@@ -232,7 +232,7 @@ def _until(step: StepResponse, end: float) -> StepResponse:
 
 
 def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
-    """Show three dead times, or up to a quarter of the way where the response is slower."""
+    """Show three dead times, or up to a quarter of the final value for a slower response."""
     final = float(np.nanmedian(step.output[-max(step.n_samples // 20, 1) :]))
     reached = np.flatnonzero(np.abs(step.output) >= 0.25 * abs(final))
     rise = step.dt * (int(reached[0]) if reached.size else step.n_samples // 4)

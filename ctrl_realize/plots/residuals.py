@@ -1,4 +1,4 @@
-"""Plots of what a model says beside what was measured, and of what is left."""
+"""Plots of simulated and measured outputs, and of the residual."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def residual_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw measured and simulated output, and the correlations of what is left with its bounds.
+    """Draw measured and simulated output, and the correlations of the residual with their bounds.
 
     Parameters
     ----------
@@ -70,13 +70,13 @@ def residual_plot(
 
 @documented()
 def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) -> ct.ControlPlot:
-    """Draw how a fitted model follows one of its records, and the correlations of what is left.
+    """Draw the fit of a model to one of its records, and the correlations of the residual.
 
     Parameters
     ----------
     fit : StateSpaceFit
     record : int, optional
-        Which of the records without gaps.
+        Number of the record, among those without gaps.
     **kwargs
         Passed on to `residual_plot`.
 
@@ -102,7 +102,7 @@ def prediction_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw a predicted output over the measured one.
+    """Draw predicted and measured output.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def prediction_plot(
 def _signals(
     axes: Axes, record: Record, values: FloatArray, row: int, label: str, looks: dict[str, Any]
 ) -> list[Line2D]:
-    """Draw an output as it was measured and as a model says it is."""
+    """Draw the measured and the simulated output."""
     factor, unit = axis_time_unit(float(np.ptp(record.time)), axes)
     time = factor * record.time
     measured = np.atleast_2d(record.output)[row]
@@ -145,7 +145,7 @@ def _signals(
 
 
 def _stems(axes: Axes, lags: FloatArray, rho: FloatArray, bound: float) -> list[Line2D]:
-    """Draw correlations as upright lines, with the bound that chance alone keeps."""
+    """Draw correlations as vertical lines, with their bound."""
     axes.axhspan(-bound, bound, color=style.BAND, alpha=0.3, linewidth=0)
     axes.vlines(lags, 0, rho, color=style.MEASURED, linewidth=1.5)
     return list(axes.plot(lags, rho, "o", color=style.MEASURED, markersize=3.5))

@@ -1,4 +1,4 @@
-"""Plots of responses: impulses, measured, estimated and of models; the step of a system."""
+"""Plots of impulse responses, measured, estimated and of models, and of the step response."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def impulse_plot(
     systems : DelayedStateSpace or sequence of them, optional
         Models, drawn dashed.
     until : float, optional
-        Last time to show, in s. Default: where the response has died away.
+        Last time to show, in s. Default: when the response has decayed.
     **kwargs
         Line properties of the measured response.
 
@@ -100,7 +100,7 @@ def impulse_plot(
 def mimo_realization_plot(
     fit: MimoRealization, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
-    """Draw the responses of all channels, with a line where the delay of each ends.
+    """Draw the responses of all channels, with their delays.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def mimo_realization_plot(
 
 @documented()
 def impulse_estimate_plot(estimate: ImpulseEstimate, *args: Any, **kwargs: Any) -> ct.ControlPlot:
-    """Draw an estimated impulse response in its band of two standard deviations.
+    """Draw an estimated impulse response with its band of two standard deviations.
 
     Parameters
     ----------
@@ -174,14 +174,15 @@ def system_plot(
 ) -> ct.ControlPlot:
     """Draw the response of a system to a unit step, with its dead time.
 
-    Every output answers a step of every input by itself. The cost does not grow with the delay.
+    The responses of every output to a step of every input are drawn. The cost does not depend on
+    the delay.
 
     Parameters
     ----------
     system : DelayedStateSpace
     until : float, optional
-        End of the plot in s; default: when the response has settled, as `control.step_response`
-        chooses it for the core, after the longest dead time.
+        End of the plot in s; default: when the response has settled, as in `control.step_response`
+        for the core, after the longest dead time.
     **kwargs
         Line properties.
 
@@ -257,7 +258,7 @@ def _model(
 
 
 def _settled(density: FloatArray) -> int:
-    """Find the time in which 95 % of the area has passed, and add a third."""
+    """Find the time after which 95 % of the area has passed, plus a third."""
     area = np.cumsum(np.abs(density).sum(axis=0))
     if area[-1] <= 0:
         return int(density.shape[1])

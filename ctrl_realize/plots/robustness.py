@@ -1,4 +1,4 @@
-"""Plots of robustness: to the dead time, to what the identification is unsure of."""
+"""Plots of robustness: to the dead time, and to the uncertainty of the identification."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def uncertainty_plot(
 def robustness_plot(
     result: RobustnessCheck, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
-    """Draw ``|T|`` under the inverse of the uncertainty bound.
+    """Draw ``|T|`` and the inverse of the uncertainty bound.
 
     Parameters
     ----------
@@ -143,6 +143,6 @@ def robustness_plot(
 
 
 def _positive_loglog(axes: Axes, x: FloatArray, y: FloatArray, **looks: Any) -> list[Line2D]:
-    """Draw what is positive; a logarithmic axis takes nothing else, and no empty curve."""
+    """Draw the positive values; a logarithmic axis accepts no others, and no empty curve."""
     keep = y > 0
     return list(axes.loglog(x[keep], y[keep], **looks)) if keep.any() else []

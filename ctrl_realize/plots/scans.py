@@ -1,4 +1,4 @@
-"""Plots of what a realization and a delay scan saw: singular values, misfit over delay."""
+"""Plots of realizations and delay scans: singular values, IAE over delay."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def delay_plot(
     title: str | None = None,
     **kwargs: Any,
 ) -> ct.ControlPlot:
-    """Draw the misfit against the delay, its minimum and all delays within 5 % of it (figure 6).
+    """Draw the IAE over the delay, its minimum and all delays within 5 % of it (figure 6).
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def delay_plot(
     Raises
     ------
     OptionError
-        A model that was not found by a delay scan.
+        The model was not found by a delay scan.
 
     Examples
     --------
@@ -91,14 +91,14 @@ def singular_value_plot(
     ----------
     fit : Realization, DelayScan or OrderScan, or model with one of them as its `fit`
     count : int, optional
-        How many to show; an `OrderScan` knows as many as its highest order.
+        Number of values to show; an `OrderScan` has as many as its highest order.
     **kwargs
         Line properties of the values.
 
     Raises
     ------
     OptionError
-        A model that was not found from singular values.
+        The model was not found by realization.
 
     Examples
     --------
@@ -121,13 +121,13 @@ def singular_value_plot(
 def order_plot(
     scan: OrderScan, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
-    """Draw the misfit over the delay for every order, and the singular values against noise.
+    """Draw the IAE over the delay for every order, and the singular values with the noise level.
 
     Parameters
     ----------
     scan : OrderScan
     **kwargs
-        Line properties of the misfit curves.
+        Line properties of the IAE curves.
 
     Examples
     --------
@@ -152,7 +152,7 @@ def order_plot(
 
 
 def _misfits_of_orders(axes: Axes, scan: OrderScan, asked: dict[str, Any]) -> list[Line2D]:
-    """Draw a misfit curve for each order: higher orders darker, the chosen one in colour."""
+    """Draw an IAE curve for each order: higher orders darker, the chosen one in colour."""
     lines: list[Line2D] = []
     for position, (order, iae, delay) in enumerate(
         zip(scan.orders, scan.iae, scan.delays, strict=True)

@@ -1,4 +1,4 @@
-"""What the docstrings of all plots say alike, written once."""
+"""Common parts of the docstrings of all plots."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ control.ControlPlot"""
 
 
 def documented(axes: str = "Axes") -> Callable[[Plot], Plot]:
-    """Add `ax`, `title` and the returned plot to the docstring of a function that draws.
+    """Add `ax`, `title` and the returned plot to the docstring of a plot function.
 
     Parameters
     ----------
     axes : str
-        What `ax` may be beside a Figure: as many axes as the plot needs.
+        Further types of `ax` beside a Figure, for plots with several axes.
     """
     shared = {"ax": f"ax : {axes} or Figure, optional\n    Default: a new figure.", "title": _TITLE}
 

@@ -1,7 +1,8 @@
-"""Style, axes, units and scales that all plots share.
+"""Common style, axes, units and scales of all plots.
 
-One colour means one thing in every figure. The colours are those of Okabe and Ito, which people
-with any kind of colour vision tell apart; models are dashed as well, for print without colour.
+Each colour has one meaning in all figures. The colours are those of Okabe and Ito, which are
+distinguishable with any kind of colour vision; models are dashed as well, for printing without
+colour.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ OTHERS = ("#cc79a7", "#009e73", "#e69f00", "#56b4e9")
 INK = "#1f2328"
 GRID = "#d9dde2"
 PAPER = "#fefefe"
-"""INK, GRID and PAPER are used for nothing else, so that a report can swap them in the dark."""
+"""INK, GRID and PAPER have no other use, so that a report can exchange them in dark mode."""
 
 DASHES = ((0, (5, 1.6)), (0, (2, 1.2)), (0, (7, 1.5, 1.5, 1.5)), (0, (1, 1)), (0, (9, 2)))
 """Line styles of models, the first for the first model."""
@@ -69,19 +70,19 @@ _SETTINGS: Any = {
 }
 
 AxesLike = Any
-"""None, Axes, a sequence of Axes, or a Figure to make them in."""
+"""None, Axes, a sequence of Axes, or a Figure."""
 
 
 def model_colour(number: int) -> str:
-    """Return the colour of the model with this number, the first being 0."""
+    """Return the colour of a model by its number from 0."""
     return (MODEL, *OTHERS)[number % (1 + len(OTHERS))]
 
 
 @contextmanager
 def context() -> Iterator[None]:
-    """Use the toolbox's style inside the block; nothing of it stays."""
-    # Not rc_context: it restores all settings, "interactive" too, which a notebook's backend
-    # switches on when the first figure is made. No later figure would be shown.
+    """Use the toolbox's style inside the block; the settings are restored afterwards."""
+    # Not rc_context: it restores all settings, including "interactive", which a notebook's backend
+    # switches on with the first figure. No later figure would be shown.
     before = {key: mpl.rcParams[key] for key in _SETTINGS}
     mpl.rcParams.update(_SETTINGS)
     try:
@@ -99,14 +100,14 @@ def axes_for(
     columns: int = 1,
     sharex: bool = True,
 ) -> list[Axes]:
-    """Return the axes to draw in: those given, or new ones.
+    """Return the axes to draw in: the given ones, or new ones.
 
     Parameters
     ----------
     ax : None, Axes, sequence of Axes or Figure
-        None makes a new figure with pyplot, as python-control does; a Figure gets the axes.
+        None makes a new figure with pyplot, as python-control does; in a Figure, axes are created.
     rows, columns : int
-        Axes needed.
+        Number of axes needed.
     size : tuple of float
         Size of a new figure in inches.
     heights : sequence of float, optional
@@ -117,7 +118,7 @@ def axes_for(
     Raises
     ------
     OptionError
-        Another number of axes than the plot needs.
+        A wrong number of axes for the plot.
     """
     needed = rows * columns
     if ax is None or isinstance(ax, FigureBase):
@@ -140,7 +141,7 @@ def axes_for(
 
 
 def put_title(axes: Axes, ax: AxesLike, title: str | None, default: str) -> None:
-    """Name a new figure; one that the caller made is the caller's to name."""
+    """Set the title of a new figure; one made by the caller is not changed."""
     text = default if title is None else title
     if text and ax is None:
         axes.set_title(plain(text), loc="left")
@@ -158,16 +159,16 @@ def canvas(
     columns: int = 1,
     sharex: bool = True,
 ) -> Iterator[list[Axes]]:
-    """Give the axes to draw in, in the toolbox's style; a new figure gets its title at the end.
+    """Provide the axes to draw in, in the toolbox's style; a new figure gets its title at the end.
 
     Parameters
     ----------
     ax, rows, size, heights, columns, sharex
         As for `axes_for`.
     title : str, optional
-        What the caller asked for; an empty one for none.
+        Title given by the caller; an empty one for none.
     default_title : str
-        What stands there when nothing was asked for.
+        Default title.
     """
     with context():
         axes = axes_for(ax, rows, size=size, heights=heights, columns=columns, sharex=sharex)
@@ -183,11 +184,11 @@ def finished(
     legends: Sequence[int] = (0,),
     loc: str = "upper right",
 ) -> ct.ControlPlot:
-    """Put the legends on, and bundle everything as python-control's plots do.
+    """Add the legends, and return a plot object as python-control does.
 
-    The place `loc` is one of matplotlib's, or one for curves that go everywhere and leave no
-    place inside: "above" is outside, at the right, and "over" is above the curves, in room that
-    the value axis gets for it, where a title needs the place outside.
+    `loc` is one of matplotlib's locations, or one for curves that leave no space inside: "above" is
+    outside, at the right; "over" is above the curves, in space added to the value axis, if a title
+    needs the space outside.
     """
     for position in legends:
         if axes[position].get_legend_handles_labels()[1]:
@@ -202,7 +203,7 @@ def finished(
 
 
 def _objects(things: Sequence[Any]) -> np.ndarray[Any, np.dtype[np.object_]]:
-    """Make an array of things that may be lists themselves."""
+    """Make an array of objects that may be lists themselves."""
     array = np.empty(len(things), dtype=object)
     array[:] = things
     return array
@@ -218,7 +219,7 @@ def _legend(axes: Axes, loc: Any) -> None:
 
 
 def _legend_over(axes: Axes) -> None:
-    """Put the legend above all that is drawn, in room that the value axis gets for it."""
+    """Put the legend above all curves, in space added to the value axis."""
     count = len(axes.get_legend_handles_labels()[1])
     assert axes.figure is not None
     inches = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())
@@ -236,7 +237,7 @@ HERTZ = 2 * np.pi
 def axis_time_unit(largest: float, axes: Axes) -> tuple[float, str]:
     """Choose s, ms or µs for times up to `largest` s; returns (units per second, name).
 
-    Axes whose label already names a unit of time keep it.
+    Axes whose label already contains a unit of time keep it.
     """
     for name, factor in _wording.UNITS.items():
         if axes.get_xlabel().endswith(f"[{name}]"):
@@ -253,10 +254,10 @@ def decibel(magnitude: ArrayLike) -> FloatArray:
 
 
 def frequency_axis(axes: Axes, *, label: bool = True) -> None:
-    """Make the x axis a logarithmic one in Hz with plain numbers."""
+    """Make the x axis logarithmic in Hz with plain numbers."""
     axes.set_xscale("log")
     low, high = axes.get_xlim()
-    # Less than two decades hold too few powers of ten to read a frequency off.
+    # Less than two decades contain too few powers of ten for reading a frequency.
     few = high / max(low, 1e-300) < 100
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

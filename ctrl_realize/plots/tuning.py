@@ -1,4 +1,4 @@
-"""Plots of controllers and reduced models: tuning rules compared."""
+"""Plots of tuning rules, controllers and reduced models."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .shared_docs import documented
 from .style import axis_time_unit
 
 RINGING = 5.0
-"""Sensitivity peak above which controllers are not told apart in the picture."""
+"""Sensitivity peak above which controllers are drawn at the edge."""
 NAME_POINTS = 10
 """Size in points of the names of the rules."""
 
@@ -28,8 +28,8 @@ def pid_comparison_plot(
 ) -> ct.ControlPlot:
     """Draw load error against sensitivity peak, a point for each stable controller.
 
-    Loops that hardly damp at all (peak above 5) stand at the right edge, with their peak beside
-    the name.
+    Loops with very little damping (peak above 5) are drawn at the right edge, with their peak
+    beside the name.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def _rule_label(rule: str, peak: float) -> str:
 
 
 def _name_points(axes: Axes, points: list[tuple[float, float, str, str]]) -> None:
-    """Write names beside points, each at the nearest place that points and other names leave."""
+    """Write names beside points, each at the nearest free position."""
     unit = axes.figure.dpi / 72
     high, wide, gap = 1.2 * NAME_POINTS * unit, 0.62 * NAME_POINTS * unit, 6 * unit
     where = [axes.transData.transform((x, y)) for x, y, _, _ in points]
@@ -108,7 +108,7 @@ def _name_points(axes: Axes, points: list[tuple[float, float, str, str]]) -> Non
         axes.annotate(
             name, (x, y), (6 * side, (level - at) / unit), textcoords="offset points",
             va="center", ha="left" if side > 0 else "right", fontsize=NAME_POINTS, color=colour,
-            # A name that had to go far keeps a line to its point.
+            # A distant name is connected to its point by a line.
             arrowprops=line if abs(level - at) > high else None,
         )  # fmt: skip
 
@@ -117,7 +117,7 @@ def _name_points(axes: Axes, points: list[tuple[float, float, str, str]]) -> Non
 def hankel_plot(
     result: BalancedReduction, *, ax: style.AxesLike = None, title: str | None = None
 ) -> ct.ControlPlot:
-    """Draw the Hankel singular values, those that were cut off pale.
+    """Draw the Hankel singular values, the truncated ones pale.
 
     Parameters
     ----------

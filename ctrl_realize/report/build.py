@@ -50,30 +50,30 @@ def write_identification(
     simulated: bool = False,
     figures: str | os.PathLike[str] | None = None,
 ) -> Path:
-    """Write the report of one identification: one HTML file that needs nothing else.
+    """Write the report of one identification as a self-contained HTML file.
 
     Parameters
     ----------
     path : path-like
-        File to write; it is written whole or not at all.
+        File to write, atomically.
     system : DelayedStateSpace
-        The model; what is known of its origin is taken from its `fit`.
+        The model, with its `fit`.
     record : Record
-        What it was identified from.
+        Record that it was identified from.
     files : sequence of path-like, optional
-        Files that the data came from, for their checksums.
+        Data files, for their checksums.
     frf : FrequencyResponseData, optional
-        Measured frequency response to show beside the model.
+        Measured frequency response to show with the model.
     comparison : FRFComparison, optional
-        Of the model with `frf`.
+        Comparison of the model with `frf`.
     settings : mapping, optional
         Settings to list.
     calls : sequence of (name, text), optional
-        What to type to do it again.
+        Commands that reproduce the result.
     simulated : bool, default False
-        Whether the data are simulated; it is then said at the top.
+        Whether the data are simulated, which is stated at the top.
     figures : path-like, optional
-        Folder to save the figures to as well, as PNG files.
+        Folder in which the figures are saved as PNG files, too.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def write_identification(
     Raises
     ------
     UnsuitableSystemError, DataError
-        `system` is no model with dead time, or `record` is no record.
+        `system` is not a model with dead time, or `record` is not a record.
     OSError
         The folder is missing or cannot be written.
 
@@ -143,23 +143,23 @@ def write_campaign(
     simulated: bool = False,
     figures: str | os.PathLike[str] | None = None,
 ) -> Path:
-    """Write the report of a campaign: one HTML file that needs nothing else.
+    """Write the report of a campaign as a self-contained HTML file.
 
     Parameters
     ----------
     path : path-like
     campaign : Campaign
     files : sequence of path-like, optional
-        Files that the data came from, for their checksums.
+        Data files, for their checksums.
     records : sequence of Record, optional
-        The records, for theirs, where there are no files.
+        The records, for their checksums if there are no files.
     frf, comparison, settings, calls, simulated, figures
         As for `write_identification`; the comparison is that of ``campaign.system``.
     more_tables, more_sketches : sequence, optional
-        Further tables and figures, behind the campaign's own.
+        Further tables and figures, after those of the campaign.
     title : str, optional
     truth : float, optional
-        Known delay of a simulation in samples, to draw beside the estimates.
+        Known delay in samples of simulated data, drawn with the estimates.
 
     Returns
     -------
@@ -223,7 +223,7 @@ def write_comparison(
     simulated: bool = False,
     figures: str | os.PathLike[str] | None = None,
 ) -> Path:
-    """Write the report of a model beside a measured frequency response: one HTML file.
+    """Write the report of a comparison with a measured frequency response as a self-contained file.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def write_comparison(
     frf : FrequencyResponseData
         Measured.
     comparison : FRFComparison
-        Of `system` with `frf`.
+        Comparison of `system` with `frf`.
     files, calls, simulated, figures
         As for `write_identification`.
 
@@ -292,7 +292,7 @@ def write_report(
     simulated: bool,
     figures: str | os.PathLike[str] | None,
 ) -> Path:
-    """Write a page and, if a folder is given, its figures beside it."""
+    """Write a page and, if a folder is given, its figures."""
     if figures is not None:
         save_sketches(figures, sketches)
     page = Page(

@@ -1,4 +1,4 @@
-"""A report as data, and its HTML: one file that needs nothing else."""
+"""Content of a report, and its conversion to a self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from markupsafe import Markup
 from ..io.atomic import write_text
 from .verdict import Verdict
 
-# control characters, and those that turn the direction of writing: names of files may hold them
+# control characters, and those that change the direction of writing, may occur in file names
 _CONTROLS = (*range(9), 11, 12, *range(14, 32), *range(127, 160))
 _UNSEEN = dict.fromkeys((*_CONTROLS, *range(0x202A, 0x202F), *range(0x2066, 0x206A)), "\ufffd")
 
 
 @dataclass(frozen=True)
 class PageFigure:
-    """A picture with its words; `svg` is ours and is not escaped."""
+    """A figure with its texts; `svg` is generated and not escaped."""
 
     key: str
     title: str
@@ -34,14 +34,14 @@ class PageFigure:
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column.
+    """Column heading.
 
     Attributes
     ----------
     name : str
         With its unit.
     kind : {"text", "name", "number", "mono"}
-        How the cells are set: numbers to the right, ``"mono"`` in letters of one width.
+        Format of the cells: numbers right-aligned, ``"mono"`` in a fixed-width font.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class Row:
     ----------
     cells : tuple of str
     kind : {"", "best", "failed"}
-        How the row stands out.
+        Emphasis of the row.
 
     Examples
     --------
@@ -115,22 +115,22 @@ class Table:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything that a report says.
+    """Content of a report.
 
     Attributes
     ----------
     title, subtitle : str
     verdict : Verdict
-        What stands first, from `verdict_of`.
+        Verdict at the top, from `verdict_of`.
     version : str
-        Of the package, for the foot of the page.
+        Version of the package, for the footer.
     figures : sequence of PageFigure
         From `Sketch.on_page`.
     tables : sequence of Table
     calls : sequence of (name, text)
-        What to type to do it again.
+        Commands that reproduce the result.
     simulated : bool
-        Whether the data are simulated; it is then said at the top.
+        Whether the data are simulated, which is stated at the top.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) ->
     title : str
     rows : sequence of (label, value)
     mono : bool, default False
-        Set the values in letters of one width.
+        Show the values in a fixed-width font.
 
     Returns
     -------
@@ -185,9 +185,9 @@ def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) ->
 
 
 def render(page: Page) -> str:
-    """Write a page as HTML; all text of it is escaped, and what steers a terminal is left out."""
+    """Convert a page to HTML; all text is escaped, and control characters are removed."""
     template, css, js = _template()
-    # The page allows this script and no other, whatever came with the data.
+    # The page allows only this script, whatever the data contain.
     digest = base64.b64encode(hashlib.sha256(js.encode("utf-8")).digest()).decode("ascii")
     text = template.render(page=page, css=Markup(css), js=Markup(js), js_digest=digest)
     return text.translate(_UNSEEN) + "\n"
@@ -195,7 +195,7 @@ def render(page: Page) -> str:
 
 @functools.cache
 def _template() -> tuple[Template, str, str]:
-    """Return the page's template, compiled once for all reports of a run, its style and script."""
+    """Return the page's template, compiled once, with style and script."""
     folder = resources.files("ctrl_realize.report") / "templates"
     html, css, js = (
         (folder / name).read_text(encoding="utf-8")
@@ -208,7 +208,7 @@ def _template() -> tuple[Template, str, str]:
 
 
 def write_page(path: str | os.PathLike[str], page: Page) -> Path:
-    """Write a page to a file, whole or not at all.
+    """Write a page to a file, atomically.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a result comes from: data with their checksums, versions."""
+"""Provenance of a result: data with their checksums, versions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PACKAGES = ("ctrl-realize", "control", "numpy", "scipy", "matplotlib", "slycot"
 
 
 def versions() -> list[tuple[str, str]]:
-    """List the versions of all that had a part in the numbers."""
+    """List the versions of all packages that affect the numbers."""
     found = [("Python", platform.python_version())]
     for package in _PACKAGES:
         try:

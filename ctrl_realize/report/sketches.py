@@ -1,4 +1,4 @@
-"""The figures that go with a result, each with its words; for pages and for files."""
+"""The figures of a report with their texts, for pages and for files."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from .page import PageFigure
 from .svg import inline_svg, laid_out, missing_glyphs_allowed
 
 MOST_DRAWN = 60
-"""Most step responses in one picture."""
+"""Largest number of step responses in one plot."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A figure that can be drawn at any time.
+    """A figure that is drawn on demand.
 
     Attributes
     ----------
     key : str
-        Short name, also that of its file.
+        Short name, also of its file.
     title, caption : str
     draw : callable
         Draws into a matplotlib Figure.
@@ -71,20 +71,20 @@ class Sketch:
         return laid_out(self.draw, self.size)
 
     def on_page(self) -> PageFigure:
-        """Put it on a page."""
+        """Convert it for a page."""
         key = self.key.replace("_", "-")
         svg = inline_svg(self.figure, key, f"{self.title}. {self.caption}")
         return PageFigure(key, self.title, self.caption, Markup(svg))
 
     def save(self, path: str | os.PathLike[str], *, dpi: float = 150) -> None:
-        """Save it to a file, whole or not at all; the ending tells the format."""
+        """Save it to a file, atomically; the extension determines the format."""
         kind = os.path.splitext(path)[1].lstrip(".").lower() or "png"
         with missing_glyphs_allowed(), replaced_when_complete(path) as temporary:
             self.figure.savefig(temporary, format=kind, dpi=dpi, facecolor="white")
 
 
 def save_sketches(folder: str | os.PathLike[str], sketches: Sequence[Sketch]) -> None:
-    """Save figures as PNG files, which any program shows, to a folder that is made if needed."""
+    """Save figures as PNG files in a folder, which is created if needed."""
     place = Path(folder)
     place.mkdir(exist_ok=True)
     for sketch in sketches:
@@ -98,7 +98,7 @@ def identification_sketches(
     frf: ct.FrequencyResponseData | None = None,
     comparison: FRFComparison | None = None,
 ) -> list[Sketch]:
-    """List the figures of one identification, the most telling first."""
+    """List the figures of one identification, the most important first."""
     step = _step_of(record) if _from_a_step(system.fit) else None
     sketches = []
     if step is not None:
@@ -123,7 +123,7 @@ def identification_sketches(
 
 
 def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[Sketch]:
-    """List the figures of how a model was found."""
+    """List the figures about how a model was found."""
     fit = system.fit
     sketches = []
     if isinstance(fit, OutputErrorFit):
@@ -194,7 +194,7 @@ def frf_sketches(
     comparison: FRFComparison | None = None,
     caption: str = "Measured, with the model on top. These data were not used for the fit.",
 ) -> list[Sketch]:
-    """List the figures in frequency: the models alone, or beside a measurement."""
+    """List the frequency-domain figures: of models alone, or with a measurement."""
     if not all(system.issiso() for system in systems):
         return []  # drawn one channel at a time
     if frf is None:
@@ -231,7 +231,7 @@ def frf_sketches(
 
 
 def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list[Sketch]:
-    """List the figures of a campaign, the final model's and the best record's among them."""
+    """List the figures of a campaign, including those of the final model and the best record."""
     count = len(campaign.good)
     tall = min(max(0.27 * count + 1.6, 3.4), 8.0) if count <= 24 else 4.2
     sketches = [
@@ -265,7 +265,7 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
 
 
 def _from_a_step(fit: ModelFit | None) -> bool:
-    """Tell whether there was rest before a step; an edge among many tells nothing by itself."""
+    """Whether there is a baseline before a single step."""
     return fit is None or fit.onset is None or not np.isnan(fit.onset)
 
 
@@ -277,7 +277,7 @@ def _step_of(record: Record) -> StepResponse | None:
 
 
 def _steps_of(campaign: Campaign) -> list[StepResponse]:
-    """Cut the step responses out of a campaign's records, at most as many as one can see."""
+    """Return the step responses of a campaign's records, up to a limit."""
     every = max(1, -(-len(campaign.good) // MOST_DRAWN))
     pairs = zip(campaign.rows, campaign.sources, strict=True)
     sources = [source for row, source in pairs if row.model is not None][::every]

@@ -1,4 +1,4 @@
-"""Figures as SVG that becomes part of a page: light, and at home in its colours."""
+"""Figures as inline SVG: small, and in the colours of the page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..numerics.arrays import FloatArray
 from ..plots import style
 
 POINTS = 1200
-"""Most points of a line that is drawn; more than a screen has columns is only weight."""
+"""Largest number of points of a line; more than the columns of a screen are not visible."""
 
 _VARIABLES = {
     style.INK: "var(--ink)",
@@ -36,12 +36,12 @@ _VARIABLES = {
 
 
 def laid_out(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure:
-    """Draw a figure and fix the places of everything in it, so that it can be saved cheaply.
+    """Draw a figure and fix its layout, so that it can be saved quickly.
 
     Parameters
     ----------
     draw : callable
-        Gets a new figure to draw in, which pyplot does not know.
+        Draws into a new figure, unknown to pyplot.
     size : tuple of float
         Width and height in inches of 72 points.
     """
@@ -56,7 +56,7 @@ def laid_out(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure
 
 @contextmanager
 def missing_glyphs_allowed() -> Iterator[None]:
-    """Draw a letter that the font does not have as a box, without a warning."""
+    """Draw letters that the font does not contain as boxes, without a warning."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
         yield
@@ -76,17 +76,17 @@ def thin_lines(figure: Figure, points: int = POINTS) -> None:
 def envelope(
     x: FloatArray, y: FloatArray, points: int, *, logarithmic: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """Keep the least and the largest value of each of points / 2 stretches of x.
+    """Keep the smallest and the largest value in each of points / 2 sections of x.
 
     Parameters
     ----------
     x : ndarray, shape (N,), rising
     y : ndarray, shape (N,)
-        Gaps are NaN; a stretch of nothing else stays a gap.
+        Gaps are NaN; a section with nothing else remains a gap.
     points : int
-        About how many are left.
+        Approximate number of points to keep.
     logarithmic : bool, default False
-        Stretches of equal ratio instead of equal length.
+        Sections of equal ratio instead of equal length.
 
     Returns
     -------
@@ -110,15 +110,15 @@ def envelope(
 
 
 def inline_svg(figure: Figure, key: str, description: str) -> str:
-    """Write a figure as an ``<svg>`` element whose colours are variables of the page.
+    """Return a figure as an ``<svg>`` element whose colours are variables of the page.
 
     Parameters
     ----------
     figure : Figure
     key : str
-        Letters and digits, different for each figure of a page; all ids begin with it.
+        Letters and digits, different for each figure of a page; prefix of all ids.
     description : str
-        Read out in place of the picture.
+        Alternative text for screen readers.
     """
     buffer = io.StringIO()
     settings: Any = {"svg.fonttype": "none", "svg.hashsalt": key}
@@ -130,11 +130,11 @@ def inline_svg(figure: Figure, key: str, description: str) -> str:
 
 
 def scales(figure: Figure) -> str:
-    """Write where the axes of a figure are and what they show, for reading values off: JSON.
+    """Return positions and ranges of the axes of a figure as JSON, for reading off values.
 
-    For each axes its box (left, top, width, height in the drawing's points), and for x and y the
-    values at its ends, whether the scale is logarithmic, and the unit; None where an axis carries
-    names instead of values.
+    For each axes its box (left, top, width, height in points), and for x and y the values at the
+    ends, whether the scale is logarithmic, and the unit; None if an axis has names instead of
+    values.
     """
     wide, high = 72 * figure.get_figwidth(), 72 * figure.get_figheight()
     found = []
@@ -156,7 +156,7 @@ def _scale(axis: Axis, ends: tuple[float, float], labels: list[str]) -> list[Any
     if isinstance(axis.get_major_locator(), FixedLocator):
         return None
     units = [re.search(r"\[([^\]]*)\]$", label) for label in labels]
-    # in a label a backslash keeps matplotlib from reading formulas between dollar signs
+    # in a label a backslash keeps matplotlib from interpreting formulas between dollar signs
     unit = next((found[1].replace(r"\$", "$") for found in units if found), "")
     low, high = (float(f"{end:.9g}") for end in ends)
     return [low, high, axis.get_scale() == "log", unit]
@@ -166,14 +166,14 @@ def _at_home(document: str, key: str, description: str, data: str) -> str:
     body = document[document.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, count=1, flags=re.DOTALL)
-    # Between the tags stand names that came with the data: "#0072b2" or 'id="' may be one.
+    # Between the tags there are names from the data, which may be like "#0072b2" or 'id="'.
     body = re.sub(r"<[^>]*>", lambda tag: _tag_at_home(tag[0], key), body)
     body = re.sub(r"\s*\n\s*", " ", body)
     head = (
         f'<svg role="img" aria-label="{_attribute(description)}" class="plot" '
         f'data-axes="{_attribute(data)}" '
     )
-    # By functions, not templates: a name in the data may hold a backslash.
+    # By functions, not templates: a name in the data may contain a backslash.
     body = re.sub(
         r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" ',
         lambda _: head,
@@ -184,7 +184,7 @@ def _at_home(document: str, key: str, description: str, data: str) -> str:
 
 
 def _tag_at_home(tag: str, key: str) -> str:
-    """Put a tag into the page: its id is the page's, its colours are variables."""
+    """Adapt a tag to the page: its id is unique, its colours are variables."""
     tag = re.sub(r'\bid="', f'id="{key}-', tag)
     tag = tag.replace("url(#", f"url(#{key}-").replace('href="#', f'href="#{key}-')
     tag = re.sub(r"font-family: [^;\"]*", "font-family: inherit", tag)

@@ -1,4 +1,4 @@
-"""The tables of the reports."""
+"""Tables of the reports."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Paths = Sequence[str | os.PathLike[str]]
 
 
 def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[Table]:
-    """Tell how a model was found, what was chosen and why."""
+    """List how a model was found, and what was chosen and why."""
     if fit is None:
         return []
     choices = [("choice", choice) for choice in fit.choices]
@@ -33,7 +33,7 @@ def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[
 def comparison_tables(
     comparison: FRFComparison | None, title: str = "Comparison with the measured frequency response"
 ) -> list[Table]:
-    """Tell how far a model is from a measurement, where there is one."""
+    """List the errors of a model with respect to a measurement, if there is one."""
     return [] if comparison is None else [pairs(title, comparison._rows())]
 
 
@@ -56,14 +56,14 @@ def _matrix(values: Any) -> str:
 
 
 def settings_tables(settings: Mapping[str, Any] | None) -> list[Table]:
-    """List settings, where there are any."""
+    """List the settings, if there are any."""
     if not settings:
         return []
     return [pairs("Settings", [(str(key), str(value)) for key, value in settings.items()])]
 
 
 def data_table(records: Sequence[Record], files: Paths) -> Table:
-    """List data with their checksums: of files, where there are any, else of samples."""
+    """List data with their checksums: of files if there are any, otherwise of samples."""
     columns = (
         Column("data"),
         Column("samples", "number"),
@@ -98,7 +98,7 @@ def _extent(record: Record | None) -> tuple[str, str, str]:
 
 
 def campaign_table(campaign: Campaign) -> Table:
-    """List the records of a campaign: delay, interval, residual, or what went wrong."""
+    """List the records of a campaign: delay, interval, residual, or the error."""
     waits = [row.dead_time for row in campaign.good]
     scale, unit = time_unit(float(np.median(waits)))
     columns = (
@@ -137,7 +137,7 @@ def campaign_table(campaign: Campaign) -> Table:
 
 
 def dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
-    """Lower end, estimate and upper end, rounded alike."""
+    """Lower end, estimate and upper end, rounded to the same digit."""
     low, high = row.interval
     seen = [scale * value for value in (low, row.dead_time, high)]
     if not np.isfinite(seen).all():

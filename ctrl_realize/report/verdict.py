@@ -1,4 +1,4 @@
-"""What a report says first: the model, its dead time, and whether to trust it."""
+"""Verdict at the top of a report: the model, its dead time, and whether to trust it."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _CONTRADICTED = "frf_disagrees"
 _GAIN_OPEN = "gain_not_resolved"
 
 WRONG_MODEL = frozenset({_CONTRADICTED, "no_common_gain", "unstable", _GAIN_OPEN})
-"""Flags after which the model should not be used as it stands, first in the list of reasons; a gain
-that is not resolved only where its sign is not told."""
+"""Flags with which the model should not be used, first in the list of reasons; for a gain that is
+not determined only if its sign is not."""
 
 WRONG_DELAY = frozenset(
     {
@@ -33,19 +33,19 @@ WRONG_DELAY = frozenset(
         "order_in_noise",
     }
 )
-"""Flags after which the dead time should not be used as it stands."""
+"""Flags with which the dead time should not be used."""
 
 SCANNED = (
     "the dead time is the delay with the smallest IAE, and the interval shows how flat the "
     "IAE curve is there; it is not a confidence interval, and fast lags that the model order "
     "leaves out count as dead time. The output-error fit gives a 95 % interval"
 )
-"""What any scan leaves open, however good the record."""
+"""Limitation of any scan, however good the record."""
 
 INTEGRATING = "none: the model integrates"
 
 _REAL, _AT_ONE = 1e-12, 1e-9
-"""Imaginary part of a pole of z that is rounding, and distance to 1 of an integrator."""
+"""Imaginary part of a z-plane pole that counts as rounding, and distance to 1 of an integrator."""
 
 Level = Literal["good", "caution", "poor"]
 
@@ -60,7 +60,7 @@ _CONTRADICTION = "The measured frequency response contradicts this model: see th
 
 @dataclass(frozen=True)
 class Verdict:
-    """Judgement, one sentence, the main numbers, and the reasons."""
+    """Judgement, headline, main numbers and reasons."""
 
     level: Level
     headline: str
@@ -77,7 +77,7 @@ def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Ve
     system : DelayedStateSpace
         Model with its `fit`.
     more_flags : sequence of Flag, optional
-        What else should be known, from a comparison with an FRF for example.
+        Further flags, from a comparison with an FRF for example.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Ve
 
 
 def campaign_verdict(campaign: Campaign, more_flags: Sequence[Flag] = ()) -> Verdict:
-    """Judge a campaign by its final model, its own flags and `more_flags`, as of an FRF."""
+    """Judge a campaign by its final model, its flags and `more_flags`."""
     system = campaign.system
     own = tuple(campaign.flags)
     flags = (*more_flags, *own, *_flags_of(system))
@@ -141,7 +141,7 @@ def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> 
 
 
 def headline_of(system: DelayedStateSpace) -> str:
-    """Say the model in one sentence."""
+    """Describe the model in one sentence."""
     wait = estimate_of(system)
     interval = interval_of(system)
     said, samples = in_time(wait, 4), f"{wait / system.dt:.4g}"
@@ -162,7 +162,7 @@ def headline_of(system: DelayedStateSpace) -> str:
 
 
 def interval_name(system: DelayedStateSpace) -> str:
-    """Name the interval for what it is."""
+    """Name the interval by its kind."""
     return INTERVAL_LABELS[None] if system.fit is None else system.fit.interval_label
 
 
@@ -183,7 +183,7 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
 
 
 def poles_of(system: DelayedStateSpace) -> str:
-    """Write the core's poles as those of a plant behind a hold, what no plant has as z."""
+    """Write the core's poles as continuous ones if possible, otherwise as poles of z."""
     poles = np.asarray(system.delay_free.poles(), dtype=np.complex128)
     alternating = (np.abs(poles.imag) <= _REAL) & (poles.real <= 0)
     plant = np.log(poles[~alternating]) / system.dt
@@ -251,7 +251,7 @@ def _judged(system: DelayedStateSpace, flags: Sequence[Any]) -> tuple[Level, str
 
 
 def _reasons(flags: Sequence[Any]) -> tuple[str, ...]:
-    """List what was flagged, the worst first."""
+    """List the flags, the worst first."""
     worst = (_CONTRADICTED, *sorted(WRONG_MODEL), *sorted(WRONG_DELAY))
     rank = {code: place for place, code in reversed(list(enumerate(worst)))}
     ordered = sorted(flags, key=lambda flag: rank.get(_code(flag), len(worst)))

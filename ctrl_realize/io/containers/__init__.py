@@ -1,1 +1,1 @@
-"""Files that hold arrays: NumPy, MATLAB, Parquet."""
+"""Files with arrays: NumPy, MATLAB, Parquet."""

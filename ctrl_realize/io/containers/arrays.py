@@ -1,4 +1,4 @@
-"""Named arrays (from ``.npz`` and ``.mat``) laid out as columns."""
+"""Named arrays (from ``.npz`` and ``.mat``) as columns."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ AnyArray = np.ndarray[Any, np.dtype[Any]]
 
 
 def table_of_arrays(path: Path, arrays: Mapping[str, AnyArray], variable: str | None) -> Table:
-    """Lay out named arrays as columns; single numbers become constants.
+    """Convert named arrays to columns; single numbers become constants.
 
-    A matrix becomes one column for each channel, ``u[0]``, ``u[1]``, ...; its longer side is
-    time. If it is the only array, its columns have no names, as in a text table without header.
+    A matrix becomes one column for each channel, ``u[0]``, ``u[1]``, ...; its longer side is time.
+    If it is the only array, its columns have no names, as in a text table without header.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ def table_of_arrays(path: Path, arrays: Mapping[str, AnyArray], variable: str | 
         Where they are from.
     arrays : mapping of str to ndarray
     variable : str or None
-        Use this array, or the fields of this struct, alone.
+        Use only this array, or the fields of this struct.
 
     Raises
     ------
     FileFormatError
-        If there are no columns of numbers in it.
+        It contains no columns of numbers.
     """
     if variable is not None:
         inside = variable + "."

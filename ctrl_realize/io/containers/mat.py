@@ -1,7 +1,7 @@
-"""MATLAB's ``.mat`` files: numbers, structs and cells, by SciPy, and by h5py for version 7.3.
+"""MATLAB's ``.mat`` files: numbers, structs and cells, by SciPy; by h5py for version 7.3.
 
-Both are compiled readers, which a damaged file can crash: they run in a process of their own, so
-that such a file ends in an error.
+Both are compiled readers that a damaged file can crash: they run in a separate process, so that
+such a file gives an error.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def read_mat(path: Path, *, variable: str | None, max_bytes: float) -> Table:
     Raises
     ------
     FileFormatError
-        Damaged, too large when unpacked, without numbers, or of version 7.3 without h5py.
+        Damaged, too large when unpacked, without numbers, or version 7.3 without h5py.
     """
     return table_of_arrays(path, _arrays(path, max_bytes), variable)
 
 
 def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
-    """Read all numeric arrays of a ``.mat`` file, also those inside structs and cells."""
+    """Read all numeric arrays of a ``.mat`` file, including those in structs and cells."""
     head = read_head(path, 128)
     if head[126:128] not in (b"IM", b"MI") and not _is_version_4(head):
         raise FileFormatError(f"{path} is not a .mat file: it does not begin like one")
@@ -61,7 +61,7 @@ def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
         raise FileFormatError(f"{path} could not be read within {_TIMEOUT:g} s") from error
     if done.returncode:
         words = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        # a negative code is the signal that ended a crashed reader
+        # a negative code is the signal that terminated the reader
         reason = words[-1][:300] if words and done.returncode > 0 else "its reader crashed"
         raise FileFormatError(f"{path} is not a .mat file, or a damaged one: {reason}")
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
@@ -69,7 +69,7 @@ def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
 
 
 def _is_version_4(head: bytes) -> bool:
-    """Tell whether a file begins with the type, size and name length of a matrix of version 4."""
+    """Whether a file begins with type, size and name length of a matrix of version 4."""
     words = head[:20]
     for order in ("<i4", ">i4"):
         if len(words) == 20:

@@ -1,7 +1,7 @@
 """Program that reads one ``.mat`` file and writes its arrays to standard output as ``.npz``.
 
 ``python mat_worker.py FILE MAX_BYTES``; the arrays are ``arr_0``, ``arr_1``, ... of ``names``. It
-imports nothing of this package, so that starting it takes little time.
+imports nothing from this package, so that it starts quickly.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _MAX_DEPTH = 8
 
 
 def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
-    """Give name and values of every numeric array, also of those inside structs and cells."""
+    """Yield name and values of every numeric array, including those in structs and cells."""
     with open(path, "rb") as file:
         head = file.read(10)
     if head == b"MATLAB 7.3":
@@ -30,7 +30,7 @@ def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
         return
     import scipy.io
 
-    # not mat_dtype=True, which takes the imaginary part off complex numbers
+    # not mat_dtype=True, which discards the imaginary part of complex numbers
     content = scipy.io.loadmat(path, struct_as_record=False)
     for name, value in content.items():
         if not name.startswith("__"):
@@ -38,10 +38,10 @@ def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
 
 
 def _inside(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
-    """Give the arrays inside what SciPy's reader returns."""
+    """Yield the arrays inside a value of SciPy's reader."""
     if depth == 0:
         raise ValueError(f"more than {_MAX_DEPTH} levels of structs")
-    # SciPy marks a struct by this attribute alone; the class of it is private
+    # a struct of SciPy's reader is recognised by this attribute; its class is private
     fields = getattr(value, "_fieldnames", None)
     if fields is not None:
         for field in fields:
@@ -51,13 +51,13 @@ def _inside(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
             single = value.size == 1 and hasattr(entry, "_fieldnames")
             yield from _inside(name if single else f"{name}[{k}]", entry, depth - (not single))
     elif type(value) is np.ndarray and value.dtype.kind in "biufc":
-        # MATLAB stores doubles in the smallest type that holds them; 64-bit integers stay
+        # MATLAB stores doubles in the smallest type that represents them; 64-bit integers are kept
         small = value.dtype.kind in "biu" and value.dtype.itemsize < 8
         yield name, value.astype(np.float64) if small else value
 
 
 def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
-    """Give the arrays inside a variable of version 7.3, which stores rows as columns."""
+    """Yield the arrays inside a variable of version 7.3, which stores rows as columns."""
     import h5py
 
     if depth == 0:
@@ -72,7 +72,7 @@ def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple
                 and inner.dtype == h5py.ref_dtype
                 and "MATLAB_class" not in inner.attrs
             ):
-                # a struct array holds, for each field, references to the values of its entries
+                # a struct array contains, for each field, references to the values of its entries
                 for k, reference in enumerate(inner[()].ravel()):
                     place = f"{name}[{k}].{field}"
                     yield from _inside_hdf5(file, place, file[reference], depth - 1)
@@ -90,7 +90,7 @@ def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple
 
 
 def main(path: str, max_bytes: float) -> None:
-    """Write all arrays; whatever a damaged file raises ends the process with its last line."""
+    """Write all arrays; any error of a damaged file ends the process with its last line."""
     names, values, size = [], [], 0.0
     for name, value in arrays_of(path):
         size += value.nbytes

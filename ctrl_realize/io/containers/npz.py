@@ -1,4 +1,4 @@
-"""NumPy's ``.npz`` and ``.npy``, without pickles and without bombs."""
+"""NumPy's ``.npz`` and ``.npy``, without pickles and decompression bombs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def read_npz(path: Path, *, variable: str | None, max_bytes: float) -> Table:
                 arrays = {path.stem: _array(path, file, "", path.stat().st_size, max_bytes)}
     except FileFormatError:
         raise
-    # zipfile, zlib and NumPy's parser of headers meet broken input with every kind of exception
+    # zipfile, zlib and NumPy's header parser raise all kinds of exceptions for damaged files
     except Exception as error:
         reason = str(error).partition("\n")[0][:200]
         raise FileFormatError(f"{path} is a damaged .npz or .npy file: {reason}") from error
@@ -66,7 +66,7 @@ def _members(path: Path, max_bytes: float) -> dict[str, AnyArray]:
 
 
 def _array(path: Path, file: IO[bytes], what: str, size: int, max_bytes: float) -> AnyArray:
-    """Read one array whose data fit into the `size` bytes that are there."""
+    """Read one array whose data fit into the available `size` bytes."""
     version = np.lib.format.read_magic(file)
     read_header: Any = {
         (1, 0): np.lib.format.read_array_header_1_0,

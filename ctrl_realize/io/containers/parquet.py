@@ -1,4 +1,4 @@
-"""Parquet tables, where pyarrow is installed; a column is read when it is asked for."""
+"""Parquet tables, if pyarrow is installed; columns are read on demand."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ AnyArray = np.ndarray[Any, np.dtype[Any]]
 
 _FREE_BYTES = 64 * 2**20
 _MAX_RATIO = 10_000
-"""Times its own size that a file may become. Runs of equal values take no room in a file, but no
-measurement is made of them alone: beside an input of two levels stands a noisy output."""
+"""Largest ratio of unpacked to packed size. Runs of equal values take no space in a file, but a
+measurement has more: beside a two-level input there is a noisy output."""
 _OBJECT_BYTES = 64
-"""What a cell costs that becomes an object of Python's: a pointer and a small object."""
+"""Memory of a cell that becomes a Python object: a pointer and a small object."""
 
 
 class LateColumn(Column):
-    """A column that is read when its cells are asked for; the first few can be seen before."""
+    """A column that is read on demand; its first cells can be read before."""
 
     def __init__(self, name: str, load: Callable[[int | None], AnyArray]) -> None:
         object.__setattr__(self, "name", name)
@@ -47,15 +47,15 @@ class LateColumn(Column):
 
 
 def read_parquet(path: Path, *, max_bytes: float) -> Table:
-    """Find the columns of a Parquet file; their cells are read when they are asked for.
+    """Find the columns of a Parquet file; their cells are read on demand.
 
-    What is asked for may take `max_bytes` together, and not more than ten thousand times the size
-    of the file: runs of equal values pack so well that a few kB of them fill any memory.
+    All columns together may take `max_bytes`, and at most ten thousand times the size of the file:
+    runs of equal values are packed so well that a few kB may fill any memory.
 
     Raises
     ------
     FileFormatError
-        If pyarrow is missing, the file is damaged, or too large when unpacked.
+        pyarrow is not installed, or the file is damaged, or too large when unpacked.
     """
     try:
         import pyarrow.parquet as pq
@@ -81,7 +81,7 @@ def read_parquet(path: Path, *, max_bytes: float) -> Table:
 
 
 class _Reader:
-    """Reads columns of one file, as long as they fit into the limit together."""
+    """Reads columns of one file, within the limit for all of them."""
 
     def __init__(self, path: Path, limit: float) -> None:
         self.path = path
@@ -103,7 +103,7 @@ class _Reader:
                 f"{self.path}: column {field.name!r} holds {str(field.type)[:60]} values; "
                 "expected numbers or times"
             )
-        # of texts each different one is kept once
+        # equal texts are stored once
         once = [field.name] if kind == "text" else None
         with _said_if_damaged(self.path), pq.ParquetFile(self.path, read_dictionary=once) as file:
             if [one.name for one in file.schema_arrow].count(field.name) > 1:
@@ -116,7 +116,7 @@ class _Reader:
             return _cells(file.read(columns=[field.name], use_threads=False).column(0))
 
     def _take(self, file: Any, position: int, field: pa.Field, kind: str) -> None:
-        """Refuse a column that does not fit any more."""
+        """Refuse a column that exceeds the limit."""
         groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
         packed = sum(
             group.column(k).total_uncompressed_size
@@ -137,7 +137,7 @@ def _first(file: Any, field: pa.Field, count: int) -> Iterator[Any]:
 
 
 def _cells(values: Any) -> AnyArray:
-    """Turn a column of Arrow's into an array; integers with gaps become floats with NaN."""
+    """Convert a column of Arrow to an array; integers with gaps become floats with NaN."""
     import pyarrow as pa
     import pyarrow.types as kinds
 
@@ -146,7 +146,7 @@ def _cells(values: Any) -> AnyArray:
     if not kinds.is_dictionary(values.type):
         return np.asarray(values.to_pandas())
     parts = [values] if isinstance(values, pa.Array) else values.chunks
-    # one object for all cells of the same text; the last entry is that of a cell without one
+    # one object for all cells with the same text; the last entry is for empty cells
     found = [
         np.array([*part.dictionary.to_pylist(), None], dtype=object)[
             part.indices.fill_null(len(part.dictionary)).to_numpy(zero_copy_only=False)
@@ -157,7 +157,7 @@ def _cells(values: Any) -> AnyArray:
 
 
 def _kind(of: pa.DataType) -> str:
-    """Tell what becomes of the values of a type: a "number", an "object", "text" or "other"."""
+    """Kind of the values of a type: a "number", an "object", "text" or "other"."""
     import pyarrow.types as kinds
 
     if kinds.is_dictionary(of):
@@ -176,7 +176,7 @@ def _said_if_damaged(path: Path) -> Iterator[None]:
         yield
     except FileFormatError:
         raise
-    # damaged metadata end in every kind of exception, ArrowException and TypeError among them
+    # damaged metadata cause all kinds of exceptions, ArrowException and TypeError among them
     except Exception as error:
         reason = str(error).partition("\n")[0][:200]
         raise FileFormatError(f"{path} is a damaged Parquet file: {reason}") from error

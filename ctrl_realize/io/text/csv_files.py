@@ -1,4 +1,4 @@
-"""Write tables as CSV that a spreadsheet shows and does not execute."""
+"""Write tables as CSV files that a spreadsheet does not execute."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from ..atomic import write_text
 if TYPE_CHECKING:
     import pandas as pd
 
-# A spreadsheet takes a cell that begins with one of these for a formula. A tab or a line end may
-# be dropped before it looks, and a semicolon ends a cell where the comma is the decimal sign.
+# A spreadsheet takes a cell that begins with one of these for a formula. A tab or a line end may be
+# ignored at the beginning, and a semicolon ends a cell if the comma is the decimal sign.
 _FORMULA = re.compile(r"(^|[;\t\r\n])(?='*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20])")
 
 _QUOTED_OR_END = re.compile(r'("[^"]*")|\r\n')
 
 
 def write_csv(path: str | os.PathLike[str], table: pd.DataFrame, *, index: bool) -> None:
-    """Write a table, whole or not at all; its texts are no formulas.
+    """Write a table atomically, without formulas.
 
-    Numbers have all their digits, so that what is read is what was written. An apostrophe stands
-    before a text that a spreadsheet would execute (`as_text`).
+    Numbers are written with all digits, so that they can be read back exactly. An apostrophe
+    precedes a text that a spreadsheet would execute (`as_text`).
 
     Parameters
     ----------
     path : path-like
     table : pandas.DataFrame
     index : bool
-        Write the index as well.
+        Write the index, too.
 
     Raises
     ------
     OSError
-        The folder is missing or cannot be written; `path` is then as it was.
+        The folder is missing or cannot be written; `path` is then unchanged.
 
     Examples
     --------
@@ -52,8 +52,8 @@ def write_csv(path: str | os.PathLike[str], table: pd.DataFrame, *, index: bool)
     """
     whole = table.reset_index() if index else table
     safe = whole.rename(columns=as_text).apply(lambda column: column.map(as_text))
-    # Pandas puts cells in quotes that hold a part of the line end, so with both parts any name
-    # that holds one is one cell. Between the lines a plain one is written.
+    # Pandas quotes cells that contain a part of the line end, so with both parts any name with a
+    # line end is one cell. The lines themselves end in a plain one.
     text = safe.to_csv(index=False, lineterminator="\r\n")
     write_text(path, _QUOTED_OR_END.sub(lambda found: found[1] or "\n", text))
 
@@ -61,10 +61,9 @@ def write_csv(path: str | os.PathLike[str], table: pd.DataFrame, *, index: bool)
 def as_text(value: Any) -> Any:
     r"""Put an apostrophe before a text that a spreadsheet would take for a formula.
 
-    Names come from files of others: ``=cmd|'/c calc'!A1`` as the name of a record would run a
-    program where the table is opened. With the apostrophe it is shown as it is. Where one stands
-    already another is put before it, so that a program that reads the table gets the name back
-    by leaving out one.
+    Names come from other people's files: a record named ``=cmd|'/c calc'!A1`` would run a program
+    when the table is opened. With the apostrophe it is displayed. If there already is one, another
+    is added, so that a program that reads the table recovers the name by removing one.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Text tables: parsed by pandas, after `sniff` has found out how they are written."""
+"""Text tables, parsed by pandas in the format determined by `sniff`."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _TAIL_LINES = 50
 def read_delimited(path: Path, options: TextOptions) -> Table:
     """Read a text table (CSV, TSV, columns between blanks).
 
-    A last line that was cut off while it was written is left out with a `DataWarning`.
+    An incomplete last line, as if writing was interrupted, is left out with a `DataWarning`.
 
     Raises
     ------
     FileFormatError
-        If it is not a table: binary, no numbers, rows longer than the others.
+        It is not a table: binary, without numbers, or with rows longer than the others.
     """
     layout = sniff(path, options)
     frame = _parse(path, layout)
@@ -36,7 +36,7 @@ def read_delimited(path: Path, options: TextOptions) -> Table:
     cut = _cut_last_line(path, layout)
     if cut and len(frame) > 1:
         warnings.warn(f"{path}: the last line is skipped: {cut}", DataWarning, stacklevel=4)
-        # columns that are text only because of the cut line become numbers in Table.numbers
+        # columns that are text only because of the incomplete line become numbers in Table.numbers
         frame = frame.iloc[:-1]
     while len(frame) and _is_blank(frame.iloc[-1]):
         frame = frame.iloc[:-1]
@@ -58,14 +58,14 @@ def _parse(path: Path, layout: TextLayout) -> Any:
     separator = r"\s+" if layout.delimiter == " " else layout.delimiter
     keywords: dict[str, Any] = {"low_memory": False}
     if not (layout.delimiter + (layout.comment or "")).isascii():
-        # the faster parser knows signs of one byte alone
+        # the faster parser accepts delimiters of one byte only
         keywords = {"engine": "python"}
     elif tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1):
-        # the default of later versions; before, the last digit could be wrong
+        # the default of later versions; without it, the last digit could be wrong
         keywords["float_precision"] = "round_trip"
     try:
         with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
-            # Not by skiprows: the parser counts lines in its own way, and would leave out more.
+            # Not by skiprows: the parser counts lines differently, and would leave out more.
             file.read(layout.start)
             frame = pd.read_csv(
                 file,
@@ -73,15 +73,15 @@ def _parse(path: Path, layout: TextLayout) -> Any:
                 decimal=layout.decimal,
                 header=None,
                 comment=layout.comment,
-                # numbers are ASCII in all encodings here; a wrong letter in a name does no harm
+                # numbers are ASCII in all encodings here; a wrong character in a name is harmless
                 skipinitialspace=True,
-                # an empty cell or a "NaN" makes its column text, and is complained about there
+                # an empty cell or "NaN" makes its column text, and is reported there
                 na_filter=False,
                 **keywords,
             )
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeError, OverflowError) as error:
         reason = str(error).strip().removeprefix("Error tokenizing data. C error: ")
-        # it counts from where we let it begin
+        # it counts from where parsing begins
         reason = re.sub(
             r"\bline (\d+)", lambda found: f"line {int(found[1]) + layout.first_line}", reason
         )
@@ -96,7 +96,7 @@ def _parse(path: Path, layout: TextLayout) -> Any:
 
 
 def _check_parsed(path: Path, layout: TextLayout, frame: Any) -> None:
-    """Compare what was parsed with what was seen of the file: no sample is lost without a word."""
+    """Compare the parsed table with the lines of the file, so that no sample is lost silently."""
     pattern = NUMBER[layout.decimal]
     for column, cell in enumerate(layout.first_row[: frame.shape[1]]):
         parsed = frame.iloc[0, column]
@@ -120,9 +120,9 @@ def _is_blank(cells: Any) -> bool:
 
 
 def _cut_last_line(path: Path, layout: TextLayout) -> str:
-    """Say how one sees that the last line was cut off while it was written, or ``""``."""
+    """Return why the last line seems incomplete, or ``""``."""
     raw = read_tail(path, _TAIL_BYTES)
-    # the mark at the start is not in the tail, and UTF-16 without it is told by its zeros
+    # the byte order mark is not in the tail; UTF-16 without it is recognised by its zeros
     encoding = layout.encoding
     if encoding == "utf-16":
         encoding = "utf-16-be" if raw[:64:2].count(0) > raw[1:64:2].count(0) else "utf-16-le"
@@ -130,7 +130,7 @@ def _cut_last_line(path: Path, layout: TextLayout) -> str:
     lines = [line for line in re.split(r"\r\n|\n|\r", text)[-_TAIL_LINES:] if line.strip()]
     if layout.comment:
         lines = [line for line in lines if not line.lstrip().startswith(layout.comment)]
-    # Zeros are what a writer that was stopped leaves behind: at the end they are a cut line.
+    # An interrupted writer may leave zeros: at the end they are an incomplete line.
     rows = [split_line(line.rstrip("\0"), layout.delimiter) for line in lines]
     before, last = [row for row in rows[:-1] if any(row)], rows[-1] if rows else []
     if not before:
@@ -152,7 +152,7 @@ def _cut_last_line(path: Path, layout: TextLayout) -> str:
 
 
 def _place(path: Path, layout: TextLayout, row: int) -> str:
-    """Line of the file on which a row of the table stands."""
+    """Line of the file that contains a row of the table."""
     with path.open(encoding=layout.encoding, errors="replace") as file:
         numbered = enumerate(file, start=1)
         data = (

@@ -1,4 +1,4 @@
-"""Where the data of a text table begin, and what stands above them."""
+"""Start of the data in a text table, and the header above them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..units import is_units_line, plain_unit, split_unit
 
 @dataclass(frozen=True, eq=False)
 class Head:
-    """The first lines, cut into cells: ``cells[k]`` are those of physical line ``rows[k]``."""
+    """The first lines, split into cells: ``cells[k]`` are those of physical line ``rows[k]``."""
 
     path: Path
     lines: list[str]
@@ -26,14 +26,14 @@ class Head:
     width: int
 
     def kinds(self, row: int) -> list[str]:
-        """Tell what the cells of a line look like."""
+        """Return the kinds of the cells of a line."""
         return [kind_of(cell, self.decimal) for cell in self.cells[row]]
 
 
 def first_data_row(head: Head, header: bool | str) -> int:
     """Position in ``head.rows`` of the first line of data."""
     last = len(head.rows) - 1
-    # of each line the kinds of its cells; none of one that does not fit the columns
+    # for each line the kinds of its cells; none if it does not match the columns
     lines = [
         head.kinds(row) if len(cells) == head.width else [] for row, cells in enumerate(head.cells)
     ]
@@ -43,7 +43,7 @@ def first_data_row(head: Head, header: bool | str) -> int:
         for column in range(head.width)
         if 2 * sum(line[column] in FILLED for line in lower) >= len(lower)
     ]
-    # part of the columns of numbers in which a line has a number
+    # fraction of the numeric columns in which a line has a number
     share = [
         sum(line[column] in FILLED for column in numeric) / max(len(numeric), 1) if line else 0.0
         for line in lines
@@ -52,7 +52,7 @@ def first_data_row(head: Head, header: bool | str) -> int:
         has_units = last > 1 and share[1] == 0 and is_units_line(head.cells[1])
         return min(2 if has_units else 1, last)
     first = next((row for row, part in enumerate(share) if part == 1), last)
-    # a line above with some numbers is a bad line of data, to be complained about, not a header
+    # a line above with some numbers is a bad line of data, to be reported, not a header
     while first > 0 and share[first - 1] > 0:
         first -= 1
     return first
@@ -78,22 +78,22 @@ def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
 
 
 def _header_cells(head: Head, row: int, first: int) -> list[str] | None:
-    """Cells of a line above the data, or None if they do not fit the columns."""
+    """Cells of a line above the data, or None if they do not match the columns."""
     cells = head.cells[row]
     if len(cells) == head.width:
         return cells
     if len(cells) == head.width - 1 > 1 and not any(
         line[-1] for line in head.cells[first:] if len(line) == head.width
     ):
-        # the lines of data end in a delimiter, the header does not
+        # the lines of data end with a delimiter, the header does not
         return [*cells, ""]
-    # names with blanks in them, above columns that are split at blanks
+    # names that contain blanks, above columns that are separated by blanks
     apart = re.split(r"\t+|\s{2,}", head.lines[head.rows[row]].strip())
     return apart if len(apart) == head.width else None
 
 
 def _names_in_comments(head: Head, first_line: int) -> list[str]:
-    """Take the last comment line above the data that has a name for each column."""
+    """Return the last comment line above the data that has a name for each column."""
     comments = [
         line.strip().strip(head.comment).strip()
         for line in head.lines[:first_line]

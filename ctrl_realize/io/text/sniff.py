@@ -1,15 +1,17 @@
-"""Find out how a text table is written, from its first lines.
+"""Determine the format of a text table from its first lines.
 
-The rules, in the order in which they are applied; every one can be overruled by the caller:
+The rules, in this order; each can be overruled by the caller:
 
-1. The encoding is told by the byte order mark, by zero bytes in every other place (UTF-16), or
-   by the text being valid UTF-8; otherwise it is Latin-1.
-2. The delimiter and the decimal sign are the pair for which the largest part of the cells in
-   the lower half of the first lines are numbers or times.
-3. The data begin with the line from which on all columns that hold numbers do so.
-4. The header is the line above, if it has as many cells and no numbers in them; a line of units
-   may lie between. Without one, the last comment line above the data is tried (NumPy's
-   ``savetxt`` writes its header so).
+1. The encoding is determined by the byte order mark, by zero bytes in every second place (UTF-16),
+or by
+   valid UTF-8; otherwise it is Latin-1.
+2. The delimiter and the decimal sign are the pair for which the largest fraction of the cells in
+the lower
+   half of the first lines are numbers or times.
+3. The data begin with the line from which on all numeric columns contain numbers.
+4. The header is the line above, if it has as many cells and no numbers; a line of units
+   may be between. Without one, the last comment line above the data is used (as written by NumPy's
+   ``savetxt``).
 """
 
 from __future__ import annotations
@@ -28,11 +30,11 @@ from ..text_options import TextOptions
 from .header import Head, column_names, first_data_row
 
 _SAMPLE_LINES = 60
-"""Lines that every pair of delimiter and decimal sign is tried on."""
+"""Number of lines on which every pair of delimiter and decimal sign is tried."""
 
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
-    # before that of UTF-16, with which it begins
+    # before that of UTF-16, which is its beginning
     (codecs.BOM_UTF32_LE, "utf-32"),
     (codecs.BOM_UTF32_BE, "utf-32"),
     (codecs.BOM_UTF16_LE, "utf-16"),
@@ -42,12 +44,12 @@ _BOMS = (
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text table is written.
+    """Format of a text table.
 
-    ``names`` and ``units`` have ``n_columns`` entries; the names are empty without a header.
-    The data begin with physical line ``first_line`` (0-based), behind ``start`` characters, and
-    ``first_row`` are the cells of its first line. ``n_rows`` lines of data were seen, all of them
-    where ``whole`` is true.
+    ``names`` and ``units`` have ``n_columns`` entries; the names are empty without a header. The
+    data begin with physical line ``first_line`` (0-based), after ``start`` characters, and
+    ``first_row`` are the cells of its first line. ``n_rows`` lines of data were read, all of them
+    if ``whole`` is true.
     """
 
     encoding: str
@@ -65,12 +67,12 @@ class TextLayout:
 
 
 def sniff(path: Path, options: TextOptions) -> TextLayout:
-    """Find out how the text table in `path` is written.
+    """Determine the format of the text table in `path`.
 
     Raises
     ------
     FileFormatError
-        If it is not text, or no columns of numbers are found in its first lines.
+        It is not text, or there are no columns of numbers in its first lines.
     """
     head_bytes = read_head(path, HEAD_BYTES)
     encoding = _encoding(path, head_bytes) if options.encoding == "auto" else options.encoding
@@ -111,7 +113,7 @@ def _encoding(path: Path, head: bytes) -> str:
         if head.startswith(mark):
             return encoding
     if b"\0" in head:
-        # numbers in UTF-16 have a zero in every second byte, and nowhere else
+        # only numbers in UTF-16 have a zero in every second byte
         for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
             if head[first::2].count(0) > 0.9 * (len(head) // 2) and 0 not in head[1 - first :: 2]:
                 return encoding
@@ -143,7 +145,7 @@ def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) 
             kinds = [kind_of(cell, decimal) for row in rows if len(row) == width for cell in row]
             good = sum(kind in FILLED for kind in kinds)
             filled = sum(map(len, rows)) - kinds.count("missing")
-            # one column of whole lines counts only if no delimiter splits them into numbers
+            # a single column counts only if no delimiter splits the lines into numbers
             score = (round(good / max(filled, 1), 3), width > 1)
             if good and score > best_score:
                 best, best_score = (delimiter, decimal), score
