@@ -3,14 +3,12 @@
 The rules, in this order; each can be overruled by the caller:
 
 1. The encoding is determined by the byte order mark, by zero bytes in every second place (UTF-16),
-or by
-   valid UTF-8; otherwise it is Latin-1.
+   or by valid UTF-8; otherwise it is Latin-1.
 2. The delimiter and the decimal sign are the pair for which the largest fraction of the cells in
-the lower
-   half of the first lines are numbers or times.
+   the lower half of the first lines are numbers or times.
 3. The data begin with the line from which on all numeric columns contain numbers.
-4. The header is the line above, if it has as many cells and no numbers; a line of units
-   may be between. Without one, the last comment line above the data is used (as written by NumPy's
+4. The header is the line above, if it has as many cells and no numbers; a line of units may be
+   between. Without one, the last comment line above the data is used (as written by NumPy's
    ``savetxt``).
 """
 
