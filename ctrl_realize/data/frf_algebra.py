@@ -287,9 +287,9 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
     def append(self, other: Any) -> Any:
         """Append another response; the cross terms are zero."""
         one, two = self._operand(), self._needed(other)
-        hold = one.hold if not two.measured else common_hold(one, two, "a response beside another")
+        hold = one.hold if not two.measured else common_hold(one, two, "appended responses")
         return self._made(
-            "one beside another",
+            "appended responses",
             blocks(one.values, two.values, self.omega.size),
             blocks(one.spread, two.spread, self.omega.size),
             (one, two),

@@ -1,8 +1,8 @@
-"""Methods of python-control that answer from core and delays.
+"""Methods of python-control systems, computed from core and delays.
 
-``sys.step_response(...)`` and its like are methods of every linear system of python-control. The
-functions of the same names read the matrices, which takes as long as the delays are; the methods
-here step through lines of past samples.
+``sys.step_response(...)`` and similar are methods of every linear system of python-control. The
+functions of the same names use the matrices, which takes longer for longer delays; the methods here
+simulate with delay lines.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from ..numerics.loops.crossings import follow, frequency_grid
 from .deferred import DeferredMatrices
 
 FINE = 0.1
-"""Turn in rad between the points of a response from which margins are interpolated: the cubic
-spline of python-control then is right to 1e-6."""
+"""Phase in rad between the points of a response from which margins are interpolated: the cubic
+spline of python-control is then accurate to 1e-6."""
 
 DECIDES = 0.2
-"""Part of the gain that decides about a margin; beyond the last frequency where the gain is as
-large the response is left out."""
+"""Least relative gain that matters for a margin; beyond the last frequency with such a gain the
+response is left out."""
 
 
 class HostResponses(DeferredMatrices):
-    """Time responses, and the frequency response that margins are read off."""
+    """Time responses, and the frequency response for margins."""
 
     @abstractmethod
     def _simulated(self, inputs: FloatArray) -> FloatArray:
-        """Compute the outputs (p, N) from rest."""
+        """Compute the outputs (p, N) from zero initial state."""
 
     @abstractmethod
     def _features(self) -> tuple[ComplexArray, float]:
-        """Poles in the s-plane near which the response turns, and the delay in s that turns it."""
+        """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
 
     def forced_response(
         self, timepts: ArrayLike | None = None, inputs: ArrayLike = 0.0, *args: Any, **settings: Any
     ) -> ct.TimeResponseData:
-        """Compute the response to any input from rest, see `control.forced_response`.
+        """Compute the response to any input from zero initial state, see `control.forced_response`.
 
-        With an initial state, or where the states are asked for, python-control steps through the
+        With an initial state, or if the states are requested, python-control simulates with the
         matrices.
         """
         if args or set(settings) - {"squeeze", "transpose"} or not self.dt:
@@ -73,7 +73,7 @@ class HostResponses(DeferredMatrices):
     def step_response(
         self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
     ) -> ct.TimeResponseData:
-        """Compute the step responses from rest, see `control.step_response`."""
+        """Compute the step responses from zero initial state, see `control.step_response`."""
         if args or timepts is None or set(settings) - {"squeeze", "transpose"} or not self.dt:
             return super().step_response(timepts, *args, **settings)
         return self._traces(timepts, "step", 1.0, settings)
@@ -113,7 +113,7 @@ class HostResponses(DeferredMatrices):
         )
 
     def _times(self, timepts: ArrayLike | None, count: int) -> FloatArray:
-        """Check that times are every sample from 0, or make as many as there are inputs."""
+        """Check that times are all samples from 0, or make as many as there are inputs."""
         if timepts is None:
             return np.asarray(np.arange(count) * float(self.dt), dtype=np.float64)
         times = finite(timepts, "timepts")
@@ -129,10 +129,11 @@ class HostResponses(DeferredMatrices):
         return 3
 
     def __iter__(self) -> Iterator[FloatArray]:
-        """Unpack as magnitude, phase in degrees, and omega: what `control.margin` takes.
+        """Unpack as magnitude, phase in degrees, and omega: what `control.margin` accepts.
 
-        `control.margin` and `control.stability_margins` accept three such arrays in place of a
-        system, and what unpacks into them. So they read the exact response, and form no polynomial.
+        `control.margin` and `control.stability_margins` accept three such arrays, or anything that
+        unpacks into them, instead of a system. So they use the exact response instead of a
+        polynomial.
 
         Raises
         ------
@@ -168,7 +169,7 @@ class HostResponses(DeferredMatrices):
 
 
 def _last(values: ComplexArray) -> int:
-    """Count the points up to the last one at which margins can be decided.
+    """Count the points up to the last one that matters for the margins.
 
     The gain is a fifth of 1 there, or of the largest gain at a phase of -180 degrees:
     python-control takes a minute for the turns of the phase beyond.

@@ -1,4 +1,4 @@
-"""Connect systems with delays by the names of their signals."""
+"""Connect systems with delays by signal names."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from .operators import common_dt, form_of, plain
 
 
 def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
-    """Connect systems by the names of their signals, with all delays kept.
+    """Connect systems by their signal names, with exact delays.
 
-    `control.interconnect` makes matrices of all states of its systems, and cannot take a dead time
-    in continuous time. This one has the same arguments.
+    `control.interconnect` makes matrices with the states of all systems, and does not allow dead
+    time in continuous time. This function has the same arguments.
 
     Parameters
     ----------
     systems : sequence of control.StateSpace or control.TransferFunction
-        With names, and labels of their signals; `control.summing_junction` among them.
+        Systems with signal names; also `control.summing_junction`.
     *args, **settings
-        ``connections``, ``inplist``, ``outlist``, ``inputs``, ``outputs``, ``name`` and so on:
-        those of `control.interconnect`, which reads them.
+        ``connections``, ``inplist``, ``outlist``, ``inputs``, ``outputs``, ``name`` etc., as for
+        `control.interconnect`.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     for system in systems[1:]:
         all_ = forms.append(all_, form_of(system))
     gain, into = np.asarray(wired.connect_map), np.asarray(wired.input_map)
-    # what is seen of the outputs, and of the inputs u = gain y + into r
+    # selection of the outputs, and the inputs u = gain y + into r
     seen = np.asarray(wired.output_map)
     of_outputs, of_inputs = seen[:, : all_.outputs], seen[:, all_.outputs :]
     try:
@@ -69,7 +69,7 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
         ) from None
     loop = forms.through(loop, of_outputs + of_inputs @ gain, into)
     total = forms.parallel(loop, forms.static(of_inputs @ into))
-    # a system without delays knows how to make what a form needs
+    # a system without delays provides the methods for a form
     maker = DelaySystem(plain(forms.static(np.zeros((1, 1))), dt))
     return maker._joined(
         total, dt, list(wired.input_labels), list(wired.output_labels), name=wired.name
@@ -87,7 +87,7 @@ def _time_base(systems: Sequence[Any]) -> float:
 
 
 def _stand_in(system: Any) -> ct.StateSpace:
-    """Make a system without dynamics that has the names of another one."""
+    """Make a system without dynamics with the names of another one."""
     form = form_of(system)
     return ct.StateSpace(
         form.A[:0, :0],

@@ -1,4 +1,4 @@
-"""Algebra of systems with delays: every interconnection is exact, and has delays again."""
+"""Algebra of systems with delays: every interconnection is exact, and is again such a system."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Numbers = (int, float, np.number)
 
 
 class DelayOperators(DeferredMatrices):
-    """Operators of python-control on core and delays.
+    """Operators of python-control for core and delays.
 
-    What an interconnection makes is of one of two kinds, which name themselves by ``kind=``: with
-    delays at the ends only, or with delays inside.
+    The result of an interconnection belongs to one of two classes, registered by ``kind=``: with
+    delays at the ends only, or with internal delays.
     """
 
     _kinds: ClassVar[dict[str, Any]] = {}
@@ -37,7 +37,7 @@ class DelayOperators(DeferredMatrices):
 
     @abstractmethod
     def _form(self) -> DelayForm:
-        """Give core and delays, those at the ends as channels too."""
+        """Return core and delays, with those at the ends as further channels."""
 
     def _joined(
         self,
@@ -47,7 +47,7 @@ class DelayOperators(DeferredMatrices):
         outputs: Sequence[str] | None = None,
         **names: Any,
     ) -> Any:
-        """Make the system of a form, with the fewest delays; labels only where they are unique."""
+        """Make the system of a form, with the fewest delays; only unique names are kept."""
         try:
             form = merged(form)
         except np.linalg.LinAlgError:
@@ -66,7 +66,7 @@ class DelayOperators(DeferredMatrices):
         return self._kinds[INSIDE](plain(form, dt), form.delays, **labels)
 
     def _other(self, other: Any) -> DelayForm | None:
-        """Form of the other operand; None for what answers an operator itself, or is no system."""
+        """Form of the other operand; None if it has its own operator, or is not a system."""
         if isinstance(other, ct.FrequencyResponseData) or not is_linear(other):
             return None
         return form_of(other)
@@ -77,7 +77,7 @@ class DelayOperators(DeferredMatrices):
         return self._joined(gain, self.dt, self.input_labels, self.output_labels)
 
     def __add__(self, other: Any) -> Any:
-        """Sum: both systems side by side on the same input."""
+        """Sum: parallel connection with the same input."""
         theirs, mine = self._other(other), self._form()
         if theirs is None:
             return NotImplemented
@@ -120,7 +120,7 @@ class DelayOperators(DeferredMatrices):
         return self._joined(product, common_dt(self, other), self.input_labels, labels)
 
     def __pow__(self, power: Any) -> Any:
-        """Product with itself; -1 is the inverse, where that is proper."""
+        """Power; -1 is the inverse, if that is proper."""
         if power != -1 or isinstance(power, bool):
             return super().__pow__(power)
         try:
@@ -133,12 +133,13 @@ class DelayOperators(DeferredMatrices):
         return self._joined(form, self.dt, self.output_labels, self.input_labels)
 
     def feedback(self, other: Any = 1, sign: float = -1) -> Any:
-        """Close `other` around this system; see `control.feedback`.
+        """Close the loop with `other` in the feedback path; see `control.feedback`.
 
         Raises
         ------
         UnsuitableSystemError
-            The direct terms of both make an algebraic loop without a solution; other time bases.
+            The feedthroughs of both form an algebraic loop without a solution, or the time bases
+            differ.
         """
         if isinstance(other, ct.FrequencyResponseData) or not is_linear(other):
             return super().feedback(other, sign)
@@ -158,7 +159,7 @@ class DelayOperators(DeferredMatrices):
         return self._joined(form, common_dt(self, other), self.input_labels, self.output_labels)
 
     def append(self, other: Any) -> Any:
-        """Put `other` beside this system; see `control.append`."""
+        """Append `other`; see `control.append`."""
         other_form = form_of(other)
         inputs = [*self.input_labels, *getattr(other, "input_labels", ["u"])]
         outputs = [*self.output_labels, *getattr(other, "output_labels", ["y"])]
@@ -166,7 +167,7 @@ class DelayOperators(DeferredMatrices):
         return self._joined(both, common_dt(self, other), inputs, outputs)
 
     def lft(self, other: Any, nu: int = -1, ny: int = -1) -> Any:
-        """Close `other` around the last inputs and outputs; see `control.StateSpace.lft`."""
+        """Close `other` between the last outputs and inputs; see `control.StateSpace.lft`."""
         upper, lower = self._form(), form_of(other)
         ny = min(lower.inputs, upper.outputs) if ny == -1 else ny
         nu = min(lower.outputs, upper.inputs) if nu == -1 else nu
@@ -191,19 +192,19 @@ def plain(form: DelayForm, dt: float) -> ct.StateSpace:
 
 
 def is_linear(system: Any) -> bool:
-    """Whether a form can be made of an object."""
+    """Whether an object can be converted to a form."""
     if isinstance(system, (np.ndarray, np.number)):
         return bool(np.isrealobj(system))
     return isinstance(system, (int, float, ct.StateSpace, ct.TransferFunction))
 
 
 def form_of(system: Any) -> DelayForm:
-    """Make the form of a linear system, a number or a matrix.
+    """Convert a linear system, a number or a matrix to a form.
 
     Raises
     ------
     UnsuitableSystemError
-        Something else, an improper transfer function, or entries that are not finite.
+        Anything else, an improper transfer function, or entries that are not finite.
     """
     if isinstance(system, DelayOperators):
         return system._form()
@@ -237,12 +238,12 @@ def _check_proper(system: ct.TransferFunction) -> None:
 
 
 def common_dt(first: Any, second: Any) -> float:
-    """Time base of both systems; numbers and systems without one follow the other.
+    """Common time base of two systems; numbers and systems without one adopt the other.
 
     Raises
     ------
     UnsuitableSystemError
-        Continuous and discrete, or other sample times.
+        Continuous and discrete, or different sample times.
     """
     bases: list[Any] = [getattr(system, "dt", None) for system in (first, second)]
     for base, other in (bases, bases[::-1]):
@@ -266,7 +267,7 @@ def _everywhere(single: DelayForm, other: DelayForm) -> DelayForm:
 
 
 def _product(second: DelayForm, first: DelayForm) -> DelayForm:
-    """Series; a system of one input and output stands in each channel, as in python-control."""
+    """Series; a system of one input and output is applied to each channel, as in python-control."""
     if _is_single(second) and first.outputs != 1:
         second = _repeated(second, first.outputs)
     elif _is_single(first) and second.inputs != 1:
@@ -296,7 +297,7 @@ def _algebraic(what: str) -> UnsuitableSystemError:
 
 
 def whole_samples(delays: Sequence[float], dt: float) -> None:
-    """Refuse delays of a discrete system that are no whole samples.
+    """Refuse delays of a discrete system that are not whole samples.
 
     Raises
     ------

@@ -100,7 +100,7 @@ ERRATA = (
     Erratum(
         "E11",
         "section 3.2",
-        "causal or zero-phase filter is not said",
+        "causal or zero-phase filter is not stated",
         "zero-phase by default; causal for replication, its lag recorded and removable",
     ),
     Erratum(

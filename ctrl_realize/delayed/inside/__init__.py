@@ -1,1 +1,1 @@
-"""Systems whose delays stand inside: in loops and sums."""
+"""Systems with internal delays: loops and sums."""

@@ -1,4 +1,4 @@
-"""How a system with delays inside shows: one line, text, HTML."""
+"""Representation of a system with internal delays: one line, text, HTML."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..deferred import DeferredMatrices
 
 
 class InsideCards(DeferredMatrices):
-    """Core and delays, never the augmented matrices."""
+    """Shows core and delays, not the augmented matrices."""
 
     _core: ct.StateSpace
     internal_delays: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Poles and zeros of systems with delays inside, when somebody asks for them."""
+"""Poles and zeros of systems with internal delays, computed on demand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..host_responses import HostResponses
 from ..operators import DelayOperators
 
 FEW_STATES = 400
-"""States up to which zeros of several channels come from the augmented matrices."""
+"""Number of states up to which zeros of several channels are computed from the matrices."""
 
 
 class InsidePoles(HostResponses, DelayOperators):
@@ -26,26 +26,26 @@ class InsidePoles(HostResponses, DelayOperators):
     internal_delays: tuple[float, ...]
 
     def poles(self) -> ComplexArray:
-        """All poles, as many as the system has states; see `dominant_poles` for the first few."""
+        """All poles, as many as the system has states; see `dominant_poles` for the slowest few."""
         return characteristic.discrete_poles(self._form())
 
     def dominant_poles(self, count: int = 10) -> ComplexArray:
-        """Find the poles that decay most slowly, or grow fastest: those of largest size.
+        """Compute the poles that decay most slowly, or grow fastest: those of largest magnitude.
 
         Parameters
         ----------
         count : int, optional
-            How many; one more where a pair would be split.
+            Number of poles; one more if a pair would be split.
 
         Returns
         -------
         ndarray, shape (count,)
-            Falling in size.
+            Descending in magnitude.
 
         Notes
         -----
-        Each is a root of the characteristic function to 1e-10. Up to 400 states all poles are found
-        first; beyond, Newton's method starts from points all around the unit circle.
+        Each is a root of the characteristic function to 1e-10. Up to 400 states all poles are
+        computed first; beyond, Newton's method starts from points around the unit circle.
 
         Examples
         --------
@@ -59,10 +59,10 @@ class InsidePoles(HostResponses, DelayOperators):
         return dominant.dominant_discrete_poles(self._form(), whole(count, "count", 1))
 
     def is_stable(self) -> bool:
-        """Whether all poles lie inside the region of stability.
+        """Whether all poles are inside the stability region.
 
-        Decided by the argument principle on its border, without any pole; False where a pole is so
-        close to the border that no side can be told.
+        Determined by the argument principle, without computing poles; False if a pole is too close
+        to the stability boundary for a decision.
         """
         count, marginal = self._unstable()
         return count == 0 and not marginal
@@ -79,7 +79,8 @@ class InsidePoles(HostResponses, DelayOperators):
     def characteristic(self, x: ComplexArray) -> ComplexArray:
         """Evaluate a function whose zeros are the poles, and which has no unstable poles.
 
-        For a count of encirclements: the characteristic function over a polynomial of its degree.
+        For counting encirclements: the characteristic function divided by a polynomial of its
+        degree.
 
         Parameters
         ----------
@@ -92,7 +93,7 @@ class InsidePoles(HostResponses, DelayOperators):
         return dominant.characteristic(self._form(), x, discrete=bool(self.dt))
 
     def features(self) -> tuple[ComplexArray, float]:
-        """Poles in the s-plane near which the response turns, and the delay in s that turns it."""
+        """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
         return self._features()
 
     def zeros(self) -> ComplexArray:
@@ -130,7 +131,7 @@ class InsidePoles(HostResponses, DelayOperators):
             return super().damp()
 
     def _features(self) -> tuple[ComplexArray, float]:
-        """Poles in the s-plane near which the response turns, and the delay in s that turns it."""
+        """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
         dt = float(self.dt)
         poles = np.concatenate([self._core.poles(), self.dominant_poles(6)])
         poles = poles[np.abs(poles) > 0.05]

@@ -1,4 +1,4 @@
-"""Responses of systems with delays inside, in frequency and time."""
+"""Frequency and time responses of systems with internal delays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..parts import settled_values
 
 
 class InsideResponses(HostResponses, DelayOperators):
-    """Responses whose cost does not grow with the delays, or in proportion to the record alone."""
+    """Responses whose cost does not depend on the delays."""
 
     _core: ct.StateSpace
     _response: Response | None
@@ -57,7 +57,7 @@ class InsideResponses(HostResponses, DelayOperators):
         return self._one_by_one(np.ones(whole(count, "count", 1)))
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
-        """Compute the response from rest to any input, sample by sample.
+        """Compute the response to any input from zero initial state, sample by sample.
 
         Parameters
         ----------
@@ -70,7 +70,7 @@ class InsideResponses(HostResponses, DelayOperators):
         Raises
         ------
         DataError
-            Another number of inputs, or values that are not finite real numbers.
+            A wrong number of inputs, or values that are not finite real numbers.
         """
         given = finite(inputs, "inputs")
         rows = np.atleast_2d(given)

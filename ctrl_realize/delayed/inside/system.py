@@ -1,7 +1,8 @@
-r"""Systems with delays inside: in feedback loops, between parts, in one of several paths.
+r"""Systems with internal delays: in feedback loops, between parts, in one of several paths.
 
-The model is a delay-free core, some of whose outputs return to its inputs through pure delays. It
-is a `control.StateSpace` like a `DelayedStateSpace`, and is what loops and sums of those are.
+The model is a delay-free core, some of whose outputs are fed back to its inputs through pure
+delays. Like a `DelayedStateSpace` it is a `control.StateSpace`, and it is the result of loops and
+sums of those.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ from .responses import InsideResponses
 
 
 class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kind=INSIDE):
-    """Linear system with dead times inside, exact: loops, sums and series of delayed systems.
+    """Linear system with internal dead times, exact: loops, sums and series of delayed systems.
 
-    A delay-free core whose last q outputs return to its last q inputs through pure delays. It is a
-    `control.StateSpace` and goes into what python-control makes of frequency responses (Bode,
-    Nyquist, Nichols, margins); every interconnection of such systems is one again. Loops around a
-    `DelayedStateSpace` are of this class.
+    A delay-free core whose last q outputs are fed back to its last q inputs through pure delays. It
+    is a `control.StateSpace`, for all functions of python-control that use frequency responses
+    (Bode, Nyquist, Nichols, margins); interconnections of such systems are of this class again, as
+    are loops around a `DelayedStateSpace`.
 
     Parameters
     ----------
@@ -52,23 +53,23 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
     Raises
     ------
     UnsuitableSystemError
-        A core that is no state-space system, has no sample time, or fewer signals than delays.
+        A core that is not a state-space system, has no sample time, or fewer signals than delays.
     DelayRangeError
-        Delays below 0, or that are no whole samples.
+        Delays below 0, or not whole samples.
 
     Notes
     -----
-    With ``w_i(t) = z_i(t - tau_i)`` between the last outputs z and inputs w of the core this is the
-    linear fractional form of [1]_, there called internal delays.
+    With ``w_i(t) = z_i(t - tau_i)`` between the last outputs z and inputs w of the core, this is
+    the linear fractional form of [1]_, called internal delays there.
 
-    The matrices A, B, C, D of a discrete system are made when somebody asks for them, up to 20 000
-    states, with the delays as shift registers behind the states of the core. ``sys(z)``, plots of
-    frequency responses, ``sys.step_response``, ``sys.forced_response``, ``sys.dominant_poles`` and
-    every interconnection need none.
+    The matrices A, B, C, D of a discrete system are computed on demand, up to 20 000 states, with
+    the delays as shift registers after the states of the core. ``sys(z)``, plots of frequency
+    responses, ``sys.step_response``, ``sys.forced_response``, ``sys.dominant_poles`` and all
+    interconnections do not need them.
 
-    python-control decides alone in ``K * sys`` and ``ct.feedback(K, sys)`` of a transfer function
-    or plain system K: write ``sys * K``, ``ct.ss(K) * sys`` and ``ct.feedback(sys * K)`` or
-    ``cr.interconnect``.
+    In ``K * sys`` and ``ct.feedback(K, sys)`` with a transfer function or plain system K,
+    python-control uses the matrices: use ``sys * K``, ``ct.ss(K) * sys`` and ``ct.feedback(sys *
+    K)`` or ``cr.interconnect`` instead.
 
     References
     ----------
@@ -126,7 +127,7 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
 
     @property
     def core(self) -> ct.StateSpace:
-        """The delay-free core, with the delays' inputs and outputs behind the others."""
+        """The delay-free core, with the delays' inputs and outputs after the others."""
         return self._core
 
     def _form(self) -> DelayForm:
@@ -152,7 +153,7 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
         )
 
     def __getitem__(self, key: Any) -> Self:
-        """Choose channels, by number or name."""
+        """Select channels, by number or name."""
         chosen = _ends_of(self)[key]
         rows = [self.output_index[name] for name in chosen.output_labels]
         columns = [self.input_index[name] for name in chosen.input_labels]
@@ -170,7 +171,7 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
         return made
 
     def minreal(self, tol: float = 0.0) -> Any:
-        """Return the system itself: its delays are as few as can be seen from its structure."""
+        """Return the system itself: its structure already has the fewest delays."""
         return self._joined(self._form(), self.dt, self.input_labels, self.output_labels)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -209,7 +210,7 @@ def _rebuild(
 
 
 def _ends_of(system: DelaySystem) -> ct.StateSpace:
-    """Make a gain with the names of a system, which python-control can index."""
+    """Make a gain with the names of a system, for indexing by python-control."""
     ends: IntArray = np.zeros((system.noutputs, system.ninputs), dtype=np.int64)
     names = {"inputs": system.input_labels, "outputs": system.output_labels}
     return ct.StateSpace([], [], [], ends, system.dt, name=system.name, **names)
