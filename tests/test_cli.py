@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -179,14 +177,9 @@ def test_the_same_call_gives_the_same_files(folder, first, tmp_path):
         assert (out / name).read_bytes() == (first[0] / name).read_bytes(), name
 
 
-def test_the_package_runs_as_a_module():
-    done = subprocess.run(
-        [sys.executable, "-m", "ctrl_realize", "--version"],
-        capture_output=True, text=True, check=False,
-        cwd=Path(cr.__file__).parents[1],
-    )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == f"ctrl-realize {cr.__version__}\n"
+def test_the_version_is_told(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr() == (f"ctrl-realize {cr.__version__}\n", "")
 
 
 @pytest.mark.slow

@@ -56,12 +56,8 @@ def alike(record, changes=CHANGES):
         np.testing.assert_allclose(others, times, rtol=0, atol=CLOSE * max(times[0], 1.0))
 
 
-@pytest.mark.parametrize(
-    ("plant", "noise", "seed", "changes"),
-    [(rigs.R1, 0.02, 1, (last_digit,)), (rigs.R3, 0.005, 3, CHANGES)],
-)
-def test_a_step_record_is_answered_alike(plant, noise, seed, changes):
-    alike(rigs.step_record(plant, noise=noise, seed=seed, before=150, after=450), changes)
+def test_a_step_record_is_answered_alike():
+    alike(rigs.step_record(rigs.R3, noise=0.005, seed=3, before=150, after=450))
 
 
 def test_a_record_in_steps_of_a_converter_is_answered_alike():

@@ -149,12 +149,6 @@ def kept(tmp_path_factory):
     return cr.identify_campaign([record], method="paper", store=store)
 
 
-distributed = pytest.importorskip("distributed", reason="dask[distributed] is not installed")
-
-# What a cluster says while it starts, stops and loses workers is not ours.
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-
-
 def quick(seed: int, wait: float = 0.0) -> cr.Record:
     time.sleep(wait)
     made = step_record(noise=1e-3, seed=seed, before=400, after=1300)
@@ -163,6 +157,7 @@ def quick(seed: int, wait: float = 0.0) -> cr.Record:
 
 @pytest.fixture
 def client():
+    distributed = pytest.importorskip("distributed", reason="dask[distributed] is not installed")
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
@@ -172,6 +167,9 @@ def client():
         yield connected
 
 
+@pytest.mark.slow
+# What a cluster says while it starts, stops and loses workers is not ours.
+@pytest.mark.filterwarnings("ignore")
 def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(client, tmp_path):
     sources = [functools.partial(quick, seed, 0.2) for seed in range(8)]
     store = cr.io.CampaignStore(tmp_path)

@@ -104,7 +104,8 @@ def moving(seed: int, *, drifts: bool) -> cr.Record:
 
 @pytest.mark.parametrize("drifts", [True, False])
 def test_records_that_were_not_at_rest_are_fitted_together(drifts):
-    fit = cr.fit_output_error([moving(seed, drifts=drifts) for seed in range(6)]).fit
+    records = [moving(seed, drifts=drifts) for seed in range(6)]
+    fit = cr.fit_output_error(records, structures=[(1, 1), (2, 2), (2, 1), (3, 3)]).fit
     assert ("drift" if drifts else "not_at_rest") in codes(fit)
     assert "records_differ" not in codes(fit)
     assert fit.interval[0] <= 0.6 <= fit.interval[1] < 1.0

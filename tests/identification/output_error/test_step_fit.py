@@ -139,7 +139,8 @@ def test_a_lag_of_a_tenth_of_a_sample_leaves_its_sample_open_and_one_of_two_samp
     intervals = []
     for slow in (0.1, 2.0):
         y = -np.expm1(-np.maximum(k - 25.4, 0) / slow) + noise
-        fit = cr.fit_output_error(cr.Record(0.01 * k, (k >= 0).astype(float), y)).fit
+        record = cr.Record(0.01 * k, (k >= 0).astype(float), y)
+        fit = cr.fit_output_error(record, structures=[(1, 1), (2, 2)]).fit
         assert covers(fit, 25.4)
         intervals.append(fit.delay_interval)
     assert intervals[0][1] == pytest.approx(26.0, abs=0.01)
