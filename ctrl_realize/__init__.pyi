@@ -20,6 +20,7 @@ from .data import Record as Record
 from .data import StepResponse as StepResponse
 from .delayed import DelayedStateSpace as DelayedStateSpace
 from .delayed import DelaySystem as DelaySystem
+from .delayed import delay as delay
 from .delayed import delayed_ss as delayed_ss
 from .delayed import interconnect as interconnect
 from .errors import CtrlRealizeError as CtrlRealizeError

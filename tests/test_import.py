@@ -31,7 +31,7 @@ PROMISED = """
 Record ImpulseResponse MeasuredFRF StepResponse read_record read_frf detect_step
 unit_step impulse_from_step impulse_from_io impulse_from_frf fit_frf realize estimate_delay
 fit_output_error fit_state_space scan_orders identify Campaign identify_campaign DelayTracker
-DelayedStateSpace DelaySystem delayed_ss interconnect save_model load_model
+DelayedStateSpace DelaySystem delay delayed_ss interconnect save_model load_model
 stepped_sine_frf spectral_frf compare_frf
 CtrlRealizeError CtrlRealizeWarning
 """

@@ -1,6 +1,7 @@
 """Systems with dead time."""
 
 from .factory import delayed_ss as delayed_ss
+from .inside.pure import delay as delay
 from .inside.system import DelaySystem as DelaySystem
 from .joined import interconnect as interconnect
 from .system import DelayedStateSpace as DelayedStateSpace

@@ -155,7 +155,8 @@ class HostResponses(DeferredMatrices):
         sizes = np.abs(features)
         sizes = sizes[sizes > 0]
         dt = float(self.dt)
-        top = np.pi / dt if dt else 1e3 * float(sizes.max(initial=1 / wait if wait else 1.0))
+        fastest = float(sizes.max(initial=1 / wait if wait else 1.0))
+        top = np.pi / dt if dt else self._gain_is_gone(fastest)
         low = 1e-3 * min(float(sizes.min(initial=top)), 1 / wait if wait else top)
 
         def curve(omega: FloatArray) -> ComplexArray:
@@ -166,6 +167,16 @@ class HostResponses(DeferredMatrices):
         omega, values = follow(curve, omega[: _last(values)], FINE)
         known = np.isfinite(values)
         return omega[known], values[known]
+
+    def _gain_is_gone(self, fastest: float) -> float:
+        """Find a frequency beyond which the gain of a continuous system decides about no margin."""
+        omega = fastest * np.geomspace(1e-3, 1e5, 4000)
+        size = np.abs(self.horner(1j * omega, warn_infinite=False)[0, 0])
+        (large,) = np.nonzero(
+            ~(size < 0.1 * DECIDES * min(1.0, float(np.median(size[:100])) or 1.0))
+        )  # a gain that stays is looked at for ten times the fastest pole
+        last = int(large[-1]) if large.size else 0
+        return float(omega[last + 1]) if last + 1 < omega.size else 10 * fastest
 
 
 def _last(values: ComplexArray) -> int:

@@ -106,7 +106,7 @@ class DelayOperators(DeferredMatrices):
         theirs = self._other(other)
         if theirs is None:
             return NotImplemented
-        labels = getattr(other, "input_labels", self.input_labels)
+        labels = _labels(other, "input_labels", self.input_labels)
         product = _product(self._form(), theirs)
         return self._joined(product, common_dt(self, other), labels, self.output_labels)
 
@@ -115,7 +115,7 @@ class DelayOperators(DeferredMatrices):
         theirs = self._other(other)
         if theirs is None:
             return NotImplemented
-        labels = getattr(other, "output_labels", self.output_labels)
+        labels = _labels(other, "output_labels", self.output_labels)
         product = _product(theirs, self._form())
         return self._joined(product, common_dt(self, other), self.input_labels, labels)
 
@@ -258,6 +258,13 @@ def common_dt(first: Any, second: Any) -> float:
     return float(bases[0])
 
 
+def _labels(system: Any, side: str, own: Sequence[str]) -> Sequence[str]:
+    """Signals of the other factor; those that python-control numbers give way to our own."""
+    labels: list[str] = getattr(system, side, list(own))
+    numbered = all(label.endswith(f"[{i}]") for i, label in enumerate(labels))
+    return own if numbered and len(labels) == len(own) else labels
+
+
 def _is_single(form: DelayForm) -> bool:
     return form.inputs == form.outputs == 1
 
@@ -272,9 +279,19 @@ def _product(second: DelayForm, first: DelayForm) -> DelayForm:
         second = _repeated(second, first.outputs)
     elif _is_single(first) and second.inputs != 1:
         first = _repeated(first, second.inputs)
+    if _is_single(second) and _is_single(first):
+        return _single_product(second, first)
     if second.inputs != first.outputs:
         raise OptionError(f"systems {_shapes(second, first)} cannot be multiplied")
     return forms.series(second, first)
+
+
+def _single_product(second: DelayForm, first: DelayForm) -> DelayForm:
+    """Series of single channels, whose delays may stand anywhere: all of them at the input."""
+    (before, behind, core), (entry, exit_, other) = ends_apart(first), ends_apart(second)
+    total = before[0] + behind[0] + entry[0] + exit_[0]
+    line = forms.delayed_ends(*forms.gain_matrices(1.0), (total,), (0.0,))
+    return forms.series(forms.series(other, core), line)
 
 
 def _repeated(single: DelayForm, count: int) -> DelayForm:

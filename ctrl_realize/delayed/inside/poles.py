@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._checks import whole
 from ...numerics.arrays import ComplexArray, FloatArray
-from ...numerics.internal_delays import characteristic, dominant
+from ...numerics.internal_delays import characteristic, dominant, spectrum
 from ...numerics.internal_delays.form import inverse
 from ...numerics.loops.crossings import frequency_grid
 from ..host_responses import HostResponses
@@ -17,6 +17,9 @@ from ..operators import DelayOperators
 
 FEW_STATES = 400
 """Number of states up to which zeros of several channels are computed from the matrices."""
+
+FIRST_POLES, MOST_POLES = 20, 640
+"""Right-most poles of a continuous loop that are looked for at first, and at most."""
 
 
 class InsidePoles(HostResponses, DelayOperators):
@@ -26,11 +29,25 @@ class InsidePoles(HostResponses, DelayOperators):
     internal_delays: tuple[float, ...]
 
     def poles(self) -> ComplexArray:
-        """All poles, as many as the system has states; see `dominant_poles` for the slowest few."""
-        return characteristic.discrete_poles(self._form())
+        """All poles of a discrete system; the right-most ones of a continuous one.
+
+        A continuous loop with a dead time has infinitely many poles: all with positive real parts
+        are given, and at least 20. See `dominant_poles` for the slowest few.
+        """
+        form = self._form()
+        if self.dt:
+            return characteristic.discrete_poles(form)
+        count = FIRST_POLES
+        poles = spectrum.rightmost_poles(form, count)
+        while poles.size >= count < MOST_POLES and poles.real.min() > 0:
+            count *= 2
+            poles = spectrum.rightmost_poles(form, count)
+        return poles
 
     def dominant_poles(self, count: int = 10) -> ComplexArray:
-        """Compute the poles that decay most slowly, or grow fastest: those of largest magnitude.
+        """Compute the poles that decay most slowly, or grow fastest.
+
+        In continuous time the right-most ones, in discrete time those of largest magnitude.
 
         Parameters
         ----------
@@ -40,12 +57,20 @@ class InsidePoles(HostResponses, DelayOperators):
         Returns
         -------
         ndarray, shape (count,)
-            Descending in magnitude.
+            Descending in real part, or in magnitude.
 
         Notes
         -----
-        Each is a root of the characteristic function to 1e-10. Up to 400 states all poles are
-        computed first; beyond, Newton's method starts from points around the unit circle.
+        Each is a root of the characteristic function to 1e-10. In discrete time up to 400 states all
+        poles are computed first; beyond, Newton's method starts from points around the unit circle.
+        In continuous time it starts from the eigenvalues of a spectral discretisation of the delays
+        [1]_.
+
+        References
+        ----------
+        .. [1] D. Breda, S. Maset and R. Vermiglio, Pseudospectral differencing methods for
+           characteristic roots of delay differential equations, SIAM J. Sci. Comput. 27 (2005)
+           482-495, doi:10.1137/030601600.
 
         Examples
         --------
@@ -56,25 +81,49 @@ class InsidePoles(HostResponses, DelayOperators):
         >>> loop.nstates, abs(loop.dominant_poles(1)).round(6)
         (10001, array([0.999931, 0.999931]))
         """
-        return dominant.dominant_discrete_poles(self._form(), whole(count, "count", 1))
+        wanted = whole(count, "count", 1)
+        if self.dt:
+            return dominant.dominant_discrete_poles(self._form(), wanted)
+        return spectrum.rightmost_poles(self._form(), wanted)
 
     def is_stable(self) -> bool:
         """Whether all poles are inside the stability region.
 
         Determined by the argument principle, without computing poles; False if a pole is too close
-        to the stability boundary for a decision.
+        to the stability boundary for a decision, and for a continuous system of neutral type that
+        is unstable for arbitrarily small changes of its delays.
         """
+        if self.neutral_gain() >= 1:
+            return False
         count, marginal = self._unstable()
         return count == 0 and not marginal
+
+    def neutral_gain(self) -> float:
+        """Gain at high frequency of the loops that only delays and gains are in; 0 without such.
+
+        A continuous system with such loops is of neutral type. At 1 or more it has unstable poles
+        without end, or will have for slightly other delays [1]_. In discrete time always 0.
+
+        References
+        ----------
+        .. [1] W. Michiels and S.-I. Niculescu, Stability, Control, and Computation for Time-Delay
+           Systems, 2nd ed., SIAM 2014, section 1.2, doi:10.1137/1.9781611973631.
+        """
+        return 0.0 if self.dt else spectrum.neutral_gain(self._form())
 
     def _unstable(self) -> tuple[int, bool]:
         features, wait = self._features()
         dt = float(self.dt)
         sizes = np.abs(features)
-        top = np.pi / dt
+        form = self._form()
+        if dt:
+            top = np.pi / dt
+        else:
+            top = float(sizes.max(initial=1 / wait if wait else 1.0))
+            top = dominant.settled_frequency(form, top)
         low = 1e-3 * min(float(sizes[sizes > 0].min(initial=top)), 1 / wait if wait else top)
         grid: FloatArray = frequency_grid(low, top, features, wait)
-        return dominant.unstable_count(self._form(), grid, dt=dt)
+        return dominant.unstable_count(form, grid, dt=dt)
 
     def characteristic(self, x: ComplexArray) -> ComplexArray:
         """Evaluate a function whose zeros are the poles, and which has no unstable poles.
@@ -97,7 +146,7 @@ class InsidePoles(HostResponses, DelayOperators):
         return self._features()
 
     def zeros(self) -> ComplexArray:
-        """Finite zeros.
+        """Finite zeros; of a continuous loop through a dead time those furthest to the right.
 
         Raises
         ------
@@ -107,9 +156,15 @@ class InsidePoles(HostResponses, DelayOperators):
         form = self._form()
         if self.ninputs == self.noutputs:
             try:
-                return characteristic.discrete_poles(inverse(form))
+                opposite = inverse(form)
             except np.linalg.LinAlgError:
                 pass
+            else:
+                if self.dt:
+                    return characteristic.discrete_poles(opposite)
+                return spectrum.rightmost_poles(opposite, FIRST_POLES)
+        if not self.dt:
+            return spectrum.rightmost_zeros(form, FIRST_POLES)
         if self.issiso():
             pulses = self.markov(self.nstates + 1)
             (seen,) = np.nonzero(np.abs(pulses) > 1e-14 * np.abs(pulses).max(initial=0.0))
@@ -134,6 +189,8 @@ class InsidePoles(HostResponses, DelayOperators):
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
         dt = float(self.dt)
         poles = np.concatenate([self._core.poles(), self.dominant_poles(6)])
+        if not dt:
+            return np.asarray(poles, dtype=np.complex128), float(sum(self.internal_delays))
         poles = poles[np.abs(poles) > 0.05]
         wait = float(sum(self.internal_delays)) * dt
         return np.asarray(np.log(poles) / dt, dtype=np.complex128), wait

@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import finite, whole
-from ...errors import DataError
+from ...errors import DataError, UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays.recurrence import recurrence
 from ...numerics.internal_delays.response import Response
 from ..host_responses import HostResponses
 from ..operators import DelayOperators
 from ..parts import settled_values
+from .motion import Motion
 
 
-class InsideResponses(HostResponses, DelayOperators):
+class InsideResponses(Motion, HostResponses, DelayOperators):
     """Responses whose cost does not depend on the delays."""
 
     _core: ct.StateSpace
@@ -36,6 +37,64 @@ class InsideResponses(HostResponses, DelayOperators):
             self._response = Response(self._form(), discrete=bool(self.dt))
         return settled_values(self._response(points), points, warn_infinite=warn_infinite)
 
+    def forced_response(
+        self, timepts: ArrayLike | None = None, inputs: Any = 0.0, *args: Any, **settings: Any
+    ) -> ct.TimeResponseData:
+        """Compute the response to any input, see `control.forced_response`.
+
+        Parameters
+        ----------
+        timepts : array_like
+            Times in s, rising from 0 (continuous time), or every sample.
+        inputs : array_like or callable
+            Values at these times, in continuous time straight between them, or a function of an
+            array of times, shape (inputs, K).
+        *args, **settings
+            ``squeeze`` and ``transpose``; in discrete time those of `control.forced_response`. In
+            continuous time also ``initial_state`` of the core, ``history``, what went into each
+            delay before time 0 (0, or one constant for each), and ``tolerance``, the largest error
+            relative to the largest output (1e-8).
+
+        Returns
+        -------
+        control.TimeResponseData
+
+        Notes
+        -----
+        In continuous time the delay differential equation is solved by the method of steps, with
+        all breaking points, and all steps are halved until the result stays [1]_.
+
+        References
+        ----------
+        .. [1] A. Bellen and M. Zennaro, Numerical Methods for Delay Differential Equations, Oxford
+           University Press 2003, chapters 2 and 3, doi:10.1093/acprof:oso/9780198506546.001.0001.
+        """
+        if self.dt:
+            return super().forced_response(timepts, inputs, *args, **settings)
+        return self._forced_motion(timepts, inputs, *args, **settings)
+
+    def step_response(
+        self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
+    ) -> ct.TimeResponseData:
+        """Compute the step responses from rest, see `control.step_response`.
+
+        In continuous time with ``tolerance`` as in `forced_response`.
+        """
+        if self.dt:
+            return super().step_response(timepts, *args, **settings)
+        return self._unit_motion(timepts, "step", *args, **settings)
+
+    def impulse_response(
+        self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
+    ) -> ct.TimeResponseData:
+        """Compute the impulse responses from rest, see `control.impulse_response`.
+
+        In continuous time as the slope of the step response; impulses in the output are left out.
+        """
+        if self.dt:
+            return super().impulse_response(timepts, *args, **settings)
+        return self._unit_motion(timepts, "impulse", *args, **settings)
+
     def markov(self, count: int) -> FloatArray:
         """Compute the unit-pulse response.
 
@@ -45,7 +104,7 @@ class InsideResponses(HostResponses, DelayOperators):
         """
         pulse = np.zeros(whole(count, "count", 1))
         pulse[0] = 1.0
-        return self._one_by_one(pulse)
+        return self._one_by_one(pulse, "impulse_response")
 
     def step(self, count: int) -> FloatArray:
         """Compute the response to a unit step on each input.
@@ -54,7 +113,7 @@ class InsideResponses(HostResponses, DelayOperators):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        return self._one_by_one(np.ones(whole(count, "count", 1)))
+        return self._one_by_one(np.ones(whole(count, "count", 1)), "step_response")
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
         """Compute the response to any input from zero initial state, sample by sample.
@@ -72,6 +131,7 @@ class InsideResponses(HostResponses, DelayOperators):
         DataError
             A wrong number of inputs, or values that are not finite real numbers.
         """
+        self._refuse_continuous("forced_response")
         given = finite(inputs, "inputs")
         rows = np.atleast_2d(given)
         if rows.ndim != 2 or rows.shape[0] != self.ninputs:
@@ -82,7 +142,14 @@ class InsideResponses(HostResponses, DelayOperators):
         out = recurrence(self._form(), rows)
         return out[0] if self.issiso() and given.ndim == 1 else out
 
-    def _one_by_one(self, signal: FloatArray) -> FloatArray:
+    def _refuse_continuous(self, instead: str) -> None:
+        if not self.dt:
+            raise UnsuitableSystemError(
+                f"{self.name!r} is continuous and has no samples; use sys.{instead}(timepts)"
+            )
+
+    def _one_by_one(self, signal: FloatArray, instead: str) -> FloatArray:
+        self._refuse_continuous(instead)
         form, m = self._form(), self.ninputs
         out = np.empty((self.noutputs, m, signal.size))
         for j in range(m):

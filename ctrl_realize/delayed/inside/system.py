@@ -7,6 +7,7 @@ sums of those.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
@@ -23,11 +24,11 @@ from ..chains import Matrices
 from ..operators import INSIDE, DelayOperators, whole_samples
 from ..parts import MAX_DELAY, check_entries, named, signal_names
 from .cards import InsideCards
-from .poles import InsidePoles
+from .conversions import InsideConversions
 from .responses import InsideResponses
 
 
-class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kind=INSIDE):
+class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperators, kind=INSIDE):
     """Linear system with internal dead times, exact: loops, sums and series of delayed systems.
 
     A delay-free core whose last q outputs are fed back to its last q inputs through pure delays. It
@@ -38,9 +39,9 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
     Parameters
     ----------
     core : control.StateSpace
-        With p + q outputs and m + q inputs; discrete with a sample time.
+        With p + q outputs and m + q inputs; continuous, or discrete with a sample time.
     internal_delays : sequence of float, optional
-        The q delays, whole samples each.
+        The q delays, whole samples each of a discrete core, in s of a continuous one.
     name, inputs, outputs : optional
         Names of the system, of its m inputs and of its p outputs, as for `control.ss`.
 
@@ -48,14 +49,15 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
     ----------
     core : control.StateSpace
     internal_delays : tuple of float
-        In samples.
+        In samples (discrete time) or s (continuous time).
 
     Raises
     ------
     UnsuitableSystemError
-        A core that is not a state-space system, has no sample time, or fewer signals than delays.
+        A core that is not a state-space system, discrete without a sample time, or with fewer
+        signals than delays; also if the matrices of a continuous system are asked for.
     DelayRangeError
-        Delays below 0, or not whole samples.
+        Delays below 0, or not whole samples of a discrete core.
 
     Notes
     -----
@@ -66,6 +68,8 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
     the delays as shift registers after the states of the core. ``sys(z)``, plots of frequency
     responses, ``sys.step_response``, ``sys.forced_response``, ``sys.dominant_poles`` and all
     interconnections do not need them.
+
+    In continuous time there are no such matrices; asking for them is an error.
 
     In ``K * sys`` and ``ct.feedback(K, sys)`` with a transfer function or plain system K,
     python-control uses the matrices: use ``sys * K``, ``ct.ss(K) * sys`` and ``ct.feedback(sys *
@@ -135,6 +139,14 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
         return DelayForm(core.A, core.B, core.C, core.D, self.internal_delays)
 
     def _make_matrices(self) -> Matrices:
+        if not self.dt and self.internal_delays:
+            raise UnsuitableSystemError(
+                f"{_who_asks()} A, B, C, D, which a dead time in continuous time does not have. "
+                "With a transfer function or plain system in front write P * C, P + C, "
+                "ct.ss(C) * P, cr.interconnect or (1 + L) ** -1 for ct.feedback(1, L); responses "
+                "in time are sys.step_response and sys.forced_response; sys.pade(order) is a "
+                "rational system, sys.to_discrete(dt) a sampled one"
+            )
         full = absorbed(self._form(), list(range(len(self.internal_delays))))
         return full.A, full.B, full.C, full.D
 
@@ -151,6 +163,9 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
             "matrices; "
             "a longer sample time has fewer states"
         )
+
+    def _isstatic(self) -> bool:
+        return self._core.nstates == 0 and not self.internal_delays
 
     def __getitem__(self, key: Any) -> Self:
         """Select channels, by number or name."""
@@ -192,6 +207,16 @@ class DelaySystem(InsidePoles, InsideResponses, InsideCards, DelayOperators, kin
         return copy
 
 
+def _who_asks() -> str:
+    """Name the function of python-control that reads the matrices, the first one called."""
+    frame, name = sys._getframe(1), ""
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").startswith("control."):
+            name = frame.f_code.co_name
+        frame = frame.f_back  # type: ignore[assignment]
+    return f"python-control reads, in {name}," if name else "asked for"
+
+
 def _rebuild(
     kind: type[DelaySystem],
     matrices: tuple[Any, ...],
@@ -226,8 +251,10 @@ def _check_core(core: Any) -> float:
             f"core is a {type(core).__name__}, which has delays of its own; expected a plain "
             "control.StateSpace"
         )
-    if core.dt is None or core.dt is True or not core.dt > 0:
-        raise UnsuitableSystemError(f"the core's dt is {core.dt!r}; expected a sample time in s")
+    if core.dt is None or core.dt is True:
+        raise UnsuitableSystemError(
+            f"the core's dt is {core.dt!r}; expected a sample time in s, or 0 for continuous time"
+        )
     check_entries(core)
     return float(core.dt)
 

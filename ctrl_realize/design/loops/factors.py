@@ -28,12 +28,13 @@ class Factor:
 
     ``response(w)`` and ``characteristic(w)`` take the shifted variable w = z - 1 (discrete) or w =
     s (continuous). Near z = 1, where the poles of oversampled systems are, z - 1 keeps its digits.
+    `hidden_delay` turns the response without standing apart; in samples, or s in continuous time.
     """
 
     response: Callable[[ComplexArray], ComplexArray]
     characteristic: Callable[[ComplexArray], ComplexArray]
     delay: int
-    hidden_delay: int
+    hidden_delay: float
     features: ComplexArray
     poles: ComplexArray
 
@@ -42,10 +43,10 @@ def factor(system: Any, dt: float, rate: float = 0.0) -> Factor:
     """Make a `Factor` of one system, a number included; `rate` as in `reflected`."""
     if isinstance(system, DelayLineController):
         return _line_factor(system)
-    if isinstance(system, ct.TransferFunction):
-        return _polynomial_factor(system, dt, rate)
     if isinstance(system, DelaySystem):
         return _inside_factor(system)
+    if isinstance(system, ct.TransferFunction):
+        return _polynomial_factor(system, dt, rate)
     if isinstance(system, ct.StateSpace):
         delay = int(system.delay) if isinstance(system, DelayedStateSpace) else 0
         core = system.delay_free if isinstance(system, DelayedStateSpace) else system
@@ -135,8 +136,7 @@ def _inside_factor(system: DelaySystem) -> Factor:
         return system.characteristic(w + shift)
 
     poles = np.exp(features * dt) if dt else features
-    hidden = round(wait / dt) if dt else 0
-    return Factor(response, characteristic, 0, hidden, features, poles)
+    return Factor(response, characteristic, 0, wait / dt if dt else wait, features, poles)
 
 
 def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> Factor:

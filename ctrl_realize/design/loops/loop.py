@@ -96,8 +96,9 @@ class Loop:
             return frequency_grid(low, top, features, self.delay + hidden)
         slowest = float(sizes.min(initial=1 / self.delay if self.delay else 1.0))
         low = self._low_end(1e-3 * slowest)
-        top = self._high_end(1e3 * float(sizes.max(initial=slowest)))
-        return frequency_grid(low, top, features, self.delay)
+        wait = self.delay + sum(part.hidden_delay for part in self.factors)
+        top = self._high_end(1e3 * float(sizes.max(initial=slowest)), wait)
+        return frequency_grid(low, top, features, wait)
 
     def _low_end(self, low: float) -> float:
         # An integrating loop must start above gain 1, however slow it is. If the gain does not
@@ -111,10 +112,10 @@ class Loop:
                     break
         return low
 
-    def _high_end(self, top: float) -> float:
-        if self.delay == 0:
+    def _high_end(self, top: float, wait: float) -> float:
+        if wait == 0:
             return max(top, self._below(top))
-        return max(self._below(top * 1e-6), 20 / self.delay)
+        return max(self._below(top * 1e-6), 20 / wait)
 
     def _below(self, top: float) -> float:
         # A strictly proper loop ends where its gain stays small.

@@ -94,9 +94,14 @@ def siso_zeros(form: DelayForm, degree: int) -> tuple[ComplexArray, bool]:
 
 
 def newton_polished(
-    form: DelayForm, starts: ComplexArray, *, discrete: bool, steps: int = 12
+    form: DelayForm,
+    starts: ComplexArray,
+    *,
+    discrete: bool,
+    steps: int = 12,
+    zeros: bool = False,
 ) -> tuple[ComplexArray, FloatArray]:
-    """Improve roots by Newton's method, each by itself.
+    """Improve poles, or zeros, by Newton's method, each by itself.
 
     Returns
     -------
@@ -110,7 +115,7 @@ def newton_polished(
     for _ in range(steps):
         if active.size == 0:
             break
-        step = newton_steps(form, roots[active], discrete=discrete)
+        step = newton_steps(form, roots[active], discrete=discrete, zeros=zeros)
         good = np.isfinite(step)
         roots[active[good]] -= step[good]
         last[active] = np.where(good, np.abs(step) / (1 + np.abs(roots[active])), np.inf)

@@ -29,6 +29,10 @@ RESIDUAL = 1e-10
 """Relative Newton step below which a point counts as a pole."""
 
 
+NEAR_ONE = 0.3
+"""Distance from 1 at which a characteristic function cannot turn about 0 any more."""
+
+
 def dominant_discrete_poles(form: DelayForm, count: int) -> ComplexArray:
     """Find the poles of largest size of a discrete system.
 
@@ -119,8 +123,27 @@ def characteristic(form: DelayForm, points: ComplexArray, *, discrete: bool) -> 
         part = points[start : start + CHUNK]
         P = characteristic_matrices(form, part, discrete=discrete)
         P[:, : form.states] /= (part if discrete else part + rate)[:, None, None]
-        out[start : start + CHUNK] = np.linalg.det(P)
+        values = np.linalg.det(P)
+        if not discrete and form.delays:
+            # What is left at high frequency: 1 for a system of retarded type. Without zeros to the
+            # right of the axis where the gain of the direct terms is below 1.
+            lines = P[:, form.states :, form.states :]
+            values = values / np.linalg.det(lines)
+        out[start : start + CHUNK] = values
     return out
+
+
+def settled_frequency(form: DelayForm, low: float) -> float:
+    """Find the frequency in rad/s from which on a continuous function stays near 1."""
+    top = low
+    for _ in range(80):
+        omega = top * np.geomspace(1, 1e4, 60)
+        points = np.asarray(1j * omega, dtype=np.complex128)
+        values = characteristic(form, points, discrete=False)
+        if np.all(np.abs(values - 1) < NEAR_ONE):
+            return top
+        top *= 2
+    return top
 
 
 def unstable_count(form: DelayForm, grid: FloatArray, *, dt: float) -> tuple[int, bool]:

@@ -72,6 +72,11 @@ class DelayForm:
         )
 
 
+def gain_matrices(gain: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A, B, C and D of a number."""
+    return np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[gain]])
+
+
 def static(D: FloatArray) -> DelayForm:
     """Make the form of a gain."""
     p, m = D.shape

@@ -1,0 +1,193 @@
+"""Time responses of continuous systems with dead time: a delay differential equation is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._checks import finite, positive
+from ...errors import DataError, ModelWarning, UnsuitableSystemError, warn_caller
+from ...numerics.arrays import FloatArray
+from ...numerics.internal_delays.equation import Solution, TooManyStepsError, solve
+from .poles import InsidePoles
+
+POINTS = 401
+"""Times of a response when none are given."""
+
+TOLERANCE = 1e-8
+"""Largest error of a response, relative to its largest value."""
+
+
+class Motion(InsidePoles):
+    """Responses of a continuous system, with a bound on their error."""
+
+    def _forced_motion(
+        self,
+        timepts: ArrayLike | None,
+        inputs: ArrayLike | Callable[[FloatArray], FloatArray] = 0.0,
+        initial_state: ArrayLike = 0.0,
+        *,
+        history: ArrayLike = 0.0,
+        tolerance: float = TOLERANCE,
+        squeeze: bool | None = None,
+        transpose: bool = False,
+    ) -> ct.TimeResponseData:
+        """Compute the response to any input; inputs are straight lines between the times."""
+        times = _checked_times(timepts, self.name)
+        m = self.ninputs
+        if callable(inputs):
+            given = inputs
+
+            def signal(t: FloatArray) -> FloatArray:
+                return np.asarray(given(t), dtype=np.float64).reshape(m, t.size)
+
+            breaks = np.zeros(0)
+        else:
+            rows = _rows(inputs, m, times.size)
+
+            def signal(t: FloatArray) -> FloatArray:
+                return np.stack([np.interp(t, times, row) for row in rows])
+
+            kinks = np.abs(np.diff(rows, 2)) > 1e-12 * np.abs(rows).max(initial=0.0)
+            breaks = times[1:-1][kinks.any(axis=0)]
+        found = self._solved(
+            signal, times, breaks, tolerance, initial_state=initial_state, history=history
+        )
+        return ct.TimeResponseData(
+            times,
+            found.outputs,
+            inputs=signal(times),
+            issiso=self.issiso(),
+            input_labels=self.input_labels,
+            output_labels=self.output_labels,
+            sysname=self.name,
+            plot_inputs=True,
+            squeeze=squeeze,
+            transpose=transpose,
+        )
+
+    def _unit_motion(
+        self,
+        timepts: ArrayLike | float | None,
+        kind: str,
+        *,
+        tolerance: float = TOLERANCE,
+        squeeze: bool | None = None,
+        transpose: bool = False,
+    ) -> ct.TimeResponseData:
+        """Compute the responses to a unit step, or a unit impulse, on each input."""
+        if timepts is None or np.size(timepts) == 1:
+            end = self._settling() if timepts is None else float(np.ravel(timepts)[0])
+            timepts = np.linspace(0, positive(end, "timepts", "time in s"), POINTS)
+        times = _checked_times(timepts, self.name)
+        m = self.ninputs
+        outputs = np.empty((self.noutputs, m, times.size))
+        drive = np.zeros((m, m, times.size))
+        for j in range(m):
+            outputs[:, j] = self._solved(
+                _unit_signal(m, j),
+                times,
+                np.zeros(0),
+                tolerance,
+                slope=kind == "impulse",
+            ).outputs
+            drive[j, j] = 1.0
+        return ct.TimeResponseData(
+            times,
+            outputs,
+            inputs=drive if kind == "step" else None,
+            issiso=self.issiso(),
+            input_labels=self.input_labels if kind == "step" else None,
+            output_labels=self.output_labels,
+            sysname=self.name,
+            trace_labels=[f"From {label}" for label in self.input_labels],
+            trace_types=[kind] * m,
+            plot_inputs=False,
+            squeeze=squeeze,
+            transpose=transpose,
+        )
+
+    def _solved(
+        self,
+        signal: Callable[[FloatArray], FloatArray],
+        times: FloatArray,
+        breaks: FloatArray,
+        tolerance: float,
+        *,
+        initial_state: ArrayLike = 0.0,
+        history: ArrayLike = 0.0,
+        slope: bool = False,
+    ) -> Solution:
+        form = self._form()
+        wanted = positive(tolerance, "tolerance", "largest error, relative to the largest output")
+        state = _spread(initial_state, form.states, "initial_state")
+        before = _spread(history, len(form.delays), "history")
+        try:
+            found = solve(
+                form,
+                signal,
+                times,
+                breaks,
+                initial_state=state,
+                history=before,
+                tolerance=wanted,
+                slope=slope,
+            )
+        except TooManyStepsError as error:
+            raise UnsuitableSystemError(
+                f"{error} steps, each no longer than the shortest delay "
+                f"({min(form.delays, default=0.0):g} s), are too many for {times[-1]:g} s: give "
+                "shorter timepts, or leave the shortest delay out (sys.pade makes it rational)"
+            ) from None
+        size = float(np.abs(found.outputs).max(initial=0.0))
+        if not found.error <= wanted * max(size, 1e-300) and size > 0:
+            warn_caller(
+                f"the response changed by {found.error:.2g} when all steps were halved for the "
+                f"last "
+                f"time, of {size:.3g}; {wanted:g} of it was asked for. Give closer timepts",
+                ModelWarning,
+            )
+        return found
+
+    def _settling(self) -> float:
+        """Guess a time in s by which a response has settled, or shows that it does not."""
+        poles = self.dominant_poles(4)
+        rates = np.abs(poles.real[np.abs(poles.real) > 1e-6 * (np.abs(poles).max(initial=0.0))])
+        slow = 6 / float(rates.min()) if rates.size else 0.0
+        wait = float(sum(self.internal_delays))
+        return min(max(slow + wait, 5 * wait), 100 * wait + slow) or 1.0
+
+
+def _unit_signal(m: int, j: int) -> Callable[[FloatArray], FloatArray]:
+    """Make the signal that is 1 on one of m inputs."""
+    unit = np.zeros((m, 1))
+    unit[j] = 1.0
+    return lambda t: np.repeat(unit, t.size, axis=1)
+
+
+def _checked_times(timepts: ArrayLike | None, name: str) -> FloatArray:
+    if timepts is None:
+        raise DataError(f"{name!r} is continuous; give timepts, the times in s")
+    times = finite(timepts, "timepts")
+    if times.ndim != 1 or times.size < 2 or times[0] != 0 or np.any(np.diff(times) <= 0):
+        raise DataError("timepts must rise from 0 and be two at least")
+    return times
+
+
+def _rows(inputs: ArrayLike, m: int, count: int) -> FloatArray:
+    given = np.atleast_2d(finite(inputs, "inputs"))
+    if given.size == 1:
+        return np.full((m, count), float(given.ravel()[0]))
+    if given.shape != (m, count):
+        raise DataError(f"inputs has shape {np.shape(inputs)}; expected ({m}, {count})")
+    return given
+
+
+def _spread(given: ArrayLike, count: int, name: str) -> FloatArray:
+    values = np.ravel(finite(given, name))
+    if values.size not in (1, count):
+        raise DataError(f"{name} has {values.size} values; expected {count}")
+    return np.broadcast_to(values, count).astype(np.float64)

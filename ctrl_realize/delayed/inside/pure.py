@@ -1,0 +1,108 @@
+"""A dead time by itself, as a factor of transfer functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._checks import positive, real
+from ...errors import DelayRangeError, UnsuitableSystemError
+from ...numerics.state_space.sampling import split_dead_time
+from ..operators import ENDS
+from .system import DelaySystem
+
+
+class _InName(ct.TransferFunction):  # type: ignore[misc]  # control is untyped
+    """A transfer function without polynomials."""
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        ct.InputOutputSystem.__init__(self, *args, **settings)
+
+    @property
+    def num_array(self) -> Any:
+        """Refused: a dead time has no polynomials."""
+        raise UnsuitableSystemError(
+            "python-control asks for polynomials, which a dead time does not have. Write "
+            "ct.margin(1 * P), cr.design.margins(P), ct.feedback(P * C) and (1 + L) ** -1"
+        )
+
+    den_array = num = den = num_list = den_list = num_array
+
+
+class TransferDelay(DelaySystem, _InName):
+    """Transfer function with dead time, such as ``ct.tf(...) * delay(0.3)``; see `delay`.
+
+    A `DelaySystem` that is a `control.TransferFunction` too, in name: transfer functions of
+    python-control ask no other class what ``C * P`` and ``C + P`` is. Such a product or sum, a
+    loop, is a `DelaySystem`, which `control.margin` takes.
+    """
+
+    def __mul__(self, other: Any) -> Any:
+        return self._plant(super().__mul__(other), other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return self._plant(super().__rmul__(other), other)
+
+    def _plant(self, made: Any, other: Any) -> Any:
+        """Keep the class where a pure dead time meets what it delays."""
+        if self._core.nstates or not isinstance(other, ct.TransferFunction):
+            return made
+        names = {"inputs": made.input_labels, "outputs": made.output_labels}
+        return type(self)(made.core, made.internal_delays, **names)
+
+
+def delay(dead_time: float, dt: float | None = None, *, name: str | None = None) -> Any:
+    """Make a dead time, ``exp(-tau s)``, as a factor of other systems.
+
+    Parameters
+    ----------
+    dead_time : float
+        In s, 0 or more.
+    dt : float, optional
+        Sample time in s: a delay of whole samples then, z^-d.
+    name : str, optional
+
+    Returns
+    -------
+    TransferDelay
+        A continuous `DelaySystem`, or with `dt` a `DelayedStateSpace`.
+
+    Raises
+    ------
+    DelayRangeError
+        A negative dead time, or one that is no multiple of `dt`.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> P = ct.tf([2], [1, 1]) * cr.delay(0.3)
+    >>> P
+    <TransferDelay: u -> y, order 1, internal delay 0.3 s, continuous>
+    >>> bool(abs(P(2j) - 2 * np.exp(-0.6j) / (1 + 2j)) < 1e-15)
+    True
+    >>> loop = ct.feedback(P * 1.5)
+    >>> loop.is_stable(), loop.dominant_poles(1).round(4)
+    (True, array([-1.606+4.819j, -1.606-4.819j]))
+    """
+    tau = real(dead_time, "dead_time", "dead time in s, >= 0")
+    if tau < 0:
+        raise DelayRangeError(f"dead_time={tau:g} s; expected a value >= 0")
+    names: dict[str, Any] = {"inputs": "u", "outputs": "y", "name": name}
+    if dt is not None:
+        step = positive(dt, "dt", "sample time in s")
+        samples, fraction = split_dead_time(tau, step)
+        if fraction:
+            raise DelayRangeError(
+                f"dead_time={tau:g} s is {tau / step:.6g} samples of {step:g} s; a discrete delay "
+                "needs whole samples. Make the plant in continuous time and sample it, "
+                "(ct.tf(...) * cr.delay(tau)).to_discrete(dt)"
+            )
+        return DelaySystem._kinds[ENDS](ct.ss([], [], [], 1.0, step), samples, **names)
+    if tau == 0:
+        return TransferDelay(ct.ss([], [], [], 1.0, 0), **names)
+    core = ct.StateSpace([], [], [], np.array([[0.0, 1.0], [1.0, 0.0]]), 0)
+    return TransferDelay(core, [tau], **names)

@@ -1,0 +1,386 @@
+"""Continuous systems with dead time: closed forms, mpmath, Lambert's W, and a second solver."""
+
+from __future__ import annotations
+
+import pickle
+from math import factorial
+
+import control as ct
+import mpmath
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+from scipy.special import lambertw
+
+import ctrl_realize as cr
+from ctrl_realize.errors import (
+    DataError,
+    DelayRangeError,
+    ModelWarning,
+    OptionError,
+    UnsuitableSystemError,
+)
+
+LAG = ct.tf([1], [1, 1])
+OMEGA = np.geomspace(0.01, 200, 30)
+
+
+def retarded(k: float, tau: float) -> cr.DelaySystem:
+    """The system x' = -k x(t - tau) + u, seen at x."""
+    core = ct.ss([[0]], [[1, -k]], [[1], [1]], np.zeros((2, 2)))
+    return cr.DelaySystem(core, [tau])
+
+
+# -- frequency responses --------------------------------------------------------------------------
+
+
+def exact(expression, omega=OMEGA) -> np.ndarray:
+    """Values of a function of s at j omega, with 30 digits."""
+    with mpmath.workdps(30):
+        return np.array([complex(expression(mpmath.mpc(0, w))) for w in omega])
+
+
+def p1(s):
+    return 2 * mpmath.exp(-mpmath.mpf("0.3") * s) / (s + 1)
+
+
+def p2(s):
+    return (s + 3) / (s**2 + 2 * s + 5) * mpmath.exp(-mpmath.mpf("1.1") * s)
+
+
+P1 = ct.tf([2], [1, 1]) * cr.delay(0.3)
+P2 = ct.tf([1, 3], [1, 2, 5]) * cr.delay(1.1)
+C = ct.tf([1, 0.5], [1, 0])
+
+ALGEBRA = {
+    "plant": (P1, p1),
+    "delay first": (cr.delay(0.3) * ct.tf([2], [1, 1]), p1),
+    "series": (P1 * P2, lambda s: p1(s) * p2(s)),
+    "controller in front": (C * P1, lambda s: (s + mpmath.mpf("0.5")) / s * p1(s)),
+    "sum": (P1 + P2, lambda s: p1(s) + p2(s)),
+    "sum with a transfer function": (LAG + P2, lambda s: 1 / (s + 1) + p2(s)),
+    "feedback": (ct.feedback(P1 * C), lambda s: 1 / (1 + s / (s + mpmath.mpf("0.5")) / p1(s))),
+    "feedback of feedback": (
+        ct.feedback(ct.feedback(P1, 0.3 * P2), P2),
+        lambda s: p1(s) / (1 + p1(s) * p2(s) * mpmath.mpf("0.3") + p1(s) * p2(s)),
+    ),
+    "sensitivity": ((1 + P1 * C) ** -1, lambda s: 1 / (1 + p1(s) * (1 + mpmath.mpf("0.5") / s))),
+    "quotient": (P2 / (2 + P1), lambda s: p2(s) / (2 + p1(s))),
+}
+
+
+@pytest.mark.parametrize("case", ALGEBRA)
+def test_frequency_responses_are_those_of_30_digits(case):
+    system, expression = ALGEBRA[case]
+    assert isinstance(system, cr.DelaySystem)
+    assert_allclose(system(1j * OMEGA), exact(expression), rtol=1e-10)
+    again = pickle.loads(pickle.dumps(system))
+    assert_allclose(again(1j * OMEGA), system(1j * OMEGA), rtol=0)
+    assert type(again) is type(system)
+
+
+def test_python_control_draws_from_the_exact_response():
+    loop = ct.feedback(P1 * C)
+    response = ct.frequency_response(loop, OMEGA)
+    assert_allclose(response.complex, loop(1j * OMEGA), rtol=1e-12)
+    assert_allclose(ct.frd(P1, OMEGA).frdata[0, 0], P1(1j * OMEGA), rtol=1e-12)
+    assert_allclose((ct.frd(LAG, OMEGA) * P1).frdata[0, 0], LAG(1j * OMEGA) * P1(1j * OMEGA))
+    for k, unstable in ((1.0, 0), (20.0, 4)):
+        # x' = -x - 2 k x(t - 0.3): two more poles at every crossing of the gain
+        assert ct.nyquist_response(k * P1).count == unstable
+        assert np.sum(ct.feedback(k * P1).poles().real > 0) == unstable
+    ours, right = ct.margin(C * P1), cr.design.margins(ct.tf([2], [1, 1]) * C, dead_time=0.3)
+    assert ours[:2] == pytest.approx((right.gain_margin, right.phase_margin), rel=1e-5)
+
+
+# -- poles and stability --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("k", "tau"), [(1.0, 1.0), (5.0, 0.3), (1.5, 1.2), (0.1, 2.0)])
+def test_right_most_poles_are_those_of_lamberts_w(k, tau):
+    poles = retarded(k, tau).dominant_poles(8)
+    branches = np.array([lambertw(-k * tau, j) / tau for j in range(-10, 11)])
+    expected = branches[np.argsort(-branches.real)][: poles.size]
+    for pole in expected:
+        assert np.abs(poles - pole).min() < 1e-10 * (1 + abs(pole))
+    # stable as long as k tau < pi / 2
+    assert retarded(k, tau).is_stable() == (k * tau < np.pi / 2)
+
+
+def test_a_lag_with_delay_is_stable_up_to_its_critical_gain():
+    # K exp(-s) / (s + 1): w + tan(w) = 0 in (pi/2, pi), K = sqrt(1 + w^2)
+    w = brentq(lambda x: x * np.cos(x) + np.sin(x), np.pi / 2 + 1e-6, np.pi)
+    critical = np.hypot(1, w)
+    P = LAG * cr.delay(1.0)
+    assert ct.feedback(0.999 * critical * P).is_stable()
+    assert not ct.feedback(1.001 * critical * P).is_stable()
+    assert_allclose(ct.feedback(critical * P).dominant_poles(2), [1j * w, -1j * w], atol=1e-9)
+    assert cr.design.margins(1 * P).gain_margin == pytest.approx(critical, rel=1e-9)
+
+
+def test_pi_control_of_an_integrator_with_delay():
+    # k / s exp(-s L): with P control stable for k L < pi / 2
+    P = ct.tf([1], [1, 0]) * cr.delay(0.5)
+    assert ct.feedback(P * 3.1).is_stable()
+    assert not ct.feedback(P * 3.2).is_stable()
+    loop = C * P
+    T = ct.feedback(loop)
+    assert T.is_stable()
+    assert T.dcgain() == pytest.approx(1, abs=1e-10)
+
+
+def test_an_unstable_plant_with_delay_can_be_stabilised_up_to_its_time_constant():
+    # exp(-L s) / (s - 1) with P control: possible for L < 1
+    assert ct.feedback(1.5 * ct.tf([1], [1, -1]) * cr.delay(0.4)).is_stable()
+    for gain in (1.05, 1.5, 3.0):
+        assert not ct.feedback(gain * ct.tf([1], [1, -1]) * cr.delay(1.2)).is_stable()
+    assert not ct.feedback(0.9 * ct.tf([1], [1, -1]) * cr.delay(0.4)).is_stable()
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "c", "stable"),
+    [
+        (2.0, 1.0, 0.5, True),  # |b| < a and |c| < 1: stable for every delay
+        (2.0, 1.0, -0.9, True),
+        (1.0, 3.0, 0.5, False),
+        (2.0, 1.0, 1.1, False),  # poles without end near Re s = log(1.1) / tau
+    ],
+)
+def test_neutral_systems_are_told_by_their_direct_terms(a, b, c, stable):
+    # (x + c x(t - 1))' = -a x - b x(t - 1): s + a + (c s + b) exp(-s) = 0
+    P = ct.tf([c, b], [1, a]) * cr.delay(1.0)
+    loop = ct.feedback(P)
+    assert loop.neutral_gain() == pytest.approx(abs(c))
+    assert loop.is_stable() is stable
+    s = loop.dominant_poles(6)
+    assert_allclose(s + a + (c * s + b) * np.exp(-s), 0, atol=1e-8)
+    assert ct.feedback(P * ct.tf([1], [0.1, 1])).neutral_gain() == 0
+
+
+def test_two_delays_in_two_loops():
+    # x' = -x(t - 1) - x(t - 2) / 2, poles of largest real part from its equation
+    core = ct.ss([[0]], [[1, -1, -0.5]], np.ones((3, 1)), np.zeros((3, 3)))
+    poles = cr.DelaySystem(core, [1.0, 2.0]).dominant_poles(6)
+    assert_allclose(poles + np.exp(-poles) + 0.5 * np.exp(-2 * poles), 0, atol=1e-9)
+
+
+def test_zeros_of_loops_are_roots():
+    zeros = (1 + P1).zeros()
+    # poles of the loop around P1
+    assert_allclose(1 + 2 * np.exp(-0.3 * zeros) / (zeros + 1), 0, atol=1e-8)
+    parallel = ct.tf([1], [1, 2]) + ct.tf([3], [1, 1]) * cr.delay(1.0)
+    z = parallel.zeros()
+    assert z.size > 5
+    assert_allclose(z + 1 + 3 * (z + 2) * np.exp(-z), 0, atol=1e-8 * np.abs(z).max())
+
+
+# -- time responses -------------------------------------------------------------------------------
+
+
+def test_the_method_of_steps_gives_its_polynomials():
+    # x' = -x(t - 1), x = 1 before: sums of (-1)^j (t - (j - 1))^j / j!
+    t = np.linspace(0, 8, 161)
+    expected = sum(
+        (-1) ** j * np.maximum(t - (j - 1), 0) ** j / factorial(j) * (t >= j - 1) for j in range(12)
+    )
+    system = retarded(1.0, 1.0)
+    found = system.forced_response(t, 0.0, initial_state=1.0, history=1.0)
+    assert_allclose(found.outputs, expected, atol=1e-12)
+
+
+def test_a_loop_before_its_first_echo_is_the_plant():
+    # 1.5 exp(-tau s) / (s + 1) in a loop: known in closed form up to two delays
+    tau, k = np.sqrt(0.5), 1.5
+    t = np.linspace(0, 2 * tau, 57)
+    loop = ct.feedback(k * LAG * cr.delay(tau))
+    expected = k * -np.expm1(-np.maximum(t - tau, 0))
+    assert_allclose(loop.step_response(t).outputs, expected, atol=1e-9)
+    impulse = loop.impulse_response(t).outputs[t > tau]
+    assert_allclose(impulse, k * np.exp(-(t[t > tau] - tau)), atol=1e-7)
+
+
+def runge_kutta(a: float, b: float, k: float, taus: tuple[float, float], end: float) -> np.ndarray:
+    """x' = a x + b x(t - tau1) + k (1 - x(t - tau2)), from rest; a fixed step that divides taus."""
+    h = 0.005
+    n1, n2 = (round(tau / h) for tau in taus)
+    steps = round(end / h)
+    x = np.zeros(steps + 1)
+    before, behind = np.zeros(steps + 1), np.zeros(steps + 1)  # slopes at either side
+
+    def past(i: int, n: int, part: float) -> float:
+        at = i - n
+        if at < 0:
+            return 0.0
+        # Hermite's cubic between two steps
+        u, d = part, x[at + 1] - x[at]
+        return (
+            x[at] * (1 - u) + x[at + 1] * u
+            + u * (u - 1) * ((1 - 2 * u) * d + (u - 1) * h * behind[at] + u * h * before[at + 1])
+        )  # fmt: skip
+
+    def f(i: int, part: float, value: float) -> float:
+        u = 1.0 if i - n2 >= 0 else 0.0
+        return a * value + b * past(i, n1, part) + k * (u - past(i, n2, part))
+
+    for i in range(steps):
+        k1 = f(i, 0.0, x[i])
+        k2 = f(i, 0.5, x[i] + h / 2 * k1)
+        k3 = f(i, 0.5, x[i] + h / 2 * k2)
+        k4 = f(i, 1.0, x[i] + h * k3)
+        behind[i] = k1
+        x[i + 1] = x[i] + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        before[i + 1] = f(i, 1.0, x[i + 1])
+    return x[:: round(0.05 / h)]
+
+
+def test_a_step_response_is_that_of_runge_kutta_with_interpolated_history():
+    # k (r - x) acts tau2 later, and the plant itself remembers tau1
+    a, b, k, taus = -0.5, -0.8, 0.6, (0.7, 1.25)
+    plant = cr.DelaySystem(ct.ss([[a]], [[1, b]], [[1], [1]], np.zeros((2, 2))), [taus[0]])
+    loop = ct.feedback(plant * cr.delay(taus[1]) * k)
+    assert loop.internal_delays == taus or loop.internal_delays == taus[::-1]
+    t = np.arange(0, 12.001, 0.05)
+    expected = runge_kutta(a, b, k, taus, 12.0)
+    # order 4, and 3 for the history: steps of 0.005
+    assert_allclose(loop.step_response(t).outputs, expected, atol=2e-8)
+
+
+def test_any_input_is_taken_as_straight_between_its_samples_or_as_a_function():
+    t = np.linspace(0, 6, 601)
+    loop = ct.feedback(P1 * 0.8)
+    function = loop.forced_response(t, lambda x: np.sin(2 * x)).outputs
+    # after the transient the frequency response; its slowest poles decay with 2.7 / s
+    late = t > 5.5
+    steady = np.imag(loop(2j) * np.exp(2j * t))
+    slowest = np.exp(loop.dominant_poles(1).real.max() * 5.5)
+    assert_allclose(function[late], steady[late], atol=5 * slowest)
+    # linear interpolation of a sine every 0.01 s is off by 5e-5
+    assert_allclose(loop.forced_response(t, np.sin(2 * t)).outputs, function, atol=1e-4)
+    ramp = P2.forced_response(t, t).outputs
+    lagged = ct.forced_response(ct.tf([1, 3], [1, 2, 5]), t, t).outputs
+    assert_allclose(ramp[110:], lagged[:-110], atol=1e-8)
+
+
+def test_stiff_cores_and_several_outputs():
+    core = ct.ss(ct.tf([1], [1e-4, 1]) * ct.tf([1], [1, 1]))
+    loop = cr.interconnect(
+        [ct.ss(core, name="P", inputs="u", outputs="y"),
+         cr.DelaySystem(ct.ss([], [], [], [[0, 1], [1, 0]], 0), [0.5], name="D",
+                        inputs="y", outputs="m"),
+         ct.summing_junction(["r", "-m"], "u")],
+        inputs="r", outputs=["y", "m"],
+    )  # fmt: skip
+    t = np.linspace(0, 4, 41)
+    out = loop.step_response(t).outputs
+    assert_allclose(out[1, 0, 5:], out[0, 0, :-5], atol=1e-8)
+    # before the first echo
+    assert_allclose(out[0, 0, :5], ct.step_response(core, t).outputs[:5], atol=1e-8)
+
+
+# -- conversions ----------------------------------------------------------------------------------
+
+
+def test_sampling_a_plant_is_exact_for_held_inputs():
+    dt = 0.1
+    discrete = P1.to_discrete(dt)
+    assert isinstance(discrete, cr.DelayedStateSpace)
+    t = np.arange(0, 5, dt)
+    assert_allclose(discrete.step(t.size), P1.step_response(t).outputs, atol=1e-8)
+    # a fraction of a sample
+    other = P2.to_discrete(0.07)
+    t = np.arange(0, 5, 0.07)
+    assert_allclose(other.step(t.size), P2.step_response(t).outputs, atol=1e-8)
+    both = ct.append(1 * P1, ct.tf([1], [1, 2]) * cr.delay(0.2)).to_discrete(0.1)
+    assert both.delay[0, 0] == 3
+    assert both.delay[1, 1] == 2
+
+
+def test_sampling_parallel_paths_and_series_is_exact_too():
+    for system, delays in ((P1 + 3 * LAG * cr.delay(0.8), (0.3, 0.8)), (P1 * P2, (1.4,))):
+        assert sorted(system.internal_delays) == pytest.approx(delays)
+        t = np.arange(0, 6, 0.1)
+        ours = system.to_discrete(0.1).step(t.size)
+        assert_allclose(ours, system.step_response(t).outputs, atol=1e-8)
+
+
+def test_sampling_a_loop_states_its_error():
+    loop = ct.feedback(P1)
+    errors = []
+    for dt in (0.1, 0.05, 0.025):
+        with pytest.warns(ModelWarning, match=r"no exact sampled form.*off by"):
+            sampled = loop.to_discrete(dt)
+        t = np.arange(0, 4, dt)
+        errors.append(np.abs(sampled.step(t.size) - loop.step_response(t).outputs).max())
+    # of second order
+    assert errors[0] < 0.005
+    assert errors[2] < errors[0] / 12
+    with pytest.raises(DelayRangeError, match=r"whole samples.*choose dt"):
+        loop.to_discrete(0.07)
+
+
+@pytest.mark.parametrize("order", [4, 8])
+def test_pade_systems_come_close_where_they_should(order):
+    loop = ct.feedback(P1 * P2 * 0.3)
+    rational = loop.pade(order)
+    assert type(rational) is ct.StateSpace
+    assert rational.nstates == 3 + order * len(loop.internal_delays)
+    slow = np.geomspace(0.01, 2.0, 20)
+    # 1.4 s of delay at 2 rad/s
+    assert_allclose(rational(1j * slow), loop(1j * slow), rtol={4: 1e-3, 8: 1e-9}[order])
+
+
+def test_discrete_and_continuous_delays_are_made_alike():
+    assert cr.delay(0.3, 0.1).delay == 3
+    assert cr.delay(0).internal_delays == ()
+    assert cr.delay(0.5)(1j) == pytest.approx(np.exp(-0.5j))
+
+
+# -- what cannot be -------------------------------------------------------------------------------
+
+T = np.linspace(0, 1, 11)
+BAD = {
+    "negative": (lambda: cr.delay(-0.1), DelayRangeError, ">= 0"),
+    "no number": (lambda: cr.delay("long"), OptionError, "finite number"),
+    "no multiple of dt": (lambda: cr.delay(0.25, 0.1), DelayRangeError, r"2.5 "
+    "samples.*to_discrete"),
+    "mixed time bases": (
+        lambda: P1 * ct.ss([[0.5]], [[1.0]], [[1.0]], [[0]], 0.1),
+        UnsuitableSystemError,
+        "continuous and dt = 0.1|dt = 0.1 s and continuous",
+    ),
+    "algebraic loop": (
+        lambda: ct.feedback(1 + P1, -1),
+        UnsuitableSystemError,
+        "algebraic loop",
+    ),
+    "matrices": (lambda: P1.A, UnsuitableSystemError, "no|not have.*pade"),
+    "step of python-control": (
+        lambda: ct.step_response(P1, T),
+        UnsuitableSystemError,
+        r"in step_response.*sys\.step_response",
+    ),
+    "controller in front of feedback": (
+        lambda: ct.feedback(ct.ss(C), P1),
+        UnsuitableSystemError,
+        r"in feedback.*cr\.interconnect",
+    ),
+    "margin of a plant": (lambda: ct.margin(P1), UnsuitableSystemError, r"ct\.margin\(1 \* P\)"),
+    "improper": (lambda: ct.tf([1, 0], [1]) * cr.delay(1.0), UnsuitableSystemError, "proper"),
+    "inverse": (lambda: P1**-1, UnsuitableSystemError, "not proper"),
+    "times": (lambda: P1.forced_response(T + 1, T), DataError, "rise from 0"),
+    "inputs": (lambda: P1.forced_response(T, np.ones(5)), DataError, r"\(1, 11\)"),
+    "samples": (lambda: P1.step(10), UnsuitableSystemError, r"step_response\(timepts\)"),
+    "too short a delay": (
+        lambda: ct.feedback(LAG * cr.delay(1e-7)).step_response(T),
+        UnsuitableSystemError,
+        "too many",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_done_is_told(case):
+    make, error, match = BAD[case]
+    with pytest.raises(error, match=match):
+        make()
