@@ -236,10 +236,6 @@ SWITCHES = (
     ),
     Switch("exponential before the step", {f"{FITS}.step_data:relaxation": giving(None)}),
     Switch(
-        "drift that ends",
-        {f"{FITS}.step_data:StepData.explanations": _only(lambda way: not way.ending)},
-    ),
-    Switch(
         "slope that was nothing",
         {f"{FITS}.step_data:_BRIEF": value(0.0)},
         (f"{FITS}.step_data:StepData.explanations",),

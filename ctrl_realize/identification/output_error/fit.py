@@ -113,8 +113,8 @@ def fit_output_error(
     with or without a lag in series) is fitted as well: it widens the interval if it is not ruled
     out, and if it is clearly better than all lags, its dead time is used.
 
-    A slope before the step is modelled as a drift, a drift that ends, the free response of the
-    plant, or not at all, as chosen by the information criterion.
+    A slope before the step is modelled as a drift, the free response of the plant, or not at all,
+    as chosen by the information criterion.
 
     In a model with more zeros than the plant the dead time has no Fisher information: a superfluous
     zero can take its place. Therefore the relative degree is chosen, not left free.

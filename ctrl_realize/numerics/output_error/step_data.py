@@ -34,7 +34,6 @@ from ..signals.noise import (
 from ..signals.onset import FirstMotion, first_motion
 from ..signals.step_sequence import input_moves
 
-_CONTINUED = 2  # a drift at rest goes on for this many times the rest; ablation: drift that ends
 _BINS_RELAXING = 60  # of a rest in which the output comes to rest, so that lags show in it
 _MANY = 100  # samples at rest in which dither would show more than two levels
 _BRIEF = 0.05  # of the samples that follow the step; ablation: slope that was nothing
@@ -65,8 +64,6 @@ class StepData:
         Output without hum and without what was still moving before the step.
     relaxing : bool
         The output was not at rest before the step: the plant's free response is in it.
-    ending : bool
-        The drift ends after twice the time for which it was seen.
     """
 
     output: FloatArray
@@ -81,7 +78,6 @@ class StepData:
     motion: FirstMotion | None
     quiet: FloatArray
     relaxing: bool = False
-    ending: bool = False
 
     @property
     def edge(self) -> int:
@@ -100,12 +96,12 @@ class StepData:
     def explanations(self) -> list[StepData]:
         """Ways to take a slope before the step: as drift, as the plant's own motion, as nothing.
 
-        A drift goes on to the end, or ends after twice the time for which it was seen. That it was
-        nothing is tried where it was seen over less than a twentieth of what follows.
+        A drift goes on to the end. That it was nothing is tried where it was seen over less than a
+        twentieth of what follows.
         """
         if not self.drift:
             return [self]
-        ways = [self, replace(self, ending=True), replace(self, drift=0.0, relaxing=True)]
+        ways = [self, replace(self, drift=0.0, relaxing=True)]
         if self.edge <= _BRIEF * (self.output.size - self.edge):
             ways.append(replace(self, drift=0.0))
         return ways
@@ -228,9 +224,7 @@ def fixed_regressors(data: StepData) -> FloatArray:
         return np.broadcast_to(1.0, (n, 1))  # no memory for ones
     columns = [np.ones((n, 1))]
     if data.drift:
-        index = np.arange(n) - data.edge
-        last = _CONTINUED * data.edge if data.ending else n
-        columns.append((np.minimum(index, last) / n)[:, None])
+        columns.append(((np.arange(n) - data.edge) / n)[:, None])
     if data.hum:
         columns.append(_hum_columns(n, data.hum))
     return np.concatenate(columns, axis=1)

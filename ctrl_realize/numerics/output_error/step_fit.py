@@ -2,8 +2,8 @@
 
 The rule:
 
-0. What the output does before the step is noise, hum, a drift to the end or one that ends, or the
-   plant's own free response: the lowest information criterion decides.
+0. What the output does before the step is noise, hum, a drift, or the plant's own free
+   response: the lowest information criterion decides.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
    is the model, and what its residual leaves is compared with the noise before the step, or, as
    long as that is not much louder, with what it leaves long after the step. Where it is noise that

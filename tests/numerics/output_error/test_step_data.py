@@ -99,7 +99,7 @@ def white(n, seed=0):
     return np.random.default_rng(seed).standard_normal(n)
 
 
-def test_a_slope_before_the_step_has_three_explanations_and_a_brief_one_may_be_nothing():
+def test_a_slope_before_the_step_has_two_explanations_and_a_brief_one_may_be_nothing():
     k = np.arange(1000)
 
     def ways(edge):
@@ -109,16 +109,13 @@ def test_a_slope_before_the_step_has_three_explanations_and_a_brief_one_may_be_n
     level, slope = fixed_regressors(ways(100)[0]).T
     assert_allclose(level, 1.0)
     assert_allclose(np.diff(slope), slope[1] - slope[0])
-    ending = np.diff(fixed_regressors(ways(100)[1])[:, 1])
-    assert_allclose(ending[:299], ending[0])
-    assert_allclose(ending[300:], 0.0)
-    moving = ways(100)[2]
+    moving = ways(100)[1]
     assert moving.relaxing
     assert fixed_regressors(moving).shape == (1000, 1)
-    assert len(ways(100)) == 3
+    assert len(ways(100)) == 2
     # 47 samples are less than a twentieth of the 953 that follow
-    assert [bool(way.drift) for way in ways(47)] == [True, True, False, False]
-    assert len(ways(48)) == 3
+    assert [bool(way.drift) for way in ways(47)] == [True, False, False]
+    assert len(ways(48)) == 2
     assert len(step_data(white(1000), 1.0 * (k >= 100), 1.0, [(100, 1)]).explanations()) == 1
 
 
