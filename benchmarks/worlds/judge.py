@@ -22,6 +22,7 @@ MODEL = frozenset(
         "not_linear",
         "time_varying",
         "earlier_input",
+        "noncausal",
         "cancelled_pair",
         "output_at_limit",
         "coarse_quantisation",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from ..._wording import in_time
 from ...data import Record
@@ -80,6 +81,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             low = max(min(low, step.dead_time - _TWO_SIDED * step.dead_time_error), 0.0)
             high = max(high, step.dead_time + _TWO_SIDED * step.dead_time_error)
             flags += _white_flags(fit, step)
+            flags += _noncausal(step)
         # Parts of one step are not several responses.
         if not loop and not (stepped and _moves(shown.drive) < 2):
             flags += against_one_model(shown, fit.delay)
@@ -137,6 +139,21 @@ def _white_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
             f"{step.gain:.3g} +- {gain:.2g} and {in_time(step.total)} -+ {in_time(total)}: "
             "neither is well determined; use a longer record, or one with smaller "
             "disturbances",
+        )
+    ]
+
+
+def _noncausal(step: WhiteStep) -> list[Flag]:
+    if not step.dead_time_error or ndtr(step.dead_time / step.dead_time_error) >= RARE:
+        return []
+    error = _TWO_SIDED * step.dead_time_error
+    return [
+        Flag(
+            "noncausal",
+            "the disturbances are coloured: weighted accordingly, the dead time is negative, "
+            f"-{in_time(-step.dead_time)} +- {in_time(error)}: the output leads the input, as it "
+            "does where an unmeasured signal moves both, where the loop is closed, or where input "
+            "and output have different clocks; dead time and lags are not those of the plant",
         )
     ]
 

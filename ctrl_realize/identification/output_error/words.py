@@ -36,6 +36,7 @@ _TOTAL_IN_DOUBT = frozenset(
         "time_varying",
         "output_at_limit",
         "earlier_input",
+        "noncausal",
     }
 )
 """Flags with which the total delay is not well determined."""

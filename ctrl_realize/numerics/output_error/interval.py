@@ -34,6 +34,7 @@ from ..separable.lag_chains import (
     chain_profile,
     still_improving,
 )
+from ..separable.profile import Points
 from ..separable.profile_ends import profile_limits
 from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
 from ..separable.varpro import Structure
@@ -46,7 +47,10 @@ from .result import (
     Profile,
     StructureFit,
     assembled,
-    profiles_of,
+    curves,
+    laid_profiles,
+    lower_minima,
+    solved_profiles,
 )
 from .selection import Choice, choose_model
 
@@ -54,6 +58,9 @@ _UNSEEN = 3.0
 """How far before the dead time a beginning that is open may lie, in times from there to the first
 motion. Diffusion behind lags and parallel paths mostly need 1 to 3. Ablation: open beginning behind
 a zero."""
+
+_MOST_ROUNDS = 6
+"""In which profiles are laid anew where they lead below a minimum."""
 
 _LIKE_A_FLOW = 6
 """Lags of a chain from which on a flow that disperses looks the same, unless one was fitted and is
@@ -88,9 +95,8 @@ def likelihood_fit(
     and `better` are those of the result, `near` close decisions that have been made.
     """
     tanks = [chain for chain in chains if not chain.hidden]
-    choice = choose_model(whole, tanks, flows)
+    whole, choice, kept = _compared(whole, tanks, chains, flows)
     chosen, scales = choice.model, whole.scales
-    kept = _not_ruled_out(whole, choice, chains, flows)
     own = kept.profile_of(choice, scales)
     if choice.chain is not None:
         whole = _with_chain(whole, choice.chain)
@@ -162,19 +168,44 @@ class _Kept:
         return [*flows, *chains]
 
 
+def _compared(
+    whole: WindowFit,
+    tanks: Sequence[LagChain],
+    chains: Sequence[LagChain],
+    flows: Sequence[DispersedFlow],
+) -> tuple[WindowFit, Choice, _Kept]:
+    """Choose, and lay the profiles of what is not ruled out: again where these lead lower."""
+    points: dict[Structure, Points] = {}
+    for _ in range(_MOST_ROUNDS):
+        choice = choose_model(whole, tanks, flows)
+        values = charged(whole.criterion, whole.penalty)
+        level = _charged_level(whole, choice)
+        free = plausible(whole.candidates, values, whole.variance, choice.model, level)
+        points |= laid_profiles(whole, [s for s in free if s not in points])
+        kept = {s: points[s] for s in free}
+        lower = lower_minima(whole, kept)
+        if not lower:
+            kept = solved_profiles(whole, kept, choice.model.structure)
+            lower = lower_minima(whole, kept)
+        if not lower:
+            break
+        candidates = whole.candidates | lower
+        whole = replace(whole, candidates=candidates, criterion=whole.criteria(candidates))
+        points = {s: own for s, own in points.items() if s not in lower}
+    return whole, choice, _not_ruled_out(whole, choice, chains, flows, curves(whole, kept))
+
+
 def _not_ruled_out(
     whole: WindowFit,
     choice: Choice,
     chains: Sequence[LagChain],
     flows: Sequence[DispersedFlow],
+    profiles: dict[Structure, Profile],
 ) -> _Kept:
     more = max(LEAST_CHARGE - whole.penalty, 0.0)
-    level = _charged_level(whole, choice)
-    limit = level + PLAUSIBLE
-    values = charged(whole.criterion, whole.penalty)
-    free = plausible(whole.candidates, values, whole.variance, choice.model, level)
+    limit = _charged_level(whole, choice) + PLAUSIBLE
     return _Kept(
-        profiles_of(whole, free, choice.model.structure),
+        profiles,
         [
             (flow, flow_profile(whole.problem, flow, whole.scales, whole.variance))
             for flow in flows

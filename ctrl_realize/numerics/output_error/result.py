@@ -17,16 +17,24 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..separable.compared_fits import settled
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain, lag_sum
-from ..separable.profile import dead_time_profile, profile_curve, profile_points, with_ends
+from ..separable.profile import Points, dead_time_profile, profile_curve, profile_points, with_ends
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import StaticGain, averaged_ends
-from ..separable.structures import Candidate, needless_parameters
+from ..separable.structures import Candidate, Scales, needless_parameters
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
 from .margins import CloseDecision
 
+_LEAST_WIDTH = 1e-6  # samples
+_ON_THE_GRID = 1e-3
+"""Steps by which an end may be beyond a rounded value and count as equal to it: ends often lie on
+samples, which are such values."""
+_LOWER = 0.01
+"""Variances by which a profile must lead below a minimum to be followed: searches of 19 of 251
+records ended 0.015 to 6 above the lowest."""
 _ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
 
 Profile: TypeAlias = tuple[FloatArray, FloatArray]
@@ -86,6 +94,24 @@ class DelayInterval(NamedTuple):
     low: float
     high: float
     std: float
+
+    def rounded(self, dead_time: float, scales: Scales) -> DelayInterval:
+        """Round the ends outwards, to a hundredth of the width at most.
+
+        The third digit of a width is less than its own error, and on flat profiles it is decided
+        by rounding errors.
+        """
+        width = (self.high - self.low) / scales.dt
+        if not _LEAST_WIDTH < width < np.inf:
+            return self
+        step = float(10.0 ** (np.floor(np.log10(width)) - 2)) * scales.dt
+        low = step * float(np.floor(self.low / step + _ON_THE_GRID))
+        high = step * float(np.ceil(self.high / step - _ON_THE_GRID))
+        return DelayInterval(
+            min(max(low, scales.earliest), dead_time),
+            max(min(high, scales.latest), dead_time),
+            self.std,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,28 +191,47 @@ def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
     return dead_time_profile(whole.problem, candidate, whole.variance, whole.scales)
 
 
-def profiles_of(
-    whole: WindowFit, structures: Sequence[Structure], chosen: Structure
-) -> dict[Structure, Profile]:
-    """Profiles of structures, solved for their ends where these may be ends of all of them.
+def laid_profiles(whole: WindowFit, structures: Sequence[Structure]) -> dict[Structure, Points]:
+    """Profile points of structures, from their minima."""
+    setting = whole.variance, whole.scales
+    return {s: profile_points(whole.problem, whole.candidates[s], *setting) for s in structures}
+
+
+def solved_profiles(
+    whole: WindowFit, points: dict[Structure, Points], chosen: Structure
+) -> dict[Structure, Points]:
+    """Profile points, with the ends of the intervals that may be ends of all of them.
 
     Between the points of a profile its ends are known to a few parts in a hundred; those of the
     chosen structure, and those that lie as far out as any, are solved for.
     """
     setting = whole.variance, whole.scales
-    models = {s: whole.candidates[s] for s in structures}
-    points = {s: profile_points(whole.problem, model, *setting) for s, model in models.items()}
-    found = {s: profile_curve(points[s], model, *setting) for s, model in models.items()}
-    limits = {s: profile_limits(*profile) for s, profile in found.items()}
+    limits = {s: profile_limits(*profile) for s, profile in curves(whole, points).items()}
     # None are left where a dispersed flow rules out every structure.
     low = min((first for first, _ in limits.values()), default=np.inf)
     high = max((last for _, last in limits.values()), default=-np.inf)
+    found = dict(points)
     for s, (first, last) in limits.items():
         margin = _ROUGHLY * (last - first)
         ends = s == chosen or first - margin <= low, s == chosen or last + margin >= high
         if any(ends):
-            solved = with_ends(whole.problem, points[s], *setting, ends)
-            found[s] = profile_curve(solved, models[s], *setting)
+            found[s] = with_ends(whole.problem, points[s], *setting, ends)
+    return found
+
+
+def curves(whole: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Profile]:
+    """Misfit over the dead time of structures with these profile points."""
+    setting = whole.variance, whole.scales
+    return {s: profile_curve(own, whole.candidates[s], *setting) for s, own in points.items()}
+
+
+def lower_minima(whole: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Candidate]:
+    """Minima to which profiles lead that are lower than those that the searches have found."""
+    found = {}
+    for s, own in points.items():
+        best = min(own.values(), key=lambda point: point.cost)
+        if whole.candidates[s].cost - best.cost > _LOWER * whole.variance:
+            found[s] = settled(whole.problem, best, whole.scales)
     return found
 
 
@@ -223,6 +268,7 @@ def assembled(
     """
     state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
+    interval = interval.rounded(chosen.dead_time, whole.scales)
     static = whole.static(chosen)
     charged = {s: whole.criterion[s] + needless_parameters(s) for s in profiles}
     least = charged.get(chosen.structure, np.inf)

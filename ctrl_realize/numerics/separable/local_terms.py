@@ -33,6 +33,9 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray, IntArray
 
+_OVER = 1e-12
+"""Part of a free response that is left at the first row, below which nothing of it counts."""
+
 
 @dataclass(frozen=True, eq=False)
 class Segments:
@@ -112,6 +115,7 @@ class LocalTerms:
             # Once more: what is nearly all within the fixed terms loses digits the first time.
             again = q.T @ own
             basis, triangle = np.linalg.qr(own - q @ again)
+            basis *= np.any(columns[:, rows], axis=1)[:, None, : basis.shape[2]]
             self._bases.append(basis)
             self._triangles.append(triangle)
             self._shared.append(shared + again)
@@ -189,15 +193,21 @@ def _columns(segments: Segments, decay: ComplexArray, poles: ComplexArray) -> Fl
 
 
 def _free_columns(decay: ComplexArray, poles: ComplexArray) -> FloatArray:
+    """Free responses, zero those of poles that are over before the first row.
+
+    Beside the other pole of its pair such a pole would be a direction of rounding errors.
+    """
     n = poles.shape[1]
     free = np.empty(decay.shape)
+    over = np.abs(decay).max(axis=1, initial=0.0) < _OVER
     if n % 2:
-        free[:, :, 0] = decay[:, :, 0].real
+        free[:, :, 0] = np.where(over[:, :1], 0.0, decay[:, :, 0].real)
     for i in range(n % 2, n, 2):
         first, second = decay[:, :, i], decay[:, :, i + 1]
         gap = poles[:, i] - poles[:, i + 1]
         free[:, :, i] = (first + second).real / 2
-        free[:, :, i + 1] = ((first - second) / gap[:, None]).real
+        apart = ((first - second) / gap[:, None]).real
+        free[:, :, i + 1] = np.where(over[:, i : i + 2].any(axis=1)[:, None], 0.0, apart)
     return free
 
 

@@ -52,6 +52,18 @@ def test_what_a_record_has_for_itself_disappears(theta):
     assert_allclose(left, 0.0, atol=1e-9 * np.abs(data).max())
 
 
+def test_a_free_response_that_is_over_before_the_first_row_takes_nothing_away():
+    clock = np.arange(60.0) + 0.5
+    rows = Segments(np.array([0, 60]), clock, np.ones((60, 1)))
+    fixed = FixedTerms(rows, np.ones(60))
+    data = np.random.default_rng(0).normal(size=(1, 60, 1))
+    alone = LocalTerms(fixed, np.array([[-0.2 + 0j]])).without(data)
+    beside = LocalTerms(fixed, np.array([[-0.2 + 0j, -900.0 + 0j]])).without(data)
+    assert_allclose(beside, alone, atol=1e-12)
+    none = LocalTerms(fixed, np.array([[-900.0 + 0j]])).without(data)
+    assert_allclose(none, data - data.mean(), atol=1e-12)
+
+
 def test_nothing_else_disappears_and_records_do_not_mix():
     poles, _ = poles_from_parameters(np.array([THETA["three"]]))
     own = LocalTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
