@@ -18,6 +18,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,10 +26,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray
-from .model import project
+from ..regression.marquardt import Damping, damped_step, descend
+from .model import Projection, project
 
 _MAX_ITERATIONS = 60
 _FIRST_ITERATIONS = 10
+_DAMPING = Damping(rise=6.0, fall=8.0)  # usual factors: Marquardt (1963)
+_STALLED = 1e-9  # of the cost: a gain that is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,13 @@ class RationalFit:
     cost: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Point:
+    theta: FloatArray
+    projected: Projection
+    cost: float
+
+
 def refine(
     data: FRFData,
     order: int,
@@ -104,42 +115,37 @@ def refine(
     iterations : int
         At most so many.
     """
-    theta = inside_limits(start, data, order)
-    now = project(data.s, data.response, data.weight, theta, order, count)
-    cost = _cost(now.residual)
-    damping = 1e-3
-    stalled = 0
-    for _ in range(iterations):
-        J = now.jacobian.copy()
-        if frozen_delay or _pinned(theta, float(J[:, order] @ now.residual), data, order):
+
+    def at(theta: FloatArray) -> _Point:
+        projected = project(data.s, data.response, data.weight, theta, order, count)
+        return _Point(theta, projected, float(projected.residual @ projected.residual))
+
+    def linearised(here: _Point) -> Callable[[float], _Point]:
+        residual, J = here.projected.residual, here.projected.jacobian.copy()
+        if frozen_delay or _pinned(here.theta, float(J[:, order] @ residual), data, order):
             J[:, order] = 0.0
-        gram, slope = J.T @ J, J.T @ now.residual
-        size = np.maximum(np.diag(gram), 1e-30 + 1e-12 * np.diag(gram).max())
-        improved = False
-        for _ in range(8):
-            damped = gram.copy()
-            # (J'J + damping diag(J'J)) step = -J'r: Marquardt (1963).
-            damped.flat[:: order + 2] += damping * size
-            step = np.linalg.solve(damped, -slope)
+        gram, slope = J.T @ J, J.T @ residual
+
+        def ahead(damping: float) -> _Point:
+            step = damped_step(gram, -slope, damping)
             # A factor of e in one step is as far as the linear picture goes.
-            step[:order] = np.minimum(np.maximum(step[:order], -1.0), 1.0)
-            trial = inside_limits(theta + step, data, order)
-            moved = project(data.s, data.response, data.weight, trial, order, count)
-            trial_cost = _cost(moved.residual)
-            if trial_cost < cost:
-                improved = True
-                break
-            damping = min(damping * 6.0, 1e12)
-        if not improved:
-            break
-        drop = cost - trial_cost
-        theta, now, cost = trial, moved, trial_cost
-        damping = max(damping / 8.0, 1e-12)
+            step[:order] = _within(step[:order], -1.0, 1.0)
+            return at(inside_limits(here.theta + step, data, order))
+
+        return ahead
+
+    stalled = 0
+
+    def finished(gain: float, here: _Point) -> bool:
+        nonlocal stalled
         # Two small steps in a row: one alone may be a damped step in a narrow valley.
-        stalled = stalled + 1 if drop <= 1e-9 * cost else 0
-        if stalled == 2:
-            break
-    return RationalFit(order=order, theta=theta, numerator=now.numerator, cost=cost)
+        stalled = stalled + 1 if gain <= _STALLED * here.cost else 0
+        return stalled == 2
+
+    best, _ = descend(
+        at(inside_limits(start, data, order)), linearised, finished, _DAMPING, iterations
+    )
+    return RationalFit(order, best.theta, best.projected.numerator, best.cost)
 
 
 def refine_best(
@@ -175,7 +181,3 @@ def _within(values: FloatArray, low: float | FloatArray, high: float | FloatArra
 def _pinned(theta: FloatArray, slope: float, data: FRFData, order: int) -> bool:
     at_zero = theta[order] <= data.min_dead_time and slope >= 0.0
     return bool(at_zero or (theta[order] >= data.max_dead_time and slope <= 0.0))
-
-
-def _cost(residual: FloatArray) -> float:
-    return float(residual @ residual)

@@ -27,6 +27,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import Z_95
+from ..regression.marquardt import Damping, damped_step, descend
 from .poles import parameters_from_poles
 from .structures import Candidate, Scales
 from .varpro import Problem, Structure, evaluate
@@ -41,7 +42,7 @@ _DIFFUSION_CHARGE = 8.0
 """Two lags far apart look like diffusion, and are more common. Ablation: charge for diffusion."""
 _ITERATIONS = 60  # at most
 _CONVERGED = 1e-13  # gain over the cost at which a fit ends, as rounding allows
-_GIVEN_UP = 1e9  # damping
+_DAMPING = Damping(rise=10.0, fall=10.0, tries=12)  # usual factors: Marquardt (1963)
 _SMALL = 1e-4  # step of the numerical derivatives of pole parameters
 _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
 
@@ -59,6 +60,17 @@ class LagChain:
     criterion: float
     error: float
     hidden: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Dead time, logarithm of the lag and shape; parameters of the model and what it leaves."""
+
+    x: FloatArray
+    parameters: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+    cost: float
 
 
 @dataclass(frozen=True)
@@ -214,30 +226,30 @@ def _fit(
     structure = Structure(order, order)
     low = np.array([scales.earliest, -np.inf, law.low])
     high = np.array([scales.latest, np.inf, law.high])
-    x, damping = np.clip(start, low, high), 1e-3
-    parameters, residual, jacobian = _evaluate(problem, structure, law, x)
-    cost = float(residual @ residual)
-    for _ in range(_ITERATIONS):
-        normal, downhill = jacobian.T @ jacobian, jacobian.T @ residual
-        free = ~((x <= low) & (downhill < 0) | (x >= high) & (downhill > 0))
-        damped = normal[np.ix_(free, free)]
-        damped = damped + np.diag(damping * np.diag(damped) + 1e-300)
-        step = np.zeros(3)
-        step[free] = np.linalg.solve(damped, downhill[free])
-        trial = np.clip(x + step / max(1.0, abs(float(step[1]))), low, high)
-        moved = _evaluate(problem, structure, law, trial)
-        new = float(moved[1] @ moved[1])
-        if not new < cost:
-            damping *= 10
-            if damping > _GIVEN_UP:
-                break
-            continue
-        settled = cost - new < _CONVERGED * new
-        x, cost, damping = trial, new, 0.1 * damping
-        parameters, residual, jacobian = moved
-        if settled:
-            break
-    return Candidate(structure, parameters, cost), x
+
+    def at(x: FloatArray) -> _Point:
+        parameters, residual, jacobian = _evaluate(problem, structure, law, x)
+        return _Point(x, parameters, residual, jacobian, float(residual @ residual))
+
+    def linearised(here: _Point) -> Callable[[float], _Point]:
+        normal, downhill = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.residual
+        free = ~((here.x <= low) & (downhill < 0) | (here.x >= high) & (downhill > 0))
+
+        def ahead(damping: float) -> _Point:
+            step = np.zeros(3)
+            step[free] = damped_step(normal[np.ix_(free, free)], downhill[free], damping)
+            return at(np.clip(here.x + step / max(1.0, abs(float(step[1]))), low, high))
+
+        return ahead
+
+    best, _ = descend(
+        at(np.clip(start, low, high)),
+        linearised,
+        lambda gain, here: gain < _CONVERGED * here.cost,
+        _DAMPING,
+        _ITERATIONS,
+    )
+    return Candidate(structure, best.parameters, best.cost), best.x
 
 
 def _error(

@@ -23,19 +23,20 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray
+from ..regression.marquardt import Damping, damped_step, descend
 from .sections import Motion, Sections, motion
 
 MOST_STEPS = 40
 ENOUGH = 0.01
 """Gain of log likelihood below which a step is the last one: far inside what data can tell."""
-_DAMPING = 1e-3
+_DAMPING = Damping(tries=16)
 _ROWS = 4096
 """Samples whose derivatives are formed at once."""
 LARGEST_POLE = 1 - 1e-7
@@ -83,7 +84,7 @@ class _Point:
     left: tuple[FloatArray, ...]
     initial: tuple[FloatArray, ...]
     variance: FloatArray
-    loss: float
+    cost: float
 
 
 def fit_sections(
@@ -140,28 +141,23 @@ def fit_sections(
     here = at(model, 1 / spread)
     mask = model.free(feedthrough=feedthrough, poles=False)
     gram, slope = _normal(here, data, known, 1 / spread, mask)
-    there = at(_stepped(model, mask, _damped(gram, slope, 1e-12)), 1 / spread)
-    if there.loss < here.loss:
+    there = at(_stepped(model, mask, damped_step(gram, slope, _DAMPING.least)), 1 / spread)
+    if there.cost < here.cost:
         here = there
-    mask, damping, done = model.free(feedthrough=feedthrough), _DAMPING, 0
-    while done < most:
+    free = model.free(feedthrough=feedthrough)
+
+    def linearised(here: _Point) -> Callable[[float], _Point]:
         weights = 1 / here.variance
-        gram, slope = _held(here.model, *_normal(here, data, known, weights, mask), mask)
-        better = None
-        while damping < 1e8:
-            candidate = _stepped(here.model, mask, _damped(gram, slope, damping))
-            there = at(_inside(candidate, LARGEST_POLE), weights)
-            if there.loss < here.loss:
-                better = there
-                break
-            damping *= 5
-        if better is None:
-            break
-        gain = here.loss - better.loss
-        here, damping, done = better, max(damping / 5, 1e-10), done + 1
-        if gain < enough:
-            break
-    return SectionFit(here.model, here.variance, spread, counts, here.loss, done)
+        gram, slope = _held(here.model, *_normal(here, data, known, weights, free), free)
+
+        def ahead(damping: float) -> _Point:
+            candidate = _stepped(here.model, free, damped_step(gram, slope, damping))
+            return at(_inside(candidate, LARGEST_POLE), weights)
+
+        return ahead
+
+    here, done = descend(here, linearised, lambda gain, _: gain < enough, _DAMPING, most)
+    return SectionFit(here.model, here.variance, spread, counts, here.cost, done)
 
 
 def _inside(model: Sections, to: float) -> Sections:
@@ -208,14 +204,6 @@ def _stepped(model: Sections, mask: NDArray[np.bool_], step: FloatArray) -> Sect
     full = np.zeros(mask.size)
     full[mask] = step
     return model.moved(full)
-
-
-def _damped(gram: FloatArray, slope: FloatArray, damping: float) -> FloatArray:
-    scale = np.sqrt(np.diag(gram))
-    scale[scale == 0] = 1.0
-    scaled = gram / np.outer(scale, scale)
-    scaled[np.diag_indices_from(scaled)] += damping
-    return np.asarray(np.linalg.solve(scaled, slope / scale) / scale)
 
 
 def _linear(model: Sections, moved: Motion, p: int) -> FloatArray:
