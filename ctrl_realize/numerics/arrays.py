@@ -1,4 +1,4 @@
-"""Names for the arrays that kernels take and return, and what is done to many of them."""
+"""Types of the arrays in the kernels, and common operations on them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Entry = TypeVar("Entry", bound=np.generic)
 
 
 def read_only(values: FloatArray) -> FloatArray:
-    """Copy real numbers and lock the copy, so that a result cannot change under its owner."""
+    """Copy real numbers to a read-only array."""
     return locked(np.asarray(values, dtype=np.float64))
 
 
@@ -30,7 +30,7 @@ def later(values: FloatArray, samples: int) -> FloatArray:
 
 
 def block_powers(first: FloatArray, A: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Stack C, CA, ..., CA^(count-1) by doubling, and return a power of A beside it.
+    """Stack C, CA, ..., CA^(count-1) by doubling; also return a power of A.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def block_powers(first: FloatArray, A: FloatArray, count: int) -> tuple[FloatArr
 
 
 def locked(values: NDArray[Entry]) -> NDArray[Entry]:
-    """Copy an array of any kind and lock the copy."""
+    """Copy an array of any type to a read-only one."""
     kept = np.array(values)
     kept.flags.writeable = False
     return kept

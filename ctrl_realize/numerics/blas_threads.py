@@ -1,8 +1,8 @@
 """One BLAS thread while the library computes.
 
-The matrices of this package have tens of rows. For these a second BLAS thread costs more, waiting,
-than it computes: two threads took six times as long as one on a machine with other work to do,
-and another order of summation may round the last digits otherwise.
+The matrices of this package have tens of rows. For these a second BLAS thread costs more time by
+waiting than it computes: two threads took six times as long as one on a busy machine, and another
+order of summation may change the last digits.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from threadpoolctl import ThreadpoolController
 P = ParamSpec("P")
 T = TypeVar("T")
 
-# The setting belongs to the whole process: only one Python thread at a time may save and restore
-# it, or two that overlap would leave it at one for good. Held by whoever limits; never waited for.
+# The setting is global: only one Python thread at a time may save and restore it, otherwise two
+# overlapping ones could leave it at one. It is never waited for.
 _LIMITING = Lock()
 
 
 @functools.cache
 def _controller() -> Any:
-    """BLAS libraries of NumPy and SciPy; to look for them takes 15 ms, so it is done once."""
+    """BLAS libraries of NumPy and SciPy; finding them takes 15 ms and is done once."""
     import scipy.linalg  # noqa: F401 - brings its own BLAS
 
     return ThreadpoolController().select(user_api="blas")
@@ -33,10 +33,10 @@ def _controller() -> Any:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Limit BLAS to one thread inside; the caller's setting is back afterwards.
+    """Limit BLAS to one thread in the block; the caller's setting is restored afterwards.
 
-    Costs 30 to 60 us, 5 us where there is one thread already, 2 us inside another one. What other
-    Python threads of the process compute meanwhile has one BLAS thread too.
+    Takes 30 to 60 us, 5 us if there is one thread already, 2 us inside another block. Other Python
+    threads of the process have one BLAS thread meanwhile.
     """
     if not _LIMITING.acquire(blocking=False):
         yield

@@ -1,8 +1,8 @@
 """The Cramer-Rao bound of a dead time in a step experiment.
 
-The bound is the inverse Fisher information [1]_ of dead time, poles and linear parameters, of which
-the linear ones are projected out [2]_: what is left of the derivative by the dead time is the Schur
-complement.
+The bound is the inverse Fisher information [1]_ of dead time, poles and linear parameters; the
+latter are projected out [2]_: the remainder of the derivative with respect to the dead time is the
+Schur complement.
 
 References
 ----------
@@ -48,19 +48,19 @@ def dead_time_bound(
     dead_time, dt : float
         Dead time and sample time in s.
     samples : tuple of int
-        How many before the step, and from the step on.
+        Number before the step, and from the step on.
     sigma : float
         Standard deviation of the noise.
     superfluous_zeros : int, optional
-        Zeros of the assumed model that the plant does not have. With one or more there is no
-        information on the dead time: a numerator that is freer than the plant's imitates it.
+        Superfluous zeros of the assumed model. With one or more there is no information about the
+        dead time: the numerator can take its place.
     known : KnownFactor, optional
         Known dynamics in cascade.
 
     Returns
     -------
     float
-        Infinite where there is no information.
+        Infinite if there is no information.
 
     Examples
     --------

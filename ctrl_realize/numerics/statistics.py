@@ -1,7 +1,7 @@
 """Robust summaries of repeated estimates.
 
-Trimmed means after [1]_; the ratio of a complex normal error to a deviation from repeats has the
-distribution that [2]_ gives for spectra; mixtures as in [3]_.
+Trimmed means follow [1]_; the ratio of a complex normal error to a standard deviation from repeats
+has the distribution given by [2]_ for spectra; mixtures follow [3]_.
 
 References
 ----------
@@ -25,7 +25,7 @@ from .arrays import FloatArray
 
 @dataclass(frozen=True)
 class TrimmedStatistics:
-    """Mean and scatter of the values that are left after trimming both ends.
+    """Mean and scatter of the values that remain after trimming both ends.
 
     ``mean`` and ``variance`` are those of the ``count`` values left;
     ``std_error`` is Yuen's, ``winsorized std / ((1 - 2 share) sqrt(n))`` with ``share = trim / n``,
@@ -34,17 +34,17 @@ class TrimmedStatistics:
     Parameters
     ----------
     mean : float
-        Mean of the values left.
+        Mean of the remaining values.
     variance : float
-        Variance of the values left, with divisor ``count - ddof``.
+        Variance of the remaining values, with divisor ``count - ddof``.
     std_error : float
         Standard error of `mean` as an estimate of the trimmed mean of the population.
     interval : tuple of float
         Confidence interval of the trimmed mean.
     count : int
-        Number of values left.
+        Number of remaining values.
     dropped : int
-        Number of values dropped, both ends together.
+        Number of values left out at both ends together.
 
     Examples
     --------
@@ -65,23 +65,23 @@ class TrimmedStatistics:
 def trimmed_statistics(
     values: FloatArray, trim: int, *, ddof: int = 1, confidence: float = 0.95
 ) -> TrimmedStatistics:
-    """Drop the `trim` smallest and the `trim` largest values and summarize the rest.
+    """Leave out the `trim` smallest and the `trim` largest values and summarize the rest.
 
     Parameters
     ----------
     values : ndarray
         Values; all axes are pooled.
     trim : int
-        Values to drop at each end, ``0 <= 2 trim < size``.
+        Number of values to leave out at each end, ``0 <= 2 trim < size``.
     ddof : int, default 1
         Divisor of the variance is ``count - ddof``.
     confidence : float, default 0.95
-        Level of the interval.
+        Confidence level of the interval.
 
     Returns
     -------
     TrimmedStatistics
-        The standard error is NaN where fewer than two values are left.
+        The standard error is NaN if fewer than two values remain.
 
     Notes
     -----
@@ -104,7 +104,7 @@ def trimmed_statistics(
     ordered = np.sort(np.ravel(values).astype(np.float64))
     n = ordered.size
     kept = ordered[trim : n - trim]
-    # Rounding puts the mean of equal values beside them.
+    # Rounding may make the mean of equal values differ from them.
     mean = float(np.clip(kept.mean(), kept[0], kept[-1]))
     winsorized = np.clip(ordered, kept[0], kept[-1])
     std_error = float("nan")
@@ -124,16 +124,16 @@ def trimmed_statistics(
 
 
 def circle_quantile(level: float, repeats: float | None) -> float:
-    """Radius of the circle that holds a complex normal error, in its standard deviations.
+    """Radius of the circle that contains a complex normal error, in standard deviations.
 
     Parameters
     ----------
     level : float
         In 0...1, ends excluded.
     repeats : float or None
-        Values, above 1, from whose scatter the standard deviation was taken: the square of the
-        error over it has the F distribution with 2 and ``2 (repeats - 1)`` degrees of freedom.
-        None where it is known.
+        Number of values, above 1, behind the standard deviation: the squared error divided by it
+        has the F distribution with 2 and ``2 (repeats - 1)`` degrees of freedom. None if the
+        standard deviation is known.
 
     Examples
     --------
@@ -152,7 +152,7 @@ def circle_quantile(level: float, repeats: float | None) -> float:
 
 
 def upper_quantile(tail: float, repeats: float | None) -> float:
-    """Standard deviations that the error in one direction of the plane exceeds with `tail`.
+    """Number of standard deviations exceeded with probability `tail` in one direction of the plane.
 
     Student's with ``2 (repeats - 1)`` degrees of freedom; see `circle_quantile`.
 

@@ -1,4 +1,4 @@
-"""Kung's realization behind one delay, or behind every delay of a range.
+"""Kung's realization after one delay, or after every delay of a range.
 
 Glue between the Hankel matrix of shifted Markov parameters, the solver that
 fits its size, and the state-space formulas.
@@ -29,8 +29,8 @@ COMPLETE_SIZE = 200
 
 SCAN_TOL = 3e-10
 """Residual of the wanted pairs in a delay scan. Poles near the unit circle magnify it over a
-thousand samples: on 12 noisy records, 101 delays and 8 orders the misfits are then within a tenth
-of what is promised (1e-11 of the data plus 1e-9 of the misfit)."""
+thousand samples: for 12 noisy records, 101 delays and 8 orders the IAE is then within a tenth of
+the stated accuracy (1e-11 of the data plus 1e-9 of the IAE)."""
 
 GROUP_BYTES = 64e6
 """Memory for the eigenvectors of the delays that are computed together."""
@@ -59,13 +59,13 @@ class DelayModels:
 
 @dataclass(frozen=True, eq=False)
 class OneModel:
-    """State-space model behind one delay.
+    """State-space model after one delay.
 
     Attributes
     ----------
     A, B, C : ndarray, shapes (k, k), (k, m), (p, k)
     singular_values : ndarray
-        All of them when `complete`, else the leading k.
+        All of them if `complete`, otherwise the leading k.
     following : float
         Singular value k + 1, or an estimate of it.
     rest_bound : float
@@ -81,7 +81,7 @@ class OneModel:
 
 
 def hankel_size(samples: int, *, padded: bool) -> int:
-    """Return the number of block rows for `samples` parameters behind the feedthrough.
+    """Return the number of block rows for `samples` parameters after the feedthrough.
 
     The paper's square matrix has floor(samples / 2): its shifted version
     then just uses all samples. The zero-padded one has as many as samples.
@@ -92,7 +92,7 @@ def hankel_size(samples: int, *, padded: bool) -> int:
 def realize_at(
     markov: FloatArray, delay: int, samples: int, order: int, *, padded: bool, tol: float = 1e-12
 ) -> OneModel:
-    """Realize the Markov parameters behind one delay.
+    """Realize the Markov parameters after one delay.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def realize_at_delays(
     padded: bool,
     tol: float = SCAN_TOL,
 ) -> DelayModels:
-    """Realize the Markov parameters behind each of several delays.
+    """Realize the Markov parameters after each of several delays.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def misfit(
     delays : ndarray of int, shape (D,)
     models : DelayModels
     order : int
-        Leading states that are used.
+        Number of leading states that are used.
     feedthrough : ndarray, shape (D, p, m)
 
     Returns

@@ -31,7 +31,7 @@ def markov_stack(A: FloatArray, B: FloatArray, C: FloatArray, count: int) -> Flo
     Returns
     -------
     ndarray, shape (D, count)
-        Not finite where an unstable model leaves the range of floats.
+        Not finite if an unstable model exceeds the range of floats.
     """
     models = len(B)
     block = 1 << max(0, int(np.ceil(0.5 * np.log2(max(count, 1)))))
@@ -63,7 +63,7 @@ def integrated_absolute_error(
     Returns
     -------
     ndarray, shape (D,)
-        Infinite for models whose response leaves the range of floats.
+        Infinite for models whose response exceeds the range of floats.
     """
     A, B, C, D = models
     window = markov.size
@@ -78,7 +78,7 @@ def integrated_absolute_error(
         difference = markov_stack(A, B, C, count)
         np.subtract(difference, data, out=difference)
         np.abs(difference, out=difference)
-        # a model behind a long delay reaches beyond the window
+        # a model with a long delay extends beyond the window
         end = window - 1 - last
         beyond = np.arange(end, count) >= (window - 1 - delays)[:, np.newaxis]
         difference[:, end:][beyond] = 0.0

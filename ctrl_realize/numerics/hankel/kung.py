@@ -31,7 +31,7 @@ import numpy as np
 from ..arrays import FloatArray
 
 SMALLEST = 1e-290
-"""Singular values up to here are zero: what is left of underflow, not of a system."""
+"""Singular values up to here are zero: the result of underflow."""
 
 LARGEST_POLE = 1e150
 """Singular values that many times smaller than the sample after their matrix are zero, too."""
@@ -55,8 +55,7 @@ def realize_symmetric(
     Returns
     -------
     A, B, C : ndarray, shapes (D, k, k), (D, k), (D, k)
-        States beyond the numerical rank do nothing: their rows and columns
-        are zero.
+        States beyond the numerical rank have no effect: their rows and columns are zero.
 
     Notes
     -----
@@ -121,7 +120,7 @@ def realize_block(
 
 
 def _inverse(root: FloatArray, next_sample: FloatArray | float | None) -> FloatArray:
-    """Invert roots of singular values; those whose products with A overflow carry no state."""
+    """Invert roots of singular values; states whose products with A overflow are set to zero."""
     smallest = np.sqrt(SMALLEST)
     if next_sample is not None:
         smallest = np.maximum(smallest, np.sqrt(next_sample / LARGEST_POLE))

@@ -6,11 +6,10 @@ algorithm. Many Hankel matrices (one for each candidate delay) go through the
 recurrence together; every product is an FFT, every step is a handful of
 array operations over all of them.
 
-The recurrence is stopped by the residual ``|H v - lambda v|`` of each wanted
-pair, never by a count of steps. What does not converge, or breaks down
-while part of the spectrum is unseen, goes to a dense solver or to ARPACK.
-Bases shared between delays and randomised range finders are faster still and
-were measured to be wrong by up to 10 % on unfiltered data.
+The recurrence is stopped by the residual ``|H v - lambda v|`` of each wanted pair, not by a number
+of steps. Matrices that do not converge, or break down before the whole spectrum is found, are
+solved by a dense solver or by ARPACK. Bases shared between delays and randomised range finders are
+faster, but errors of up to 10 % were measured on unfiltered data.
 
 References
 ----------
@@ -47,10 +46,10 @@ CHUNK_BYTES = 8e6
 """Size of 32 basis vectors for all members that run together."""
 
 PROBES = 5
-"""Members that are looked at before all are."""
+"""Number of matrices that are tested before all are solved."""
 
 LONGEST_WAIT = 10
-"""Steps between two looks at the residuals."""
+"""Number of steps between two tests of the residuals."""
 
 LOOK_COST = 2e5
 """Numbers in the vectors of a step that costs as much as a look."""
@@ -59,7 +58,7 @@ TWINS = 1e-10
 """Relative difference of magnitudes up to which eigenvalues are twins."""
 
 LOSS_OVER_TOL = 1e-3
-"""Loss of orthogonality that is let pass, relative to the tolerance of the residuals."""
+"""Tolerated loss of orthogonality, relative to the tolerance of the residuals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,12 +149,12 @@ class _Result:
         return cls(np.zeros((members, count)), np.zeros((members, count, size)), np.zeros(members))
 
     def part(self, members: IntArray) -> _Result:
-        """Return the places of consecutive members."""
+        """Return the positions of consecutive members."""
         rows = slice(int(members[0]), int(members[-1]) + 1)
         return _Result(self.values[rows], self.vectors[rows], self.following[rows])
 
     def put(self, d: int, values: FloatArray, vectors: FloatArray, following: float) -> None:
-        """Store pairs up to the numerical rank; `vectors` may lie in their place already."""
+        """Store pairs up to the numerical rank; `vectors` may be in their final place already."""
         magnitude = np.abs(values)
         rounding = vectors.shape[1] * np.finfo(float).eps * magnitude.max()
         rank = int(np.count_nonzero(magnitude > rounding))
@@ -195,7 +194,7 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
             if doubtful[i] or _has_twins(values, following):
                 _fall_back(h[d], size, count, run.mixture(i, coordinates), result, d)
             else:
-                # straight to their place: a million samples leave no room for a copy
+                # directly to their place: for a million samples there is no memory for a copy
                 vectors = result.vectors[d, : values.size]
                 run.vectors(i, coordinates, vectors)
                 result.put(d, values, vectors, following)
@@ -209,7 +208,7 @@ def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) 
 
 
 def _excess(values: FloatArray, residuals: FloatArray, tol: float) -> float:
-    """Return the largest residual over the one that is asked for."""
+    """Return the largest residual relative to the tolerance."""
     magnitude = np.abs(values)
     asked = max(tol * float(magnitude[-1]), FLOOR * float(magnitude[0]))
     largest = float(residuals.max())
@@ -217,7 +216,7 @@ def _excess(values: FloatArray, residuals: FloatArray, tol: float) -> float:
 
 
 def _has_twins(values: FloatArray, following: float) -> bool:
-    """Tell whether two eigenvalues have the same magnitude, which noise never makes.
+    """Whether two eigenvalues have the same magnitude, which noise excludes.
 
     A pulse on top of a smooth response has 1 and -1 many times, and one
     start vector finds one of each.
@@ -227,7 +226,7 @@ def _has_twins(values: FloatArray, following: float) -> bool:
 
 
 class _Pace:
-    """Says when to look at the residuals again: they fall about geometrically."""
+    """Determines when to test the residuals again: they decrease about geometrically."""
 
     def __init__(self, first: int, longest: float) -> None:
         self.next_look = first

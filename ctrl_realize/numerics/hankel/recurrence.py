@@ -1,4 +1,4 @@
-"""Lanczos recurrence for many symmetric Hankel matrices in step.
+"""Lanczos recurrence for many symmetric Hankel matrices at the same time.
 
 The recurrence is [2]_; its loss of orthogonality is bounded as in [1]_.
 
@@ -41,9 +41,9 @@ def start_vectors(h: FloatArray, size: int) -> FloatArray:
 class LanczosRecurrence:
     """Three-term recurrence for many Hankel matrices, all members in step.
 
-    After ``steps`` steps, ``H Q^T = Q^T T + beta[-1] q e^T`` for every
-    member, with T from ``alpha`` and ``beta``. A member whose Krylov space
-    is exhausted gets a zero vector and stands still.
+    After ``steps`` steps, ``H Q^T = Q^T T + beta[-1] q e^T`` for every member, with T from
+    ``alpha`` and ``beta``. A member whose Krylov space is exhausted gets a zero vector and is not
+    changed any more.
 
     The basis loses its orthogonality as Ritz values converge. Simon's
     recurrence bounds the loss; before it reaches `loss`, two vectors in a row
@@ -58,7 +58,7 @@ class LanczosRecurrence:
     capacity : int
         Largest number of steps.
     loss : float
-        Largest inner product of two basis vectors that is let pass.
+        Largest tolerated inner product of two basis vectors.
     """
 
     def __init__(self, h: FloatArray, size: int, capacity: int, loss: float) -> None:
@@ -100,7 +100,7 @@ class LanczosRecurrence:
         self.steps = j + 1
 
     def _loses_orthogonality(self, norm: FloatArray) -> bool:
-        """Bound the loss of the vector to come; tell whether to orthogonalise it against all."""
+        """Bound the loss of orthogonality of the next vector; return whether to reorthogonalise."""
         # The recurrence of Simon for the inner products, in absolute values, with one bound for
         # all earlier vectors in the place of each product.
         j = self.steps
@@ -140,7 +140,7 @@ class LanczosRecurrence:
         return values[:count], residuals, coordinates[:, :count], following
 
     def end_products(self) -> None:
-        """Give back the memory that only further steps would need."""
+        """Release the memory that only further steps would need."""
         del self.stack
 
     def vectors(self, i: int, coordinates: FloatArray, out: FloatArray) -> None:
@@ -154,11 +154,10 @@ class LanczosRecurrence:
         return vector
 
     def sees_everything(self) -> NDArray[np.bool_]:
-        """Tell for which members H vanishes on the complement of the exhausted Krylov space.
+        """Determine for which members H vanishes on the complement of the exhausted Krylov space.
 
-        One start vector finds one copy of a multiple eigenvalue: a pulse
-        has 1 and -1 many times. A product with a new random vector shows
-        whether anything is left.
+        One start vector finds one copy of a multiple eigenvalue: a pulse has 1 and -1 many times. A
+        product with a new random vector shows whether there are more.
         """
         known = self.basis[:, : self.steps]
         random = np.random.default_rng(1966).standard_normal(known.shape[2])
@@ -172,7 +171,7 @@ class LanczosRecurrence:
         return seen
 
     def keep(self, members: IntArray) -> None:
-        """Go on with some members only."""
+        """Continue with some members only."""
         self.stack = self.stack.take(members)
         kept = np.empty((members.size, *self.basis.shape[1:]))
         kept[:, : self.steps + 1] = self.basis[members, : self.steps + 1]

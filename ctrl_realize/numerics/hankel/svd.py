@@ -30,11 +30,10 @@ from .matrix import BlockHankel, hankel_matrix
 
 
 def thin_svd(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return U, the singular values in falling order, and V transposed.
+    """Return U, the singular values in descending order, and V transposed.
 
-    LAPACK's divide and conquer (``gesdd``, as in NumPy) is quick, but on rare matrices ends
-    without an answer: of random Hankel matrices with one value out of order about one in
-    30 000. The older ``gesvd`` then does it.
+    LAPACK's divide and conquer (``gesdd``, as in NumPy) is fast, but fails for rare matrices: about
+    one in 30 000 random Hankel matrices with one outlier. The older ``gesvd`` is used then.
 
     Examples
     --------
@@ -63,7 +62,7 @@ FLOOR = 1e-14
 MAX_STEPS = 400
 
 REST_TOL = 0.02
-"""Accuracy to which the first singular value that is left out is estimated."""
+"""Accuracy of the first truncated singular value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +75,8 @@ class Triplets:
     values : ndarray, shape (k,)
         Decreasing; zero beyond the numerical rank.
     others : ndarray
-        The singular values that follow: all of them after a dense
-        decomposition, else the first, to a few percent.
+        The singular values that follow: all of them after a dense decomposition, otherwise the
+        first, to a few percent.
     complete : bool
         Whether `values` and `others` are all there are.
     """
@@ -110,8 +109,8 @@ def leading_triplets(
         return _dense(h, rows, columns, count)
     exponent = int(np.frexp(np.abs(h).max())[1])
     H = BlockHankel(np.ldexp(h, -exponent), rows, columns)
-    # One start vector finds one copy of a multiple singular value, as equal channels have
-    # them. A second start, beside what is known, shows whether anything larger is left.
+    # One start vector finds one copy of a multiple singular value, as for equal channels. A second
+    # start, orthogonal to the known ones, shows whether anything larger remains.
     starts = iter(np.random.default_rng(2005).spawn(2 * count + 2))
     found = _golub_kahan(H, count, tol, None, next(starts))
     rest = None if found is None else _golub_kahan(H, 1, REST_TOL, found, next(starts))
@@ -163,11 +162,11 @@ def _largest(one: Triple, other: Triple, count: int) -> Triple:
 def _golub_kahan(
     H: BlockHankel, count: int, tol: float, locked: Triple | None, start: np.random.Generator
 ) -> Triple | None:
-    """Bidiagonalise H, beside triplets that are known, until the wanted ones have converged.
+    """Bidiagonalise H, orthogonal to known triplets, until the wanted ones have converged.
 
-    After j steps ``H V_j = U_j B`` and ``H^T U_j = V_j B^T + above_j v e_j^T``
-    with B upper bidiagonal. None when that takes too many steps. Where H has
-    no more singular values, the rest are zero.
+    After j steps ``H V_j = U_j B`` and ``H^T U_j = V_j B^T + above_j v e_j^T`` with B upper
+    bidiagonal. None if that takes too many steps. If H has no more singular values, the rest are
+    zero.
     """
     height, width = H.shape
     known = 0 if locked is None else locked[1].size
@@ -220,7 +219,7 @@ def _golub_kahan(
 
 
 def _columns(vectors: FloatArray, count: int) -> FloatArray:
-    """Add zero columns up to the wanted count."""
+    """Add zero columns up to the requested count."""
     return np.pad(vectors, ((0, 0), (0, count - vectors.shape[1])))
 
 

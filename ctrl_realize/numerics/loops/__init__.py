@@ -1,1 +1,1 @@
-"""Closed loops: crossings of a response, and circles around points of it."""
+"""Closed loops: crossings of a response, and responses from values on a circle."""

@@ -1,4 +1,4 @@
-"""Closed-loop time responses from frequency responses, whatever the delay.
+"""Closed-loop time responses from frequency responses, for any delay.
 
 Inversion of a z-transform by a fast Fourier transform on a circle, whose radius sets the error of
 aliasing [1]_. The largest gain outside a circle around -1 is that of [2]_, here at any controller
@@ -22,12 +22,12 @@ from scipy.optimize import minimize_scalar
 from ..arrays import ComplexArray, FloatArray
 
 DAMPING = 1e6
-"""Growth of the circle's radius over the record: what wraps around is divided by this, and
-rounding multiplied."""
+"""Growth of the circle's radius over the record: wrap-around is divided by this, and rounding
+multiplied."""
 
 
 def damped_circle(count: int) -> ComplexArray:
-    """Points of the z-plane for `response_on_circle`: a circle a little outside the unit one.
+    """Points of the z-plane for `response_on_circle`, slightly outside the unit circle.
 
     Returns
     -------
@@ -41,8 +41,8 @@ def damped_circle(count: int) -> ComplexArray:
 def response_on_circle(values: ComplexArray, count: int) -> FloatArray:
     """Inverse z-transform of values on `damped_circle(count)`.
 
-    Right to about 1e-6 of the signal's size for every signal that does not grow faster than
-    the circle; the error is largest at the end of the record.
+    Accurate to about 1e-6 of the signal's size for every signal that does not grow faster than the
+    circle; the error is largest at the end of the record.
 
     Parameters
     ----------
@@ -58,19 +58,19 @@ def response_on_circle(values: ComplexArray, count: int) -> FloatArray:
 
 
 def step_on_circle(values: ComplexArray, z: ComplexArray, count: int) -> FloatArray:
-    """Response to a unit step at k = 0 of a system known on the circle, shape (count,)."""
+    """Unit-step response (count,) of a system with known values on the circle."""
     return response_on_circle(values * z / (z - 1), count)
 
 
 def gain_gaps(shape: ComplexArray, distance: float) -> list[tuple[float, float]]:
     """Ranges of k > 0 in which |1 + k L| >= distance holds at all frequencies.
 
-    Stability is the same all over such a range, since -1 is nowhere met.
+    Stability is the same for all k in such a range, since -1 is never reached.
 
     Returns
     -------
     list of (low, high)
-        Rising; the last `high` is inf.
+        Increasing; the last `high` is inf.
     """
     square = np.abs(shape) ** 2
     real = shape.real
@@ -96,7 +96,7 @@ def largest_gain(shape: ComplexArray, distance: float) -> tuple[float, int]:
     Parameters
     ----------
     shape : ndarray, shape (K,)
-        L at gain 1.
+        L for unit gain.
     distance : float
         0 < distance < 1.
 
@@ -105,7 +105,7 @@ def largest_gain(shape: ComplexArray, distance: float) -> tuple[float, int]:
     gain : float
         inf if no gain reaches the circle.
     at : int
-        Index of the frequency that decides.
+        Index of the decisive frequency.
     """
     square = np.abs(shape) ** 2
     real = shape.real
@@ -114,7 +114,7 @@ def largest_gain(shape: ComplexArray, distance: float) -> tuple[float, int]:
     if not enters.any():
         return float("inf"), 0
     gains = np.full(shape.size, np.inf)
-    # The rationalized root: no cancellation where the circle is only touched.
+    # The rationalized root: no cancellation if the circle is only touched.
     gains[enters] = (1 - distance**2) / (-real[enters] + np.sqrt(inside[enters]))
     at = int(np.argmin(gains))
     return float(gains[at]), at

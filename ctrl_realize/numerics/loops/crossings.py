@@ -1,7 +1,7 @@
-"""Crossings and closest points of a frequency response that is known at any frequency.
+"""Crossings and closest points of a frequency response that can be evaluated anywhere.
 
-Everything works on a function of frequency, not on a polynomial: each crossing is bracketed on a
-grid that follows the curve, then found by root finding on the curve itself.
+Everything is based on a function of frequency, not on a polynomial: each crossing is bracketed on a
+sufficiently fine grid, then computed by root finding on the curve itself.
 
 Encirclements as in [1]_.
 
@@ -27,7 +27,7 @@ MAX_REFINEMENTS = 24
 
 
 def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: float) -> FloatArray:
-    """Place frequencies where a response can turn.
+    """Place frequencies at which a response may change quickly.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: fl
         Poles and zeros in the s-plane, rad/s; points are gathered around those near the
         imaginary axis.
     turn_time : float
-        Delay in s that turns the phase; it gets 16 points per turn.
+        Delay in s; it gets 16 points per turn of its phase.
 
     Returns
     -------
     ndarray, shape (K,)
-        Rising frequencies from `low` to `top`.
+        Increasing frequencies from `low` to `top`.
     """
     decades = max(np.log10(top / low), 0.1)
     parts = [
@@ -56,7 +56,7 @@ def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: fl
             parts.append(centre + max(width, 1e-9 * centre) * spread)
     grid = np.unique(np.concatenate(parts))
     grid = grid[(grid >= low) & (grid <= top)]
-    # Twins, equal up to rounding, would close the bracket of a minimum beside them.
+    # Points equal up to rounding would spoil the bracket of a nearby minimum.
     apart = np.diff(grid, prepend=-np.inf) > 1e-9 * grid
     return np.asarray(grid[apart], dtype=np.float64)
 
@@ -67,7 +67,7 @@ def follow(
     """Refine a grid until the curve turns by less than `largest_turn` rad between its points.
 
     Intervals whose ends differ by more than a factor of 2 in magnitude are halved too. A curve
-    through zero would need ever more points; the refinement then stops after 24 halvings.
+    through zero would need infinitely many points; the refinement stops after 24 halvings.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def follow(
 def half_turns(values: ComplexArray) -> float:
     """Count half turns about 0 along a curve whose neighbours differ by less than half a turn.
 
-    The curve starts next to the real axis (where a real system is at frequency 0) and is
+    The curve starts near the real axis (where a real system is at frequency 0), and half turns are
     counted from there.
     """
     steps = np.angle(values[1:] / values[:-1])
@@ -111,12 +111,12 @@ def _roots(
         return np.zeros(0)
     found = elementwise.find_root(function, (low, high), tolerances={"xatol": 0.0, "xrtol": 1e-15})
     roots = np.asarray(found.x, dtype=np.float64)
-    # Far down, rounding alone may have made the sign change; there is no root to find then.
+    # Very close to zero, rounding may have caused the sign change; there is no root to find.
     return roots[np.isfinite(roots)]
 
 
 def unit_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> FloatArray:
-    """Frequencies where the magnitude crosses 1 (gain crossovers), rising."""
+    """Frequencies where the magnitude crosses 1 (gain crossovers), increasing."""
     above = np.abs(values) > 1
     at = np.flatnonzero(above[1:] != above[:-1])
 
@@ -127,7 +127,7 @@ def unit_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> Floa
 
 
 def negative_axis_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> FloatArray:
-    """Frequencies where the curve crosses the negative real axis (phase crossovers), rising."""
+    """Frequencies where the curve crosses the negative real axis (phase crossovers), increasing."""
     below = values.imag < 0
     unit = values / np.abs(values)
     left = (unit[1:] + unit[:-1]).real < 0

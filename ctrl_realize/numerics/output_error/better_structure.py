@@ -1,6 +1,6 @@
-"""Look beyond the structures that were asked for: would another one explain the record better?
+"""Test whether another structure explains a record better than the requested ones.
 
-A structure is ruled out by the difference of criteria that [1]_ calls very strong.
+A structure is ruled out by a difference of criteria that [1]_ calls very strong.
 
 References
 ----------
@@ -20,25 +20,25 @@ from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
 from .result import StructureFit, profile_of
 
-_MOST_ORDER = ALL_STRUCTURES[-1].order  # nothing richer is tried
+_MOST_ORDER = ALL_STRUCTURES[-1].order  # highest order that is tried
 
 
 def better_structure(
     whole: WindowFit, given: Candidate, refit: Callable[[], WindowFit]
 ) -> StructureFit | None:
-    """Find what rules a given structure out, None where nothing does.
+    """Find a structure that rules out the given one; None if there is none.
 
-    One pole more is tried first, from the given optimum on, which costs little; only where it
-    fits better by more than noise does is everything fitted again.
+    One more pole is tried first, starting from the given optimum, which is cheap; only if it fits
+    significantly better are all structures fitted again.
 
     Parameters
     ----------
     whole : WindowFit
-        Of the structures that were asked for.
+        Of the requested structures.
     given : Candidate
         The best of them.
     refit : callable
-        Fit of the structures that are tried by default.
+        Fit of the default structures.
     """
     if not _lacks_a_pole(whole, given):
         return None
@@ -50,7 +50,7 @@ def better_structure(
     own = free.criteria({given.structure: Candidate(given.structure, given.parameters, cost)})
     excess = own[given.structure] + needless_parameters(given.structure)
     excess -= free.criterion[best.structure] + needless_parameters(best.structure)
-    # Too many poles are no reason: they leave as little.
+    # Too many poles are not excluded: their residual is as small.
     if excess <= PLAUSIBLE or cost <= best.cost + PLAUSIBLE * free.variance:
         return None
     static = free.static(best)
@@ -70,19 +70,20 @@ def _lacks_a_pole(whole: WindowFit, given: Candidate) -> bool:
     n, r = given.structure.order, given.structure.relative_degree
     if n >= _MOST_ORDER:
         return False
-    # Without Huber's clipping towards the given model: what that misses may be what is sought.
+    # Without Huber's clipping towards the given model, which may hide its errors.
     problem = whole.window.problem
     state = evaluate(problem, given.structure, given.parameters[None])
     start = Candidate(given.structure, given.parameters, float(state.cost[0]))
     richer = (Structure(n + 1, r + 1), Structure(n + 1, r))
     found = search(problem, richer, whole.scales, {given.structure: start})
     least = min(found[s].cost for s in richer)
-    # Against what the richer ones leave: the given one may leave much, and that correlated.
+    # Relative to the residual of the richer ones: that of the given one may be large and
+    # correlated.
     variance = least / max(problem.data.size - 2 * n - 4, 1)
     return bool(start.cost - least > PLAUSIBLE * variance)
 
 
 def _cost(free: WindowFit, given: Candidate) -> float:
-    """Cost of the given structure on other data, from its optimum on."""
+    """Cost of the given structure for other data, starting from its optimum."""
     state = evaluate(free.problem, given.structure, given.parameters[None])
     return float(np.asarray(state.cost)[0])

@@ -1,4 +1,4 @@
-"""Fit structures again where the noise of a step record is coloured, and known from its rest.
+"""Repeat the fits for a step record with coloured noise that is known from the baseline.
 
 Generalised least squares [1]_; noise at rest counts as coloured by its correlation time [2]_. The
 thresholds are our own.
@@ -41,9 +41,9 @@ alone."""
 
 
 def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
-    """Fit by generalised least squares if the noise at rest is coloured, else return `whole`.
+    """Fit by generalised least squares if the baseline noise is coloured; otherwise return `whole`.
 
-    Noise that is white at rest stays so: what is coloured in the residual then is a misfit.
+    White baseline noise is not changed: correlation of the residual is then a misfit.
     """
     bins = whole.window.bins
     if data.coarse or bins is None or whole.problem.segments is not None:
@@ -55,7 +55,7 @@ def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
     samples = correlation_time(rest)
     if samples < max(_COLOURED, 0.5 * whole.correlation) or rest.size < _TIMES * samples:
         return whole
-    # Not the pseudo-values of Huber's loss: they bend what is smooth in the noise.
+    # Not the pseudo-values of Huber's loss, which distort smooth noise.
     limit = _WILD * max(mad_sigma(error), whole.sigma)
     plain = whole.window.with_output(whole.window.output - error + np.clip(error, -limit, limit))
     covariance = noise_covariance(_quiet(error, data), error.size)
@@ -75,7 +75,7 @@ def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
 
 
 def _fitted_again(whole: WindowFit, problem: Problem) -> dict[Structure, Candidate]:
-    """Fit all structures, from their optima of before and those next to them."""
+    """Fit all structures, starting from the previous optima and those next to them."""
     found: dict[Structure, Candidate] = {}
     for structure in sorted(whole.candidates, key=lambda s: (s.order, s.zeros)):
         starts = _dead_times_near(problem, whole.candidates[structure], whole.scales)
@@ -91,9 +91,9 @@ def _fitted_again(whole: WindowFit, problem: Problem) -> dict[Structure, Candida
 
 
 def _dead_times_near(problem: Problem, old: Candidate, scales: Scales) -> list[FloatArray]:
-    """Parameters of before, and the same at the two best dead times around.
+    """Previous parameters, and the same at the two best dead times around.
 
-    Where the noise is smooth the least corner tells: between any two samples is a minimum.
+    With smooth noise the cost has a local minimum between every two samples.
     """
     starts = np.tile(old.parameters, (_NEAR.size, 1))
     starts[:, 0] = np.clip(old.dead_time + _NEAR * scales.dt, scales.earliest, scales.latest)
@@ -102,6 +102,6 @@ def _dead_times_near(problem: Problem, old: Candidate, scales: Scales) -> list[F
 
 
 def _quiet(error: FloatArray, data: StepData) -> FloatArray:
-    """Residual at rest, and in the later half of what comes when the response has settled."""
+    """Residual in the baseline, and in the later half of the settled response."""
     late = error[(settled_at(data) + error.size) // 2 :]
     return np.concatenate([error[: data.edge][-_ENOUGH:], late[:_ENOUGH]])

@@ -1,17 +1,17 @@
-r"""Long records condensed to one row for each direction of the input that they excite.
+r"""Long records condensed to one row for each excited direction of the input.
 
-An output that follows the last L samples of the input, y = Phi g + e with white e, says of g no
-more than the sums R = Phi^T Phi and r = Phi^T y: up to a constant
+For an output that depends on the last L samples of the input, y = Phi g + e with white e, all
+information about g is contained in the sums R = Phi^T Phi and r = Phi^T y: up to a constant
 
     |y - Phi g(theta)|^2 = |z - F g(theta)|^2,   R = F^T F,   z = F^-T r.
 
-So a model of any structure is fitted to L rows or fewer instead of to millions, and nothing is
-lost. What makes the noise white, an autoregression, is applied to input and output alike, which
-leaves g as it is. What came before a record matters to its first L samples alone: they are left
-out. A level of its own for every 2^17 samples takes slow drifts along.
+So a model of any structure can be fitted to at most L rows instead of millions of samples, without
+loss. The autoregressive prewhitening filter is applied to input and output alike, which does not
+change g. The past before a record only affects its first L samples, which are left out. A separate
+level for every 2^17 samples removes slow drifts.
 
 The sums are a sufficient statistic [1]_, their factor the triangle of a QR factorisation [2]_.
-Outliers are pulled in as in [3]_ with the constant of [4]_.
+Outliers are downweighted as in [3]_ with the constant of [4]_.
 
 References
 ----------
@@ -45,9 +45,9 @@ from ..signals.noise import mad_sigma
 from ..signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS
 
 MOST_LAGS = 1000
-"""Longest response, in samples, that is condensed: time goes with its square."""
+"""Longest response, in samples, that is condensed: time grows with its square."""
 PER_LAG = 20
-"""Samples for each lag that a record must have: as for the noise in `noise_model`."""
+"""Least number of samples for each lag: as for the noise in `noise_model`."""
 _PIECE = 2**17  # samples that are looked at together, to save memory
 _EXCITED = 1e-10  # of the strongest direction of the input; rounding is 1e-15 of it
 _RIDGE = 1e-8  # of the mean square of the input: what it does not excite stays small
@@ -56,7 +56,7 @@ _TURNS = 5  # of Huber's steps at most, the first from least squares
 
 @dataclass(frozen=True, eq=False)
 class CondensedInput:
-    """Factor (m, L) of the sums of products of an input with itself at L lags."""
+    """Factor (m, L) of the sums of products of an input at L lags."""
 
     factor: FloatArray
     dt: float
@@ -66,7 +66,7 @@ class CondensedInput:
         return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
-        """Evaluate H, E and T of a unit pulse, times the factor; see `HeldInput`."""
+        """Evaluate H, E and T for a unit pulse, times the factor; see `HeldInput`."""
         pulse = np.zeros(self.factor.shape[1])
         pulse[0] = 1.0
         static, mode, slope = SampledInput(pulse, self.dt).modes(tau, poles)
@@ -83,18 +83,18 @@ class CondensedInput:
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """What long records say about a pulse response of L samples.
+    """Information of long records about a pulse response of L samples.
 
     Attributes
     ----------
     data : ndarray, shape (m,)
-        z; its noise is white, of standard deviation `noise`.
+        z, with white noise of standard deviation `noise`.
     drive : CondensedInput
     noise : float
     samples : int
-        That were condensed.
+        Number of condensed samples.
     noise_lags : int
-        Lags of the autoregression that makes the noise white.
+        Order of the autoregressive prewhitening filter.
     """
 
     data: FloatArray
@@ -112,7 +112,7 @@ def condensed(
     *,
     huber: bool,
 ) -> Condensed | None:
-    """Condense records of one plant; None where they are too short, or excite too little.
+    """Condense records of one plant; None if they are too short, or not exciting.
 
     Parameters
     ----------
@@ -121,10 +121,10 @@ def condensed(
     dt : float
         Sample time in s.
     lags : int
-        Samples within which the response ends.
+        Duration of the response in samples.
     huber : bool
-        Pull outliers of the residual of the free pulse response in: one Newton step of Huber's
-        loss from there (Huber and Ronchetti, Robust Statistics, 2nd ed., section 7.8).
+        Downweight outliers of the residual of the free pulse response: one Newton step of Huber's
+        loss (Huber and Ronchetti, Robust Statistics, 2nd ed., section 7.8).
     """
     if not 1 < lags <= MOST_LAGS or sum(y.size for y in outputs) < PER_LAG * lags:
         return None
@@ -157,9 +157,10 @@ def condensed(
 def _noise_and_pulse(
     outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], lags: int, *, huber: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Autoregression of the noise, leading 1 included, and a first pulse response.
+    """Autoregressive noise model, leading 1 included, and a first pulse response.
 
-    From the longest record, where its input moves: white noise first, then the noise that shows.
+    From the longest record, where its input moves: assuming white noise first, then with the noise
+    model.
     """
     longest = int(np.argmax([y.size for y in outputs]))
     y, u = outputs[longest], inputs[longest]
@@ -176,7 +177,7 @@ def _noise_and_pulse(
 
 
 def _free_pulse(y: FloatArray, u: FloatArray, lags: int, *, huber: bool) -> FloatArray:
-    """Free pulse response, by least squares, and as many of Huber's steps as outliers need."""
+    """Free pulse response by least squares, with Huber steps as needed for outliers."""
     pulse: FloatArray = np.zeros(0)
     for _ in range(_TURNS if huber else 1):
         pulled = y
@@ -184,7 +185,7 @@ def _free_pulse(y: FloatArray, u: FloatArray, lags: int, *, huber: bool) -> Floa
             pulled = y.copy()
             pulled[lags - 1 :] += _pulled_in(y[lags - 1 :] - fftconvolve(u, pulse, "valid"))
         sums = normal_equations(u[None], pulled[None], lags)
-        # what the input does not excite stays small
+        # directions that the input does not excite stay small
         ridge = _RIDGE * float(np.trace(sums.gram)) / lags
         found = np.linalg.solve(sums.gram + ridge * np.eye(lags), sums.cross[:, 0])
         pulse = np.asarray(found, dtype=np.float64)
@@ -206,7 +207,7 @@ def _pieces(
 
 
 def _pulled_in(error: FloatArray) -> FloatArray:
-    """What moves an output so that its least squares are Huber's."""
+    """Change of an output for which its least-squares fit is that of Huber's loss."""
     centred = error - np.median(error)
     limit = HUBER * mad_sigma(centred)
     inside = float(np.mean(np.abs(centred) <= limit))

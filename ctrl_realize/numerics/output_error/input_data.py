@@ -1,6 +1,6 @@
-"""Records of any input as one problem: where each begins to count, and what it has for itself.
+"""Several records with any input as one problem, with local terms for each record.
 
-Our own rule, for time: how many samples are fitted grows with what they cost, not with the record.
+The number of fitted samples is limited by computing time, by our own rule.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ MOST_SAMPLES = 4000
 Where their response ends in time all samples are fitted afterwards (`condensed`)."""
 
 MOST_IN_ALL = 12000
-"""Samples of all records together; beyond that every record is cut to its share."""
+"""Samples of all records together; beyond that every record is shortened proportionally."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampledData:
-    """Records with any input, cut, without the samples that depend on unknown input.
+    """Shortened records with any input, without the samples that depend on unknown past input.
 
     Attributes
     ----------
     inputs, outputs : tuple of ndarray
-        Of every record, from its first sample on; the mean of the input is taken out.
+        Of every record, from its first sample on; without the mean of the input.
     starts : tuple of int
-        Samples before these are reached by input from before the record.
+        Samples before these depend on the input before the record.
     scales : tuple of float
-        Noise level of every record over the mean one. A linear plant is the same for input and
-        output divided by it, and the records then count as they should.
+        Noise level of every record relative to the mean one. A linear plant is the same for input
+        and output divided by it, and the records are then weighted correctly.
     dt : float
         Sample time in s.
     period : float
-        Shortest period, in s, of the slow disturbances that are fitted along; infinite: none.
+        Shortest period, in s, of the slow disturbances that are modelled; infinite: none.
     offsets : tuple of int
-        Where in its record each of them begins.
+        First sample of each within its record.
     """
 
     inputs: tuple[FloatArray, ...]
@@ -55,12 +55,12 @@ class SampledData:
 
     @property
     def counts(self) -> list[int]:
-        """Samples of every record that are fitted."""
+        """Number of samples of every record that are fitted."""
         return [y.size - start for y, start in zip(self.outputs, self.starts, strict=True)]
 
     @property
     def edges(self) -> IntArray:
-        """Bounds of the records in what is fitted, one after the other."""
+        """Bounds of the records in the concatenated data."""
         return np.concatenate([[0], np.cumsum(self.counts)]).astype(np.int64)
 
     def problem(self, known: KnownFactor) -> Problem:
@@ -89,7 +89,7 @@ class SampledData:
 
 
 def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) -> SampledData:
-    """Take a stretch of long records, from where the input moves; the shortest keep all."""
+    """Shorten long records to a part in which the input moves; the shortest are kept complete."""
     lengths = np.minimum([y.size for y in outputs], MOST_SAMPLES)
     share = MOST_SAMPLES
     while np.minimum(lengths, share).sum() > MOST_IN_ALL:
@@ -111,12 +111,12 @@ def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) 
 
 
 def _own_shapes(clock: FloatArray, known: KnownFactor, period: float) -> FloatArray:
-    """Level, drift, the free responses of what is known, and slow cosines, shape (m, q)."""
+    """Level, drift, the free responses of known dynamics, and slow cosines, shape (m, q)."""
     length = max(float(clock[-1]), 1e-300)
     shapes = [np.ones_like(clock), clock / length]
     for pole in known.poles[known.poles.imag >= 0]:
         wave = np.exp(pole * clock)
         shapes += [wave.real] if pole.imag == 0 else [wave.real, wave.imag]
-    # Cosines of half periods: with a line they make up anything slow, whatever its ends.
+    # Cosines of half periods: with a straight line they represent anything slow.
     shapes += [np.cos(np.pi * k * clock / length) for k in range(1, int(2 * length / period) + 1)]
     return np.stack(shapes, axis=1)

@@ -1,10 +1,10 @@
-"""Output-error fit for inputs that are no steps: random, pseudo-random, sweeps, operation.
+"""Output-error fit for inputs other than steps: random, pseudo-random, sweeps, operating data.
 
 One record or several of one plant: poles, numerator and dead time are common; level, drift and
-initial state are each record's own (see `local_terms`).
+initial state are estimated for each record (see `local_terms`).
 
-Output error [1]_ with linear terms eliminated [2]_. Which samples count and when slow cosines are
-fitted along are our own rules.
+Output error [1]_ with elimination of linear terms [2]_. The selection of samples and of slow
+cosines is our own rule.
 
 References
 ----------
@@ -70,9 +70,9 @@ _CLEARLY = 4.0  # standard deviations of a chi-square: 3e-5 by chance
 class SampledFit:
     """Fit of records with any input.
 
-    `fitted` has one entry for each record, from its start on. `explained` is how much the input
-    lowers the sum of squares, over the variance of the residual: a chi-square. Where the records
-    are longer than `data`, `condensed` is what was fitted of them.
+    `fitted` has one entry for each record, from its start on. `explained` is the decrease of the
+    sum of squares due to the input, divided by the residual variance: a chi-square. If the records
+    are longer than `data`, `condensed` contains the data that were fitted.
     """
 
     fit: OutputErrorEstimate
@@ -83,7 +83,7 @@ class SampledFit:
     condensed: Condensed | None = None
 
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
-        """Shift and scale the common model to fit one record best, seen before or not."""
+        """Shift and scale the common model to fit one record best, whether it was fitted or not."""
         one = cut([output], [signal], self.data.dt)
         start = min(max(self.data.starts), output.size // 2)
         return own_response(replace(one, starts=(start,)), self.fit, self.known)
@@ -108,15 +108,14 @@ def fit_sampled(
     dt : float
         Sample time in s.
     structures, latest, known, huber
-        See `fit_step_record`; orders up to 3 by default, `latest` a quarter of the longest
-        record.
+        See `fit_step_record`; orders up to 3 by default, `latest` a quarter of the longest record.
 
     Notes
     -----
-    What was before a record is an initial state, which is eliminated with level and drift. What
-    was on its way through the dead time is not known: the first samples are left out, as many as
-    one and a half dead times of the first-order model that fits best, half the record at most.
-    Where the residual is coloured and slow cosines take half of it, they are local terms as well.
+    The past before a record is represented by an initial state, which is eliminated together with
+    level and drift. The input within the dead time before the record is unknown: samples for one
+    and a half dead times of the best first-order model are left out, at most half of the record. If
+    the residual is coloured and slow cosines explain half of it, they are added to the local terms.
     """
     factor = known or KnownFactor()
     data = cut(outputs, inputs, dt)
@@ -153,7 +152,8 @@ def fit_sampled(
     chains = chains_of(whole) if structures is None else []
     better = None
     if structures is not None:
-        # On the stretch also where all samples were fitted: what is ruled out there is so at all.
+        # On the part also if all samples were fitted: what is ruled out there is ruled out in any
+        # case.
         every = partial(_fit, data, factor, ORDERS, scales, huber)
         better = better_structure(stretch, stretch.best, every)
     white = whole.correlation <= WHITE
@@ -164,7 +164,7 @@ def fit_sampled(
         left = correlation_time(whole.window.output - fit.fitted)
         fit = replace(fit, correlation=left, adequate=left <= WHITE)
     fit = replace(fit, close=fit.close + close_to("adequate", fit.correlation, WHITE))
-    # The noise is not known from a rest; correlation is what shows in means over bins.
+    # There is no baseline for the noise; correlation is estimated from means over bins.
     fit = replace(fit, normalized_rms=float(np.sqrt(fit.correlation)))
     parts = np.split(fit.fitted, data.edges[1:-1])
     return SampledFit(
@@ -186,7 +186,7 @@ def _fit(
 ) -> WindowFit:
     problem = data.problem(known)
     window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
-    # behind a spike at the start nothing may be left that moves
+    # after a spike at the start there may be nothing left that moves
     whole = 1e-9 * max(float(np.ptp(y)) for y in data.outputs)
     sigma = _SMALLEST * max(float(np.ptp(problem.data)), whole)
     noise = sigma, max(map(quantisation_step, data.outputs))
@@ -200,7 +200,7 @@ def _condensed(
     stretch: WindowFit,
     huber: bool,
 ) -> Condensed | None:
-    """All samples of records of which a stretch was fitted, where their response ends in time."""
+    """All samples of records of which a part was fitted, if their response is short enough."""
     best = stretch.best
     slowest = float(1.0 / np.abs(best.poles.real).min())
     lags = (_BEYOND * best.dead_time + _DIED_AWAY * slowest) / data.dt
@@ -216,7 +216,7 @@ def _condensed(
 
 
 def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> WindowFit:
-    """Fit all structures to all samples, from where they are on a stretch of them."""
+    """Fit all structures to all samples, starting from the fit of a part."""
     m = sums.data.size
     problem = Problem(sums.data, np.ones(m), sums.drive, np.empty((m, 0)), known)
     window = Window(0, sums.data, problem, sums.drive, problem.regressors, None)
@@ -233,7 +233,7 @@ def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> W
     found = converged(problem, found, stretch.scales, sums.noise**2, sums.samples)
     first = min(found.values(), key=lambda candidate: candidate.cost)
     freedom = max(m - 2 - first.structure.order - first.structure.zeros, 1)
-    # More than noise leaves: what no structure explains counts as noise of that size.
+    # Residual above the noise: what no structure explains is treated as noise of that size.
     excess = first.cost / freedom / sums.noise**2
     colour = excess if excess > 1 + _CLEARLY * np.sqrt(2 / freedom) else 1.0
     fit = WindowFit(
@@ -243,7 +243,7 @@ def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> W
 
 
 def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> FloatArray:
-    """Model at the samples of the stretch, with its own level, drift and initial state."""
+    """Model at the samples of the part, with local level, drift and initial state."""
     problem = data.problem(known)
     parameters = np.concatenate([[fit.dead_time], parameters_from_poles(fit.poles)])
     model = respond(problem.drive, known, fit.numerator, parameters)
@@ -253,7 +253,7 @@ def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor)
 
 
 def _noise_levels(data: SampledData, whole: WindowFit) -> FloatArray:
-    """Residual of the best model in every record, in its own unit."""
+    """Residual of the best model in every record, in its unit."""
     error = whole.window.output - whole.window.predict(whole.problem, whole.best)
     floor = _SMALLEST * float(np.ptp(whole.window.output))
     return np.array(
@@ -271,10 +271,10 @@ def _explained(whole: WindowFit) -> float:
 
 
 def _seen(data: SampledData, limit: float) -> list[float]:
-    """First lag, in samples, at which the output follows the input; empty where none is seen.
+    """First lag, in samples, at which the output responds to the input; empty if there is none.
 
-    The valleys of an input that moves at every sample are as narrow as the plant is fast, and the
-    dead times that are tried otherwise lie too far apart to find one.
+    For an input that changes at every sample the minima are as narrow as the plant is fast, and may
+    lie between the dead times that are tried otherwise.
     """
     found = []
     for u, y in zip(data.inputs, data.outputs, strict=True):
@@ -296,5 +296,5 @@ def _first_order(
     ]
     tries = [search(problem, [Structure(1, 1)], each)[Structure(1, 1)] for each in scales]
     best = min(tries, key=lambda candidate: candidate.cost)
-    # It has converged, for samples are counted by its dead time.
+    # It has converged, because its dead time determines the samples that are used.
     return settled(problem, replace(best, ends=None), scales[0])

@@ -1,11 +1,11 @@
-"""Dead time and interval where the residual is noise: of all explanations that are not ruled out.
+"""Dead time and interval for a residual at noise level: all models that are not ruled out.
 
 Point 2 of the rule in `output_error`.
 
-Profile likelihoods [1]_ of all structures within a difference of criteria [2]_; joining them,
-instead of trusting the best one, is the advice of [3]_. `_UNSEEN` and `_LIKE_A_FLOW` are our own,
-and so is the width that a zero opens: a zero imitates the beginning of a response, so that the
-first motion is all that is known of it.
+Profile likelihoods [1]_ of all structures within a difference of criteria [2]_; joining them
+instead of using only the best one follows [3]_. `_UNSEEN` and `_LIKE_A_FLOW` are our own, and so is
+the widening for a zero: a zero can imitate the onset of a response, so that only the visible onset
+is known.
 
 References
 ----------
@@ -69,11 +69,11 @@ _OUT_OF_QUESTION = 2 * PLAUSIBLE  # in the criterion
 
 
 def flow_lead(poles: ComplexArray) -> float:
-    r"""Time by which a flow that disperses begins before a chain of lags that looks like it, in s.
+    r"""Time in s by which dispersion starts before a chain of lags with the same response.
 
     n lags of T have the cumulants nT, nT^2, 2nT^3, 6nT^4 in time; a residence time with an inverse
     Gaussian distribution of mean m and shape l has m, m^3/l, 3m^5/l^2, 15m^7/l^3. With m = 1.5 nT
-    behind half of nT less dead time the first three are equal and the fourth differs by a ninth.
+    and a dead time shorter by nT/2 the first three are equal and the fourth differs by a ninth.
     """
     return 0.5 * float(np.sum(1 / np.abs(poles)))
 
@@ -89,10 +89,10 @@ def likelihood_fit(
     better: StructureFit | None = None,
     near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
-    """Take dead time and interval from the likelihood.
+    """Determine dead time and interval from the likelihood.
 
-    `onset` is the time of the first motion; without it the structures are believed. `relaxing`
-    and `better` are those of the result, `near` close decisions that have been made.
+    `onset` is the time of the visible onset; without it the structures are used alone. `relaxing`
+    and `better` are those of the result, `near` are close decisions made before.
     """
     tanks = [chain for chain in chains if not chain.hidden]
     whole, choice, kept = _compared(whole, tanks, chains, flows)
@@ -146,14 +146,14 @@ def likelihood_fit(
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """What the data cannot rule out: structures and flows with their profiles, and chains."""
+    """Models that the data cannot rule out: structures, dispersion and chains, with profiles."""
 
     profiles: dict[Structure, Profile]
     flows: list[tuple[DispersedFlow, Profile]]
     chains: list[LagChain]
 
     def profile_of(self, choice: Choice, scales: Scales) -> Profile:
-        """Misfit over the dead time of what was chosen."""
+        """Misfit over the dead time for the chosen model."""
         if choice.chain is not None:
             return chain_profile(choice.chain, scales)
         for flow, profile in self.flows:
@@ -162,7 +162,7 @@ class _Kept:
         return self.profiles[choice.model.structure]
 
     def other_models(self, scales: Scales) -> list[OtherModel]:
-        """What is not among the structures, with its interval."""
+        """Models other than the structures, with their intervals."""
         flows = (OtherModel(flow, *profile_limits(*profile)) for flow, profile in self.flows)
         chains = (OtherModel(chain, *chain_limits(chain, scales)) for chain in self.chains)
         return [*flows, *chains]
@@ -216,12 +216,12 @@ def _not_ruled_out(
 
 
 def _charged_level(whole: WindowFit, choice: Choice) -> float:
-    """Level of the choice where structures are ruled out."""
+    """Value of the criterion relative to which structures are ruled out."""
     return choice.level + max(LEAST_CHARGE - whole.penalty, 0.0) * choice.parameters
 
 
 def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:
-    """Tell whether the model is a chain so long that it may be a flow, none being ruled out."""
+    """Whether the model is a chain so long that it may be dispersion, with none ruled out."""
     if choice.chain is None or choice.model.structure.order < _LIKE_A_FLOW:
         return False
     return not flows or min(flow.delta_bic for flow in flows) <= _OUT_OF_QUESTION
@@ -230,7 +230,7 @@ def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:
 def _opened(
     low: float, high: float, dead_time: float, onset: float, scales: Scales
 ) -> tuple[float, float]:
-    """Widen an interval by what is open where a zero imitates the beginning."""
+    """Widen an interval for a zero that can imitate the onset."""
     unseen = _UNSEEN * max(onset - dead_time, scales.dt)
     return (
         min(low, max(dead_time - unseen, scales.earliest)),

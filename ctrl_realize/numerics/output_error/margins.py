@@ -1,8 +1,8 @@
-"""Decisions whose margin is so small that rounding, or another processor, may turn them.
+"""Decisions so close that rounding, or another processor, may change them.
 
-What a decision compares has converged (`compared_fits`): two ways to round the same record differ
-in it by much less than `CLOSE`. What was not followed to its minimum differs by hundredths of
-a variance at most. What counts as close is our own rule.
+All values that are compared have converged (`compared_fits`): different rounding of the same record
+changes them by much less than `CLOSE`; structures that were not followed to their minimum by
+hundredths of a variance at most. The definition of close is our own rule.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ DecisionKey: TypeAlias = Literal["structure", "ruled_out", "adequate"]
 
 @dataclass(frozen=True)
 class CloseDecision:
-    """A decision near its threshold: which, and the structure that would be in its place."""
+    """A decision near its threshold: its kind, and the structure that would be chosen instead."""
 
     key: DecisionKey
     structure: Structure | None = None
@@ -35,9 +35,9 @@ def close_to(key: DecisionKey, value: float, threshold: float) -> tuple[CloseDec
 
 
 def close_choices(whole: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
-    """List structures with the criterion of the chosen, which is `level`, but for little.
+    """List structures whose criterion nearly equals `level`, that of the chosen one.
 
-    And those that might as well have been asked how much noise there is, on which all hangs.
+    Also those that could have determined the noise level, on which everything depends.
     """
     near = [
         s
@@ -51,7 +51,7 @@ def close_choices(whole: WindowFit, level: float, chosen: Structure) -> tuple[Cl
 def close_exclusions(
     whole: WindowFit, level: float, chosen: Structure
 ) -> tuple[CloseDecision, ...]:
-    """List structures that are just ruled out, or just not; `level` with its charges, as there."""
+    """List structures that are just ruled out, or just not; `level` includes penalties."""
     values = charged(whole.criterion, whole.penalty)
     most, least = (
         plausible(whole.candidates, values, whole.variance, whole.candidates[chosen], level, slack)

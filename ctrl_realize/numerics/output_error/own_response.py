@@ -1,4 +1,4 @@
-"""Dead time, gain and time constants of one record beside a model of several.
+"""Dead time, gain and time constants of one record relative to a model of several.
 
 Gauss-Newton steps [1]_ from the common model.
 
@@ -29,7 +29,7 @@ _FARTHEST = 2.0  # logarithm of a stretch that is extrapolated from it
 
 
 def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> OwnResponse:
-    """Gauss-Newton steps for gain and dead time, everything else of the model being common."""
+    """Gauss-Newton iterations for gain and dead time; everything else of the model is common."""
     problem = data.problem(known)
     assert problem.segments is not None
     own = problem.local_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
@@ -38,7 +38,7 @@ def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor
     h = 0.25 * data.dt
 
     def response(dead_time: float, stretch: float = 1.0) -> FloatArray:
-        # The core in a slower time: poles over the stretch, and its gain as before.
+        # The core with a slower time scale: poles divided by the stretch, with the same gain.
         parameters = np.concatenate(
             [[max(dead_time, 0.0)], parameters_from_poles(fit.poles / stretch)]
         )
@@ -66,7 +66,7 @@ def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor
         shift = at - fit.dead_time + float(np.clip(move, -20 * data.dt, 20 * data.dt))
         if abs(move) < 1e-3 * data.dt:
             break
-    # Small stretches: the slope of the response by the log of the time constants.
+    # Small stretches: the derivative of the response with respect to the log of the time constants.
     turn = (response(at, 1 + _STRETCH) - response(at, 1 - _STRETCH)) / (2 * _STRETCH)
     solution, errors = regression([response(at), slope, turn])
     size = float(solution[0]) or 1.0

@@ -1,9 +1,9 @@
-"""Choose what explains a step record whose residual is noise: lags, a chain of them, or a flow.
+"""Choose the model of a step record with a residual at noise level: lags, a chain, or dispersion.
 
-Beside the free structures stand chains of lags and flows that disperse, of few parameters each
+Besides the free structures there are chains of lags and axial dispersion, with few parameters each
 (point 1 of the rule in `output_error`).
 
-Compared by BIC [1]_, [2]_: lags, chains of lags [3]_ and flows that disperse [4]_.
+Compared by BIC [1]_, [2]_: lags, chains of lags [3]_ and dispersion [4]_.
 
 References
 ----------
@@ -38,9 +38,9 @@ _BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0,
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """The model that is chosen, and the criterion to which others are held.
+    """The chosen model, and the criterion with which others are compared.
 
-    It is a chain of lags, or lags behind the dead time of a flow, where one of these is given.
+    It is a chain of lags, or lags with the dead time of dispersion, if one of these is given.
     """
 
     model: Candidate
@@ -50,7 +50,7 @@ class Choice:
 
     @property
     def parameters(self) -> int:
-        """Free ones beside gain and dead time."""
+        """Number of free parameters besides gain and dead time."""
         if self.flow is not None:
             return self.flow.parameters
         own = self.model.structure
@@ -58,7 +58,7 @@ class Choice:
 
 
 def chains_of(whole: WindowFit) -> list[LagChain]:
-    """Chains of lags, where so many lags show that there may be more than were tried."""
+    """Fit chains of lags if the best order suggests more lags than were tried."""
     best = whole.best
     setting = whole.problem, best, whole.scales, whole.variance, whole.penalty
     tanks = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
@@ -67,7 +67,7 @@ def chains_of(whole: WindowFit) -> list[LagChain]:
 
 
 def flows_of(whole: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
-    """Flows that disperse, where more than one lag shows."""
+    """Fit dispersion if there is more than one lag."""
     best = whole.best
     if best.structure.order < _LAGS_OF_DIFFUSION:
         return []
@@ -78,10 +78,10 @@ def flows_of(whole: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow
 def choose_model(
     whole: WindowFit, tanks: Sequence[LagChain], flows: Sequence[DispersedFlow]
 ) -> Choice:
-    """Choose by the lowest criterion; of a flow, lags must be able to follow it.
+    """Choose by the lowest criterion; dispersion must be representable by lags.
 
-    Modes of diffusion are not among the chains here: friction, too, looks like them, so that they
-    widen the interval and are never the model.
+    Diffusion is not among the chains here: friction has a similar response, so diffusion widens the
+    interval and is never the model.
     """
     lags = _among_lags(whole, tanks)
     flow = min(flows, key=lambda flow: flow.criterion, default=None)
@@ -101,10 +101,10 @@ def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> Choice:
 
 
 def _behind(whole: WindowFit, flow: DispersedFlow) -> Candidate | None:
-    """Lags and zeros behind the dead time of a flow that leave no more than it does, if any."""
+    """Lags and zeros with the dead time of dispersion that fit as well, if there are any."""
     pinned = replace(whole.scales, earliest=flow.dead_time, latest=flow.dead_time)
     limit = flow.cost + PLAUSIBLE * whole.variance
     found = search(whole.problem, _BEHIND_A_FLOW, pinned)
-    # They need not be worth their number: it is known what they stand for.
+    # Their number is not penalised, since they only represent the dispersion model.
     good = {structure: model for structure, model in found.items() if model.cost <= limit}
     return good[choose(whole.criteria(good))] if good else None

@@ -1,6 +1,6 @@
-"""Turn the record of a step experiment into separable least-squares problems.
+"""Convert the record of a step experiment to separable least-squares problems.
 
-Means over bins weigh with the inverse of their variance [1]_.
+Means over bins are weighted by the inverse of their variance [1]_.
 
 References
 ----------
@@ -41,7 +41,7 @@ _BRIEF = 0.05  # of the samples that follow the step; ablation: slope that was n
 
 @dataclass(frozen=True, eq=False)
 class StepData:
-    """A record of one or several steps, and what its samples at rest tell.
+    """A record of one or several steps, with the properties of its baseline.
 
     Attributes
     ----------
@@ -49,21 +49,21 @@ class StepData:
     dt : float
         Sample time in s.
     edges : list of (index, samples)
-        Where the input moves, and for how many samples.
+        Samples at which the input moves, and the durations.
     sigma, quantum : float
         Noise level and quantisation step of the output.
     drift : float
         Significant slope before the step, per sample.
     colour : float
-        How much larger than white noise the noise is in means of samples.
+        Standard deviation of means of samples relative to that for white noise.
     hum : list of float
-        Lines in the noise, in cycles per sample.
+        Sinusoids in the noise, in cycles per sample.
     motion : FirstMotion or None
-        None when the output stays at rest.
+        None if the output does not move.
     quiet : ndarray, shape (N,)
-        Output without hum and without what was still moving before the step.
+        Output without hum and without the extrapolated motion before the step.
     relaxing : bool
-        The output was not at rest before the step: the plant's free response is in it.
+        The output was not in steady state before the step: the model includes a free response.
     """
 
     output: FloatArray
@@ -88,16 +88,16 @@ class StepData:
     def coarse(self) -> bool:
         """Quantised so coarsely that averaging does not remove the rounding."""
         rest = self.output[: self.edge]
-        # A rest between two levels jumps between both, however little noise there is: that is no
-        # dither, which takes more levels (95 % of its samples are within two, half a step high).
+        # A baseline between two levels jumps between both, however small the noise: this is not
+        # dither, which needs more levels (95 % of its samples are within two, half a step high).
         two_levels = rest.size >= _MANY and np.ptp(rest) < 1.5 * self.quantum
         return bool(is_coarse(self.sigma, self.quantum) or two_levels)
 
     def explanations(self) -> list[StepData]:
-        """Ways to take a slope before the step: as drift, as the plant's own motion, as nothing.
+        """Models of a slope before the step: drift, free response of the plant, or none.
 
-        A drift goes on to the end. That it was nothing is tried where it was seen over less than a
-        twentieth of what follows.
+        A drift continues to the end. No drift is also tried if the baseline is shorter than a
+        twentieth of the rest.
         """
         if not self.drift:
             return [self]
@@ -110,7 +110,7 @@ class StepData:
 def step_data(
     output: FloatArray, signal: FloatArray, dt: float, edges: list[tuple[int, int]]
 ) -> StepData:
-    """Measure noise, drift, hum and first motion of a step record."""
+    """Determine noise, drift, hum and visible onset of a step record."""
     edge = edges[0][0]
     quantum = quantisation_step(output)
     sigma, drift = rest_noise(output[:edge], output, quantum)
@@ -142,12 +142,12 @@ def step_data(
 
 
 def bare_data(output: FloatArray, signal: FloatArray, dt: float, sigma: float) -> StepData:
-    """Data of a record without a step: nothing is known from samples at rest."""
+    """Data of a record without a step: there is no baseline."""
     return StepData(output, signal, dt, [(0, 1)], sigma, 0.0, 0.0, 1.0, [], None, output)
 
 
 def stop_at(data: StepData, part: float) -> int:
-    """Sample at which the response has first made `part` of its excursion (1: the end)."""
+    """Sample at which the response first reaches `part` of its final value (1: the end)."""
     n = data.output.size
     if part >= 1 or data.motion is None:
         return n
@@ -162,7 +162,7 @@ def stop_at(data: StepData, part: float) -> int:
 
 
 def settled_at(data: StepData) -> int:
-    """Sample from which on a response counts as settled: twice the rise to 95 % after the step."""
+    """Sample from which on a response has settled: twice the rise to 95 % after the step."""
     return data.edge + 2 * (stop_at(data, 0.95) - data.edge)
 
 
@@ -193,7 +193,7 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
 
 def _free_response(data: StepData, bins: Bins, columns: FloatArray) -> tuple[Segments, Segments]:
     """Local terms of the record, on bins and at every sample: regressors and free response."""
-    # In the middle of a bin: they are narrow beside what is left of the free response there.
+    # In the middle of a bin, which is narrow compared with the decay of the free response there.
     middle = data.dt * (bins.first + (bins.width - 1) / 2)
     every = data.dt * np.arange(len(columns), dtype=np.float64)
     return (
@@ -203,7 +203,7 @@ def _free_response(data: StepData, bins: Bins, columns: FloatArray) -> tuple[Seg
 
 
 def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
-    """Rough times of the response, from its first motion and its 63 % point."""
+    """Initial guesses of the times of the response, from its onset and its 63 % point."""
     assert data.motion is not None
     motion, dt = data.motion, data.dt
     rise = min(stop, stop_at(data, 0.63)) - data.edge - motion.onset
@@ -231,9 +231,9 @@ def fixed_regressors(data: StepData) -> FloatArray:
 
 
 def own_regressors(data: StepData, poles: ComplexArray | None) -> FloatArray:
-    """What a record has for itself at every sample, shape (N, q).
+    """Local terms of the record at every sample, shape (N, q).
 
-    The fixed regressors, and the free response of a plant with poles (n,) where they are given.
+    The fixed regressors, and the free response of a plant with poles (n,) if they are given.
     """
     fixed = fixed_regressors(data)
     if poles is None:
@@ -244,9 +244,9 @@ def own_regressors(data: StepData, poles: ComplexArray | None) -> FloatArray:
 
 
 def _weights(data: StepData, bins: Bins) -> FloatArray:
-    """Inverse variance of every mean, that of a single sample being 1."""
+    """Inverse variance of every mean, relative to that of a single sample."""
     count = bins.width.astype(np.float64)
-    # Means of undithered samples stay wrong by the rounding, however many there are.
+    # Means of samples without dither keep the rounding error, however many there are.
     return count / (1 + count) * 2 if data.coarse else count
 
 

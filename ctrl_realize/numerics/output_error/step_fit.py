@@ -1,31 +1,31 @@
-"""Output-error estimate of a dead time from a step record, with an honest interval.
+"""Output-error estimate of a dead time from a step record, with a realistic interval.
 
 The rule:
 
-0. What the output does before the step is noise, hum, a drift, or the plant's own free
-   response: the lowest information criterion decides.
+0. The output before the step is modelled as noise, hum, a drift, or the free response of the
+   plant, as chosen by the information criterion.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
-   is the model, and what its residual leaves is compared with the noise before the step, or, as
-   long as that is not much louder, with what it leaves long after the step. Where it is noise that
-   was coloured before the step already, all structures are fitted again with that noise made white.
-2. Where the residual is noise, the dead time is that of the model, and its interval spans the
-   95 % profile-likelihood intervals of all structures that the data cannot rule out, chains of
-   four to eight nearly equal lags, modes of diffusion and flows that disperse among them. Where
-   such a flow fits clearly better than any lags, the dead time is that of the flow. A zero imitates
-   a smooth beginning: where the best structure has one, the interval reaches to a sample after the
-   first motion, and three times as far before the dead time as the first motion comes after it.
-3. Where it is not, no likelihood knows the error. Five views are taken: the first motion, a
-   first- and a second-order lag fitted to the first 15 % of the excursion, and the best model
-   of up to three poles for the first 63 % and for all of it. The dead time is their median.
-4. The interval then spans the views and a third-order lag on the first 15 % (more lags, less
-   dead time), without the lowest: a fit that goes wrong takes dead time for lag.
-5. No dead time is later than the first lasting motion of the output.
+   is the model, and its residual is compared with the noise before the step or, if that is
+   not much larger, with the residual long after the step. If it is at noise level and the noise was
+   coloured before the step already, all structures are fitted again with prewhitening.
+2. If the residual is at noise level, the dead time is that of the model, and its interval spans the
+   95 % profile-likelihood intervals of all structures that the data cannot rule out, including
+   chains of four to eight nearly equal lags, diffusion and axial dispersion. If dispersion fits
+   clearly better than any lags, its dead time is used. A zero can imitate a smooth onset: if the
+   best structure has one, the interval extends to a sample after the visible onset, and to
+   three times the distance between dead time and onset before the dead time.
+3. Otherwise a likelihood does not describe the error. Five estimates are made: the visible onset, a
+   first- and a second-order model of the first 15 % of the response, and the best models of up
+   to three poles of the first 63 % and of all of it. The dead time is their median.
+4. The interval then spans these and a third-order model of the first 15 % (more lags, less dead
+   time), without the lowest: a fit that fails takes dead time for lag.
+5. No dead time is later than the visible onset of the output.
 
-Points 0 to 2 rest on the information criterion [3]_, profile likelihoods [1]_ and what is said of
-several models in [2]_. Points 3 to 5 are our own: views whose errors have different causes
-(threshold, few lags, late misfit), so that their median is wrong only where most of them are; what
-such methods find apart is compared in [4]_. They were measured on simulated and real plants, see
-docs/accuracy.md; `benchmarks.ablation` switches each of them off.
+Points 0 to 2 are based on the information criterion [3]_, profile likelihoods [1]_ and multimodel
+inference [2]_. Points 3 to 5 are our own: estimates whose errors have different causes (threshold,
+few lags, late misfit), so that their median is wrong only if most of them are; such methods are
+compared in [4]_. They were tested on simulated and real plants, see docs/accuracy.md;
+`benchmarks.ablation` switches each of them off.
 
 References
 ----------
@@ -93,18 +93,18 @@ def fit_step_record(
     Parameters
     ----------
     data : StepData
-        With a motion.
+        With a visible onset.
     structures : sequence of Structure, optional
-        Default: orders 1 to 5, relative degrees 1 to the order. With structures given, the
-        dead time is that of the best of them, adequate or not.
+        Default: orders 1 to 5, relative degrees 1 to the order. If structures are given, the dead
+        time is that of the best of them, adequate or not.
     latest : float, optional
         Largest dead time, in s.
     known : KnownFactor, optional
-        Dynamics in cascade that do not belong to the plant.
+        Dynamics in cascade that are not part of the plant.
     huber : bool, optional
         Huber's loss (k = 1.345) instead of least squares.
     whiten : bool, optional
-        Make noise white that is coloured at rest.
+        Prewhiten the data if the baseline noise is coloured.
     """
     factor = known or KnownFactor()
     tried = ALL_STRUCTURES if structures is None else tuple(structures)
@@ -150,7 +150,7 @@ def fit_step_record(
 
 
 def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
-    """Choose between explanations of the samples before the step, by an information criterion."""
+    """Choose between models of the samples before the step, by an information criterion."""
     closest = min((whole for _, whole in ways), key=lambda whole: whole.sigma)
     worst = _WILD * closest.sigma
 
@@ -166,7 +166,7 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
 
 
 def _is_noise(data: StepData, whole: WindowFit) -> bool:
-    """Tell whether the model leaves what was there before the step, or what goes on long after."""
+    """Whether the residual is at the noise level before the step, or at that long after it."""
     if whole.normalized_rms <= ADEQUATE * data.colour:
         return True
     if whole.normalized_rms > ADEQUATE * data.colour * _LOUDER:
@@ -179,7 +179,7 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
     moving = state.residual[0][(first >= data.edge) & (first < settled)]
     if late.size < 2 * _FEWEST_LATE:
         return False
-    # What a wrong model leaves dies away: it is in the first half.
+    # The error of a wrong model decays: it is in the first half.
     late = late[late.size // 2 :]
     return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
 
@@ -191,7 +191,7 @@ def _robust_fit(
     *,
     relaxing: bool,
 ) -> OutputErrorEstimate:
-    """Take dead time and interval from the views (points 3 and 4 of the rule)."""
+    """Determine dead time and interval from the delay estimates (points 3 and 4 of the rule)."""
     dead_time = float(np.median([at for _, at in views[:-1]]))
     dead_times = np.sort([at for _, at in views])
     low, high = float(dead_times[1]), float(dead_times[-1])
@@ -222,7 +222,7 @@ def _fit_until(
 def _views(
     data: StepData, whole: Candidate, latest: float | None, known: KnownFactor, huber: bool
 ) -> tuple[tuple[RobustKey, float], ...]:
-    """Six estimates in s whose errors are independent; the sixth only widens the interval."""
+    """Six estimates in s with independent errors; the sixth only widens the interval."""
     assert data.motion is not None
     lags = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
     early = _fit_until(data, stop_at(data, 0.15), lags, latest, known, huber)
@@ -232,7 +232,7 @@ def _views(
         ("onset", onset if latest is None else min(onset, latest)),
         ("one_lag_early", early.candidates[lags[0]].dead_time),
         ("two_lags_early", early.candidates[lags[1]].dead_time),
-        # by the criterion alone: a rise shows no gain, and none is asked of it
+        # by the criterion alone: the first part of a response does not show the gain
         ("model_of_rise", rise.candidates[choose(rise.criterion)].dead_time),
         ("model_of_record", whole.dead_time),
         ("three_lags_early", early.candidates[lags[2]].dead_time),

@@ -1,7 +1,7 @@
-"""Stretches of a frequency grid in which something holds.
+"""Bands of a frequency grid in which a condition holds.
 
 The band of good coherence is our own rule: the widest run in octaves, so that neither the many
-points of a high octave nor one bad point decides.
+points of a high octave nor one bad point is decisive.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from ..arrays import FloatArray
 
 
 def running_median(values: FloatArray, length: int) -> FloatArray:
-    """Smooth by the median of `length` neighbours; the ends repeat their last value.
+    """Smooth by the median of `length` neighbours; the ends are extended by their last value.
 
-    A single bad point does not end a good stretch, and a single lucky one does not make one.
+    A single bad point does not end a good band, and a single good one does not make a band.
 
     Examples
     --------

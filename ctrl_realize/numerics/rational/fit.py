@@ -37,7 +37,7 @@ _STALLED = 1e-9  # of the cost: a gain that is none
 
 @dataclass(frozen=True, eq=False)
 class FRFData:
-    """A frequency response with weights, in units where frequencies are around 1.
+    """A frequency response with weights, scaled so that frequencies are around 1.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class FRFData:
     max_dead_time : float
         Upper bound of the search.
     min_dead_time : float
-        Lower bound; below 0 only to see whether the phase leads.
+        Lower bound; below 0 only to test whether the phase leads.
     """
 
     s: ComplexArray
@@ -61,13 +61,13 @@ class FRFData:
 
     @property
     def clear(self) -> NDArray[np.bool_]:
-        """Points whose phase is known; all where the weights do not tell."""
+        """Points with a significant phase; all if there are no weights."""
         clear = np.asarray(np.abs(self.response) * self.weight > 1 / 0.3)
         return clear if clear.sum() >= 4 else np.ones(clear.size, dtype=np.bool_)
 
     @cached_property
     def pole_range(self) -> tuple[float, float]:
-        """Logarithms of the slowest and the fastest pole to look for, two decades off the band."""
+        """Logarithms of the slowest and fastest pole, two decades beyond the band."""
         omega = np.abs(self.s)
         return float(np.log(omega.min() / 100)), float(np.log(omega.max() * 100))
 
@@ -113,7 +113,7 @@ def refine(
     frozen_delay : bool
         Keep the dead time of the start.
     iterations : int
-        At most so many.
+        Largest number of iterations.
     """
 
     def at(theta: FloatArray) -> _Point:
@@ -128,7 +128,7 @@ def refine(
 
         def ahead(damping: float) -> _Point:
             step = damped_step(gram, -slope, damping)
-            # A factor of e in one step is as far as the linear picture goes.
+            # A factor of e in one step is the limit of the linearisation.
             step[:order] = _within(step[:order], -1.0, 1.0)
             return at(inside_limits(here.theta + step, data, order))
 
@@ -159,7 +159,7 @@ def refine_best(
 
 
 def inside_limits(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
-    """Keep poles near the band, dampings sane and the dead time in its range."""
+    """Keep poles near the band, dampings in a sensible range and the dead time in its range."""
     low, high = data.pole_range
     kept = theta.copy()
     pairs = order - order % 2
@@ -173,7 +173,7 @@ def inside_limits(theta: FloatArray, data: FRFData, order: int) -> FloatArray:
 
 
 def _within(values: FloatArray, low: float | FloatArray, high: float | FloatArray) -> FloatArray:
-    # half the time of numpy.clip, which is called most
+    # half the time of numpy.clip, which is called most often
     clipped: FloatArray = np.minimum(np.maximum(values, low), high)
     return clipped
 

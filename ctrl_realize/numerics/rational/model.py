@@ -1,13 +1,13 @@
 r"""Transfer functions with dead time, fitted to frequency responses.
 
-The model is :math:`G(s) = e^{-s\tau}\, b(s) / a(s)`. The denominator is a product of factors of
-first and second order with positive coefficients, kept as logarithms, so that every model is
-stable and real and conjugate poles go into each other without a seam. The numerator enters
+The model is :math:`G(s) = e^{-s\tau}\, b(s) / a(s)`. The denominator is a product of first- and
+second-order factors with positive coefficients, parametrised by their logarithms, so that every
+model is stable and real, and real poles become complex ones continuously. The numerator enters
 linearly and is eliminated (variable projection [2]_, [3]_). The likelihood is that of [1]_, [4]_.
 
-Numerators are written in the basis of partial products of the factors, slow ones first, which
-stays well conditioned over many decades, where powers of s do not. The basis functions are at
-the same time the states of a chain of the sections, so a state-space model needs no conversion.
+Numerators are expressed in the basis of partial products of the factors, slow ones first, which is
+well conditioned over many decades, unlike powers of s. The basis functions are also the states of a
+cascade of the sections, so a state-space model needs no conversion.
 
 References
 ----------
@@ -35,7 +35,7 @@ from ..arrays import ComplexArray, FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """The best numerator for given poles and dead time, and what it leaves.
+    """The best numerator for given poles and dead time, and the residual.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ class Projection:
 def factor_parameters(poles: ComplexArray) -> FloatArray:
     """Return the logarithms of the factors' coefficients for stable poles.
 
-    Conjugate pairs and pairs of real poles give ``log a0, log a1`` of ``s^2 + a1 s + a0``;
-    with an odd number, a real pole is left and gives ``log w`` of ``s + w``, at the end.
-    Pairs come with rising ``a0``.
+    Conjugate pairs and pairs of real poles give ``log a0, log a1`` of ``s^2 + a1 s + a0``; for an
+    odd number the remaining real pole gives ``log w`` of ``s + w``, at the end. Pairs are sorted by
+    ``a0``.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ def factor_parameters(poles: ComplexArray) -> FloatArray:
 
 
 def poles_of(theta: FloatArray, order: int) -> ComplexArray:
-    """Return the poles that `theta` stands for, slow ones first."""
+    """Return the poles that belong to `theta`, slow ones first."""
     poles: list[complex] = []
     for log_a0, log_a1 in theta[: order - order % 2].reshape(-1, 2):
         a1, a0 = np.exp(log_a1), np.exp(log_a0)
         root = np.sqrt(complex(a1 * a1 / 4 - a0))
-        # The larger root first: the smaller one from the product has all its digits.
+        # The larger root first: the smaller one from the product keeps all its digits.
         large = -(a1 / 2 + root)
         poles += [large, a0 / large]
     if order % 2:
@@ -92,7 +92,7 @@ def poles_of(theta: FloatArray, order: int) -> ComplexArray:
 def basis_functions(
     s: ComplexArray, theta: FloatArray, order: int, count: int
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Evaluate the basis and its derivatives by the pole parameters.
+    """Evaluate the basis and its derivatives w.r.t. the pole parameters.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def full_jacobian(
     numerator: FloatArray,
     order: int,
 ) -> FloatArray:
-    """Differentiate the weighted model by poles, dead time and numerator, in this order."""
+    """Differentiate the weighted model w.r.t. poles, dead time and numerator, in this order."""
     basis, derivatives = basis_functions(s, theta[:order], order, numerator.size)
     turn = weight * np.exp(-s * theta[order])
     design = turn[:, None] * basis
@@ -250,7 +250,7 @@ def full_jacobian(
 def chain_state_space(
     theta: FloatArray, numerator: FloatArray, order: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Write the model without its dead time as a chain of sections, the fast ones first.
+    """Convert the model without its dead time to a cascade of sections, the fast ones first.
 
     Returns
     -------
@@ -265,7 +265,7 @@ def chain_state_space(
     if order % 2:
         w = float(np.exp(theta[order - 1]))
         blocks.append((float(theta[order - 1]), np.array([[-w]]), np.array([[w]])))
-    # Same order of sections as in the basis: ties must fall alike.
+    # Same order of sections as in the basis, also for equal ones.
     blocks = [blocks[k] for k in np.argsort([b[0] for b in blocks], kind="stable")]
 
     A, B = np.zeros((order, order)), np.zeros((order, 1))

@@ -1,7 +1,7 @@
-"""Phase of responses with a dead time, on grids too coarse to unwrap.
+"""Phase of responses with dead time, on grids too coarse for direct unwrapping.
 
-Our own: a dead time turns the phase by ``-omega tau``, so that of all dead times the true one
-leaves the least to unwrap.
+Our own: a dead time changes the phase by ``-omega tau``, so the remaining phase is smoothest for
+the true dead time.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from ..arrays import ComplexArray, FloatArray
 
 
 def unwrap_with_dead_time(omega: FloatArray, values: ComplexArray, dead_time: float) -> FloatArray:
-    """Unwrap the phase after taking a dead time out, and put it back.
+    """Unwrap the phase after removing a dead time, and add the dead time again.
 
-    Neighbouring points may then differ by any number of turns of the delay; only the rest has to
-    change by less than half a turn.
+    The phase of the delay may change by any number of turns between neighbouring points; only the
+    rest has to change by less than half a turn.
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ def unwrap_with_dead_time(omega: FloatArray, values: ComplexArray, dead_time: fl
 
 
 def dead_time_from_phase(omega: FloatArray, values: ComplexArray) -> float:
-    """Find the dead time that leaves the smoothest phase behind.
+    """Find the dead time for which the remaining phase is smoothest.
 
-    The sum of the absolute phase steps that remain is searched over delays up to one turn between
-    the closest points; on an evenly spaced grid that is all that can be told.
+    The sum of the absolute remaining phase steps is minimised over delays up to one turn between
+    the closest points; on a uniform grid larger delays are indistinguishable.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def dead_time_from_phase(omega: FloatArray, values: ComplexArray) -> float:
         return 0.0
     steps = np.angle(values[1:] / values[:-1])
     longest = 2 * np.pi / gaps.min() if gaps.max() > 1.01 * gaps.min() else np.pi / gaps.min()
-    # The widest gap sets how finely the delay must be tried; the total band how far it matters.
+    # The widest gap determines the step of the delay, the total band its range.
     count = int(np.clip(8 * longest * gaps.max() / (2 * np.pi), 64, 20_000))
     tried = np.linspace(0, min(longest, count * np.pi / (4 * gaps.max())), count)
     left = phase_roughness(steps, gaps, tried)
@@ -66,13 +66,13 @@ def dead_time_from_phase(omega: FloatArray, values: ComplexArray) -> float:
         near = np.linspace(max(0.0, best - width), best + width, 9)
         best = float(near[np.argmin(phase_roughness(steps, gaps, near))])
         width /= 3
-    # A plain lag also slopes; where no delay at all is nearly as smooth, there is none to take.
+    # The phase of a lag also decreases; if no delay is nearly as smooth, none is used.
     turned = best * gaps.max()
     return best if turned > 0.5 else 0.0
 
 
 def phase_roughness(steps: FloatArray, gaps: FloatArray, delays: FloatArray) -> FloatArray:
-    """Sum the absolute phase steps that are left when each delay is taken out.
+    """Sum the absolute phase steps that remain after removal of each delay.
 
     Parameters
     ----------

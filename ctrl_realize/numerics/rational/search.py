@@ -24,7 +24,7 @@ from .model import factor_parameters, poles_of, project
 from .starts import delay_grid, grown_starts, starting_points
 
 DEFAULT_ORDERS = range(1, 5)
-"""Tried where none is given; larger ones where the largest of these is the best."""
+"""Default orders; larger ones are tried if the largest of these is the best."""
 _LARGEST_ORDER = 10
 _LARGEST_FROM_GRID = 3
 _STEPS_OF_ONE = 8
@@ -32,7 +32,7 @@ _KEPT = 2
 
 
 def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
-    """Bound the dead time by the steepest slope of the phase, in s.
+    """Upper bound of the dead time from the steepest slope of the phase, in s.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray
         clear = np.ones(omega.size, dtype=bool)
     w, phase = omega[clear], np.unwrap(np.angle(response[clear]))
     slopes = [0.0]
-    # From low frequencies upwards: unwrapping goes wrong first where points lie far apart, and
-    # lags add to the slope there, so the steepest one bounds the dead time from above.
+    # From low frequencies upwards: unwrapping fails first where points are far apart, and lags add
+    # to the slope there, so the steepest one is an upper bound of the dead time.
     for stop in [*(w[0] * 2.0 ** np.arange(1, 1 + np.log2(w[-1] / w[0]))), w[-1]]:
         for part in (w <= stop, (w <= stop) & (w >= 0.5 * stop)):
             if part.sum() >= 4:
                 slopes.append(-float(np.polyfit(w[part], phase[part], 1)[0]))
-    # Half a turn at the highest frequency for noise and for phases that lead.
+    # Half a turn at the highest frequency for noise and for leading phases.
     return 1.1 * max(slopes) + np.pi / float(w[-1])
 
 
@@ -68,7 +68,7 @@ def fit_structures(
     ----------
     data : FRFData
     orders : sequence of int or None
-        Rising. None: from 1 on, until an order is no longer better than the one before.
+        Increasing. None: from 1 on, until an order is no longer better than the one before.
     degrees : sequence of int or None
         Relative degrees, rising; None: 1 to the order.
 
@@ -85,7 +85,7 @@ def fit_structures(
                 fits[n, r] = _fit_one(data, ladder, fits, n, r)
     if orders is not None:
         return fits
-    # An order is believed when a larger one was tried and found no better.
+    # An order is accepted if a larger one was tried and is no better.
     points = data.s.size
     while fits:
         criteria = information_criteria(data, fits)
@@ -102,11 +102,11 @@ def fit_structures(
 def information_criteria(
     data: FRFData, fits: dict[tuple[int, int], RationalFit]
 ) -> dict[tuple[int, int], float]:
-    """Return the Bayesian information criterion of each structure, for noise of unknown size.
+    """Return the Bayesian information criterion of each structure, for unknown noise variance.
 
-    What the best fit leaves may be alike at neighbouring frequencies: then it is no noise, as
-    with a plant that is not quite linear, and so many points count for fewer. Otherwise every
-    higher order would be welcome.
+    The residuals of the best fit may be correlated along frequency, for instance for a slightly
+    nonlinear plant; the number of points is then reduced. Otherwise every higher order would be
+    accepted.
     """
     best = min(fits.values(), key=lambda fit: fit.cost)
     count = 2 * data.s.size / correlation_cost(data, best)
@@ -118,7 +118,7 @@ def information_criteria(
 
 
 def smallest_cost(data: FRFData, fit: RationalFit) -> float:
-    """Return the misfit, or what rounding leaves of exact data."""
+    """Return the misfit, or the rounding error for exact data."""
     largest = float(np.max(np.abs(data.response) * data.weight))
     return max(fit.cost, 2 * data.s.size * (1e-13 * largest) ** 2)
 
@@ -141,7 +141,7 @@ def _fit_one(
 
 
 class _Ladder:
-    """Starts for every order; beyond a few, each order's grow out of the one or two below."""
+    """Starts for every order; beyond a few, those of each order are extensions of lower ones."""
 
     def __init__(self, data: FRFData) -> None:
         self._data = data
@@ -149,7 +149,7 @@ class _Ladder:
         self._fits: dict[int, list[RationalFit]] = {}
 
     def starts(self, order: int) -> list[FloatArray]:
-        """Return what to refine for this order, whatever the relative degree."""
+        """Return the starts for this order, for all relative degrees."""
         if order not in self._starts:
             found = []
             if order <= _LARGEST_FROM_GRID:
@@ -176,10 +176,10 @@ class _Ladder:
 
 
 def residual_variance(data: FRFData, fit: RationalFit, freedom: int, noise_known: bool) -> float:
-    """Return the variance of the weighted residual, with what its correlation costs.
+    """Return the variance of the weighted residual, with the effect of its correlation.
 
-    Residuals that are alike at neighbouring frequencies count for fewer points. Known noise is
-    never scaled down: a lucky fit is no reason to trust it more.
+    Correlated residuals count for fewer points. Known noise is never scaled down: a lucky fit is
+    not more reliable.
     """
     scale = 2 * fit.cost / max(freedom, 1)
     if noise_known:
@@ -188,7 +188,7 @@ def residual_variance(data: FRFData, fit: RationalFit, freedom: int, noise_known
 
 
 def correlation_cost(data: FRFData, fit: RationalFit) -> float:
-    """Return how many neighbouring points count for one, by the residuals' correlation."""
+    """Return how many neighbouring points count as one, by the correlation of the residuals."""
     stacked = project(
         data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
     ).residual

@@ -1,4 +1,4 @@
-"""Least-squares sines: amplitude, phase, offset and, when asked, frequency.
+"""Least-squares sines: amplitude, phase, offset and, optionally, frequency.
 
 Several channels of one record share one frequency. The frequency enters nonlinearly, the
 rest linearly, so it is eliminated by variable projection: Gauss-Newton on the frequency
@@ -31,7 +31,7 @@ class SineFit:
 
     Channel ``c`` of record ``b`` is
     ``real(phasor[b, c] * exp(1j * omega[b] * t)) + offset[b, c] + slope[b, c] * t + noise``,
-    with the time ``t`` as it was passed in.
+    with the time ``t`` as given.
 
     Parameters
     ----------
@@ -40,11 +40,11 @@ class SineFit:
     phasor : ndarray of complex, shape (B, C)
         Amplitude and phase at ``t = 0``.
     offset, slope : ndarray, shape (B, C)
-        Level at ``t = 0``, and drift per second (0 where not fitted).
+        Level at ``t = 0``, and drift per second (0 if not fitted).
     noise_variance : ndarray, shape (B, C)
         Variance of the residual, corrected for the fitted parameters.
     omega_std : ndarray, shape (B,)
-        Standard deviation of `omega`; 0 where the frequency was given.
+        Standard deviation of `omega`; 0 if the frequency was given.
     phasor_covariance : ndarray, shape (B, C, 2, 2)
         Covariance of real and imaginary part of `phasor`, at the frequency found.
     """
@@ -81,9 +81,9 @@ def fit_sines(
     free_frequency : bool, default True
         Estimate the frequency that is common to the channels of a record.
     drift : bool, default False
-        Fit a straight line instead of a constant offset.
+        Fit a linear drift instead of a constant offset.
     mask : ndarray of 0 and 1, shape (B, N), optional
-        Samples to use; all by default.
+        Samples to use; default: all.
 
     Notes
     -----
@@ -103,7 +103,8 @@ def fit_sines(
     times = np.broadcast_to(time, (n_records, n_samples))
     kept = np.ones((n_records, n_samples)) if mask is None else mask
     count = kept.sum(axis=1)
-    # Time is centred on the samples in use: offset, drift and phase are then nearly orthogonal.
+    # Time is relative to the mean of the samples used: offset, drift and phase are nearly
+    # orthogonal.
     centre = (kept * times).sum(axis=1) / count
     local = times - centre[:, None]
     span = np.ptp(np.where(kept > 0, local, 0.0), axis=1)
@@ -124,7 +125,7 @@ def fit_sines(
             step, curvature = _frequency_step(
                 local, omega, kept, basis, coefficients, residual, weights
             )
-            # A step longer than a fraction of the line width would leave the valley.
+            # A step longer than a fraction of the line width would leave the minimum.
             limit = 1.0 / span
             step = np.clip(step, -limit, limit)
             omega = omega + step
@@ -139,7 +140,7 @@ def fit_sines(
 
 
 def dominant_frequency(signals: FloatArray, dt: float) -> FloatArray:
-    """Find the strongest line of each record, good enough to start a sine fit.
+    """Find the strongest line of each record, as initial frequency of a sine fit.
 
     Parameters
     ----------
@@ -219,7 +220,7 @@ def _collect(
     centre: FloatArray,
     omega_std: FloatArray,
 ) -> SineFit:
-    """Move the result from centred time back to the caller's, with its covariance."""
+    """Convert the result from centred time back to the caller's, with its covariance."""
     noise_variance = (residual**2).sum(axis=2) / freedom
     phasor_local = coefficients[..., 0] - 1j * coefficients[..., 1]
     turn = np.exp(-1j * omega * centre)

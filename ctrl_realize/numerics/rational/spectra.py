@@ -1,4 +1,4 @@
-"""Spectra, averaged over segments or periods, and what belongs to a frequency response.
+"""Spectra, averaged over segments or periods, for frequency responses.
 
 Segments are averaged as in [1]_, [2]_, periods as in [3]_; the hold is that of [4]_.
 
@@ -40,7 +40,7 @@ def hold_response(omega: FloatArray, dt: float) -> ComplexArray:
 
 
 def unwrapped_phase(response: ComplexArray, omega: FloatArray, delay: float) -> FloatArray:
-    """Unwrap the phase along frequency after taking out the phase of a known delay.
+    """Unwrap the phase along frequency after removing the phase of a known delay.
 
     Parameters
     ----------
@@ -49,12 +49,12 @@ def unwrapped_phase(response: ComplexArray, omega: FloatArray, delay: float) -> 
     omega : ndarray, shape (K,)
         Rising frequencies in rad/s.
     delay : float
-        Delay in s whose phase ``-omega delay`` is taken out before unwrapping and put back.
+        Delay in s whose phase ``-omega delay`` is removed before unwrapping and added again.
 
     Returns
     -------
     ndarray, shape (K,)
-        Phase in rad; right at any delay and on coarse grids, as long as the *rest* turns by
+        Phase in rad; correct at any delay and on coarse grids, as long as the *rest* changes by
         less than half a turn from point to point.
     """
     turned = np.angle(response * np.exp(1j * omega * delay))
@@ -83,7 +83,7 @@ class SpectralSums:
 
 
 def segment_sums(u: FloatArray, y: FloatArray, window: FloatArray, hop: int) -> SpectralSums:
-    """Sum the spectra of overlapping segments; each is taken about its own mean.
+    """Sum the spectra of overlapping segments, each without its mean.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def segment_sums(u: FloatArray, y: FloatArray, window: FloatArray, hop: int) -> 
     uu = np.zeros((m, m, size), dtype=np.complex128)
     yu = np.zeros((p, m, size), dtype=np.complex128)
     yy = np.zeros((p, size))
-    # Blocks of segments: memory stays with the block, whatever the length of the record.
+    # Blocks of segments, to limit the memory for long records.
     block = max(1, 2**20 // (length * (m + p)))
     for first in range(0, n_segments, block):
         count = min(block, n_segments - first)
@@ -164,12 +164,12 @@ class PeriodStatistics:
 
 
 def period_statistics(u: FloatArray, y: FloatArray) -> PeriodStatistics:
-    """Transform every period and take mean and scatter of each line.
+    """Transform every period; compute mean and scatter of each line.
 
     Parameters
     ----------
     u, y : ndarray, shape (P, L), P >= 2
-        One period a row; the transform over a whole period has no leakage.
+        One period per row; the transform over a whole period has no leakage.
     """
     count = u.shape[0]
     U, Y = np.fft.rfft(u, axis=1), np.fft.rfft(y, axis=1)

@@ -1,12 +1,12 @@
-"""Starting values of a rational fit: vector fitting, phase slope, and patterns of poles.
+"""Starting values of a rational fit: vector fitting, phase slope, and sets of poles.
 
-Low orders come from a grid of dead times, at each of which the poles are found by a linear
-problem. Higher orders grow out of the lower ones by a pole or a resonance at a time, put where
-it explains most of what was left: over decades of frequency and many resonances the linear
-problem alone ends in poor local minima, above all in noise.
+For low orders the poles are found by a linear problem at each dead time of a grid. Higher orders
+extend lower ones by a pole or a resonance at a time, placed where it explains most of the residual:
+over decades of frequency and for many resonances the linear problem alone leads to poor local
+minima, especially with noise.
 
-The linear problem is one step of vector fitting [1]_, which writes that of [2]_ in partial
-fractions. Where the search for a dead time begins and how many starts are kept is our own rule.
+The linear problem is one step of vector fitting [1]_, which is that of [2]_ in partial fractions.
+The start of the search for a dead time and the number of starts are our own rule.
 
 References
 ----------
@@ -87,7 +87,7 @@ def relocate_poles(
     sigma = (solution / scale)[n:]
     # New poles: eigenvalues of A - b c' (Gustavsen and Semlyen, appendix on zeros of sigma).
     moved = np.linalg.eigvals(A - np.outer(b, sigma)).astype(np.complex128)
-    # Keep away from the axis: a pole on it would make the next problem singular.
+    # Keep a distance from the axis: a pole on it would make the next problem singular.
     floor = 1e-4 * np.abs(moved) + 1e-12 * np.abs(s).max()
     return np.asarray(-np.maximum(np.abs(moved.real), floor) + 1j * moved.imag)
 
@@ -105,12 +105,12 @@ _KEPT = 2
 
 
 def delay_grid(data: FRFData, order: int) -> FloatArray:
-    """Spread candidate dead times, close enough that no minimum is missed.
+    """Spread candidate dead times, so closely that no minimum is missed.
 
-    The misfit has a minimum about every half turn of the phase at the highest frequency. Where
-    the band is wide, a slow lag allows a dead time of hundreds of turns, over six decades of
-    millions; but a dead time that is wrong by many turns leaves a phase that turns far more than
-    poles and zeros can, and such candidates are left out.
+    The misfit has a minimum about every half turn of the phase at the highest frequency. If the
+    band is wide, a slow lag allows a dead time of hundreds of turns, over six decades of millions;
+    but for a dead time that is wrong by many turns the remaining phase is more than poles and zeros
+    can have, and such candidates are left out.
     """
     top = float(np.abs(data.s).max())
     count = max(int(np.ceil(_PER_TURN * data.max_dead_time * top / (2 * np.pi))), 6)
@@ -121,8 +121,8 @@ def delay_grid(data: FRFData, order: int) -> FloatArray:
     steps, gaps = np.angle(values[1:] / values[:-1]), np.diff(omega)
     allowed = np.pi * (2 * order + 2)
     octaves = _octaves_below(omega, count)
-    # In the lower part of the band few candidates cover all dead times; those that it leaves are
-    # split in two for every octave more.
+    # In the lower part of the band few candidates cover all dead times; the remaining ones are
+    # divided in two for every further octave.
     first = min(-(-count // 2**octaves), _MAX_TRIED)
     delays, spacing = np.linspace(0.0, data.max_dead_time, first + 1), data.max_dead_time / first
     for octave in range(octaves, 0, -1):
@@ -138,23 +138,23 @@ def delay_grid(data: FRFData, order: int) -> FloatArray:
 
 
 def longest_search(omega: FloatArray) -> float:
-    """Return the longest dead time, in s, that candidates can cover on rising frequencies."""
+    """Return the longest dead time, in s, that candidates can cover for increasing frequencies."""
     return 2 * np.pi * _MAX_TRIED / (_PER_TURN * _lowest_start(omega))
 
 
 def _octaves_below(omega: FloatArray, count: int) -> int:
-    """Return how far below the highest frequency the search among `count` dead times begins."""
+    """Return how far below the highest frequency the search with `count` dead times starts."""
     wanted = int(np.ceil(np.log2(max(count / _MAX_TRIED, 1.0))))
     return min(wanted, int(np.log2(omega[-1] / _lowest_start(omega))))
 
 
 def _lowest_start(omega: FloatArray) -> float:
-    """Return the frequency up to which there are enough points to tell dead times apart."""
+    """Return the frequency up to which there are enough points to distinguish dead times."""
     return float(omega[min(_POINTS_BELOW, omega.size) - 1])
 
 
 def _smoothest(delays: FloatArray, left: FloatArray, allowed: float, most: int) -> FloatArray:
-    """Return the dead times that leave hardly more phase than the best one, the best first."""
+    """Return the dead times with nearly the smallest remaining phase, the best first."""
     possible = np.flatnonzero(left <= left.min() + allowed)
     return np.asarray(delays[possible[np.argsort(left[possible], kind="stable")][:most]])
 
@@ -162,9 +162,9 @@ def _smoothest(delays: FloatArray, left: FloatArray, allowed: float, most: int) 
 def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[FloatArray]:
     """Find poles for each candidate dead time, and keep the candidates worth refining.
 
-    With the dead time fixed the problem is linear but for a few pole relocations, which need no
-    start. The minima of the misfit over the grid of dead times come first; this is what spares
-    the maximum-likelihood fit its good initial guess.
+    For a fixed dead time the problem is linear except for a few pole relocations, which need no
+    initial guess. The minima of the misfit over the grid of dead times come first, so the
+    maximum-likelihood fit needs no initial guess either.
     """
     omega = np.abs(data.s)
     low, high = omega.min(), omega.max()
@@ -195,13 +195,13 @@ def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[Float
 
 
 def grown_starts(data: FRFData, smaller: RationalFit, order: int) -> list[FloatArray]:
-    """Add one or two poles to a fit, where they take away most of its misfit.
+    """Add one or two poles to a fit where they remove most of its misfit.
 
     Parameters
     ----------
     data : FRFData
     smaller : RationalFit
-        Of one or two poles less than `order`.
+        With one or two poles fewer than `order`.
     order : int
     """
     omega = np.abs(data.s)
@@ -230,7 +230,7 @@ def grown_starts(data: FRFData, smaller: RationalFit, order: int) -> list[FloatA
 
 
 def _peaks(omega: FloatArray, residual: FloatArray) -> FloatArray:
-    """Return the frequencies around which most of the misfit is left."""
+    """Return the frequencies around which most of the misfit remains."""
     power = residual[: omega.size] ** 2 + residual[omega.size :] ** 2
     width = min(5, omega.size)
     smooth = np.convolve(power, np.ones(width), mode="same")

@@ -1,4 +1,4 @@
-"""Uncertainty of fitted transfer functions: covariance, poles, and the dead time's profile.
+"""Uncertainty of fitted transfer functions: covariance, poles, and profile of the dead time.
 
 The covariance is the inverse Fisher information [1]_, or the sandwich of [2]_; the interval of the
 dead time is the profile likelihood's [3]_.
@@ -26,7 +26,7 @@ _LEAST_INFORMATION = 1e-10
 
 
 def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
-    """Invert the information on (poles, dead time, numerator).
+    """Invert the information matrix of (poles, dead time, numerator).
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
     Returns
     -------
     ndarray, shape (P, P)
-        With infinite diagonal entries where the data say nothing.
+        With infinite diagonal entries for parameters that the data do not determine.
     """
     J, root, determined = _inverse_root(data, fit)
     if not determined:
@@ -50,8 +50,8 @@ def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
 def error_root(data: FRFData, fit: RationalFit, scale: float, *, robust: bool) -> FloatArray:
     """Factor R of the covariance R R' of (poles, dead time, numerator), shape (P, Q).
 
-    A pole far beyond the band makes both coefficients of its factor uncertain by many decades,
-    and the other pole not at all: that survives in R, but not in the products of R R'.
+    A pole far beyond the band makes both coefficients of its factor uncertain by many decades, but
+    not the other pole: this is preserved in R, but not in the products of R R'.
 
     Parameters
     ----------
@@ -60,10 +60,10 @@ def error_root(data: FRFData, fit: RationalFit, scale: float, *, robust: bool) -
     scale : float
         As for `covariance`.
     robust : bool
-        Take it from the residuals point by point. Right also where the noise is not in
-        proportion to the weights (White 1980): each point counts with its own residual, so a
-        noisy part of the band makes uncertain what rests on it. The excess of `scale` over the
-        mean square of the residuals, which is what their correlation costs, is kept.
+        Compute it from the residuals of the individual points. Also valid if the noise is not
+        proportional to the weights (White 1980): poles that depend on a noisy part of the band are
+        more uncertain. The excess of `scale` over the mean square of the residuals, due to their
+        correlation, is kept.
     """
     J, root, _ = _inverse_root(data, fit)
     if not robust:
@@ -80,7 +80,7 @@ def error_root(data: FRFData, fit: RationalFit, scale: float, *, robust: bool) -
 
 
 def pole_deviations(fit: RationalFit, errors: FloatArray) -> tuple[ComplexArray, FloatArray]:
-    """Return the poles, slow ones first, and the root mean square error of each.
+    """Return the poles, slow ones first, and the standard error of each.
 
     Parameters
     ----------
@@ -94,13 +94,13 @@ def pole_deviations(fit: RationalFit, errors: FloatArray) -> tuple[ComplexArray,
     for i in range(0, order - order % 2, 2):
         a0, a1 = np.exp(fit.theta[i]), np.exp(fit.theta[i + 1])
         root = np.sqrt(complex(a1 * a1 / 4 - a0))
-        # Poles that coincide split with the square root of a change: as good as undetermined.
+        # Coincident poles split with the square root of a change: practically undetermined.
         root = root if abs(root) > 1e-9 * a1 else complex(1e-9 * a1)
         for k, turn in ((i, -root), (i + 1, root)):
             poles[k] = -a1 / 2 + turn
             gradients[k, i] = -a0 / (2 * turn)
             gradients[k, i + 1] = a1 * (-0.5 + a1 / (4 * turn))
-        # The smaller one from the product has all its digits.
+        # The smaller one from the product keeps all its digits.
         poles[i + 1] = a0 / poles[i]
     if order % 2:
         w = np.exp(fit.theta[order - 1])
@@ -113,8 +113,8 @@ def pole_deviations(fit: RationalFit, errors: FloatArray) -> tuple[ComplexArray,
 def _inverse_root(data: FRFData, fit: RationalFit) -> tuple[FloatArray, FloatArray, bool]:
     """Return the Jacobian J, R with ``R R' = inv(J' J)``, and whether there is an inverse.
 
-    Where there is none, what the data leave open gets a very large variance in R, and the rest
-    its own.
+    If there is none, undetermined directions get a very large variance in R, and the others their
+    own.
     """
     J = full_jacobian(data.s, data.weight, fit.theta, fit.numerator, fit.order)
     size = np.linalg.norm(J, axis=0)
@@ -127,7 +127,7 @@ def _inverse_root(data: FRFData, fit: RationalFit) -> tuple[FloatArray, FloatArr
 def profile_interval(
     data: FRFData, fit: RationalFit, count: int, scale: float, std: float
 ) -> tuple[float, float]:
-    """Find the dead times at which the misfit has grown by what 95 % confidence allows."""
+    """Find the dead times at which the misfit has increased to the 95 % threshold."""
     # Rise of the misfit by chi-square times the variance (Venzon and Moolgavkar 1988).
     allowed = 0.5 * scale * CHI2_95
     best = fit.theta[fit.order]
@@ -158,13 +158,13 @@ def profile_interval(
                 outside = step
                 if outside - inside < 0.05 * outside:
                     break
-                # A little less than a parabola says: what comes next shall be inside.
+                # Slightly less than for a parabola, so that the next point is inside.
                 ratio = 0.98 * np.sqrt(allowed / grown)
                 step = max(step * ratio, inside + 0.1 * (outside - inside))
         if outside is None:
             ends.append(best + side * inside)
         else:
-            # Near the minimum the misfit grows with the square of the distance.
+            # Near the minimum the misfit grows quadratically.
             end = 0.5 * (inside + outside)
             if grown_inside > 0.8 * allowed:
                 end = min(inside * np.sqrt(allowed / grown_inside), outside)

@@ -1,4 +1,4 @@
-"""Least squares on lagged signals, ARX models, and the pulse response that they stand for.
+"""Least squares on lagged signals, ARX models, and their pulse response.
 
 ``A(q) y = B(q) u + e`` with ``A = I + A_1 q^-1 + ...`` is linear in its coefficients. Its pulse
 response is ``A^-1 B``: with many lags this is the observer/Kalman filter identification (OKID)
@@ -23,7 +23,7 @@ from ..arrays import FloatArray
 from .normal_equations import NormalEquations, normal_equations
 
 RANK_TOLERANCE = 1e-11
-"""Eigenvalues of the scaled Gram matrix below this share of the largest are rounding."""
+"""Eigenvalues of the scaled Gram matrix below this fraction of the largest are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class LeastSquares:
 
 
 def excited_directions(gram: FloatArray) -> int:
-    """Count the directions of parameter space about which the data say something."""
+    """Count the directions of parameter space that the data determine."""
     # rounding of the sums can leave a square just below zero
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     if not np.any(scale > 0):
@@ -65,7 +65,7 @@ def least_squares(equations: NormalEquations) -> LeastSquares:
     W = solve_triangular(C, np.diag(1 / scale), lower=True).T
     explained = solve_triangular(C, equations.cross / scale[:, None], lower=True)
     misfit = equations.power - explained.T @ explained
-    # What rounding of the sums leaves; a negative variance would make NaN of the std.
+    # Rounding of the sums; a negative variance would make the std NaN.
     floor = 1e-15 * np.diag(equations.power)
     misfit[np.diag_indices_from(misfit)] = np.maximum(np.diag(misfit), floor)
     freedom = max(equations.freedom - scale.size, 1)
@@ -76,8 +76,8 @@ def least_squares(equations: NormalEquations) -> LeastSquares:
 class ArxFit:
     """ARX model ``y[k] + sum A_i y[k-i] = sum B_j u[k-delay-j] + e``.
 
-    ``a`` (na, p, p) holds A_1 ..., ``b`` (nb, p, m) holds B_0 ..., `a_std` and `b_std` their
-    standard deviations, `noise` (p, p) the covariance of e, `rows` the equations used and
+    ``a`` (na, p, p) contains A_1 ..., ``b`` (nb, p, m) contains B_0 ..., `a_std` and `b_std` their
+    standard deviations, `noise` (p, p) the covariance of e, `rows` the number of equations and
     `solution` the regression, with the lags of y before those of u.
     """
 
@@ -100,16 +100,16 @@ def arx_equations(
     *,
     offset: bool = True,
 ) -> NormalEquations:
-    """Sum up the regression of an ARX model; records are joined by adding their sums.
+    """Sum up the regression of an ARX model; sums of several records can be added.
 
     Parameters
     ----------
     inputs, outputs : ndarray, shapes (m, N), (p, N)
-        NaN takes out the rows that it touches.
+        NaN removes the rows that contain it.
     na, nb, delay : int
         Lags 1 ... na of y and delay ... delay + nb - 1 of u.
     offset : bool, default True
-        Leave room for an unknown constant in every output.
+        Include an unknown constant in every output.
     """
     lags = max(na + 1, delay + nb)
     both = np.concatenate([outputs, inputs])
@@ -173,7 +173,7 @@ def arx_markov_std(fit: ArxFit, count: int) -> FloatArray:
     nb, _, m = fit.b.shape
     H = arx_markov(fit, count).transpose(2, 0, 1)
     inverse = _divide(fit.a, np.concatenate([np.eye(p)[None], np.zeros((count - 1, p, p))]))
-    # Targets are correlated through their noise: L mixes the rows of A and B.
+    # Targets are correlated through their noise: L combines the rows of A and B.
     L = _root(fit.noise)
     mixed = inverse @ L
     variance = np.zeros((p, m, count))
@@ -198,7 +198,7 @@ def arx_markov_std(fit: ArxFit, count: int) -> FloatArray:
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """Return L with ``L L^T = covariance``, which is singular where outputs say the same."""
+    """Return L with ``L L^T = covariance``, which is singular for equal outputs."""
     scale = np.sqrt(np.diag(covariance))
     size = np.where(scale > 0, scale, 1.0)
     values, vectors = eigh(covariance / np.outer(size, size))

@@ -1,8 +1,8 @@
 """Regularised impulse responses: Gaussian priors tuned by their marginal likelihood.
 
-The priors are those of `kernel_priors`; how fast the response decays and how large it is
-`kernel_search` finds from the data [1]_. `cautious_std` is our own: a posterior deviation is
-right only where the prior is.
+The priors are those of `kernel_priors`; decay and size of the response are estimated from the data
+by `kernel_search` [1]_. `cautious_std` is our own: a posterior standard deviation is valid only if
+the prior is.
 
 References
 ----------
@@ -24,17 +24,17 @@ from .kernel_search import CLOSE, KernelProblem
 from .normal_equations import NormalEquations
 
 CHOSEN_FROM = ("TC", "SS")
-"""Kernels that are compared when none is asked for: a search in DC takes several times as long."""
+"""Kernels that are compared by default: a search for DC takes several times as long."""
 
 
 @dataclass(frozen=True, eq=False)
 class KernelFit:
     """Posterior of the pulse response of one output.
 
-    ``markov`` (m, n) is the mean and ``std`` its standard deviation; `decay` (m,) holds lambda,
+    ``markov`` (m, n) is the mean and ``std`` its standard deviation; `decay` (m,) is lambda,
     `correlation` (m,) the correlation of neighbours, `scale` (m,) c, and `evidence` the log
-    marginal likelihood up to a constant. ``effective`` is the number of parameters that the data
-    decide, trace(I - M^-1); ``kernel`` is the prior.
+    marginal likelihood up to a constant. ``effective`` is the number of parameters determined by
+    the data, trace(I - M^-1); ``kernel`` is the prior.
     """
 
     markov: FloatArray
@@ -67,23 +67,22 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
 
 
 def cautious_std(equations: NormalEquations, lags: int, fit: KernelFit) -> FloatArray:
-    """Standard deviations (m, lags) that do not rest on the smoothness of the prior.
+    """Standard deviations (m, lags) that do not depend on the smoothness of the prior.
 
-    At each lag the larger one of the fit's own and that under TC, the distance of both means
-    included. Its own takes it for known how smooth a response is and how fast it decays: under SS
-    it misses the truth where the response sets in, and where it dies away more slowly than it
-    began.
+    At each lag the larger of that of the fit and that for TC, including the difference of both
+    means. That of the fit assumes that smoothness and decay of the response are known: with SS it
+    is too small at the onset, and where the response decays more slowly than at first.
     """
     if fit.kernel == "TC":
         return fit.std
     problem = KernelProblem.of(equations, lags, "TC")
-    # Tied taps make the decay too fast for the last ones.
+    # Grouped taps make the decay too fast for the last ones.
     other = _posterior(problem, problem.search(problem.roughly()[0], CLOSE)[0])
     return np.maximum(fit.std, np.hypot(other.std, fit.markov - other.markov))
 
 
 def _posterior(problem: KernelProblem, x: FloatArray) -> KernelFit:
-    """Mean and standard deviation of the response, given the hyper-parameters."""
+    """Mean and standard deviation of the response for given hyper-parameters."""
     m, lags = problem.inputs, problem.taps
     factors = problem.factors(x)
     found = problem.likelihood(factors)

@@ -29,7 +29,7 @@ from ..arrays import FloatArray
 
 
 def shape_count(kernel: str) -> int:
-    """Count the hyper-parameters of one input that shape its prior, beside the scale."""
+    """Count the hyper-parameters of one input that shape its prior, without the scale."""
     return 2 if kernel == "DC" else 1
 
 
@@ -50,7 +50,7 @@ def prior_of(x: FloatArray, m: int, kernel: str) -> tuple[FloatArray, FloatArray
 def prior_factors(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> list[FloatArray]:
     """Return sqrt(c / sigma^2) D L of every input: lower triangular, `lags` rows.
 
-    Taps lie `group` samples apart, the first one in the middle of its group.
+    Taps are `group` samples apart, the first one in the middle of its group.
     """
     factors = []
     index = group * np.arange(lags)
@@ -60,7 +60,7 @@ def prior_factors(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> 
         if kernel == "SS":
             slow, fast = np.exp(-rate / 2 * index), np.exp(-1.5 * rate * index)
             K = ((3 * slow - fast) / 2)[np.abs(apart)]
-            # Smooth kernels are singular to rounding when the decay is slow.
+            # Smooth kernels are singular to rounding if the decay is slow.
             K.flat[:: lags + 1] += 1e-11
             L = cholesky(K)
             decline = 1.5 * rate
@@ -71,14 +71,14 @@ def prior_factors(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> 
             L[:, 1:] *= np.sqrt(-np.expm1(-2 * step * group))
             decline = rate / 2
         exponent = decline * (index + (group + 1) / 2)
-        # Numbers below 1e-154 square to denormals, on which processors are slow.
+        # Squares of numbers below 1e-154 are denormal numbers, which are slow.
         D = np.where(exponent < 350, np.exp(-np.minimum(exponent, 350)), 0.0)
         factors.append(np.asfortranarray(scale * D[:, None] * L))
     return factors
 
 
 def cholesky(matrix: FloatArray) -> FloatArray:
-    """Factorize in place where that can be: LAPACK without SciPy's checks, a third of the time."""
+    """Factorize in place if possible: LAPACK without SciPy's checks, a third of the time."""
     lower, failed = dpotrf(matrix, lower=1, clean=1, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError("the matrix is not positive definite")

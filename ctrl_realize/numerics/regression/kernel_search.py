@@ -1,11 +1,11 @@
 """Hyper-parameters of the prior of a pulse response, by the marginal likelihood of the data.
 
-With the prior's factor F, F F^T its covariance in units of the noise, estimate, covariance and
-likelihood need one Cholesky factorization of ``M = I + F^T R F``, R the Gram matrix of the lagged
-input; the noise variance is eliminated in closed form. The inverse of a kernel, whose entries
-reach lambda^-n, is never formed.
+With the prior's factor F, F F^T its covariance relative to the noise variance, estimate, covariance
+and likelihood need one Cholesky factorization of ``M = I + F^T R F``, with the Gram matrix R of the
+lagged input; the noise variance is eliminated in closed form. The inverse of a kernel, with entries
+up to lambda^-n, is not formed.
 
-The marginal likelihood is that of [1]_; that no inverse of a kernel is formed is the point of [2]_.
+The marginal likelihood is that of [1]_; avoiding the inverse of a kernel follows [2]_.
 
 References
 ----------
@@ -31,25 +31,25 @@ from .kernel_prior import cholesky, prior_factors, shape_count
 from .normal_equations import NormalEquations
 
 FEW = 40
-"""Taps to which a response is tied where hyper-parameters are only looked for roughly."""
+"""Number of grouped taps in the coarse search for hyper-parameters."""
 
 COARSE = 100
-"""Taps up to which hyper-parameters are searched at full resolution."""
+"""Number of taps up to which hyper-parameters are searched at full resolution."""
 
 FLOOR = 1e-13
-"""Least noise variance, as a share of the output's: what rounding leaves of the sums."""
+"""Least noise variance, relative to that of the output: rounding of the sums."""
 
 _WORST = 1e300
 _ROUNDING = 1e-13
-"""Part of the mean square added to the squares, so that rounding leaves none below zero."""
+"""Added to the squares, relative to their mean, so that rounding makes none negative."""
 
 WIDE, CLOSE = 0.7, 0.15
-"""First steps of a search from a guess, and of one that begins near its end."""
+"""Initial steps of a search from a guess, and of one that starts near its end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """What one set of hyper-parameters makes of the data.
+    """Likelihood for one set of hyper-parameters.
 
     ``value`` is -2 log marginal likelihood up to a constant, ``C`` the lower factor of M, ``half``
     is C^-1 F^T b, and ``least`` the weighted misfit.
@@ -65,7 +65,7 @@ class Likelihood:
 class KernelProblem:
     """Sums over the data of one output, and the prior of its pulse responses.
 
-    ``gram`` (m n, m n) and ``cross`` (m n,) are those of m inputs with n taps each, which lie
+    ``gram`` (m n, m n) and ``cross`` (m n,) are those of m inputs with n taps each, which are
     `group` samples apart; ``power`` is the output's sum of squares.
     """
 
@@ -80,7 +80,7 @@ class KernelProblem:
 
     @classmethod
     def of(cls, equations: NormalEquations, lags: int, kernel: str) -> KernelProblem:
-        """Take the sums as they are, but for what rounding leaves of the squares."""
+        """Correct the sums for rounding of the squares."""
         size = equations.gram.shape[0]
         diagonal = np.full(size, _ROUNDING * np.trace(equations.gram) / size)
         return cls(
@@ -95,7 +95,7 @@ class KernelProblem:
         )
 
     def tied(self, group: int) -> KernelProblem:
-        """Tie neighbouring taps together: the same data with `group` times fewer unknowns."""
+        """Group neighbouring taps: the same data with `group` times fewer unknowns."""
         edges = np.arange(0, self.taps, group)
         where = (np.arange(self.inputs)[:, None] * self.taps + edges).ravel()
         gram = np.add.reduceat(np.add.reduceat(self.gram, where, axis=0), where, axis=1)
@@ -127,14 +127,14 @@ class KernelProblem:
         return Likelihood(value, C, half, least)
 
     def start(self) -> FloatArray:
-        """Guess that the response decays within a third of the window and explains the output."""
+        """Guess: the response decays within a third of the window and explains the output."""
         energy = np.diag(self.gram).reshape(self.inputs, self.taps).mean(axis=1)
         signal = 20.0 * self.freedom / np.maximum(energy, 1e-300) / self.taps
         shape = [np.log(6.0 / self.taps), np.log(3.0 / self.taps)][: shape_count(self.kernel)]
         return np.concatenate([[*shape, np.log(s)] for s in signal])
 
     def roughly(self) -> tuple[FloatArray, float]:
-        """Search on tied taps, where a likelihood costs little."""
+        """Search with grouped taps, which is fast."""
         return self.tied(-(-self.taps // FEW)).search(self.start(), WIDE)
 
     def best(self) -> FloatArray:
@@ -142,7 +142,7 @@ class KernelProblem:
         group = -(-self.taps // COARSE)
         if group == 1:
             return self.search(self.start(), WIDE)[0]
-        # Most of the way is gone with neighbouring taps tied, at a fraction of the cost.
+        # Most of the search is done with grouped neighbouring taps, at a fraction of the cost.
         return self.search(self.tied(group).search(self.start(), WIDE)[0], CLOSE)[0]
 
     def search(self, start: FloatArray, size: float) -> tuple[FloatArray, float]:
@@ -154,15 +154,15 @@ class KernelProblem:
         m, shapes = self.inputs, shape_count(self.kernel)
         low = np.tile([np.log(0.1 / span)] * shapes + [-80.0], m)
         high = np.tile([np.log(3.0)] * shapes + [80.0], m)
-        # Where one point weighs 1e77 times as much as another, the prior is narrow from the start.
+        # If one point has 1e77 times the weight of another, the prior is narrow from the start.
         low[shapes :: shapes + 1] = np.minimum(-80.0, start[shapes :: shapes + 1] - 40.0)
 
         def misfit(x: FloatArray) -> float:
             try:
                 return self.likelihood(self.factors(x)).value
             except np.linalg.LinAlgError:
-                # a prior so wide that the rounding of `gram` outweighs the identity: no better
-                # for it. Not infinity, which the search takes differences of.
+                # a prior so wide that the rounding of `gram` exceeds the identity: no improvement.
+                # Not infinity, because the search computes differences.
                 return _WORST
 
         steps = np.tile([size] * shapes + [2 * size], m)
@@ -170,7 +170,7 @@ class KernelProblem:
         scales = slice(shapes, None, shapes + 1)
         while misfit(inside) >= _WORST and (inside[scales] > low[scales]).any():
             inside[scales] = np.maximum(inside[scales] - 3.0, low[scales])
-        # Steps go inward where the start lies at a bound, or the simplex would be flat there.
+        # From a start at a bound, steps go inward; otherwise the simplex would be flat there.
         steps = np.where(inside + steps > high, -steps, steps)
         simplex = np.vstack([inside, inside + np.diag(steps)])
         rough = size == WIDE

@@ -1,12 +1,12 @@
 """Normal equations of models that are linear in lagged signals, in O(N log N + n^2).
 
-Row k of the regression holds ``z[k], z[k-1], ..., z[k-n+1]`` for every signal z. The product of
-two rows of its Gram matrix differs from the one a diagonal step before by the samples that leave
-and enter at the ends, so one correlation by FFT and n row operations make the whole matrix; the
-tall regression matrix, 800 MB for 1e5 samples and 1000 lags, is never formed.
+Row k of the regression contains ``z[k], z[k-1], ..., z[k-n+1]`` for every signal z. An entry of its
+Gram matrix differs from the previous one along the diagonal by the samples at the ends, so one
+correlation by FFT and n row operations give the whole matrix; the tall regression matrix, 800 MB
+for 1e5 samples and 1000 lags, is not formed.
 
-Only rows with a complete past count (the covariance method [1]_): what the plant did before the
-record started does not enter.
+Only rows with a complete past are used (the covariance method [1]_): the past before the record has
+no effect.
 
 References
 ----------
@@ -26,16 +26,16 @@ from ..arrays import FloatArray, IntArray
 from ..hankel.matrix import fft_length
 
 CHUNK = 4096
-"""Rows that are formed at once where some have to be taken out."""
+"""Number of rows that are formed at once if some have to be left out."""
 
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
     """Sums of products over the rows of a regression, free of an offset per record.
 
-    ``gram = Phi^T Phi`` (q, q), ``cross = Phi^T Y`` (q, p), ``power = Y^T Y`` (p, p), each with
-    the mean over its record taken out of every column; `rows` counts the rows and `freedom` the
-    rows less the offsets.
+    ``gram = Phi^T Phi`` (q, q), ``cross = Phi^T Y`` (q, p), ``power = Y^T Y`` (p, p), each without
+    the mean of every column over its record; `rows` is the number of rows and `freedom` that of the
+    rows minus the offsets.
     """
 
     gram: FloatArray
@@ -62,7 +62,7 @@ class NormalEquations:
 
 
 def complete_rows(signals: FloatArray, targets: FloatArray, lags: int) -> NDArray[np.bool_]:
-    """Mark the rows lags-1 ... N-1 whose target and whole past are numbers, shape (N-lags+1,)."""
+    """Mark the rows lags-1 ... N-1 whose target and past are complete, shape (N-lags+1,)."""
     gaps = np.concatenate([[0], np.cumsum(~np.isfinite(signals).all(axis=0))])
     whole = gaps[lags:] == gaps[:-lags]
     return np.asarray(whole & np.isfinite(targets[:, lags - 1 :]).all(axis=0))
@@ -71,18 +71,18 @@ def complete_rows(signals: FloatArray, targets: FloatArray, lags: int) -> NDArra
 def normal_equations(
     signals: FloatArray, targets: FloatArray, lags: int, *, offset: bool = True
 ) -> NormalEquations:
-    """Sum the products of lagged signals among each other and with the targets.
+    """Sum the products of lagged signals with each other and with the targets.
 
     Parameters
     ----------
     signals : ndarray, shape (s, N)
-        Regressors; NaN takes out the rows that it touches.
+        Regressors; NaN removes the rows that contain it.
     targets : ndarray, shape (p, N)
-        Left-hand sides; NaN takes out its row.
+        Left-hand sides; NaN removes its row.
     lags : int
         Lags 0 ... lags-1 of every signal; ``1 <= lags <= N``.
     offset : bool, default True
-        Leave room for an unknown constant in every target.
+        Include an unknown constant in every target.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def normal_equations(
         Regressors are ordered signal by signal.
     """
     keep = complete_rows(signals, targets, lags)
-    # Means are taken out first: sums of large offsets would drown what is looked for.
+    # Means are subtracted first: sums with large offsets would lose digits.
     z, y = (
         (_centred(signals), _centred(targets)) if offset else (_zeroed(signals), _zeroed(targets))
     )

@@ -1,9 +1,9 @@
-"""Recursive least squares with forgetting, and the running size of its residual.
+"""Recursive least squares with forgetting, and recursive statistics of its residual.
 
-The regressors phi[k] come from the input alone, so those of delay d are the same numbers d samples
+The regressors phi[k] depend on the input alone, so those for delay d are the same numbers d samples
 later: ``R_d[k] = sum lambda^(k-i) phi[i-d] phi[i-d]^T = R_0[k-d]``. One Gram matrix and its past
-serve all candidates, and a candidate costs one scaled vector sum a sample. Nothing is solved
-until somebody asks.
+serve all candidates, and a candidate costs one scaled vector sum per sample. Equations are solved
+on demand.
 
 References
 ----------
@@ -25,19 +25,19 @@ from ..constants import LARGEST
 
 
 class RunningResidual:
-    """Sums that tell what of a residual is correlated, and how large the rest is.
+    """Recursive sums that separate the correlated part of a residual from the rest.
 
-    Sums of B white samples have B times the variance of one; slow errors of a model show in the
-    sums long before they show from sample to sample. Differences over `lag` samples hold twice
-    the variance of what is uncorrelated over so short a time, and little of slow errors (the
-    ratio to the whole is von Neumann's).
+    Sums of B white samples have B times the variance of one; slow model errors show in the sums
+    long before they show in single samples. Differences over `lag` samples contain twice the
+    variance of the part that is uncorrelated over so short a time, and little of slow errors (the
+    ratio to the total is von Neumann's).
 
     Parameters
     ----------
     forgetting : float
-        Factor by which a sample's weight falls from one sample to the next.
+        Factor by which a sample's weight decreases from one sample to the next.
     lag : int, optional
-        Samples, few beside the time in which a model's error changes.
+        Number of samples, small compared with the time in which a model's error changes.
     """
 
     def __init__(self, forgetting: float, lag: int = 1) -> None:
@@ -50,7 +50,7 @@ class RunningResidual:
         self._weight = 0.0
 
     def add(self, error: float) -> None:
-        """Take in the residual of one sample."""
+        """Process the residual of one sample."""
         self._sum += error
         self._squares = self._forgetting * self._squares + error**2
         self._squared_sums *= self._forgetting
@@ -60,23 +60,23 @@ class RunningResidual:
         self._last.append(error)
 
     def close_sum(self) -> None:
-        """End one sum and begin the next."""
+        """Finish one sum and start the next."""
         self._squared_sums += self._sum**2
         self._sum = 0.0
 
     @property
     def inflation(self) -> float:
-        """How many samples count as one, at least 1."""
+        """Number of samples that count as one independent sample, at least 1."""
         return max(self._squared_sums / self._squares, 1.0) if self._squares > 0 else 1.0
 
     @property
     def noise_std(self) -> float:
-        """Standard deviation of what differs over `lag` samples; inf before there are any."""
+        """Standard deviation of differences over `lag` samples; inf before there are any."""
         return float((self._changes / self._weight) ** 0.5) if self._weight > 0 else float("inf")
 
 
 FORGOTTEN = 1e-6
-"""Part of its start that a settled system still shows."""
+"""Fraction of its initial state at which a system counts as settled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,16 +98,16 @@ class BankSolution:
 
 
 class DelayBank:
-    """Exponentially weighted sums for regressors behind every delay low...high.
+    """Exponentially weighted sums for the regressors of every delay low...high.
 
     Parameters
     ----------
     A, B, C, D : ndarray, shapes (n, n), (n,), (q, n), (q,)
-        System from the input to the q regressors, at rest before the first sample.
+        System from the input to the q regressors, with zero initial state.
     low, high : int
         Candidate delays, in samples.
     forgetting : float
-        Factor lambda by which a sample's weight falls from one sample to the next.
+        Factor lambda by which a sample's weight decreases from one sample to the next.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class DelayBank:
         depth = high + 1
         self._depth = depth
         self._slot = 0
-        # Written twice, so that the last `depth` rows always lie side by side.
+        # Written twice, so that the last `depth` rows are always contiguous.
         self._phi = np.zeros((2 * depth, q))
         self._gram = np.zeros((2 * depth, q, q))
         self._sums = np.zeros((2 * depth, q))
@@ -142,17 +142,17 @@ class DelayBank:
         self.weight = self.weight_squared = self._total = self._power = 0.0
 
     def settling(self) -> int | None:
-        """Return how many samples the system takes to forget its start; None if it never does."""
+        """Return the duration of the system's transient in samples; None if it does not decay."""
         radius = np.abs(np.linalg.eigvals(self._step[: self._n, : self._n])).max(initial=0.0)
         if radius >= 1 - 1e-9:
             return None
         return int(np.ceil(np.log(FORGOTTEN) / np.log(radius))) if radius > 0 else 0
 
     def restart(self) -> None:
-        """Count from the next sample on; the input's past stays known.
+        """Restart at the next sample; the past input is kept.
 
-        What R_0 has summed up to now is remembered: ``R_d[k]`` is then ``R_0[k-d]`` less its
-        decayed value at the restart.
+        The present R_0 is stored: ``R_d[k]`` is then ``R_0[k-d]`` minus its decayed value at the
+        restart.
         """
         slot = (self._slot - 1) % self._depth
         self._old_gram = self._past(self._gram, slot).copy()
@@ -162,7 +162,7 @@ class DelayBank:
         self.weight = self.weight_squared = self._total = self._power = 0.0
 
     def update(self, u: float, y: float) -> None:
-        """Take in one sample; the cost does not depend on how many came before."""
+        """Process one sample; the cost does not depend on the number of samples before."""
         keep, depth = self.forgetting, self._depth
         self._state[-1] = u
         out = self._step @ self._state
@@ -208,7 +208,7 @@ class DelayBank:
         cross = self._cross - sums * (self._total / self.weight)
         power = max(self._power - self._total**2 / self.weight, 0.0)
         peak = float(np.einsum("dii->di", gram).max(initial=0.0))
-        # An input that never moved leaves zeros, one that moved by less than any measurement
+        # An input that never moved leaves zeros, one that moved by an implausibly small amount
         # squares that underflow; the floor is far below any information.
         floor = 1e-13 * peak if peak > LARGEST**-2 else 1.0
         precision = np.maximum(precision, floor)

@@ -1,6 +1,6 @@
 """Improve a batch of starts of a separable fit by Levenberg-Marquardt steps [1]_.
 
-The first, quick part of a search; `polish` and `newton` follow what is promising to its minimum.
+The first, fast part of a search; `polish` and `newton` follow promising ones to their minimum.
 
 References
 ----------
@@ -41,9 +41,9 @@ def fit_batch(
     dead_time_fixed : bool
         Keep the first column as it is (profile likelihood).
     most_iterations : int
-        Of all starts together.
+        Limit for all starts together.
     tolerance : float
-        A start is done when an iteration lowers its cost by less than this part.
+        A start has converged if an iteration lowers its cost by less than this part.
 
     Returns
     -------
@@ -93,11 +93,11 @@ def _damped_step(
     bounds: Bounds,
     dead_time_fixed: bool,
 ) -> tuple[FloatArray, BoolArray]:
-    """Levenberg-Marquardt steps in the free directions, and which of them were not cut."""
-    # The dead time counts in parts of its range: any unit of time gives the same steps.
+    """Levenberg-Marquardt steps in the free directions, and which of them were not limited."""
+    # The dead time is relative to its range, so that the steps do not depend on the unit of time.
     unit = np.ones(x.shape[1])
     unit[0] = max(float(bounds.high[0] - bounds.low[0]), 1e-300)
-    # A response that shows in rounding alone has a gain, and slopes, whose squares overflow.
+    # A response of the size of rounding has derivatives whose squares overflow.
     jacobian = np.clip(jacobian * unit, -_STEEPEST, _STEEPEST)
     downhill = np.einsum("bmp,bm->bp", jacobian, residual)
     free = ~((x <= bounds.low) & (downhill < 0) | (x >= bounds.high) & (downhill > 0))

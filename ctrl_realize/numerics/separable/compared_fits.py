@@ -1,7 +1,7 @@
-"""Bring all structures that a comparison may choose, or not rule out, to their minima.
+"""Follow all structures that may be chosen, or not be ruled out, to their minima.
 
-Criteria are compared at minima, for that is what they are defined for [1]_; how far a search is
-followed (`REACH`) was measured.
+Criteria are defined at minima [1]_; the range within which searches are followed (`REACH`) was
+determined by experiment.
 
 References
 ----------
@@ -54,7 +54,7 @@ _ALL = 6  # structures that are few enough for each to matter: those of up to th
 def on_new_data(
     problem: Problem, candidates: dict[Structure, Candidate]
 ) -> dict[Structure, Candidate]:
-    """Find the costs of models on data that have changed: all of them, or none are comparable."""
+    """Find the costs of models for changed data: all of them must be computed again."""
     return {
         s: replace(c, cost=float(evaluate(problem, s, c.parameters[None]).cost[0]))
         for s, c in candidates.items()
@@ -76,18 +76,18 @@ def converged(
     ----------
     problem : Problem
     candidates : dict of Structure to Candidate
-        From a search on this problem, or on data that differ little.
+        From a search on this problem, or on slightly different data.
     scales : Scales
     variance, samples : float
         See `criteria`.
     last : bool, optional
-        Whether the data are the last ones. Otherwise it is enough to be near, and the best ends
-        of every structure stay.
+        Whether the data are final. Otherwise it suffices to be near the minimum, and the best ends
+        of every structure are kept.
 
     Notes
     -----
-    Each begins at all ends that its search has met, not only at the lowest, which has not
-    converged, and at the optima of the structures next to it.
+    Each starts from all ends of its search, not only from the lowest, which has not converged, and
+    from the optima of neighbouring structures.
     """
     found = dict(candidates)
     for structure in sorted(candidates, key=lambda s: (s.order, s.zeros)):
@@ -107,7 +107,7 @@ def converged(
 def _that_matter(
     found: dict[Structure, Candidate], variance: float, samples: float
 ) -> list[Structure]:
-    """What may be chosen or not be ruled out, when it has come to its minimum."""
+    """Structures that may be chosen or not be ruled out, at their minima."""
     if len(found) <= _ALL:
         return list(found)
     values = charged(criteria(found, variance, samples), parameter_charge(samples))
@@ -129,15 +129,15 @@ def settled(problem: Problem, candidate: Candidate, scales: Scales) -> Candidate
 
 
 def _in_order(problem: Problem, candidate: Candidate, bounds: Bounds) -> Candidate:
-    """Pair real poles by their size: which of them a search has paired is chance.
+    """Pair real poles by their size, because the pairing by a search is arbitrary.
 
-    What begins here, a profile for one, would end elsewhere by another pairing.
+    Otherwise a fit that starts here, of a profile for instance, would depend on it.
     """
     x = np.append(candidate.dead_time, parameters_from_poles(candidate.poles))
     if np.any(x < bounds.low) or np.any(x > bounds.high):
         return candidate
     cost = float(evaluate(problem, candidate.structure, x[None]).cost[0])
-    # Poles that coincide are kept apart in another way.
+    # Coincident poles are separated in another way.
     return (
         candidate
         if cost > candidate.cost * (1 + _SAME)
@@ -178,8 +178,8 @@ def at_dead_time(
 ) -> Candidate:
     """Best model of the same structure with a given dead time.
 
-    Far from the optimum other poles are best, and a way there from the optimum may end in
-    a minimum beside it: the patterns of a search are followed as well.
+    Far from the optimum other poles are best, and starting from the optimum may lead to a local
+    minimum: the initial poles of a search are followed as well.
     """
     structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
     starts = np.array([candidate.parameters, *pattern_starts(structure, scales)])
@@ -195,9 +195,9 @@ def at_dead_time(
 def _with_a_pole_more(
     structure: Structure, scales: Scales, found: dict[Structure, Candidate]
 ) -> list[FloatArray]:
-    """Optimum of the structure with a pole and a zero less, with a pole anywhere.
+    """Optimum of the structure with one pole and one zero fewer, with an additional pole anywhere.
 
-    The zero may cancel it, so that none of them is worse: which is best does not hang on the
+    The zero can cancel it, so that none of them is worse: the best one does not depend on the
     course of a search.
     """
     smaller = found.get(Structure(structure.order - 1, structure.relative_degree))

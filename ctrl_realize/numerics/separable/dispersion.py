@@ -1,14 +1,13 @@
-"""The axial-dispersion model (inverse-Gaussian residence time): its modes and its fit.
+"""The axial-dispersion model (inverse-Gaussian residence time): its modal responses and its fit.
 
-Residence times in a pipe or a packed bed have an inverse Gaussian distribution where the flow
-carries its load along and spreads it by diffusion [1]_, [2]_: with a mean m and a standard
-deviation c m its transfer function is
+With convection and diffusion, residence times in a pipe or a packed bed have an inverse Gaussian
+distribution [1]_, [2]_: with a mean m and a standard deviation c m the transfer function is
 
     exp((1 - sqrt(1 + 2 c^2 m s)) / c^2),
 
-and 2/c^2 is the Peclet number. Three or four lags and a longer dead time imitate it down to the
-noise, so that no residual shows it; fitted to the same record it needs two parameters where they
-need four, and wins. Behind it there may be one lag, as of a sensor.
+and 2/c^2 is the Peclet number. Three or four lags with a longer dead time have the same response to
+within the noise, which no residual shows; in a fit to the same record, dispersion needs two
+parameters instead of four. There may be one lag in series, as of a sensor.
 
 References
 ----------
@@ -38,12 +37,12 @@ from .varpro import Problem, partial_fractions
 def flow_modes(
     time: FloatArray, mean: float, spread: float, poles: ComplexArray
 ) -> tuple[FloatArray, ComplexArray]:
-    r"""Step responses of a flow, and of modes behind it.
+    r"""Step response of dispersion, and responses of modes in series with it.
 
     Parameters
     ----------
     time : ndarray, shape (m,)
-        Since the flow set in, in s; positive.
+        Time since the start of the flow, in s; positive.
     mean, spread : float
         Mean residence time in s, and its standard deviation over the mean.
     poles : ndarray, shape (J,)
@@ -52,9 +51,10 @@ def flow_modes(
     Returns
     -------
     passed : ndarray, shape (m,)
-        Part of the flow that has passed.
+        Fraction that has left the pipe.
     modes : ndarray, shape (m, J)
-        exp(p t) behind the flow: the integral of exp(p (t - s)) over the residence times s.
+        exp(p t) in series with dispersion: the integral of exp(p (t - s)) over the residence times
+        s.
 
     Notes
     -----
@@ -68,7 +68,7 @@ def flow_modes(
     envelope = 0.5 * np.exp(-((root * (1 - x)) ** 2))
     early, late = root * (1 - q * x), root * (1 + q * x)
     behind = early.real < 0
-    # erfcx(z) = 2 exp(z^2) - erfcx(-z): of a negative z it would overflow.
+    # erfcx(z) = 2 exp(z^2) - erfcx(-z): for negative z it would overflow.
     sign = np.where(behind, -1.0, 1.0)
     whole = np.exp(np.where(behind, rates * mean * x + (1 - q) / spread**2, -np.inf))
     values = whole + envelope * (wofz(1j * late) + sign * wofz(1j * sign * early))
@@ -94,11 +94,11 @@ _PROFILE = np.array([0.7, 1.2, 1.7, 2.3, 3.2])  # standard errors from the optim
 
 @dataclass(frozen=True, eq=False)
 class DispersedFlow:
-    """Best fit of a flow behind a dead time; times in s.
+    """Best fit of dispersion with a dead time; times in s.
 
     `mean` is that of the residence time, `spread` its standard deviation over the mean, `lag` the
-    time constant behind it, 0 if there is none. `criterion` includes what a flow must be worth,
-    `delta_bic` is it above that of the best lags.
+    time constant in series, 0 if there is none. `criterion` includes the penalty on dispersion,
+    `delta_bic` is its difference from the best lags.
     """
 
     dead_time: float
@@ -111,7 +111,7 @@ class DispersedFlow:
 
     @property
     def parameters(self) -> int:
-        """Free ones beside gain and dead time."""
+        """Number of free parameters besides gain and dead time."""
         return 3 if self.lag else 2
 
     @property
@@ -128,28 +128,28 @@ def fit_flows(
     penalty: float,
     level: float,
 ) -> list[DispersedFlow]:
-    """Fit a flow with a dead time before it, with and without a lag behind it.
+    """Fit dispersion with a dead time, with and without a lag in series.
 
     Parameters
     ----------
     problem : Problem
         Of a step record.
     like : Candidate
-        A model with the dead time and the spread in time at which the starts are aimed.
+        A model with the dead time and the spread in time for the initial values.
     scales : Scales
         Bounds of the dead time.
     variance, penalty : float
-        Of the noise, and what the criterion charges for a parameter.
+        Variance of the noise, and the penalty on a parameter.
     level : float
-        Criterion of the best lags: what ends far above it is left alone.
+        Criterion of the best lags: fits far above it are abandoned.
 
     Returns
     -------
     list of DispersedFlow
-        None of them spreads by less than half the lag behind it, where a second lag would do as
-        well. A short flow before a long lag and a long flow alone are often equally good: both are
-        told. Empty where `like` spreads in time by less than a sample, and where the record has a
-        free response, which a flow has no poles for.
+        Only fits whose spread is at least half of the lag in series; otherwise a second lag would
+        be equivalent. A short flow with a long lag and a long flow alone are often equally good:
+        both are returned. Empty if the spread in time of `like` is less than a sample, or if the
+        record has a free response, for which dispersion has no poles.
     """
     if problem.segments is not None or not isinstance(problem.drive, StepSequence):
         return []
@@ -159,7 +159,7 @@ def fit_flows(
     target = like.dead_time, mean, float(np.sqrt(square))
     lagging = _FlowFit(problem, problem.drive, scales, True)
     flows = _followed(lagging, target, variance, penalty, level)
-    # Without the lag there are no fewer squares: a parameter is all that can be won.
+    # Without the lag the sum of squares is no smaller: only a parameter can be saved.
     if flows and flows[0].delta_bic - penalty <= PLAUSIBLE:
         plain = _FlowFit(problem, problem.drive, scales, False)
         flows += _followed(plain, target, variance, penalty, level)
@@ -173,7 +173,7 @@ def _followed(
     penalty: float,
     level: float,
 ) -> list[DispersedFlow]:
-    """Follow the most promising starts while one may get near the level; the best end, if any."""
+    """Follow the most promising starts while one may reach the level; return the best, if any."""
     best: DispersedFlow | None = None
     for start in sorted(fit.starts(*target), key=fit.cost)[:_FOLLOWED]:
         x = fit.improved(start)
@@ -185,7 +185,7 @@ def _followed(
         if again or best.delta_bic > _HOPELESS:
             break
     if best is not None and best.delta_bic <= _REACH:
-        # What may be compared with a limit has converged.
+        # Everything that is compared with a limit has converged.
         x = fit.improved(fit.parameters(best), converged=True)
         cost = fit.cost(x)
         criterion = cost / variance + fit.count * penalty + _CHARGE
@@ -227,9 +227,9 @@ def flow_profile(
 
 @dataclass(frozen=True, eq=False)
 class _FlowFit:
-    """Least squares over x = (dead time, log mean, log spread, log lag), times in rises.
+    """Least squares over x = (dead time, log mean, log spread, log lag), times over the rise.
 
-    The last is not there where no lag is tried.
+    The last is missing if no lag is tried.
     """
 
     problem: Problem
@@ -239,7 +239,7 @@ class _FlowFit:
 
     @property
     def count(self) -> int:
-        """Parameters, the gain among them."""
+        """Number of parameters, including the gain."""
         return _FREE + self.lagging
 
     @property
@@ -274,7 +274,7 @@ class _FlowFit:
         return float(residual @ residual)
 
     def starts(self, dead_time: float, mean: float, deviation: float) -> Iterator[FloatArray]:
-        """Share mean and variance in time out over dead time, flow and lag."""
+        """Divide mean and variance in time between dead time, dispersion and lag."""
         low, high = self.bounds
         rise = self.scales.rise
         for part in _DELAYS:
@@ -289,7 +289,7 @@ class _FlowFit:
     def improved(
         self, start: FloatArray, fixed_dead_time: bool = False, converged: bool = False
     ) -> FloatArray:
-        """Follow a start towards its minimum, or down to it, the dead time fixed or not."""
+        """Follow a start towards its minimum, or to it, with free or fixed dead time."""
         kept = start[:1] if fixed_dead_time else start[:0]
         low, high = (bound[kept.size :] for bound in self.bounds)
         inside = 1e-9 * (high - low)
@@ -310,7 +310,7 @@ class _FlowFit:
         return np.concatenate([kept, found.x])
 
     def dead_time_error(self, x: FloatArray, variance: float) -> float:
-        """Standard error of the dead time, in rises, from the curvature."""
+        """Standard error of the dead time, in units of the rise, from the curvature."""
         here = self.residual(x)
         moved = [self.residual(x + _SMALL * row) - here for row in np.eye(x.size)]
         jacobian = np.stack(moved, axis=1) / _SMALL
@@ -319,7 +319,7 @@ class _FlowFit:
         return float(np.sqrt(variance) * np.linalg.norm(on_dead_time))
 
     def _response(self, x: FloatArray) -> FloatArray:
-        """Unit response in means over the bins, by Simpson's rule where they are wide."""
+        """Unit response in means over the bins, by Simpson's rule for wide bins."""
         dead_time, *shape = self.times(x)
         drive = self.drive
         wide = drive.width > 1

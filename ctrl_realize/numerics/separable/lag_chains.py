@@ -1,12 +1,13 @@
-"""Chains of many lags: tanks in series, and modes of diffusion, by three parameters.
+"""Chains of many lags (tanks in series, diffusion) with three parameters.
 
-A response that many lags have smoothed is imitated by fewer lags and a longer dead time. The free
-structures end at five poles; the chain goes on, because its rates follow a law. In a row of tanks
-they are nearly equal, as in Strejc's evaluation of step responses: here, spread evenly around one
-rate. Where heat or matter diffuses they grow as (k - c)^2, c between 0 and 1/2 by the boundaries.
+The response of many lags is similar to that of fewer lags with a longer dead time. The free
+structures have at most five poles; a chain may have more, because its rates follow a law. For tanks
+in series they are nearly equal, as in Strejc's method: here, spread evenly around one rate. For
+diffusion of heat or matter they grow as (k - c)^2, with c between 0 and 1/2 depending on the
+boundaries.
 
-Tanks after [1]_, diffusion after [2]_ (eigenvalues of a slab), steps after [3]_; the spread of the
-rates and the charge of a kind of chain are our own.
+Tanks follow [1]_, diffusion [2]_ (eigenvalues of a slab), steps [3]_; the spread of the rates and
+the penalty on a kind of chain are our own.
 
 References
 ----------
@@ -51,9 +52,9 @@ _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
 class LagChain:
     """Best fit of a chain of lags, with the standard error of its dead time in s.
 
-    `criterion` includes what the kind of chain must be worth. `hidden` is the sum of the lags, in
-    s, that the law goes on with beyond those fitted: faster than anything that a record shows,
-    they are in the dead time.
+    `criterion` includes the penalty on the kind of chain. `hidden` is the sum of the lags, in s, of
+    the law beyond those fitted: they are too fast to be visible in a record, and part of the dead
+    time.
     """
 
     candidate: Candidate
@@ -75,7 +76,7 @@ class _Point:
 
 @dataclass(frozen=True)
 class _Law:
-    """How the rates of a chain grow: ``rates(order, shape)``, and the bounds of the shape."""
+    """Law of the rates of a chain: ``rates(order, shape)``, and the bounds of the shape."""
 
     rates: Callable[[int, float], FloatArray]
     low: float
@@ -84,7 +85,7 @@ class _Law:
 
 
 def _spread_rates(order: int, square: float) -> FloatArray:
-    # The square of half the range, for the response is even in the range itself.
+    # The square of half the range, because the response is an even function of the range.
     return np.asarray(1 + np.sqrt(square) * np.linspace(-1, 1, order))
 
 
@@ -99,25 +100,25 @@ _DIFFUSION = _Law(_diffusion_rates, 0.0, 0.25, 0.5)
 def fit_chains(
     problem: Problem, like: Candidate, scales: Scales, variance: float, penalty: float
 ) -> list[LagChain]:
-    """Fit chains of four to eight lags, as long as they get better.
+    """Fit chains of four to eight lags, as long as the fit improves.
 
     Parameters
     ----------
     problem : Problem
     like : Candidate
         A model whose dead time and spread in time (mean and variance of the impulse response) are
-        where the chains start.
+        the initial values.
     scales : Scales
         Bounds of the dead time.
     variance : float
-        Of the noise.
+        Variance of the noise.
     penalty : float
-        What the criterion charges for a parameter.
+        Penalty on a parameter in the criterion.
 
     Returns
     -------
     list of LagChain
-        Empty where `like` has no positive spread, as with an inverse response.
+        Empty if `like` has no positive spread, as with an inverse response.
     """
     chains: list[LagChain] = []
     moments = time_moments(problem, like)
@@ -143,7 +144,7 @@ def fit_diffusion(
     chain = _chain(problem, LONGEST, _DIFFUSION, moments, scales, variance, penalty)
     if _over_within_a_sample(chain, scales):
         return []
-    # The sum of 1 / (k - c)^2 beyond n is that of the integral from n + 1/2 - c on.
+    # The sum of 1 / (k - c)^2 beyond n is approximated by the integral from n + 1/2 - c on.
     slowest, second = np.sort(np.abs(chain.candidate.poles))[:2]
     root = float(np.sqrt(second / slowest))  # (2 - c) / (1 - c)
     first = 1 / (root - 1)  # 1 - c
@@ -152,12 +153,12 @@ def fit_diffusion(
 
 
 def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
-    """Tell whether no sample shows anything of the lags, so that their curvature is rounding."""
+    """Whether the lags are invisible in all samples, so that their curvature is rounding."""
     return float(np.sum(1 / np.abs(chain.candidate.poles))) < scales.dt
 
 
 def still_improving(chains: Sequence[LagChain]) -> bool:
-    """Tell whether the longest chain is not the end: the parabola of the last three goes down."""
+    """Whether the fit would improve beyond the longest chain, by a parabola of the last three."""
     if not chains or chains[-1].candidate.structure.order < LONGEST:
         return False
     first, middle, last = (chain.criterion for chain in chains[-3:])
@@ -166,9 +167,9 @@ def still_improving(chains: Sequence[LagChain]) -> bool:
 
 
 def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArray]:
-    """Misfit over the dead time as of `dead_time_profile`; with few parameters it is a parabola."""
+    """Misfit over the dead time as `dead_time_profile`; with few parameters it is a parabola."""
     dead_time = chain.candidate.dead_time
-    # An error may be nothing or infinite where no sample shows anything of the dead time.
+    # The error may be zero or infinite if no sample depends on the dead time.
     error = float(
         np.clip(chain.error, 1e-9 * scales.dt, scales.latest - scales.earliest + scales.dt)
     )
@@ -178,14 +179,14 @@ def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArr
 
 
 def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
-    """Ends of the 95 % interval of the dead time, what is hidden taken off the lower one."""
+    """Ends of the 95 % interval of the dead time; the hidden lags are subtracted from the lower."""
     dead_time, half = chain.candidate.dead_time, Z_95 * chain.error
     low = max(dead_time - half - chain.hidden, scales.earliest)
     return low, min(dead_time + half, scales.latest)
 
 
 def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
-    """Dead time at zero frequency of b(s)/a(s): sum of its lags less that of its leads, in s."""
+    """Total delay of b(s)/a(s) without dead time: sum of its lags minus that of its leads, in s."""
     lag = float(np.sum(-1.0 / poles).real)
     if numerator.size > 1 and numerator[0] != 0:
         lag -= float(numerator[1] / numerator[0])
@@ -268,7 +269,7 @@ def _error(
 def _evaluate(
     problem: Problem, structure: Structure, law: _Law, x: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Parameters, residual, and its derivatives by dead time, logarithm of the lag, and shape."""
+    """Parameters, residual, and its derivatives w.r.t. dead time, log of the lag, and shape."""
     order = structure.order
     rates = law.rates(order, x[2]) * np.exp(-x[1])
     parameters = np.append(x[:1], _parameters(rates))

@@ -1,18 +1,18 @@
-"""Linear terms that belong to one stretch of the data only: its level, drift and initial state.
+"""Linear terms that belong to one segment of the data only: its level, drift and initial state.
 
-Several records of one plant share poles, numerator and dead time. What each of them has for itself
-enters linearly and touches only its own samples, so it is projected out of them, stretch by
-stretch; a hundred records cost no more than one of the same length.
+Several records of one plant have common poles, numerator and dead time. The local terms of each
+enter linearly and affect only its own samples, so they are projected out segment by segment; a
+hundred records cost no more than one of the same length.
 
-An initial state of the plant is a free response, a sum of exp(p_j t) with free amplitudes. As
-poles of a pair may be real, complex, or almost equal, its columns are
+An initial state of the plant gives a free response, a sum of exp(p_j t) with free amplitudes. Since
+the poles of a pair may be real, complex, or almost equal, its columns are
 
     (exp(p t) + exp(q t)) / 2    and    (exp(p t) - exp(q t)) / (p - q),
 
 which are real and independent in every case.
 
-Linear terms are projected out as in [1]_, [2]_; that a term of one stretch needs that stretch alone
-is what makes the projection block diagonal.
+Linear terms are projected out as in [1]_, [2]_; since a term of one segment is zero in all others,
+the projection is block diagonal.
 
 References
 ----------
@@ -39,17 +39,17 @@ _OVER = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Parts of the data with an initial state each.
+    """Parts of the data with a separate initial state each.
 
     Attributes
     ----------
     edges : ndarray of int, shape (R + 1,)
-        Stretch r has the rows ``edges[r]...edges[r + 1] - 1``.
+        Segment r has the rows ``edges[r]...edges[r + 1] - 1``.
     clock : ndarray, shape (m,)
-        Time since the first sample of the own stretch, in s.
+        Time since the first sample of the segment, in s.
     regressors : ndarray, shape (m, q)
-        Known shapes, which enter every stretch with coefficients of its own. A stretch with
-        fewer of them has zeros in its last columns.
+        Known shapes, which have separate coefficients in every segment. A segment with fewer of
+        them has zeros in its last columns.
     """
 
     edges: IntArray
@@ -58,7 +58,7 @@ class Segments:
 
     @property
     def rows(self) -> list[slice]:
-        """Rows of every stretch."""
+        """Number of rows of every segment."""
         edges = [int(edge) for edge in self.edges]
         return [slice(a, b) for a, b in pairwise(edges)]
 
@@ -69,7 +69,7 @@ class Segments:
 
 
 class FixedTerms:
-    """What does not depend on the plant in the local terms, orthonormalised once.
+    """Part of the local terms that does not depend on the plant, orthonormalised once.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class FixedTerms:
 
 
 class LocalTerms:
-    """Local terms of all segments at B sets of poles, ready to be taken out.
+    """Local terms of all segments for B sets of poles, prepared for projection.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class LocalTerms:
             own, norm = _normalised(columns[:, rows])
             shared = q.T @ own
             own = own - q @ shared
-            # Once more: what is nearly all within the fixed terms loses digits the first time.
+            # Repeated: columns that are nearly within the fixed terms lose digits the first time.
             again = q.T @ own
             basis, triangle = np.linalg.qr(own - q @ again)
             basis *= np.any(columns[:, rows], axis=1)[:, None, : basis.shape[2]]
@@ -122,7 +122,7 @@ class LocalTerms:
             self._norms.append(norm)
 
     def without(self, columns: FloatArray) -> FloatArray:
-        """Take the local terms out of weighted columns (B, m, k)."""
+        """Project the local terms out of weighted columns (B, m, k)."""
         left = np.empty_like(columns)
         for rows, (q, _, _), basis in zip(self._rows, self._fixed.parts, self._bases, strict=True):
             part = columns[:, rows]
@@ -131,14 +131,14 @@ class LocalTerms:
         return left
 
     def moved(self, rest: FloatArray, dpoles: ComplexArray) -> FloatArray:
-        """Derivative of the free responses by the pole parameters, weighted, shape (B, m, n).
+        """Derivative of the free responses w.r.t. the pole parameters, weighted, shape (B, m, n).
 
         Parameters
         ----------
         rest : ndarray, shape (B, m)
-            Weighted data less the forced response; the local terms are fitted to it.
+            Weighted data minus the forced response; the local terms are fitted to it.
         dpoles : ndarray, shape (B, n, n)
-            Poles (rows) by their parameters (columns).
+            Derivatives of the poles (rows) w.r.t. their parameters (columns).
         """
         out = np.empty((*rest.shape, dpoles.shape[2]))
         for i, rows in enumerate(self._rows):
@@ -148,9 +148,9 @@ class LocalTerms:
         return out * self._weight[:, None]
 
     def fitted(self, rest: FloatArray, where: Segments) -> FloatArray:
-        """Local terms as they are fitted to `rest` (B, m), at the rows of other segments (B, N).
+        """Local terms fitted to `rest` (B, m), at the rows of other segments (B, N).
 
-        The segments are the same ones, looked at more or less closely.
+        The other segments are the same ones with another resolution.
         """
         columns = local_columns(where, self._poles)
         out = np.empty(columns.shape[:2])
@@ -159,7 +159,7 @@ class LocalTerms:
         return out
 
     def _weights(self, i: int, rest: FloatArray) -> FloatArray:
-        """Coefficients of the local terms of stretch i, fitted to weighted data (B, m)."""
+        """Coefficients of the local terms of segment i, fitted to weighted data (B, m)."""
         q, r, norm = self._fixed.parts[i]
         part = rest[:, self._rows[i]]
         inside = np.einsum("bmk,bm->bk", self._bases[i], part - (part @ q) @ q.T)
@@ -169,7 +169,7 @@ class LocalTerms:
         return np.concatenate([solve_upper(triangle, known) / norm, free / self._norms[i]], axis=1)
 
     def _amplitudes(self, weights: FloatArray) -> ComplexArray:
-        """Turn weights of the columns into amplitudes of the exponentials."""
+        """Convert coefficients of the columns to amplitudes of the exponentials."""
         n = self._poles.shape[1]
         out = weights.astype(np.complex128)
         for i in range(n % 2, n, 2):
@@ -212,23 +212,23 @@ def _free_columns(decay: ComplexArray, poles: ComplexArray) -> FloatArray:
 
 
 def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Basis (m, k) of columns of norm 1, triangle (k, k), and their norms before (k,)."""
+    """Basis (m, k) of columns of norm 1, triangle (k, k), and the original norms (k,)."""
     single, norm = _normalised(columns[None])
     q, r = np.linalg.qr(single[0])
-    # A column of zeros spans nothing; a direction that QR makes up for it would.
+    # A zero column spans nothing, but QR would add a direction for it.
     q[:, ~single[0].any(axis=0)[: q.shape[1]]] = 0.0
     return q, r, norm[0]
 
 
 def _normalised(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Columns (B, m, k) of norm 1, zeros as they are, and their norms (B, k)."""
+    """Columns (B, m, k) of norm 1, zero columns unchanged, and their norms (B, k)."""
     norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
     norm[norm == 0] = 1.0
     return columns / norm[:, None], norm
 
 
 def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve R x = b for a batch, R from columns of norm 1; what they do not resolve gets 0."""
+    """Solve R x = b for a batch, R from columns of norm 1; unresolved components are 0."""
     x = np.zeros_like(right)
     for i in range(right.shape[1] - 1, -1, -1):
         rest = right[:, i] - np.einsum("bj,bj->b", r[:, i, i + 1 :], x[:, i + 1 :])

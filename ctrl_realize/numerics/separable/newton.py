@@ -1,6 +1,6 @@
-"""End fits with Newton's steps, which see the curvature of what is left.
+"""Final convergence of fits by Newton's method, which includes the curvature of the residual.
 
-The Hessian is made of differences of the gradient, which is exact, and is kept for as long as it
+The Hessian is computed from differences of the exact gradient, and kept as long as the iteration
 converges (chord method [1]_); a step ends at the bounds. The end of a profile-likelihood interval
 is solved for in all parameters at once [2]_.
 
@@ -47,11 +47,11 @@ def settle(
     *,
     dead_time_fixed: bool = False,
 ) -> tuple[FloatArray, float]:
-    """End one fit (1 + n,) with Newton's steps, which see the curvature of what is left.
+    """Bring one fit (1 + n,) to convergence by Newton's method.
 
-    Where a direction shows little, that is more than what the Jacobian knows of it, and steps of
-    Gauss and Newton come to the bottom slowly. The Hessian is made of differences of the gradient,
-    which is exact. Returns the parameters and the cost.
+    If a direction is poorly determined, the curvature of the residual exceeds that of the Jacobian,
+    and Gauss-Newton steps converge slowly. The Hessian is computed from differences of the exact
+    gradient. Returns the parameters and the cost.
     """
     x = start.copy()
     if not dead_time_fixed:
@@ -69,7 +69,7 @@ def settle(
         if over * float(state.jacobian[0, :, 0] @ state.residual[0]) > 0:
             x = beside
         else:
-            # From both sides of the sample the way leads back to it.
+            # On both sides of the sample the cost decreases towards it.
             held[0] = True
     if not dead_time_fixed:
         x[0] = np.clip(snapped(x[:1], dt)[0], bounds.low[0], bounds.high[0])
@@ -85,11 +85,11 @@ def solve_level(
     goal: float,
     variance: float,
 ) -> FloatArray | None:
-    """Find the dead time at which the minimum over all other parameters is a given cost.
+    """Find the dead time at which the minimum over all other parameters has a given cost.
 
-    The end of a profile-likelihood interval, by Newton's steps in all parameters at once [2]_:
-    the slopes of the others are zero there, and the cost is `goal`. None where they do not come
-    to an end.
+    The end of a profile-likelihood interval, by Newton's method in all parameters at once [2]_: the
+    derivatives w.r.t. the others are zero there, and the cost is `goal`. None if it does not
+    converge.
     """
     x, unit = start.copy(), np.ones(start.size)
     unit[0] = dt
@@ -101,14 +101,14 @@ def solve_level(
         free = others & ~((x <= limits[0]) & (slope > 0) | (x >= limits[1]) & (slope < 0))
         curvature = hessian[np.ix_(free, free)]
         try:
-            # How the minimum over the others moves with the dead time, and how far away it is.
+            # Derivative of the conditional minimum w.r.t. the dead time, and distance to it.
             along, back = np.linalg.solve(
                 curvature, np.stack([-hessian[free, 0], -slope[free]], axis=1)
             ).T
         except np.linalg.LinAlgError:
             return None
         if not np.abs([*along, *back]).max(initial=0.0) < _ENDLESS:
-            return None  # the response shows in rounding alone
+            return None  # the response has the size of rounding
         lower = cost + 0.5 * float(slope[free] @ back)
         steep = float(slope[0] + hessian[0, free] @ back)
         if steep == 0 or not np.isfinite(steep):
@@ -122,7 +122,7 @@ def solve_level(
             x[0] += away * unit[0]
             return x
         if 0 < before * _KEPT < off:
-            # The Hessian of before is another one here.
+            # The previous Hessian is not valid here.
             if made == _MOST_HESSIANS:
                 return None
             cost, slope, hessian = _curvature(problem, structure, x, unit, limits)
@@ -138,7 +138,7 @@ def solve_level(
 
 
 def _to_level(slope: float, bend: float, rise: float) -> float:
-    """Step along a parabola that rises by so much; along its tangent where it never does."""
+    """Step along a parabola to a given increase; along its tangent if it does not reach it."""
     square = slope**2 + 2 * bend * rise
     if square <= 0:
         return rise / slope
@@ -152,7 +152,7 @@ def _newton(
     bounds: tuple[FloatArray, FloatArray],
     dt: float,
 ) -> tuple[FloatArray, float, FloatArray]:
-    """Parameters, cost, and its slope in a minimum within bounds."""
+    """Parameters, cost, and its derivative at a minimum within bounds."""
     unit = np.ones(x.size)
     unit[0] = dt
     low, high = bounds
@@ -174,7 +174,7 @@ def _newton(
                 x, cost, slope, damping, before = trial, float(reached), turned, 0.0, predicted
                 continue
         if before == 0:
-            # With the Hessian of this place: too long a step.
+            # With the Hessian of this point: the step is too long.
             damping = max(10 * damping, 1.0)
             if damping > _GIVEN_UP:
                 break
@@ -197,14 +197,14 @@ def _newton_step(
     free, step = free.copy(), np.zeros(slope.size)
     while free.any():
         values, vectors = np.linalg.eigh(hessian[np.ix_(free, free)])
-        # Where the curvature is that of a hill, the way down is the other one.
+        # For negative curvature the direction is reversed.
         size = np.maximum(np.abs(values), _FLAT * np.abs(values).max() + 1e-300)
         downhill = -slope[free] - hessian[np.ix_(free, ~free)] @ step[~free]
         step[free] = vectors @ ((vectors.T @ downhill) / size)
         beyond = free & ((step < low) | (step > high))
         if not beyond.any():
             break
-        # It ends at the bound, and the others go where they are best then.
+        # It ends at the bound, and the other parameters are optimised for it.
         step = np.clip(step, low, high)
         free &= ~beyond
     return step
@@ -217,8 +217,8 @@ def _curvature(
     unit: FloatArray,
     bounds: tuple[FloatArray, FloatArray],
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Cost, gradient and Hessian in parameters over their units."""
-    # Beside a sample, where the gradient jumps, differences are taken on one side.
+    """Cost, gradient and Hessian in scaled parameters."""
+    # Near a sample, where the gradient jumps, one-sided differences are used.
     later = np.minimum(x + _SMALL * unit, np.maximum(bounds[1], x))
     earlier = np.maximum(x - _SMALL * unit, np.minimum(bounds[0], x))
     moving = np.flatnonzero(later > earlier)
@@ -236,6 +236,6 @@ def _curvature(
 def _slopes(
     problem: Problem, structure: Structure, rows: FloatArray, unit: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Costs (B,) and gradients (B, 1 + n) in parameters over their units."""
+    """Costs (B,) and gradients (B, 1 + n) in scaled parameters."""
     state = evaluate(problem, structure, rows)
     return state.cost, -2 * np.einsum("bmp,bm->bp", state.jacobian, state.residual) * unit

@@ -2,12 +2,12 @@
 
 An order-n denominator is written with ``n // 2`` quadratic factors
 ``s^2 + 2 zeta omega s + omega^2`` and, for odd n, one real factor ``s + lambda``.
-The parameters are ``log(lambda)`` (odd n, first), then ``log(omega), log(zeta)`` of
-every pair. A damping above 1 stands for two real poles, so that nothing has to be
-decided in advance about which poles are complex.
+The parameters are ``log(lambda)`` (odd n, first), then ``log(omega), log(zeta)`` of every pair. A
+damping above 1 represents two real poles, so that it need not be decided in advance which poles are
+complex.
 
-Our own parametrisation of stable polynomials: all real numbers give a stable one, and relative
-changes of a time constant are alike for slow and fast poles.
+Our own parametrisation of stable polynomials: all real parameters give a stable one, and relative
+changes of a time constant have the same size for slow and fast poles.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 
-# Partial fractions need distinct poles. A pair is kept at least this far apart
-# (relative); the response moves by the square of it, far below any noise.
+# Partial fractions need distinct poles. The poles of a pair are kept at least this far apart
+# (relative); the effect on the response is of second order, far below any noise.
 _GAP = 0.01
 
 
@@ -78,10 +78,10 @@ def parameters_from_poles(poles: ComplexArray) -> FloatArray:
 
 
 def _separate(poles: ComplexArray) -> ComplexArray:
-    """Move coinciding poles of different factors apart by the smallest useful amount."""
+    """Separate coincident poles of different factors by the smallest useful amount."""
     order = poles.shape[1]
     gap = np.abs(poles[:, :, None] - poles[:, None]) < 0.5 * _GAP * np.abs(poles[:, None])
-    if np.count_nonzero(gap) == gap.shape[0] * order:  # every pole with itself
+    if np.count_nonzero(gap) == gap.shape[0] * order:  # only every pole with itself
         return poles
     for j in range(1, order):
         for _ in range(order):

@@ -1,10 +1,10 @@
-r"""Follow separable least squares to near the bottom: what is compared must have converged.
+r"""Follow separable least squares close to the minimum, so that criteria can be compared.
 
-A search ends where one more step gains little. What is left then is decided by rounding, and where
-structures are compared, or an interval ends at a threshold, so would be the result. Here every
-step is a Levenberg-Marquardt step from an orthogonal factorisation (the normal equations square
-the condition number), and its damping follows the ratio of gained to predicted decrease [1]_,
-[2]_. Newton's steps take over from there (`newton`); samples are kinks (`sample_kinks`).
+A search ends when a step gains little. The remaining difference depends on rounding, and would
+affect the comparison of structures and the ends of intervals. Here every step is a
+Levenberg-Marquardt step from an orthogonal factorisation (the normal equations square the condition
+number), with a damping that depends on the ratio of actual to predicted decrease [1]_, [2]_.
+Newton's method continues from there (`newton`); sample times are kinks (`sample_kinks`).
 
 References
 ----------
@@ -44,7 +44,7 @@ def polish(
 ) -> tuple[FloatArray, FloatArray]:
     """Follow every start until it is near its minimum; `newton.settle` does the rest.
 
-    Starts of one structure race: the one that will not get as low as another is left.
+    Starts of one structure compete: those that cannot reach the best are abandoned.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def polish(
     dead_time_fixed : bool, optional
         Keep the first column as it is (profile likelihood).
     level : float, optional
-        A cost of which is asked only whether a minimum lies below it.
+        A cost; it is only tested whether a minimum lies below it.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def polish(
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
     count = len(x)
     damping, growth = np.full(count, _DAMPING), np.full(count, 2.0)
-    # A dead time that is held: always, or in a kink from both sides of which the way leads back.
+    # A fixed dead time: given, or at a kink towards which the cost decreases on both sides.
     pinned = np.full(count, dead_time_fixed)
     crossed = np.zeros(count, dtype=np.bool_)
     pins = np.where(dead_time_fixed, _MOST_PINS, 0) * np.ones(count, dtype=np.int64)
@@ -87,7 +87,7 @@ def polish(
         free = ~((at <= low) & (downhill < 0) | (at >= high) & (downhill > 0) | (low >= high))
         step, predicted = _step(residual[active], jacobian[active], free, damping[active])
         trial = np.clip(at + step, low, high)
-        # From both sides of a sample the way leads back to it.
+        # On both sides of a sample the cost decreases towards it.
         kink = (over != 0) & crossed[active]
         turn = (over != 0) & ~kink
         trial[turn] = at[turn]
@@ -115,7 +115,7 @@ def polish(
         elif not dead_time_fixed:
             enough = np.maximum(enough, _NO_WAY * (cost[active] - cost.min()))
         done = ~turn & ~kink & (predicted <= enough)
-        # The others have moved since: look at the kink once more.
+        # The other parameters have changed since: test the kink once more.
         again = done & pinned[active] & (pins[active] < _MOST_PINS)
         pinned[active[again]] = False
         pins[active[again]] += 1

@@ -1,8 +1,8 @@
 """Profile-likelihood interval of the dead time of one structure.
 
-Interval of the profile likelihood as in [1]_, ends by the method of [2]_ (Illinois). A kink of the
-misfit at a sample, where the dead time passes it, is why points are laid inside the sample of the
-optimum.
+Interval of the profile likelihood as in [1]_, ends by the method of [2]_ (Illinois). The misfit has
+a kink where the dead time passes a sample; therefore points are also placed inside the sample
+interval of the optimum.
 
 References
 ----------
@@ -51,7 +51,7 @@ Points: TypeAlias = dict[float, Candidate]
 def dead_time_profile(
     problem: Problem, candidate: Candidate, variance: float, scales: Scales
 ) -> tuple[FloatArray, FloatArray]:
-    """Misfit of the best model with each of a range of fixed dead times.
+    """Misfit of the best model for each of a range of fixed dead times.
 
     Parameters
     ----------
@@ -59,10 +59,10 @@ def dead_time_profile(
     candidate : Candidate
         The optimum of a structure.
     variance : float
-        Of the noise.
+        Variance of the noise.
     scales : Scales
-        The profile covers ``scales.earliest`` ... ``scales.latest``, densest where the local
-        curvature puts the ends of the interval.
+        The profile covers ``scales.earliest`` ... ``scales.latest``, densest near the ends of the
+        interval expected from the local curvature.
 
     Returns
     -------
@@ -79,14 +79,14 @@ def dead_time_profile(
 def profile_points(
     problem: Problem, candidate: Candidate, variance: float, scales: Scales
 ) -> Points:
-    """Best models at dead times of a grid, between which the ends of the interval lie."""
+    """Best models for a grid of dead times that brackets the ends of the interval."""
     half = _EDGE * dead_time_error(problem, candidate, variance)
     low, high = scales.earliest, scales.latest
     grid = np.linspace(low, high, _FAR)
     if np.isfinite(half):
         grid = np.concatenate([candidate.dead_time + half * _NEAR, grid])
     if _jumps(candidate, scales):
-        # Nothing changes while the jump stays between the same two samples.
+        # Nothing changes while the jump remains between the same two samples.
         grid = np.concatenate([(_jump_sample(candidate, scales) + _INSIDE) * scales.dt, grid])
     grid = np.unique(np.clip(grid, low, high))
     starts = np.tile(candidate.parameters, (grid.size, 1))
@@ -101,8 +101,8 @@ def profile_points(
 
     fitted, cost = followed(starts)
     for _ in range(_SWEEPS):
-        # The way from the optimum may end in a valley beside the deepest; what a point has found
-        # is followed to those next to it.
+        # Starting from the optimum may lead to a local minimum; the result at each point is used as
+        # start for its neighbours.
         at = np.concatenate([np.arange(grid.size - 1), np.arange(1, grid.size)])
         near = np.concatenate([np.arange(1, grid.size), np.arange(grid.size - 1)])
         wanted = np.minimum(cost[at], cost[near]) < level + _HIGH * variance
@@ -146,9 +146,9 @@ def with_ends(
 def profile_curve(
     points: Points, candidate: Candidate, variance: float, scales: Scales
 ) -> tuple[FloatArray, FloatArray]:
-    """Dead times (G,) and excess (G,) of points, as of `dead_time_profile`."""
+    """Dead times (G,) and excess (G,) of points, as in `dead_time_profile`."""
     if _jumps(candidate, scales):
-        # The later the jump begins, the faster it is: up to the sample that sees it done.
+        # The later the jump begins, the faster it is, up to the sample at which it is complete.
         end = min((_jump_sample(candidate, scales) + 1) * scales.dt, scales.latest)
         late = end - _LATE * scales.dt
         dead_times = np.array(sorted(points))
@@ -174,11 +174,11 @@ def _end(
     bounds: Bounds,
     dt: float,
 ) -> list[Candidate]:
-    """Points of a profile that close in on where its excess is that of an end.
+    """Points of a profile that approach the end of an interval.
 
-    `ends` are fits inside and outside, `level` the least cost and the variance. Where the way
-    along the minima is too bent to be solved for from there, it is followed between them, by regula
-    falsi (Illinois) in the root of the excess, which is linear where the misfit is.
+    `ends` are fits inside and outside, `level` the smallest cost and the variance. If the path of
+    the conditional minima is too curved for Newton's method, it is followed by regula falsi
+    (Illinois) in the root of the excess, which is linear for a quadratic misfit.
     """
     least, variance = level
     inside, outside = ends
@@ -213,7 +213,7 @@ def _end(
 
 
 def dead_time_error(problem: Problem, candidate: Candidate, variance: float) -> float:
-    """Standard error of the dead time in s from the local curvature, infinite if there is none."""
+    """Standard error of the dead time in s from the local curvature; infinite if there is none."""
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
     jacobian, free = state.jacobian[0], float(state.sensitivity[0, 0])
     size = np.sqrt((jacobian**2).sum(axis=0))
@@ -221,7 +221,7 @@ def dead_time_error(problem: Problem, candidate: Candidate, variance: float) -> 
         return float("inf")
     moving = size > _NOTHING * state.sensitivity[0]
     columns: FloatArray = (jacobian / np.where(moving, size, 1.0))[:, moving]
-    # The dead time comes last, so that the corner is what the others leave of it.
+    # The dead time comes last, so that the last diagonal element is its remainder.
     triangle = np.linalg.qr(columns[:, ::-1])[1]
     corner = float(np.abs(triangle[-1, -1])) * float(size[0])
     return float(np.sqrt(variance)) / corner if corner > _NOTHING * free else float("inf")

@@ -22,7 +22,7 @@ _MOST_TRIES = 20
 
 
 def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
-    """Pairs of neighbours, inside and outside, at the lower and upper end, where there are any."""
+    """Pairs of neighbours, inside and outside, at the lower and upper end, if there are any."""
     dead_times = sorted(excess)
     inside = [i for i, at in enumerate(dead_times) if excess[at] <= CHI2_95]
     first, last = inside[0], inside[-1]
@@ -33,10 +33,10 @@ def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
 
 
 def solve_ends(excess_at: Callable[[float], float], excess: Mapping[float, float]) -> None:
-    """Ask for the excess at dead times that close in on both ends.
+    """Request the excess at dead times that approach both ends.
 
-    Regula falsi (Illinois) in the root of the excess, which is linear in the dead time where the
-    misfit is.
+    Regula falsi (Illinois) in the root of the excess, which is linear in the dead time for a
+    quadratic misfit.
     """
     edge = float(np.sqrt(CHI2_95))
     for inside, outside in bracket_ends(excess):
@@ -59,7 +59,7 @@ def solve_ends(excess_at: Callable[[float], float], excess: Mapping[float, float
 
 
 def root_of(excess: float) -> float:
-    """Square root of an excess that rounding may have made negative."""
+    """Square root of an excess that may be negative by rounding."""
     return float(np.sqrt(max(excess, 0.0)))
 
 

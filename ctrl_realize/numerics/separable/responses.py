@@ -1,20 +1,20 @@
 """Responses of first-order modes to a delayed, held input, and their derivatives.
 
-The response of a rational transfer function with distinct poles ``p_j`` to an input that moves
-by ``d_l`` at ``t_l`` and holds in between is a sum of
+The response of a rational transfer function with distinct poles ``p_j`` to an input that changes by
+``d_l`` at ``t_l`` and is constant in between is a sum of
 
     H(t)   = sum_l d_l                                   (the static part)
     E_j(t) = sum_l d_l exp(p_j (t - t_l - tau))
 
-over the moves that have arrived, t > t_l + tau. Derivatives need dE_j/dp_j in addition:
+over the changes that have arrived, t > t_l + tau. Derivatives need dE_j/dp_j in addition:
 
     T_j(t) = sum_l d_l (t - t_l - tau) exp(p_j (t - t_l - tau)).
 
-`StepSequence` evaluates their means over bins of samples for a few moves (steps, ramps), many
-dead times and pole sets at once; `SampledInput` does it for a long measured signal, by recursion.
+`StepSequence` evaluates their means over bins of samples for a few changes (steps, ramps), and many
+dead times and pole sets at once; `SampledInput` is for a long measured signal, by recursion.
 
-Exact for a held input, as sampling is in [1]_; a dead time of a fraction of a sample needs nothing
-of its own, since moves have times and not sample numbers.
+Exact for a held input, as sampling in [1]_; a fractional dead time needs no special treatment,
+since changes have times and not sample numbers.
 
 References
 ----------
@@ -42,10 +42,10 @@ _PIECE = 2**16  # samples of a response that are found at a time, which bounds t
 
 
 class HeldInput(Protocol):
-    """An input that is constant between its moves."""
+    """An input that is constant between its changes."""
 
     def pieces(self) -> Sequence[HeldInput]:
-        """Inputs whose responses, one after the other, are the response to this one."""
+        """Inputs whose concatenated responses are the response to this one."""
         ...
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
@@ -55,7 +55,7 @@ class HeldInput(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class StepSequence:
-    """A few moves of the input; the response is wanted as means over bins of samples.
+    """A few changes of the input; the response is needed as means over bins of samples.
 
     Attributes
     ----------
@@ -66,13 +66,13 @@ class StepSequence:
     dt : float
         Sample time in s.
     moves, sizes : ndarray, shape (L,)
-        When, and by how much, the input moves; sorted.
+        Times and heights of the changes of the input; sorted.
 
     Notes
     -----
-    Between two arrivals each mode is one exponential, whatever came before: the sum over the
-    moves is carried along from arrival to arrival. Means of exponentials are geometric sums, so
-    that nothing is approximated; bins during which a move arrives are taken sample by sample.
+    Between two arrivals each mode is one exponential: the sum over the changes is updated from
+    arrival to arrival. Means of exponentials are geometric sums, so there is no approximation; bins
+    during which a change arrives are computed sample by sample.
     """
 
     first: FloatArray
@@ -82,14 +82,14 @@ class StepSequence:
     sizes: FloatArray
 
     def pieces(self) -> list[StepSequence]:
-        """Cut the bins, of which every one stands for itself, into short pieces."""
+        """Divide the bins into short sequences, to limit the memory."""
         stops = range(_PIECE, self.first.size, _PIECE)
         parts = zip(np.split(self.first, stops), np.split(self.width, stops), strict=True)
         return [replace(self, first=first, width=width) for first, width in parts]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for every bin; see `HeldInput`."""
-        # Real exponentials cost a third of complex ones.
+        # Real exponentials take a third of the time of complex ones.
         rates = poles if np.any(poles.imag) else poles.real
         since = self.first - tau[:, None]
         here = self._arrived(since)
@@ -108,7 +108,7 @@ class StepSequence:
             mode = mode * mean[:, kind]
         row, column = np.nonzero(here != last)
         if row.size:
-            # The samples of all bins during which a move arrives, one after the other.
+            # The samples of all bins during which a change arrives, concatenated.
             count = self.width[column]
             ends = np.cumsum(count)
             within = np.arange(ends[-1]) - np.repeat(ends - count, count)
@@ -125,19 +125,19 @@ class StepSequence:
 
     @cached_property
     def _kinds(self) -> tuple[IntArray, IntArray]:
-        """Different widths, and which of them every bin has."""
+        """Distinct widths, and the index of that of every bin."""
         widths, kind = np.unique(self.width, return_inverse=True)
         return widths, kind
 
     def _arrived(self, since: FloatArray) -> IntArray:
-        """Count the moves that have arrived at delayed times (B, m)."""
-        # With a dead time of whole samples rounding must not decide what has arrived.
+        """Count the changes that have arrived at delayed times (B, m)."""
+        # For a dead time of whole samples rounding must not decide what has arrived.
         return np.searchsorted(self.moves + _TOGETHER * self.dt, since, side="left").astype(
             np.int64
         )
 
     def _carried(self, rates: FloatArray | ComplexArray) -> tuple[FloatArray, Any, Any]:
-        """Sum the moves up to each arrival, decayed to that time; entry 0 is before the first."""
+        """Sum of the changes up to each arrival, decayed to then; entry 0 is before the first."""
         count = self.moves.size + 1
         total = np.zeros((rates.shape[0], count, rates.shape[1]), dtype=rates.dtype)
         stretch = np.zeros_like(total)
@@ -162,13 +162,13 @@ def _geometric_mean(x: Any, count: IntArray) -> tuple[Any, Any]:
 
 @dataclass(frozen=True, eq=False)
 class SampledInput:
-    """A sampled, held input (N,), rest level removed; the response is wanted at each sample."""
+    """A sampled, held input (N,) without its baseline; the response is needed at each sample."""
 
     signal: FloatArray
     dt: float
 
     def pieces(self) -> list[SampledInput]:
-        """All of it: a recursion runs through."""
+        """The complete input: a recursion needs all of it."""
         return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
@@ -179,7 +179,7 @@ class SampledInput:
         mode = np.zeros((tau.size, n, poles.shape[1]), dtype=np.complex128)
         slope = np.zeros_like(mode)
         for b in range(tau.size):
-            # A move at sample l is first seen at the first sample after l + tau/dt.
+            # A change at sample l is first visible at the first sample after l + tau/dt.
             whole = int(np.ceil(tau[b] / self.dt - _TOGETHER))
             if whole >= n:
                 continue
@@ -198,20 +198,20 @@ class SampledInput:
 
 @dataclass(frozen=True, eq=False)
 class SeveralInputs:
-    """Sampled inputs of several records one after the other, each without its first samples.
+    """Sampled inputs of several records, concatenated, each without its first samples.
 
     Attributes
     ----------
     parts : tuple of SampledInput
     starts : tuple of int
-        First sample of every part at which the response is wanted.
+        First sample of every part at which the response is needed.
     """
 
     parts: tuple[SampledInput, ...]
     starts: tuple[int, ...]
 
     def pieces(self) -> list[SeveralInputs]:
-        """All of it: a recursion runs through."""
+        """The complete input: a recursion needs all of it."""
         return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:

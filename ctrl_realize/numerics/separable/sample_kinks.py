@@ -1,7 +1,7 @@
-"""Dead times beside samples: the sum of squares has a kink at each, where the response begins.
+"""Dead times near samples: the sum of squares has a kink where the response starts at a sample.
 
-Between two samples it is smooth, so that a step ends at the next sample and begins anew on its
-other side, and a minimum in a kink is where both sides lead back. Our own rule.
+Between two samples it is smooth, so a step ends at the next sample and continues on its other side;
+a kink is a minimum if the cost decreases towards it on both sides. Our own rule.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from .varpro import Bounds
 
 BESIDE = 1e-8
-"""Samples by which a dead time lies beside a sample to be on one side of it."""
+"""Distance in samples from a sample at which a dead time counts as being on one side of it."""
 
 
 def cell(
     at: FloatArray, bounds: Bounds, dt: float, pinned: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds of every row, those of its dead time the samples beside it."""
+    """Bounds of every row; those of its dead time are the neighbouring samples."""
     low, high = (np.tile(bound, (len(at), 1)) for bound in (bounds.low, bounds.high))
     sample = np.ceil(at[:, 0] / dt)
     low[:, 0] = np.maximum(low[:, 0], (sample - 1 + BESIDE) * dt)
@@ -29,7 +29,7 @@ def cell(
 
 
 def beside_a_sample(dead_time: FloatArray, bounds: Bounds, dt: float) -> FloatArray:
-    """Dead times (B,) within their bounds that are at no sample."""
+    """Dead times (B,) within their bounds that do not coincide with a sample."""
     sample = np.round(dead_time / dt)
     at_one = np.abs(dead_time / dt - sample) < BESIDE
     earlier, later = (sample - BESIDE) * dt, (sample + BESIDE) * dt
@@ -45,7 +45,7 @@ def leaving(
     bounds: Bounds,
     pinned: BoolArray,
 ) -> IntArray:
-    """-1 or 1 for rows whose dead time is at a sample, with the way down on its other side."""
+    """-1 or 1 for rows with a dead time at a sample beyond which the cost decreases."""
     dead_time, way = at[:, 0], downhill[:, 0]
     later = (dead_time >= high[:, 0]) & (way > 0) & (high[:, 0] < bounds.high[0])
     earlier = (dead_time <= low[:, 0]) & (way < 0) & (low[:, 0] > bounds.low[0])
@@ -53,13 +53,13 @@ def leaving(
 
 
 def other_side(dead_time: FloatArray, way: IntArray, dt: float) -> FloatArray:
-    """Dead times (B,) behind the sample that is reached, -1 (earlier) or 1 (later) of it."""
+    """Dead times (B,) beyond the sample that is reached, -1 (earlier) or 1 (later)."""
     sample = np.round(dead_time / dt)
     return np.asarray((sample + way * BESIDE) * dt)
 
 
 def snapped(dead_time: FloatArray, dt: float) -> FloatArray:
-    """Take back by how much a dead time lies beside a sample to be on a side of it."""
+    """Remove the offset of a dead time from a sample."""
     sample = np.round(dead_time / dt)
-    # Plus nothing: no zero is negative.
+    # Adding zero avoids a negative zero.
     return np.where(np.abs(dead_time / dt - sample) <= 2 * BESIDE, sample * dt + 0.0, dead_time)

@@ -1,4 +1,4 @@
-"""How well a record tells the gain and the total delay of a model that was fitted to it.
+"""Accuracy of the gain and the total delay of a fitted model.
 
 Errors by the delta method [1]_, mixtures of structures as in [2]_.
 
@@ -38,7 +38,7 @@ _NOTHING = 1e-13  # part of the largest singular value that is rounding
 
 @dataclass(frozen=True, eq=False)
 class StaticGain:
-    """Response to what is slow, with standard errors (delta method, structure given).
+    """Static response, with standard errors (delta method, structure given).
 
     `gain` is that at zero frequency (the slope per second of a model with an integrator) and
     `total` dead time and lags less leads, in s. `slowest` is the length of the record in units of
@@ -58,22 +58,22 @@ class StaticGain:
 
     @property
     def extrapolated(self) -> bool:
-        """Whether the record ends before the slowest time constant, if that is no integrator."""
+        """Whether the record is shorter than its slowest time constant (integrators excluded)."""
         return self.slowest < 1.0
 
     @property
     def significant(self) -> bool:
-        """Whether the gain is told from none, and has the sign of what was seen of it."""
+        """Whether the gain is significant, and has the sign of the observed response."""
         return abs(self.gain) > SIGNIFICANT * self.gain_std and self.reached * self.gain > 0
 
     @property
     def resolved(self) -> bool:
-        """Whether a pole as slow as the record, or an integrator, brings a significant gain."""
+        """Whether a pole as slow as the record, or an integrator, has a significant gain."""
         return self.significant or not (self.extrapolated or self.integrates)
 
     @property
     def ends(self) -> tuple[float, float]:
-        """95 % interval of the gain; without end where it is extrapolated and not significant."""
+        """95 % interval of the gain; infinite if it is extrapolated and not significant."""
         if self.resolved:
             reach = SIGNIFICANT * self.gain_std
             return self.gain - reach, self.gain + reach
@@ -94,7 +94,7 @@ def static_gain(
     variance : float
         Of the noise, per sample.
     length : float
-        Of the record after the input has moved, in s.
+        Duration of the record after the change of the input, in s.
     """
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
     theta, numerator = candidate.parameters, state.numerator[0]
@@ -114,11 +114,11 @@ def static_gain(
         return np.array(_told(at[: theta.size], at[theta.size :], length))
 
     moves = steps * np.eye(point.size)
-    # No dead time is negative: the slopes at none are those a little later.
+    # A dead time is not negative: the derivatives at zero are those slightly later.
     inside = np.concatenate([[max(point[0], steps[0])], point[1:]])
     slopes = np.stack([(response(inside + m) - response(inside - m)) / 2 for m in moves], axis=1)
     gradient = np.stack([(told(point + m) - told(point - m)) / 2 for m in moves], axis=1)
-    # An integrator is taken for one: how slow a pole it is shows in rounding alone.
+    # For an integrator the slowness of the pole is only rounding.
     seen = np.any(gradient != 0, axis=0)
     slopes, gradient = slopes[:, seen], gradient[:, seen]
     columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
@@ -132,7 +132,7 @@ def static_gain(
     gain_std, total_std, rate_std = np.sqrt(variance * np.sum(along**2, axis=0))
     gain, total, rate = (float(value) for value in told(point))
     slow = np.abs(candidate.poles)
-    # An integrator has no slowest time constant, but a slope that goes on.
+    # An integrator has no slowest time constant, but a constant slope.
     slow = slow[slow * length >= INTEGRATOR]
     return StaticGain(
         gain=gain,
@@ -147,11 +147,11 @@ def static_gain(
 
 
 def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, float]:
-    """95 % interval of what several structures tell: (estimate, standard error, evidence) each.
+    """95 % interval from several structures: (estimate, standard error, evidence) each.
 
-    The middle of the mixture of their normal distributions (model averaging: Burnham and Anderson,
+    Middle of the mixture of their normal distributions (model averaging: Burnham and Anderson,
     Model Selection and Multimodel Inference, 2nd ed., 2002, section 4.3): a structure with a
-    needless zero, which leaves the gain open, counts for as little as its evidence.
+    superfluous zero, which leaves the gain undetermined, is weighted by its evidence.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, f
     errors, weights = np.maximum(errors, 1e-12 * np.abs(means) + 1e-300), weights / weights.sum()
 
     def ends(share: float) -> float:
-        # The quantiles of the parts hold that of the mixture between them.
+        # The quantiles of the components bracket that of the mixture.
         parts = means + errors * ndtri(share)
         low, high = float(parts.min()), float(parts.max())
         for _ in range(_HALVINGS):
@@ -176,14 +176,14 @@ def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, f
 
 
 def _reached(poles: ComplexArray, numerator: FloatArray, length: float) -> float:
-    """Value of the response of b(s)/a(s) to a step after a time."""
+    """Value of the step response of b(s)/a(s) after a time."""
     residues, level, _ = partial_fractions(poles[None], np.ones(1), numerator.size)
     modes = np.exp(poles * length) @ residues[0]
     return float((modes.real + level[0]) @ numerator)
 
 
 def _told(theta: FloatArray, numerator: FloatArray, length: float) -> tuple[float, float, float]:
-    """Gain, total delay, and the gain that poles slower than the record integrate."""
+    """Gain, total delay, and the gain that is integrated by poles slower than the record."""
     poles = poles_from_parameters(theta[None, 1:])[0][0]
     pace = np.abs(poles) * length
     moving = poles[pace >= INTEGRATOR]

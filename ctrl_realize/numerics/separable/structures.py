@@ -1,8 +1,8 @@
-"""Fit many structures to one record: where to start each, what to keep, how to compare.
+"""Fit many structures to one record: initial values, selection, comparison.
 
-The criterion is BIC [1]_, [3]_. A difference of 10 (`PLAUSIBLE`) is where [2]_ speaks of very
-strong evidence. What zeros and poles beyond the third must be worth, and the patterns of poles that
-a search begins from, are our own rules.
+The criterion is BIC [1]_, [3]_. A difference of 10 (`PLAUSIBLE`) is very strong evidence according
+to [2]_. The penalty on zeros and poles beyond the third, and the initial poles of a search, are our
+own rules.
 
 References
 ----------
@@ -29,7 +29,7 @@ from .varpro import Bounds, Problem, Structure
 
 ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
 """Further lags are those of a chain or a flow: free ones would not be told apart."""
-SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)  # for the views
+SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)  # for the delay estimates
 NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
 """Charged for every zero, and for every pole beyond the third, when a structure is chosen: needless
 ones lower the sum of squares by so many variances in one record of 70, and of 22. Ablation:
@@ -55,11 +55,11 @@ Ablation: least charge."""
 
 @dataclass(frozen=True)
 class Scales:
-    """What is roughly known of a response before it is fitted, in s.
+    """Initial guess of a response, in s.
 
-    `onset` is when it starts to move, `rise` the time from there to 63 % of its excursion,
-    `length` the time that was recorded after the input moved, `dt` the sample time. `latest`
-    and `earliest` bound the dead time.
+    `onset` is when it starts to move, `rise` the time from there to 63 % of its final value,
+    `length` the duration of the record after the change of the input, `dt` the sample time.
+    `latest` and `earliest` bound the dead time.
     """
 
     onset: float
@@ -74,8 +74,8 @@ class Scales:
 class Candidate:
     """Best fit of one structure: ``cost`` at ``parameters`` = [tau, pole parameters...].
 
-    `ends` (B, 1 + n) is where else a search has come to; `searched` tells that none of them has
-    been followed further.
+    `ends` (B, 1 + n) are other end points of the search; `searched`: none of them has been followed
+    further.
     """
 
     structure: Structure
@@ -103,17 +103,17 @@ def search(
 ) -> dict[Structure, Candidate]:
     """Find the best fit of every structure.
 
-    Each is started from two dead times for every one of up to four patterns of poles, and from the
-    optima of the structures next to it (one zero less, one pole less).
+    Each starts from two dead times for each of up to four sets of poles, and from the optima of the
+    neighbouring structures (one zero fewer, one pole fewer).
 
     Parameters
     ----------
     problem : Problem
     structures : iterable of Structure
-        Smaller orders and larger relative degrees are fitted first.
+        Lower orders and larger relative degrees are fitted first.
     scales : Scales
     beside : dict of Structure to Candidate, optional
-        What was found before; it is in the answer as well.
+        Previous results, which are included.
     """
     found = dict(beside or {})
     for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
@@ -130,7 +130,7 @@ def search(
 
 
 def apart(ends: FloatArray) -> FloatArray:
-    """Leave out the first of some ends, and those that are the same as one before."""
+    """Leave out the first of some ends, and duplicates."""
     size = np.maximum(np.abs(ends).max(axis=0), 1e-300)
     kept = [ends[0]]
     for end in ends[1:]:
@@ -142,10 +142,10 @@ def apart(ends: FloatArray) -> FloatArray:
 def _worth_a_search(
     problem: Problem, structure: Structure, found: dict[Structure, Candidate]
 ) -> bool:
-    """Tell whether a rich structure may differ much from the optima next to it.
+    """Whether a rich structure may differ much from the neighbouring optima.
 
-    Zeros are added to the optimum without them; and where the last pole did not lower the cost
-    by more than noise does, one more will not.
+    Zeros are added to the optimum without them; and if the last pole did not lower the cost
+    significantly, one more will not.
     """
     if structure.zeros:
         return False
@@ -157,10 +157,10 @@ def _worth_a_search(
 
 
 def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
-    """Box for dead time and poles: time constants up to (nearly) an integrator.
+    """Bounds for dead time and poles: time constants up to (nearly) an integrator.
 
-    Beside zeros they are half a sample at least: with more freedom such a model imitates a ringing
-    that was sampled too coarsely.
+    With zeros they are at least half a sample: with more freedom such a model imitates an
+    oscillation that was sampled too coarsely.
     """
     order = structure.order
     fast = np.log((SLOWER_WITH_ZEROS if structure.zeros else FASTEST) / scales.dt)
@@ -179,23 +179,23 @@ def criteria(
 ) -> dict[Structure, float]:
     """Information criterion of every structure: cost / variance + parameters x log(samples).
 
-    `variance` is that of the noise, colour included; `samples` how many independent ones there
-    are.
+    `variance` is that of the noise, including its correlation; `samples` the number of independent
+    ones.
     """
     # Schwarz (1978) with known variance; parameters are dead time, poles, numerator (zeros + 1).
     penalty = parameter_charge(samples)
-    # A record that stands still has no noise, and nothing to compare.
+    # A constant record has no noise, and nothing to compare.
     variance = max(variance, SMALLEST)
     return {s: c.cost / variance + (s.order + s.zeros + 2) * penalty for s, c in candidates.items()}
 
 
 def parameter_charge(samples: float) -> float:
-    """What a parameter costs in the criterion: log of the number of independent samples."""
+    """Penalty on a parameter in the criterion: log of the number of independent samples."""
     return float(np.log(max(samples, 3.0)))
 
 
 def choose(criterion: dict[Structure, float]) -> Structure:
-    """Structure of the lowest criterion, where zeros and a fourth pole must be worth it."""
+    """Structure with the lowest criterion, with a penalty on zeros and a fourth pole."""
     return min(criterion, key=lambda s: criterion[s] + needless_parameters(s))
 
 
@@ -207,12 +207,12 @@ def plausible(
     level: float,
     slack: float = 0.0,
 ) -> list[Structure]:
-    """List what the data cannot rule out.
+    """List the structures that the data cannot rule out.
 
-    That is what is within 10 of the best criterion, or of `level`, that of the chosen with its
-    simplicity counted; and lags without zeros that fit no worse, up to three of them or one more
-    than were chosen, for noise hides lags, but does not remove them. What costs still go down by
-    is `slack`, in variances.
+    Those within 10 of the best criterion, or of `level`, that of the chosen one including its
+    penalties; and lags without zeros that fit no worse, up to three of them or one more than
+    chosen, because noise hides lags but does not remove them. `slack` is the remaining convergence
+    error, in variances.
     """
     reach = PLAUSIBLE + slack
     limit = min(*criterion.values(), level) + reach
@@ -231,20 +231,20 @@ def plausible(
 
 
 def charged(criterion: dict[Structure, float], penalty: float) -> dict[Structure, float]:
-    """Criterion with no less charged for a parameter than where structures are ruled out."""
+    """Criterion with at least the penalty per parameter used for ruling out."""
     more = max(LEAST_CHARGE - penalty, 0.0)
     return {s: value + more * (s.order + s.zeros) for s, value in criterion.items()}
 
 
 def needless_parameters(structure: Structure) -> float:
-    """What zeros, and poles beyond the third, must be worth before a structure is chosen."""
+    """Penalty on zeros, and on poles beyond the third, when a structure is chosen."""
     return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
 
 
 def pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
-    """Starts of a search from every pattern of poles, at one dead time or two."""
+    """Starts of a search for every set of poles, at one dead time or two."""
     patterns = _pole_patterns(structure.order, scales)
-    # With zeros, the optimum without them is a start as well: fewer patterns do.
+    # With zeros, the optimum without them is a start as well: fewer sets suffice.
     dead_times = (0.4, 1.0) if structure.zeros == 0 else (0.7,)
     return [
         np.concatenate([[part * scales.onset], parameters_from_poles(poles)])
@@ -254,7 +254,7 @@ def pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
 
 
 def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
-    """Equal lags; one slow; one very slow; a ringing pair."""
+    """Equal lags; one slow; one very slow; an oscillatory pair."""
     rise = 1.0 / scales.rise
     patterns = [
         -np.linspace(0.8, 1.2, order) * order * rise,
@@ -272,7 +272,7 @@ def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
 def neighbour_starts(
     structure: Structure, scales: Scales, found: dict[Structure, Candidate]
 ) -> list[FloatArray]:
-    """Optima of the structures next to one: a zero less, a pole less."""
+    """Optima of the neighbouring structures: one zero fewer, one pole fewer."""
     n, r = structure.order, structure.relative_degree
     starts = []
     if Structure(n, r + 1) in found:

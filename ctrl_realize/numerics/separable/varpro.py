@@ -4,10 +4,10 @@ The model of one record is
 
     y(t) = L^-1{ exp(-tau s) b(s) K(s) U(s) / a(s) } + fixed regressors,
 
-with a monic `a` of order n (see `pole_factors`), `b` of degree n - r (r: relative degree) and
-known dynamics K in cascade. Numerator and regressors enter linearly and are eliminated (variable
-projection [2]_, [3]_); what is left has Kaufman's Jacobian [1]_ by dead time and poles. A whole
-batch of models is evaluated in the same array operations; `batch_search` moves them.
+with a monic `a` of order n (see `pole_factors`), `b` of degree n - r (r: relative degree) and known
+dynamics K in cascade. Numerator and regressors enter linearly and are eliminated (variable
+projection [2]_, [3]_); for dead time and poles Kaufman's Jacobian [1]_ is used. A whole batch of
+models is evaluated by the same array operations; `batch_search` optimises them.
 
 References
 ----------
@@ -44,10 +44,10 @@ class KnownFactor:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is fitted: data (m,), root weights (m,), input, fixed regressors (m, q).
+    """The problem: data (m,), root weights (m,), input, fixed regressors (m, q).
 
-    With `segments` each of them has an initial state and regressors of its own besides. Without
-    them, a `whitener` (m, m) may stand in for the weights: it makes coloured noise white.
+    With `segments` each of them has a separate initial state and regressors. Without them, a
+    `whitener` (m, m) may replace the weights for coloured noise.
     """
 
     data: FloatArray
@@ -61,7 +61,7 @@ class Problem:
     def weighted(self, columns: FloatArray) -> FloatArray:
         """Columns (..., m, k) in units of the noise."""
         if self.whitener is not None:
-            # One product of a wide matrix is several times as fast as many of thin ones.
+            # One product of a wide matrix is several times as fast as many of narrow ones.
             wide = np.moveaxis(columns, -2, 0)
             white = self.whitener @ wide.reshape(wide.shape[0], -1)
             return np.asarray(np.moveaxis(white.reshape(wide.shape), 0, -2))
@@ -78,11 +78,11 @@ class Problem:
         return FixedTerms(self.segments, self.root_weight)
 
     def local_terms(self, poles: ComplexArray) -> LocalTerms:
-        """Local terms of the segments, which there must be, at poles (B, n)."""
+        """Local terms of the segments for poles (B, n)."""
         return LocalTerms(self._fixed, poles)
 
     def local_count(self, order: int) -> int:
-        """Linear terms that all segments have for themselves, of a model of an order."""
+        """Number of local linear terms of all segments, for a model of a given order."""
         if self.segments is None:
             return 0
         return self.segments.shapes + order * (int(self.segments.edges.size) - 1)
@@ -103,7 +103,7 @@ class Structure:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Box of the parameters ``[tau, pole parameters...]``, shapes (1 + n,)."""
+    """Bounds of the parameters ``[tau, pole parameters...]``, shapes (1 + n,)."""
 
     low: FloatArray
     high: FloatArray
@@ -111,13 +111,12 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The eliminated problem at B parameter sets.
+    """The problem without its linear terms, at B parameter sets.
 
-    ``residual`` (B, m) is weighted and orthogonal to all linear terms, ``jacobian``
-    (B, m, 1 + n) is minus its derivative (Kaufman's form), ``sensitivity`` (B, 1 + n) the norm
-    of the model's derivative before the linear terms are taken out of it. ``numerator``
-    (B, n - r + 1) has the coefficients of b, lowest power first, ``regression`` (B, q) those of
-    the regressors.
+    ``residual`` (B, m) is weighted and orthogonal to all linear terms, ``jacobian`` (B, m, 1 + n)
+    is minus its derivative (Kaufman's form), ``sensitivity`` (B, 1 + n) the norm of the model's
+    derivative before the projection. ``numerator`` (B, n - r + 1) are the coefficients of b, lowest
+    power first, ``regression`` (B, q) those of the regressors.
     """
 
     residual: FloatArray
@@ -141,7 +140,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     poles = np.concatenate([free, np.tile(known.poles, (batch, 1))], axis=1)
     static, mode, slope = problem.drive.modes(parameters[:, 0], poles)
     residues, gain, dresidues = partial_fractions(poles, known.numerator, count)
-    # Columns of one size: the powers of s differ by many decades.
+    # Columns scaled to equal norm: the powers of s differ by many decades.
     size = np.abs(residues).sum(axis=1) + np.abs(gain)
     basis = (
         _real_product(mode, residues / size[:, None]) + static[:, :, None] * (gain / size)[:, None]
@@ -186,7 +185,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
 
 
 def _real_product(modes: Any, weights: ComplexArray) -> FloatArray:
-    """Real part of modes (B, m, J) times weights (B, J, k); those of real modes are real."""
+    """Real part of modes (B, m, J) times weights (B, J, k); real modes have real weights."""
     if np.iscomplexobj(modes):
         return np.asarray((modes @ weights).real)
     return np.asarray(modes @ weights.real)
@@ -241,7 +240,7 @@ def _moved_amplitudes(
     dresidues: ComplexArray,
     numerator: FloatArray,
 ) -> ComplexArray:
-    """Derivatives of amplitudes (rows j) by poles (columns k), shape (B, J, J)."""
+    """Derivatives of amplitudes (rows j) w.r.t. poles (columns k), shape (B, J, J)."""
     n = poles.shape[1]
     own = np.eye(n, dtype=bool)
     inverse = 1.0 / np.where(own, 1.0, poles[:, :, None] - poles[:, None, :])

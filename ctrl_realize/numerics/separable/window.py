@@ -1,7 +1,7 @@
-"""Fit all structures to one stretch of a record, and see what noise the best of them leaves.
+"""Fit all structures to one part of a record, and determine the noise from the best of them.
 
 Huber's loss by modified residuals [1]_ with the constant of [2]_ (95 % efficiency in Gaussian
-noise); the number of independent samples is that of [3]_, the criterion [4]_.
+noise); the effective number of samples follows [3]_, the criterion [4]_.
 
 References
 ----------
@@ -48,7 +48,7 @@ _PASSES = 2  # of modified residuals; see `fit_window`
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """A stretch of a record, sample by sample and as a problem of means over bins.
+    """A part of a record, sample by sample and as a problem of means over bins.
 
     Attributes
     ----------
@@ -56,16 +56,16 @@ class Window:
         Residuals count from this sample on.
     output : ndarray, shape (N,)
     problem : Problem
-        On the bins, or on the samples where there are none.
+        On the bins, or on the samples if there are none.
     drive : HeldInput
         For the response at every sample.
     columns : ndarray, shape (N, q)
         Regressors at every sample.
     bins : Bins or None
     own : Segments or None
-        Local terms at every sample, where the problem has them on bins.
+        Local terms at every sample, if the problem has them on bins.
     samples : int or None
-        That the output stands for, where it is none of them itself.
+        Represented by the output, if it is different from them.
     """
 
     start: int
@@ -86,7 +86,7 @@ class Window:
         """Model at every sample, with the linear terms of the problem."""
         state = evaluate(problem, candidate.structure, candidate.parameters[None])
         if self.bins is None:
-            # The samples are the data of the problem, all of weight 1.
+            # The samples are the data of the problem, all with weight 1.
             return np.asarray(problem.data - state.residual[0])
         setting = problem.known, state.numerator[0], candidate.parameters
         model = respond(self.drive, *setting)
@@ -101,14 +101,14 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class WindowFit:
-    """Candidates on one window, and the noise that the best of them leaves.
+    """Candidates for one window, and the noise estimated from the best of them.
 
-    ``variance`` is that of independent noise which would scatter the estimates as much as the
-    residual does: its own, with that of a coarse `rounding` once more, for neighbours are rounded
-    alike, times its `correlation`; where the noise has been made white instead, times `colour`,
-    the mean square that is left there in units of it. `misfit` is the root mean square of the
-    residual of the chosen structure, in means over bins, over the noise level given. `rivals` are
-    the margins by which structures were chosen, or not, to tell what noise there is.
+    ``variance`` is that of independent noise with the same effect on the estimates as the residual:
+    the variance of the residual, plus that of a coarse `rounding` (neighbours are rounded alike),
+    times its `correlation`; after prewhitening, times `colour`, the mean square of the whitened
+    residual. `misfit` is the root mean square of the residual of the chosen structure, in means
+    over bins, over the given noise level. `rivals` are the margins by which structures were chosen,
+    or not, for estimating the noise.
     """
 
     window: Window
@@ -125,19 +125,19 @@ class WindowFit:
 
     @property
     def variance(self) -> float:
-        """Variance per sample, colour included."""
+        """Variance per sample, including correlation."""
         colour = self.correlation if self.colour is None else self.colour
         return (self.sigma**2 + self.rounding**2) * colour
 
     @property
     def independent(self) -> float:
-        """Samples after the step that count."""
+        """Number of samples after the step that count."""
         count = self.window.samples or self.window.output.size - self.window.start
         return count / self.correlation
 
     @property
     def penalty(self) -> float:
-        """What the criterion charges for a parameter: log of the independent samples."""
+        """Penalty on a parameter in the criterion: log of the number of independent samples."""
         return parameter_charge(self.independent)
 
     @cached_property
@@ -148,8 +148,9 @@ class WindowFit:
     def best_of(self, criterion: dict[Structure, float]) -> Candidate:
         """Fit of the structure that is chosen among some.
 
-        One with a pole slower than the record, or an integrator, whose gain is not significant is
-        left for the best one without that is not ruled out: what wanders slowly is no response.
+        A structure with a pole slower than the record, or an integrator, whose gain is not
+        significant is replaced by the best one without that is not ruled out: a slow drift is not a
+        response.
         """
         first = choose(criterion)
         limit = criterion[first] + PLAUSIBLE
@@ -188,8 +189,9 @@ def fit_window(
     noise : tuple of float
         Noise level and quantisation step.
     huber : bool
-        Huber's loss by pseudo-values: the data are moved towards the model, so that their least
-        squares are Huber's. From a least-squares start one pass suffices, two with outliers.
+        Huber's loss by pseudo-values: the data are moved towards the model, so that their
+        least-squares fit is that of Huber's loss. Starting from least squares one pass suffices,
+        two with outliers.
     """
     sigma, quantum = noise
     problem = window.problem
@@ -199,22 +201,22 @@ def fit_window(
     for turn in range(passes + 1):
         rest = _left(window, problem, candidates, (sigma, quantum), huber)
         setting = rest.variance, rest.independent
-        del rest  # of a long record every array counts
+        del rest  # to save the memory of a long record
         candidates = converged(problem, candidates, scales, *setting, last=turn > 0 or not huber)
         rest = _left(window, problem, candidates, (sigma, quantum), huber)
         if turn == 0 and rest.best.ends is not None:
-            # What moves the data has converged.
+            # The structure that determines the pseudo-values has converged.
             candidates[rest.best.structure] = settled(problem, rest.best, scales)
             del rest
             rest = _left(window, problem, candidates, (sigma, quantum), huber)
-        # Huber's data are those of the structure that was chosen at every turn.
+        # Huber's pseudo-values are those of the structure chosen in each pass.
         rivals = {s: min(v, rivals.get(s, v)) for s, v in rest.rivals.items()}
         if turn == passes or (turn == 1 and not rest.wild):
             break
         problem = window.with_output(rest.values)
         candidates = on_new_data(problem, candidates)
     criterion = criteria(candidates, rest.variance, rest.independent)
-    # One initial value more for a pole fits noise alone by one variance.
+    # One initial value more for a pole reduces the cost by one variance for noise alone.
     criterion = {s: value + problem.local_count(s.order) for s, value in criterion.items()}
     chosen = candidates[choose(criterion)]
     freedom = max(problem.data.size - rest.lost, 1)
@@ -228,7 +230,7 @@ def fit_window(
 
 @dataclass(frozen=True, eq=False)
 class _Left:
-    """What the best of some candidates leaves of a window: the noise, if it is a good one.
+    """Residual of the best of some candidates on a window: the noise, if the fit is good.
 
     `values` (N,) are the data that Huber's loss asks for, `wild` tells of outliers; `level` is the
     standard deviation of what is left, `correlation` its correlation time, `lost` the parameters,
@@ -257,11 +259,11 @@ def _left(
     noise: tuple[float, float],
     huber: bool,
 ) -> _Left:
-    """Look at what the structure of the lowest criterion leaves.
+    """Determine the residual of the structure with the lowest criterion.
 
-    Not at that of the lowest cost: of parameters that fit noise alone many values are as good.
-    The criterion here is that of white noise of unknown variance, m log(cost) of m means: a model
-    too poor would leave much that is correlated, and pass for enough by that.
+    Not that of the lowest cost, because with superfluous parameters many values are equally good.
+    The criterion here is that of white noise of unknown variance, m log(cost) for m means: the
+    residual of too poor a model would be large and correlated, and would thus be accepted.
     """
     sigma, quantum = noise
     samples = window.output.size - window.start
@@ -282,7 +284,7 @@ def _left(
     lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
     lost += problem.local_count(best.structure.order)
     level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
-    # Far below the noise the residual is rounding, and its correlation says nothing.
+    # Far below the noise the residual is rounding, and its correlation has no meaning.
     floor = 0.3 * sigma
     correlation = correlation_time(after) if level > floor else 1.0
     independent = after.size / correlation
@@ -293,14 +295,14 @@ def _left(
 
 
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
-    """Add structures to a fit; noise and data stay those of the structures before."""
+    """Add structures to a fit; noise and data remain those of the previous structures."""
     candidates = search(fit.problem, structures, fit.scales, fit.candidates)
     candidates = converged(fit.problem, candidates, fit.scales, fit.variance, fit.independent)
     return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
 
 
 def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
-    """Compare some of the structures with each other alone, at their minima."""
+    """Compare some of the structures with each other only, at their minima."""
     few = {s: fit.candidates[s] for s in structures}
     candidates = fit.candidates | converged(
         fit.problem, few, fit.scales, fit.variance, fit.independent
@@ -309,7 +311,7 @@ def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
 
 
 def _clipped(error: FloatArray, least: float) -> FloatArray:
-    """Residuals clipped at 1.345 sigma and scaled up again by the part that was not."""
+    """Residuals clipped at 1.345 sigma and rescaled by the fraction that was not."""
     limit = HUBER * max(mad_sigma(error), least)
     left = np.clip(error, -limit, limit)
     inside = float(np.mean(left == error))
@@ -317,5 +319,5 @@ def _clipped(error: FloatArray, least: float) -> FloatArray:
 
 
 def _wild(error: FloatArray) -> bool:
-    """Tell whether there are more residuals beyond four sigma than Gaussian noise has."""
+    """Whether there are more residuals beyond four sigma than in Gaussian noise."""
     return bool(np.mean(np.abs(error) > 4 * mad_sigma(error)) > 0.002)

@@ -1,1 +1,1 @@
-"""Numbers about a single signal: edges, noise, baseline, onset, correlation, filters."""
+"""Properties of a single signal: edges, noise, baseline, onset, correlation, filters."""

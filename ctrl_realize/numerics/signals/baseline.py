@@ -1,7 +1,7 @@
-"""Level and slope before a step: constant, drifting, or still settling from an earlier move.
+"""Level and slope before a step: constant, drifting, or settling after an earlier change.
 
-A slope counts as real by the rule of `noise.is_drift`, the correlation of the residual after
-Geyer [1]_.
+The significance of a slope is tested by `noise.is_drift`, with the correlation of the residual
+after Geyer [1]_.
 
 References
 ----------
@@ -19,27 +19,27 @@ from .edges import difference_noise
 from .noise import correlation_time, is_drift, rounding_error
 
 FEW = 5
-"""With fewer samples before the step, those after it that are still at rest are added."""
+"""With fewer samples before the step, those after it that are still at the baseline are added."""
 
-MIN_DRIFT_SAMPLES = 50  # from which on a slope is looked for; as `noise` has it
+MIN_DRIFT_SAMPLES = 50  # least number of samples for a slope, as in `noise`
 
 
 def rest_line(
     before: FloatArray, after: FloatArray, remove_drift: bool | None
 ) -> tuple[float, float]:
-    """Level at the step and slope per sample of an output at rest.
+    """Level at the step and slope per sample of the baseline.
 
     Parameters
     ----------
     before, after : ndarray, shapes (P,), (N,)
         Output before and from the step on.
     remove_drift : bool or None
-        None decides by the significance of the slope.
+        None: decided by the significance of the slope.
 
     Returns
     -------
     level, slope : float
-        At sample 0 of `after`; the slope is 0 when no drift is removed.
+        At sample 0 of `after`; the slope is 0 if no drift is removed.
     """
     if before.size < FEW:
         return _level_from_start(np.concatenate([before, after])), 0.0
@@ -53,7 +53,7 @@ def rest_line(
 
 
 def _level_from_start(values: FloatArray) -> float:
-    """Level of a record that starts at its step: the samples that have not moved yet."""
+    """Level of a record that starts at its step: the samples before the response starts."""
     start = values[:FEW]
     noise = difference_noise(values)
     still = [float(start[0])]
@@ -72,10 +72,10 @@ _RATES = np.geomspace(0.5, 30.0, 24)  # decay over the samples before the step, 
 
 
 def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
-    """Exponential on which an output comes to rest, continued over the whole record.
+    """Exponential before the step, extrapolated over the whole record.
 
-    A plant whose input moved not long before the record goes on moving: by its free response,
-    which bends, where a drift does not.
+    After an earlier change of its input a plant continues to move by its free response, which is
+    curved, unlike a drift.
 
     Parameters
     ----------
@@ -86,11 +86,12 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
     Returns
     -------
     ndarray, shape (N,)
-        Level and exponential; None where a line tells the samples before the step as well.
+        Level and exponential; None if a straight line describes the samples before the step as
+        well.
     """
     if edge < FEWEST:
         return None
-    # Single wild samples are no curve, the first of a record least of all.
+    # Single outliers are not a curve, especially the first sample of a record.
     before = median_filter(output[:edge], size=5, mode="mirror")
     time = np.arange(edge) / edge
     line = np.stack([np.ones(edge), time], axis=1)
@@ -104,7 +105,7 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
         left = float(np.sum(error**2))
         if left < best:
             best, rate, weights, residual = left, float(tried), found, error
-    # On one level of a quantiser nothing is left, and rounding bends.
+    # On one level of a quantiser the residual is zero, and rounding would decide.
     noise = max(best / (edge - 3), rounding_error(output) ** 2)
     variance = noise * correlation_time(residual)
     if float(straight @ straight) - best <= _SIGNIFICANT * variance:

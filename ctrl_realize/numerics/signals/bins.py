@@ -1,11 +1,11 @@
 """Average a step response over bins that grow with the distance from its onset.
 
-A record of thousands of samples says little more about a smooth response than some two hundred
-averages, if they are single samples where the onset may be.
+Some two hundred averages contain nearly all information of thousands of samples of a smooth
+response, if they are single samples near the onset.
 
-Our own rule: a bin is as wide as 4 % of its distance from the onset. Lags faster than that distance
-have died away there, slower ones are nearly straight over the bin, and the model is averaged over
-the same bins: nothing is approximated, and little information lost.
+Our own rule: the width of a bin is 4 % of its distance from the onset. Lags faster than that
+distance have decayed there, slower ones are nearly straight over the bin, and the model is averaged
+over the same bins: there is no approximation, and little loss of information.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 
 _GROWTH = 0.04  # of the distance from the onset; see above
-BINS_AT_REST = 12  # means of the rest: they tell its level and slope, and single samples its noise
-# Few different widths: what depends on the width alone is computed once for each.
+BINS_AT_REST = 12  # means of the baseline, for its level and slope; samples for its noise
+# Few different widths: everything that depends on the width alone is computed once for each.
 _WIDTHS = np.unique((1.19 ** np.arange(80)).astype(np.int64))
 
 
@@ -36,19 +36,19 @@ class Bins:
 
 
 def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BINS_AT_REST) -> Bins:
-    """Lay bins over samples 0...stop - 1 of a record.
+    """Divide samples 0...stop - 1 of a record into bins.
 
     Parameters
     ----------
     stop : int
         Number of samples.
     edges : list of int
-        Samples at which the input has moved; every one starts a new response.
+        Samples at which the input has moved; each starts a new response.
     crossing : int
-        First lasting motion after an edge, in samples. Bins are single samples there and grow
-        by 4 % of the distance from it.
+        Visible onset after an edge, in samples. Bins are single samples there, and their width
+        grows by 4 % of the distance from it.
     at_rest : int, optional
-        Bins before the first edge.
+        Number of bins before the first edge.
     """
     bounds = sorted({*np.linspace(0, edges[0], min(at_rest, edges[0]) + 1).astype(int)})
     starts = [*edges, stop]

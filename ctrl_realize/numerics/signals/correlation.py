@@ -1,4 +1,4 @@
-"""Correlations of residuals, their bounds, and predictions of a residual from its own past.
+"""Correlations of residuals, their bounds, and prediction of a residual from its past.
 
 Whiteness after [1]_, independence of the input after [2]_, autoregression by the recursion of Burg
 [3]_ with the order of [5]_, predictions as in [4]_.
@@ -32,7 +32,7 @@ def correlation(late: FloatArray, early: FloatArray, lags: int) -> FloatArray:
     Parameters
     ----------
     late, early : ndarray, shape (N,)
-        Means are taken out.
+        Means are subtracted.
     lags : int, < N
 
     Returns
@@ -50,7 +50,7 @@ def correlation(late: FloatArray, early: FloatArray, lags: int) -> FloatArray:
 
 
 def whiteness(rho: FloatArray, samples: int) -> float:
-    """Return the probability that white noise looks less white (Ljung and Box 1978).
+    """Return the p-value of the Ljung-Box test of whiteness.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def whiteness(rho: FloatArray, samples: int) -> float:
 
 
 def cross_bound(residual: FloatArray, drive: FloatArray, lags: int, confidence: float) -> float:
-    """Bound the correlation of a residual with an input that it does not contain.
+    """Bound of the correlation of a residual with an input that it does not depend on.
 
     Both may be coloured: the variance is ``sum rho_e rho_u / N`` (Ljung, System Identification,
     2nd ed., section 16.6), summed over `lags` lags to both sides.
@@ -87,7 +87,7 @@ def fit_percent(measured: FloatArray, modelled: FloatArray) -> FloatArray:
 def autoregression(signal: FloatArray, most: int) -> FloatArray:
     """Fit ``e[k] = sum c_i e[k-i]`` with the order of least BIC, 0...most; shape (order,).
 
-    Burg's recursion: stable at every order, so that no prediction runs away.
+    Burg's recursion: stable at every order, so that no prediction diverges.
     """
     forward = signal - signal.mean()
     backward, N = forward, signal.size
@@ -99,7 +99,8 @@ def autoregression(signal: FloatArray, most: int) -> FloatArray:
         energy = float(ahead @ ahead + behind @ behind)
         if energy <= 1e-28 * power:
             break
-        # Burg: the reflection coefficient of least forward and backward prediction errors.
+        # Burg: the reflection coefficient that minimises the forward and backward prediction
+        # errors.
         reflection = -2.0 * float(ahead @ behind) / energy
         forward, backward = ahead + reflection * behind, behind + reflection * ahead
         longer = np.append(filter_, 0.0)
@@ -115,7 +116,7 @@ def predict_ahead(signal: FloatArray, coefficients: FloatArray, steps: int) -> F
     """Predict ``e[k]`` from samples up to ``k - steps`` by an autoregression.
 
     The first ``order + steps - 1`` samples, without a complete past, are predicted as zero: with
-    zeros in place of a past, an autoregression that rings answers with a burst.
+    zeros in place of the past, an oscillatory autoregression would respond with a transient.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ def predict_ahead(signal: FloatArray, coefficients: FloatArray, steps: int) -> F
     ndarray, shape (N,)
     """
     N = signal.size
-    # ahead[j][k]: what samples up to k say about e[k + j]; j <= 0 are the samples themselves.
+    # ahead[j][k]: prediction of e[k + j] from samples up to k; j <= 0 are the samples themselves.
     ahead = {-i: later(signal, i) for i in range(coefficients.size)}
     for j in range(1, steps + 1):
         ahead[j] = sum(

@@ -1,8 +1,8 @@
 """Find the edges of a measured input signal.
 
-Levels are medians and noise a median absolute deviation [1]_, neither of which a minority of
-samples moves. Where an edge begins and ends is our own rule: within `REST_TOLERANCE` of its height
-from the levels beside it.
+Levels are medians and noise is a median absolute deviation [1]_, both insensitive to a minority of
+samples. The definition of the beginning and end of an edge is our own: within `REST_TOLERANCE` of
+its height from the neighbouring levels.
 
 References
 ----------
@@ -21,7 +21,7 @@ from scipy.ndimage import median_filter, rank_filter
 from ..arrays import FloatArray
 
 REST_TOLERANCE = 0.02
-"""The input has left its level when it is off by this part of the step (or 5 sigma of noise)."""
+"""The input has left its level if the difference is this fraction of the step (or 5 sigma)."""
 
 _PIECE = 2**18  # samples that are looked at together, to save memory
 
@@ -30,7 +30,7 @@ _PIECE = 2**18  # samples that are looked at together, to save memory
 class Edge:
     """Samples index...index + samples - 1 lead from `baseline` to `baseline + amplitude`.
 
-    The level before it holds from sample `start` on, that after it up to sample `stop`.
+    The level before it is valid from sample `start` on, that after it up to sample `stop`.
     """
 
     index: int
@@ -42,9 +42,9 @@ class Edge:
 
 
 def difference_noise(values: FloatArray) -> float:
-    """Noise level (sigma) from first differences, unmoved by steps, drift and rare spikes.
+    """Noise level (sigma) from first differences, insensitive to steps, drift and rare spikes.
 
-    Zero for a signal of which most neighbours are equal, such as a clean or coarse one.
+    Zero for a signal in which most neighbours are equal, such as a clean or coarse one.
     """
     if values.size < 3:
         return 0.0
@@ -55,10 +55,10 @@ def difference_noise(values: FloatArray) -> float:
 
 
 def despike(values: FloatArray, spike_samples: int) -> FloatArray:
-    """Remove spikes of at most `spike_samples` samples; levels and edges stay in place.
+    """Remove spikes of at most `spike_samples` samples; levels and edges are not changed.
 
-    A median over 2 s + 1 samples keeps every level that lasts longer than s samples. The ends
-    are continued with their own value, so a record that holds a single sample of rest keeps it.
+    A median over 2 s + 1 samples preserves every level that lasts longer than s samples. At the
+    ends the signal is extended by its own value, so a single baseline sample is preserved.
     """
     if spike_samples < 1:
         return values
@@ -77,18 +77,17 @@ def find_edges(
     spike_samples : int
         Longest spike to ignore, in samples.
     min_share : float
-        Smallest edge, as a part of the range of the input without spikes.
+        Smallest edge, as a fraction of the range of the input without spikes.
     most : int, optional
-        Look no further than for one edge more than these: an input that moves all the time has
-        millions.
+        Stop after one edge more than these: an input that moves all the time has millions.
 
     Returns
     -------
     list of Edge
-        In order of time; empty when the input holds still.
+        In chronological order; empty if the input is constant.
     """
     clean = despike(values, spike_samples)
-    # A median over w samples leaves 1.25 / sqrt(w) of white noise.
+    # A median over w samples has a standard deviation of 1.25 / sqrt(w) for white noise.
     noise = difference_noise(values) * (
         1.25 / np.sqrt(2 * spike_samples + 1) if spike_samples else 1.0
     )
@@ -96,18 +95,18 @@ def find_edges(
     if span == 0.0:
         return []
     if spike_samples and clean.size > 4 * spike_samples:
-        # At the ends a spike cannot be told from a level. Where the rest of the record has a
-        # step of its own it is taken for a spike; where not, it is the rest level of a record
-        # that starts at its step.
+        # At the ends a spike cannot be distinguished from a level. If the rest of the record has a
+        # step, it is treated as a spike; otherwise it is the baseline of a record that starts at
+        # its step.
         inner_span = _significant_range(clean[spike_samples:-spike_samples], noise)
         if inner_span > 0.0:
             span = inner_span
             clean[:spike_samples] = clean[spike_samples]
             clean[-spike_samples:] = clean[-spike_samples - 1]
-    # An edge of just the share counts, however it is rounded: a ramp is not cut to pieces.
+    # An edge of exactly this height counts, whatever the rounding: a ramp is not divided.
     threshold = max(min_share * span, 5 * noise) * (1 - 1e-9)
     width = spike_samples + 1
-    # Level before and after each sample; an edge is where they differ.
+    # Level before and after each sample; they differ at an edge.
     jump = _jumps(clean, width)
     edges: list[Edge] = []
     for k in _peaks(jump, threshold):
@@ -127,7 +126,7 @@ def find_edges(
 
 
 def _significant_range(values: FloatArray, noise: float) -> float:
-    """Range of a signal; 0 when rounding (of a constant) or noise explains it."""
+    """Range of a signal; 0 if rounding (of a constant) or noise explains it."""
     span = float(values.max() - values.min())
     if span <= 1e-9 * float(np.abs(values).max()) or span <= 10 * noise:
         return 0.0
@@ -135,9 +134,9 @@ def _significant_range(values: FloatArray, noise: float) -> float:
 
 
 def _jumps(values: FloatArray, width: int) -> FloatArray:
-    """Median of the `width` samples from each sample on, less that of those before it."""
+    """Median of the `width` samples from each sample on, minus that of those before it."""
     jump = np.empty(values.size)
-    # in pieces, or what is between would take several times the memory of a long record
+    # in pieces, because intermediate arrays would take several times the memory of a long record
     for start in range(0, values.size, _PIECE):
         stop = min(start + _PIECE, values.size)
         part = values[max(start - width, 0) : stop + width]
@@ -184,7 +183,7 @@ def _peaks(jump: FloatArray, threshold: float) -> Iterator[int]:
 
 
 def _quiet_after(jump: FloatArray, limit: float) -> int:
-    """First position with a jump up to a limit; the length where there is none."""
+    """First position with a jump up to a limit; the length if there is none."""
     start, count = 0, 64
     while start < jump.size:
         quiet = np.flatnonzero(np.abs(jump[start : start + count]) <= limit)
@@ -196,7 +195,7 @@ def _quiet_after(jump: FloatArray, limit: float) -> int:
 
 def _measure(values: FloatArray, jump: FloatArray, k: int, noise: float) -> Edge | None:
     """Find levels, first moved sample and length of the edge whose steepest point is k."""
-    # The edge reaches as far as levels before and after differ by more than noise.
+    # The edge extends as far as the levels before and after differ by more than noise.
     limit = max(0.02 * abs(jump[k]), 3 * noise)
     low = max(k - 1 - _quiet_after(jump[:k][::-1], limit), 0)
     high = min(k + _quiet_after(jump[k:], limit), values.size - 1)

@@ -1,6 +1,6 @@
-"""Where in a long record its inputs move.
+"""Part of a long record in which its inputs move.
 
-Our own rule, to spend a limited number of samples where the input has most of its variance.
+Our own rule, to use a limited number of samples where the input has most of its variance.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ _TOGETHER = 2**20  # samples that are looked at together
 
 
 def lively_start(inputs: FloatArray, count: int) -> int:
-    """First sample of the first stretch in which the inputs move as they do in the record.
+    """First sample of the first part with nearly the largest variance of the inputs.
 
-    That is, with half the variance of the stretch of `count` samples that has most of it. An
-    input that moves from the beginning gives 0.
+    That is, half the variance of the part of `count` samples with the largest one. For an input
+    that moves from the beginning this is 0.
 
     Parameters
     ----------
     inputs : ndarray, shape (m, N)
     count : int
-        Samples in a stretch.
+        Number of samples of a part.
     """
     samples = inputs.shape[1]
     hop = max(count // _HOPS, 1)
@@ -37,11 +37,11 @@ def lively_start(inputs: FloatArray, count: int) -> int:
         window = np.ones(_HOPS)
         mean = np.convolve(means, window, "valid") / (_HOPS * hop)
         variance = np.convolve(squares, window, "valid") / (_HOPS * hop) - mean**2
-        # what rounding leaves of an input at rest far from where it began
+        # rounding error of an input that is constant far from its initial value
         variance[variance < 1e-12 * mean**2] = 0.0
         if variance.max() > 0:
             moved[:] = variance / variance.max()
-    # all of them together where they ever do
+    # for all inputs together if they ever move together
     together = moves.min(axis=0)
     moved = together if together.max() > 0 else moves.max(axis=0)
     if moved.max() == 0:
@@ -50,7 +50,7 @@ def lively_start(inputs: FloatArray, count: int) -> int:
 
 
 def _block_sums(rows: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
-    """Sums and sums of squares of the rows, from a level."""
+    """Sums and sums of squares of the rows, relative to a level."""
     sums, squares = np.empty(len(rows)), np.empty(len(rows))
     step = max(_TOGETHER // rows.shape[1], 1)
     for first in range(0, len(rows), step):

@@ -22,10 +22,9 @@ from ..arrays import FloatArray
 
 
 def backward_difference(step: FloatArray, before: float = 0.0) -> FloatArray:
-    """Unit-pulse response of the plant behind its hold: G_k = S_k - S_(k-1).
+    """Unit-pulse response of the plant with its hold: G_k = S_k - S_(k-1).
 
-    Exactly step-invariant: the sum of the result is the step response again, and there is no
-    truncation error.
+    Exactly step-invariant: the sum of the result is the step response, without truncation error.
 
     Parameters
     ----------
@@ -46,10 +45,11 @@ def backward_difference(step: FloatArray, before: float = 0.0) -> FloatArray:
 def central_difference(step: FloatArray) -> FloatArray:
     """Five-point derivative, error O(Ts^4), times the sample time.
 
-    This is the paper's differentiation (section 3.2; it says "third order", but the stencil
-    whose error is O(Ts^4) has order four). It samples the continuous impulse response, which
-    is half a sample earlier than the step-invariant one, and it looks two samples ahead, so an
-    edge shows up two samples early. The two samples at each end use the three-point and the
+    This is the paper's differentiation (section 3.2; it is called "third order" there, but the
+    stencil with an error O(Ts^4) has order four). It samples the continuous impulse response, which
+    is half a sample earlier than the step-invariant one, and uses two future samples, so an edge
+    appears two samples early. The two samples at each end use the three-point and the one-sided
+    stencils of order two.
     one-sided stencils of order two.
 
     Parameters
@@ -76,9 +76,9 @@ def central_difference(step: FloatArray) -> FloatArray:
 def butterworth(order: int, cutoff_hz: float, dt: float) -> FloatArray:
     """Design a digital Butterworth low-pass as second-order sections.
 
-    The cut-off is in Hz and the sample rate is given beside it. Normalised frequencies invite
-    the error of the paper, which calls 500 Hz the Nyquist frequency of a record sampled at
-    1280 Hz: its filter would then cut at 64 Hz.
+    The cut-off is in Hz and the sample time is a separate argument. Normalised frequencies invite
+    the error of the paper, which calls 500 Hz the Nyquist frequency of a record sampled at 1280 Hz:
+    its cut-off would then be 64 Hz.
 
     Returns
     -------
@@ -108,14 +108,14 @@ def butterworth_group_delay(order: int, cutoff_hz: float, dt: float) -> float:
 
 
 def settling_samples(cutoff_hz: float, dt: float) -> int:
-    """Samples after which the filter has forgotten: five periods of its cut-off."""
+    """Duration of the filter's transient in samples: five periods of its cut-off."""
     return int(np.ceil(5 / (cutoff_hz * dt)))
 
 
 def low_pass(
     values: FloatArray, order: int, cutoff_hz: float, dt: float, *, zero_phase: bool
 ) -> FloatArray:
-    """Filter a signal that starts at rest at its first value.
+    """Filter a signal that is constant at its first value before the first sample.
 
     Parameters
     ----------
@@ -135,13 +135,13 @@ def low_pass(
 
 
 _WIDE = 256
-"""Samples from which on sums that are carried along are quicker than a sum for every window."""
+"""Window length from which on running sums are faster than a sum for every window."""
 
 
 def moving_mean(values: FloatArray, width: int) -> FloatArray:
-    """Mean over `width` samples about every sample, zeros beyond the ends.
+    """Mean over `width` samples around every sample, zeros beyond the ends.
 
-    Windows of an even number of samples reach one sample further back than ahead.
+    Windows of an even number of samples contain one more past than future sample.
 
     Parameters
     ----------
@@ -150,9 +150,9 @@ def moving_mean(values: FloatArray, width: int) -> FloatArray:
 
     Notes
     -----
-    A wide window is the end of one block of `width` samples and the beginning of the next. Sums
-    are carried along within the blocks only: a wild sample spoils no means but its own, as it
-    would in a sum over everything before.
+    A wide window consists of the end of one block of `width` samples and the beginning of the next.
+    Running sums are computed within blocks only: an outlier affects only the means that contain it,
+    unlike in a sum over everything before.
 
     Examples
     --------

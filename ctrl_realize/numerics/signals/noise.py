@@ -1,4 +1,4 @@
-"""How large the noise of a measured signal is, how coarse, how coloured, and whether it hums.
+"""Level, quantisation, correlation and sinusoids of the noise of a measured signal.
 
 Noise levels are median absolute deviations [1]_ or winsorised ones [3]_, never below ``q /
 sqrt(12)`` of a quantiser [4]_. The correlation time ends its sum as in [2]_, section 3.3.
@@ -40,20 +40,20 @@ _FEW = 8  # samples at rest below which the whole record must tell the noise: si
 
 
 def rounding_error(values: FloatArray) -> float:
-    """Difference of two values that is rounding: what is no larger is none.
+    """Difference of two values that is attributed to rounding.
 
-    A few units in the last place of the largest, and a billionth of the range: a converter of 24
-    bits, the finest there is, has steps of sixty billionths.
+    A few units in the last place of the largest, and a billionth of the range: a 24-bit converter,
+    the finest there is, has steps of sixty billionths.
     """
     last_place = float(np.spacing(max(np.abs(values.max()), np.abs(values.min()))))
     return max(1e-9 * float(np.ptp(values)), 4 * last_place)
 
 
 def quantisation_step(values: FloatArray) -> float:
-    """Step of the quantiser, 0 where none shows.
+    """Quantisation step; 0 if there is none.
 
-    The step is the smallest difference between two values; it is believed when the other
-    differences are multiples of it.
+    It is the smallest difference between two values, accepted if the other differences are
+    multiples of it.
     """
     gaps = np.diff(np.unique(values))
     gaps = gaps[gaps > rounding_error(values)]
@@ -68,10 +68,10 @@ def quantisation_step(values: FloatArray) -> float:
 
 
 def is_coarse(sigma: float, quantum: float) -> bool:
-    """Tell whether a quantiser's steps are so high that averaging does not remove the rounding.
+    """Whether the quantisation is so coarse that averaging does not remove the rounding.
 
-    With less noise than half a step the mean of rounded samples depends on where between two
-    levels the signal lies (dither).
+    With noise below half a step the mean of rounded samples depends on the position of the signal
+    between two levels (dither).
     """
     return quantum > 0 and sigma < _DITHER * quantum
 
@@ -85,36 +85,35 @@ def mad_sigma(values: FloatArray) -> float:
 
 
 def winsorised_sigma(values: FloatArray, quantum: float, lost: int = 0) -> float:
-    """Standard deviation with values beyond two median absolute deviations moved to that limit.
+    """Standard deviation after clipping at two median absolute deviations.
 
-    `lost` degrees of freedom are counted off. The limit is at least half a quantisation step,
-    else a signal that mostly rests on one level would have no noise at all.
+    `lost` degrees of freedom are subtracted. The limit is at least half a quantisation step,
+    otherwise a signal that mostly stays on one level would have no noise.
     """
     limit = 2 * max(mad_sigma(values), 0.5 * quantum)
     clipped = np.clip(values - np.median(values), -limit, limit)
-    # Two-sigma clipping leaves 0.921 of a Gaussian's variance.
+    # Two-sigma clipping leaves 0.921 of the variance of a Gaussian.
     return float(np.sqrt(np.sum(clipped**2) / max(values.size - lost, 1))) / 0.96
 
 
 def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[float, float]:
-    """Noise level and significant drift of an output at rest.
+    """Noise level and significant drift of the baseline.
 
     Parameters
     ----------
     before : ndarray, shape (P,)
-        Samples before the step. With fewer than 8 the third differences of the record tell the
-        noise: they are blind to anything smooth.
+        Samples before the step. With fewer than 8, the noise is estimated from the third
+        differences of the record, which are insensitive to anything smooth.
     record : ndarray, shape (N,)
         The whole record.
     quantum : float
-        Quantisation step; the noise is never taken below ``quantum / sqrt(12)``.
+        Quantisation step; the noise is at least ``quantum / sqrt(12)``.
 
     Returns
     -------
     sigma : float
     drift : float
-        Slope per sample, 0 unless it is five standard errors, which slow noise has larger ones
-        of.
+        Slope per sample, 0 if it is below five standard errors, which are larger for slow noise.
     """
     floor = quantum / np.sqrt(12)
     if before.size < _FEW:
@@ -124,7 +123,7 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     slope, left = _robust_line(before, quantum)
     sigma = max(winsorised_sigma(left, quantum, lost=2), floor)
     if before.size < _MANY:
-        # A dozen samples tell sigma to a factor of two: the settled half of the record helps.
+        # A dozen samples determine sigma to a factor of two: the settled half of the record helps.
         settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
         if settled.size:
             sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
@@ -132,21 +131,21 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
 
 
 def is_drift(slope: float, sigma: float, residual: FloatArray) -> bool:
-    """Tell whether a slope per sample is five standard errors, correlation allowed for.
+    """Whether a slope per sample exceeds five standard errors, with correlation.
 
     Parameters
     ----------
     slope, sigma : float
         Of a line, and of the noise about it.
     residual : ndarray, shape (P,)
-        What the line leaves, for its correlation.
+        Residual of the line, for its correlation.
     """
     error = sigma * np.sqrt(12 * correlation_time(residual) / residual.size**3)
     return bool(abs(slope) > _DRIFT_ERRORS * error)
 
 
 def _robust_line(values: FloatArray, quantum: float) -> tuple[float, FloatArray]:
-    """Slope per sample, and what the line leaves; wild values count as four standard deviations."""
+    """Slope per sample, and the residual; outliers are clipped at four standard deviations."""
     index = np.arange(values.size, dtype=np.float64)
     tamed = values
     for _ in range(_TURNS):
@@ -158,10 +157,10 @@ def _robust_line(values: FloatArray, quantum: float) -> tuple[float, FloatArray]
 
 
 def correlation_time(residual: FloatArray) -> float:
-    """Samples that one independent sample is worth: 1 + 2 x the sum of the autocorrelation.
+    """Samples per independent sample: 1 + 2 x the sum of the autocorrelation.
 
-    The sum ends where a pair of neighbouring terms turns negative (Geyer's initial positive
-    sequence); what white noise scatters to, 1.5, counts as 1.
+    The sum ends where a pair of neighbouring terms is negative (Geyer's initial positive sequence);
+    values up to 1.5, the scatter of white noise, count as 1.
     """
     # Geyer (1992), section 3.3: -1 + 2 sum of rho_2m + rho_2m+1 while these pairs are positive.
     time = 2 * float(_correlation(residual).sum(axis=1).sum()) - 1.0
@@ -169,10 +168,10 @@ def correlation_time(residual: FloatArray) -> float:
 
 
 def kept_in_blocks(residual: FloatArray, length: int) -> float:
-    """Part of the variance of slow means that blocks of `length` samples keep.
+    """Fraction of the variance of slow means that remains in blocks of `length` samples.
 
-    Blocks that are drawn one by one know nothing of each other: the autocorrelation at lag k is
-    left in ``1 - k / length`` of the pairs. 1 for white noise.
+    Separate blocks are uncorrelated: the autocorrelation at lag k remains in ``1 - k / length`` of
+    the pairs. 1 for white noise.
     """
     time = correlation_time(residual)
     if time == 1.0:
@@ -183,13 +182,13 @@ def kept_in_blocks(residual: FloatArray, length: int) -> float:
 
 
 def _correlation(residual: FloatArray) -> FloatArray:
-    """Autocorrelation from lag 0 to where a pair turns negative, in pairs: shape (K, 2)."""
+    """Autocorrelation from lag 0 to where a pair is negative, in pairs: shape (K, 2)."""
     n = residual.size
     centred = residual - residual.mean()
     energy = float(centred @ centred)
     if n < 8 or energy == 0:
         return np.zeros((0, 2))
-    # The sum mostly ends after a few lags: of a long record these are looked at first.
+    # The sum mostly ends after a few lags: for a long record these are computed first.
     for lags in (_FIRST_LAGS, n // 2):
         if lags < n // 8 or lags == n // 2:
             correlation = _lagged_products(centred, lags) / energy
@@ -214,9 +213,9 @@ def _lagged_products(values: FloatArray, lags: int) -> FloatArray:
 
 
 def colouring(rest: FloatArray, sigma: float) -> float:
-    """How much larger means of 4 and 16 samples at rest are than white noise would leave them.
+    """Standard deviation of means of 4 and 16 baseline samples, relative to that for white noise.
 
-    1 for white noise and where there are too few samples to tell.
+    1 for white noise and if there are too few samples.
     """
     worst = 1.0
     for width in (4, 16):
@@ -228,10 +227,10 @@ def colouring(rest: FloatArray, sigma: float) -> float:
 
 
 def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
-    """Frequencies, in cycles per sample, of the lines in a signal at rest.
+    """Frequencies, in cycles per sample, of sinusoids in the baseline.
 
-    A line carries at least a third of the variance and stands 20 times above its neighbours in
-    the spectrum, over three and a half periods or more.
+    A sinusoid has at least a third of the variance and 20 times the power of its neighbours in the
+    spectrum, over three and a half periods or more.
     """
     found: list[float] = []
     left = rest - rest.mean()
@@ -245,10 +244,10 @@ def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
         if peak < 4 or around.size < 6 or power[peak] < 20 * np.median(around) / np.log(2):
             break
         if _MOST_OF_A_LINE * power[peak] / n < float(left @ left) / 3:
-            break  # far too weak, wherever its frequency lies between those of the spectrum
+            break  # far too weak, for any frequency between those of the spectrum
         frequency = _refine(left, peak / n)
         if frequency * n < 3.5:
-            break  # slower than it looked: too few periods to go on like this
+            break  # slower than assumed: too few periods
         wave = sine_pair(np.arange(n), frequency)
         fitted = wave @ np.linalg.lstsq(wave, left, rcond=None)[0]
         if float(fitted @ fitted) < float(left @ left) / 3:
@@ -265,7 +264,7 @@ def sine_pair(index: FloatArray, frequency: float) -> FloatArray:
 
 
 def _refine(values: FloatArray, frequency: float) -> float:
-    """Improve the frequency of a line: its periodogram is largest between two bins."""
+    """Refine the frequency of a sinusoid: its periodogram has a maximum between two bins."""
     # Turned to the frequency within blocks, and then from block to block.
     whole = values.size // _BLOCK * _BLOCK
     blocks, rest = values[:whole].reshape(-1, _BLOCK), values[whole:]

@@ -1,9 +1,9 @@
-"""Autoregressive noise models, and records made white with them.
+"""Autoregressive noise models, and prewhitening of records.
 
-Least squares weigh all errors alike. Noise that is slow, or that rings as the ripple of a motor
-does, is much weaker where a delay shows, in fast motions, than a count of independent samples
-makes of it: means over bins are decorrelated first [1]_, by the autoregression that the
-output follows where the plant stands still.
+Least squares treats all errors as independent. Slow noise, or oscillating noise such as the ripple
+of a motor, is much weaker in the fast part of a response, where a delay shows, than an effective
+sample size accounts for: means over bins are decorrelated first [1]_, by the autoregressive model
+of the output in steady state.
 
 References
 ----------
@@ -33,16 +33,16 @@ _SAMPLES_PER_LAG = 20  # each coefficient is then known to a fifth: 1 / sqrt(20)
 
 
 def noise_lags(samples: int) -> int:
-    """Lags of autoregressive noise that so many samples can tell."""
+    """Order of an autoregressive noise model that so many samples can determine."""
     return max(min(MOST_LAGS, samples // _SAMPLES_PER_LAG), 1)
 
 
 def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
-    """Bayesian information criterion of stretches of one noise, and the lags that it takes.
+    """Bayesian information criterion of segments with common noise, and the chosen order.
 
-    ``e[k] = a_1 e[k-1] + ... + a_r e[k-r] + w[k]`` with white w: r is the one with the least
-    ``n log(mean w^2) + r log n``, and that is returned. Whatever is tried, the same n samples
-    count, those behind `noise_lags` others of their stretch. Means are taken out.
+    ``e[k] = a_1 e[k-1] + ... + a_r e[k-r] + w[k]`` with white w: r minimises ``n log(mean w^2) + r
+    log n``, and the minimum is returned. For all orders the same n samples are used, those after
+    `noise_lags` others of their segment. Means are subtracted.
     """
     most = noise_lags(min(e.size for e in residuals))
     rows, targets = [], []
@@ -63,22 +63,22 @@ def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
 
 
 _WILD = 4.0  # standard deviations of which one of 16 000 Gaussian samples is beyond: cut
-_NOTHING = 1e-6  # of a response that has died away
+_NOTHING = 1e-6  # relative size of a response that has decayed
 _JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singular
 
 
 def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
-    """Autocovariance of noise over its variance, from lag 0 until it has died away.
+    """Autocovariance of noise over its variance, from lag 0 until it has decayed.
 
-    That of white noise has lag 0 alone.
+    For white noise this is lag 0 alone.
 
     Parameters
     ----------
     quiet : ndarray
-        Noise alone. Its autoregression (Burg, least BIC) goes on where sample covariances would
-        be noise themselves.
+        Pure noise. Its autoregressive model (Burg, smallest BIC) is used at lags where sample
+        covariances are only noise.
     longest : int
-        Lags at most.
+        Largest number of lags.
     """
     limit = _WILD * mad_sigma(quiet)
     tamed = np.clip(quiet - np.median(quiet), -limit, limit)
@@ -96,16 +96,16 @@ def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
 
 
 def whitener(bins: Bins, covariance: FloatArray) -> FloatArray:
-    """Lower triangle (m, m) that makes means over bins independent, of unit variance.
+    """Lower triangle (m, m) that makes means over bins independent with unit variance.
 
     Parameters
     ----------
     bins : Bins
         Of m bins.
     covariance : ndarray
-        Of single samples over their variance, from lag 0 until it has died away.
+        Of single samples relative to their variance, from lag 0 until it has decayed.
     """
-    # Variance of a sum of k samples, less what it grows by at last: bounded, however long bins are.
+    # Variance of a sum of k samples, minus its asymptotic growth: bounded for long bins.
     lag = np.arange(covariance.size + 1)
     plain = np.concatenate([[0.0], np.cumsum(covariance)])
     moment = np.concatenate([[0.0], np.cumsum(lag[:-1] * covariance)])

@@ -1,8 +1,8 @@
-"""Where a response first leaves the noise, and how fast a step response rises from there.
+"""Visible onset of a response, onset of a correlation, and rise time of a step response.
 
-Whitened correlation as in [1]_ and [2]_, slope of the phase as in [3]_. The first lasting motion is
-our own rule: a threshold in standard deviations, and the line through two thresholds back to rest.
-Rise time in its usual sense, 10 % to 90 %; the averaging is our own.
+Prewhitened correlation as in [1]_ and [2]_, slope of the phase as in [3]_. The visible onset is our
+own rule: a threshold in standard deviations, and extrapolation of the line through two thresholds
+to the baseline. Rise time in the usual sense, 10 % to 90 %; the averaging is our own.
 
 References
 ----------
@@ -30,7 +30,7 @@ from .filters import moving_mean
 
 @dataclass(frozen=True, eq=False)
 class CorrelationOnset:
-    """Cross-correlation of the whitened input with the output, filtered alike.
+    """Cross-correlation of the prewhitened input with the output, filtered alike.
 
     ``onset`` is the first lag where ``|rho| > bound`` (-1 if there is none) and `peak` the lag of
     the largest; `rho` and `bound` have shape (lags + 1,).
@@ -45,10 +45,10 @@ class CorrelationOnset:
 def correlation_onset(
     drive: FloatArray, output: FloatArray, lags: int, confidence: float
 ) -> CorrelationOnset:
-    """Correlate input and output after the input is made white.
+    """Correlate input and output after prewhitening of the input.
 
-    Whitened, the correlation is the pulse response up to a factor (Box and Jenkins, Time Series
-    Analysis, chapter 11); the bound holds for all lags together.
+    After prewhitening, the correlation is proportional to the pulse response (Box and Jenkins, Time
+    Series Analysis, chapter 11); the bound is for all lags together.
 
     Parameters
     ----------
@@ -56,21 +56,21 @@ def correlation_onset(
     lags : int
         Lags 0...lags.
     confidence : float
-        Chance that nothing is seen where nothing is.
+        Confidence: probability of no significant correlation if there is none.
     """
     c = autoregression(drive, min(20, drive.size // 20))
     whiten = np.concatenate([[1.0], -c])
     white = lfilter(whiten, [1.0], drive - drive.mean())[c.size :]
     alike = lfilter(whiten, [1.0], output - output.mean())[c.size :]
     rho = correlation(alike, white, lags)
-    # An input that is held for samples on end is silent between its moves when whitened: then few
-    # products make up a lag, and their own squares tell how far it scatters (White 1980).
+    # An input that is held for many samples is zero between its changes after prewhitening: few
+    # products then contribute to a lag, and their squares determine its scatter (White 1980).
     drive2, output2 = (white - white.mean()) ** 2, (alike - alike.mean()) ** 2
     pairs = np.array([drive2[: white.size - k] @ output2[k:] for k in range(lags + 1)])
     total = float(drive2.sum() * output2.sum())
     spread = np.sqrt(np.maximum(pairs / total if total > 0 else 0.0, 1 / white.size))
     bound = -ndtri((1 - confidence) / 2 / (lags + 1)) * spread
-    # What whitening has left of the input's own correlation shows a late response early as well.
+    # The remaining autocorrelation of the prewhitened input shows a late response early as well.
     left = np.abs(correlation(white, white, lags))
     left[left < 4 / np.sqrt(white.size)] = 0.0
     bound += [left[1 : lags + 1 - k] @ np.abs(rho[k + 1 :]) for k in range(lags + 1)]
@@ -89,7 +89,7 @@ def phase_slope(omega: FloatArray, phase: FloatArray, share: float) -> tuple[flo
     phase : ndarray, shape (K,)
         Unwrapped, rad.
     share : float
-        Part of the band, counted from its upper end in rad/s; at least three points are taken.
+        Part of the band, from its upper end in rad/s; at least three points are used.
     """
     count = max(int(np.count_nonzero(omega >= omega[-1] - share * np.ptp(omega))), 3)
     x, y = omega[-count:], phase[-count:]
@@ -107,11 +107,11 @@ _SMOOTHINGS = (1, 8, 64)
 
 @dataclass(frozen=True)
 class FirstMotion:
-    """Where an output leaves its rest level, in samples after the input's edge.
+    """Time at which an output leaves its baseline, in samples after the input's edge.
 
-    `crossing` is the first sample of a lasting excursion beyond 5 sigma (1.5 quantisation
-    steps, 0.5 % of the whole excursion); `onset` extrapolates the rise from there back to the
-    rest level, not further than to the last sample that is still inside one sigma.
+    `crossing` is the first sample of a lasting excursion beyond 5 sigma (1.5 quantisation steps,
+    0.5 % of the whole response); `onset` extrapolates the rise from there back to the baseline, at
+    most to the last sample inside one sigma.
     """
 
     crossing: int
@@ -124,7 +124,7 @@ class FirstMotion:
 def first_motion(
     output: FloatArray, edge: int, sigma: float, quantum: float, drift: float
 ) -> FirstMotion | None:
-    """Find the first motion of a record; None if the output stays where it is.
+    """Find the visible onset of a record; None if the output does not move.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def first_motion(
     sigma, quantum : float
         Noise level and quantisation step of the output.
     drift : float
-        Slope before the step, per sample. It is continued for as long as it was seen.
+        Slope before the step, per sample. It is extrapolated for as long as it was observed.
     """
     n = output.size
     if edge >= 8:
@@ -148,7 +148,7 @@ def first_motion(
     size = np.abs(moved[edge:])
     span = float(np.percentile(size, 80, overwrite_input=True))
     span = max(abs(float(np.median(moved[-end:]))), span)
-    del size, level  # of a long record every array counts
+    del size, level  # to save the memory of a long record
     single, noise = moved, sigma
     for smoothing in _SMOOTHINGS:
         if smoothing > 1:
@@ -176,13 +176,13 @@ def first_motion(
 
 
 def _clipped_index(n: int, edge: int) -> FloatArray:
-    """Samples from the edge on, not further from it than the record's start."""
+    """Samples from the edge on, at most as many as before it."""
     index = np.arange(-edge, n - edge, dtype=np.float64)
     return np.clip(index, -edge, edge, out=index)
 
 
 def _lasting(crossing: IntArray, smoothing: int) -> IntArray:
-    """How long an excursion must last: a quarter of the time that it took to come."""
+    """Required duration of an excursion: a quarter of the time until it started."""
     return np.asarray(np.maximum(3 * smoothing, np.ceil(0.25 * crossing).astype(np.int64)))
 
 
@@ -209,7 +209,7 @@ def _lasting_excursion(moved: FloatArray, threshold: float, smoothing: int) -> i
 
 
 def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:
-    """Continue the line through one and three thresholds back to the rest level."""
+    """Extrapolate the line through one and three thresholds to the baseline."""
     higher = np.flatnonzero(rise[crossing:] > 3 * threshold)
     if not higher.size:
         return float(crossing)
@@ -225,14 +225,14 @@ def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:
 def rise_time(step: FloatArray, dt: float) -> float:
     """Time in s from 10 % to 90 % of the final change of a step response.
 
-    The final level is the median of the last tenth. Crossings are those of the response
-    averaged over a window that is shortened until it is small beside the rise itself, so that
-    noise neither starts nor ends the rise early.
+    The final level is the median of the last tenth. The crossings are those of the response
+    averaged over a window that is shortened until it is short compared with the rise, so that noise
+    affects neither end.
 
     Parameters
     ----------
     step : ndarray, shape (N,), N >= 5
-        Starts at rest at 0.
+        Starts at 0.
     dt : float
         Sample time in s.
     """

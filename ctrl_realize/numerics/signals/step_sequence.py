@@ -1,6 +1,6 @@
-"""Write a measured input as a short list of moves.
+"""Approximate a measured input by a short sequence of steps.
 
-Our own rule: what does not differ by more than its noise is one level.
+Our own rule: values that differ by less than the noise are one level.
 """
 
 from __future__ import annotations
@@ -18,31 +18,30 @@ _SEGMENT_GROWTH = 0.5  # of the distance from the edge, over which a droop is ne
 def input_moves(
     signal: FloatArray, edges: list[tuple[int, int]], stop: int
 ) -> tuple[IntArray, FloatArray]:
-    """Moves of an input that holds between its edges, up to noise and slow variation.
+    """Steps of an input that is constant between its edges, up to noise and slow variation.
 
     Parameters
     ----------
     signal : ndarray, shape (N,)
         Measured input.
     edges : list of (index, samples)
-        First sample of every edge, and how many samples it takes.
+        First sample of every edge, and its duration in samples.
     stop : int
-        Samples from here on do not matter.
+        Samples from here on are not used.
 
     Returns
     -------
     index : ndarray, shape (L,)
         Samples at which the input moves.
     size : ndarray, shape (L,)
-        By how much.
+        Heights of the steps.
 
     Notes
     -----
-    A clean input is returned exactly. A noisy one keeps its edges sample by sample; between
-    them it is replaced by means over segments that grow from the edge on, as far as these
-    means differ by more than their noise: a drooping amplifier is followed, its noise is not.
-    Spikes of a few samples are those of the measurement or the drive, too short to move the
-    plant, and are left out.
+    A clean input is returned exactly. A noisy one keeps its edges sample by sample; between them it
+    is replaced by means over segments that grow from the edge on, if these means differ by more
+    than their noise: the droop of an amplifier is followed, its noise is not. Spikes of a few
+    samples, too short to move the plant, are left out.
     """
     signal = signal[:stop]
     moves = np.diff(signal, prepend=signal[0])
@@ -64,7 +63,7 @@ def input_moves(
 
 
 def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
-    """Piecewise means; one mean where they do not differ significantly."""
+    """Piecewise means; a single mean if they do not differ significantly."""
     values = _without_spikes(values, noise)
     n = values.size
     mean = np.full(n, float(np.median(values)))
@@ -82,6 +81,6 @@ def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
 
 
 def _without_spikes(values: FloatArray, noise: float) -> FloatArray:
-    """Replace what stands out of a running median of seven samples, so up to three of them."""
+    """Replace outliers from a running median of seven samples, at most three in a row."""
     middle = median_filter(values, size=7, mode="nearest")
     return np.where(np.abs(values - middle) > 6 * noise, middle, values)

@@ -1,7 +1,7 @@
-"""Is a time axis uniform, and if not, where does it break?
+"""Test whether a time axis is uniform, and find its first fault.
 
 Our own rule: time stamps within 5 % of a sample of the uniform grid were rounded when they were
-written; a missed sample is twenty times as far off.
+written; a missed sample is twenty times as far away.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..constants import LARGEST, SMALLEST
 UNIFORM_WITHIN = 0.05
 """Largest distance of a time stamp from the uniform grid, in samples.
 
-Time stamps printed with few digits (0.000073 s steps of 73.24 us) stay well inside it; a
-missed sample is twenty times as large.
+Time stamps printed with few digits (0.000073 s steps of 73.24 us) are well inside it; a missed
+sample is twenty times as large.
 """
 
 
 def sample_time(time: FloatArray) -> float:
-    """Mean step of a time axis, freed of the rounding that a subtraction leaves.
+    """Mean step of a time axis, without the rounding error of the subtraction.
 
     Examples
     --------
@@ -49,12 +49,12 @@ class AxisFault(NamedTuple):
     kind : str
         Key of the fault.
     row : int
-        Where it is.
+        Its row.
     value : float
         Time stamp of that row in s; for "tiny_steps" and "gap" the step in s, for "not_uniform"
         the distance from the uniform grid in samples.
     usual : float
-        What it is compared with, in s: the stamp before, or the usual step.
+        The value it is compared with, in s: the stamp before, or the usual step.
     worst : float
         Largest distance from the uniform grid, in samples.
     """
@@ -67,7 +67,7 @@ class AxisFault(NamedTuple):
 
 
 def axis_fault(time: FloatArray) -> AxisFault | None:
-    """Find the first fault of a time axis; None when it is uniform.
+    """Find the first fault of a time axis; None if it is uniform.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""State-space models: responses, sampling, balancing, sections, dead time approximations."""
+"""State-space models: responses, sampling, balancing, sections, approximation of dead time."""

@@ -44,7 +44,7 @@ def split_modes(
     Returns
     -------
     (A1, B1, C1), (A2, B2, C2)
-        Either may have no state.
+        Either may have no states.
     """
     n = A.shape[0]
     if n == 0:
@@ -72,8 +72,8 @@ MAX_DOUBLINGS = 60
 def gramian_factor(A: FloatArray, B: FloatArray) -> FloatArray:
     """Factor L with L L' = sum_k A^k B B' A'^k, by doubling.
 
-    ``[L, A^s L]`` holds twice as many terms; a QR step keeps it n columns wide. The Gramian itself
-    is never formed, so small directions keep their digits.
+    ``[L, A^s L]`` contains twice as many terms; a QR step keeps it n columns wide. The Gramian
+    itself is not formed, so small directions keep their digits.
 
     Parameters
     ----------
@@ -104,14 +104,14 @@ def balanced_truncation(
     ----------
     A, B, C : ndarray, shapes (n, n), (n, m), (p, n)
     order : int
-        0...n; lower where fewer directions are reachable and observable.
+        0...n; lower if fewer directions are reachable and observable.
 
     Returns
     -------
     A, B, C : ndarray
         Reduced; both Gramians are the diagonal of the kept singular values.
     singular_values : ndarray, shape (n,)
-        All Hankel singular values, falling.
+        All Hankel singular values, descending.
 
     References
     ----------

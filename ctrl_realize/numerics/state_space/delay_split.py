@@ -1,7 +1,6 @@
-"""Delays of several channels: split into those of inputs and outputs, and lines that hold the rest.
+"""Delays of several channels: split into those of inputs and outputs, and tapped delay lines.
 
-A line is a chain of delays with taps: one line per input serves all outputs, one per output all
-inputs.
+One tapped delay line per input serves all outputs, one per output all inputs.
 
 References
 ----------
@@ -21,32 +20,32 @@ Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntArray, IntArray]]:
-    """Share delays out to outputs and inputs: ``outputs[i] + inputs[j] <= delays[i, j]``.
+    """Split delays into outputs and inputs: ``outputs[i] + inputs[j] <= delays[i, j]``.
 
     Parameters
     ----------
     delays : ndarray of int, shape (p, m)
     known : ndarray of bool, shape (p, m)
-        Entries that have a delay; the others put no limit.
+        Entries that have a delay; the others impose no limit.
 
     Returns
     -------
     list of (outputs, inputs)
-        Whole numbers >= 0 of shapes (p,) and (m,). The first leaves the least sum inside the
-        entries. Where that leaves nothing it is the only one; else it is followed by the two that
-        serve the inputs first, or the outputs, whose rest lies in other entries.
+        Whole numbers >= 0 of shapes (p,) and (m,). The first leaves the smallest sum of residual
+        delays. If that sum is zero it is the only one; otherwise it is followed by the two splits
+        that give priority to the inputs, or the outputs, with other residual delays.
 
     Notes
     -----
-    The least rest is a linear program whose constraints are the edges of a bipartite graph:
-    totally unimodular, so that its corners are whole numbers (see the module).
+    The smallest sum is a linear program whose constraints are the edges of a bipartite graph:
+    totally unimodular, so that its vertices are whole numbers (see the module).
     """
     p, m = delays.shape
     rows, columns = np.nonzero(known)
     limits = np.zeros((rows.size, p + m))
     limits[np.arange(rows.size), rows] = 1.0
     limits[np.arange(rows.size), p + columns] = 1.0
-    # How many entries each delay serves, less a trifle for the samples that it takes.
+    # Number of entries that each delay serves, with a small penalty on the samples it takes.
     gain = np.concatenate([known.sum(axis=1), known.sum(axis=0)]) - 0.5 / (p + m)
     top = float(delays[known].max(initial=0))
     found = linprog(-gain, A_ub=limits, b_ub=delays[known], bounds=(0.0, top), method="highs")
@@ -61,20 +60,20 @@ def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntAr
 
 
 def _least(delays: IntArray, known: NDArray[np.bool_]) -> IntArray:
-    """Return the least known entry of each column; 0 where none is."""
+    """Return the smallest known entry of each column; 0 if there is none."""
     least = np.where(known, delays, np.iinfo(np.int64).max).min(axis=0)
     return np.where(known.any(axis=0), least, 0)
 
 
 def _balanced(outputs: IntArray, inputs: IntArray) -> tuple[IntArray, IntArray]:
-    """Move what all have in common to the side with fewer signals; to the inputs where equal."""
+    """Move the common delay to the side with fewer signals; to the inputs if they are equal."""
     p, m = outputs.size, inputs.size
     common = int(outputs.min()) if m <= p else -int(inputs.min())
     return outputs - common, inputs + common
 
 
 def joined_rows(parts: list[Matrices], taps: IntArray) -> Matrices:
-    """Join one model per output, all inputs each, behind tapped input lines.
+    """Join one model per output, each with all inputs, with tapped input delay lines.
 
     Parameters
     ----------
@@ -115,7 +114,7 @@ def joined_rows(parts: list[Matrices], taps: IntArray) -> Matrices:
 
 
 def joined_columns(parts: list[Matrices], taps: IntArray) -> Matrices:
-    """Join one model per input, all outputs each, in front of tapped output lines.
+    """Join one model per input, each with all outputs, with tapped output delay lines.
 
     The transpose of `joined_rows`: `parts` have shapes (n, n), (n, 1), (p, n), (p, 1).
     """

@@ -1,4 +1,4 @@
-"""Optimal state feedback of a core whose inputs act after different delays.
+"""Optimal state feedback of a core whose inputs have different delays.
 
 Known as the regulator for multiple input delays [1]_; with one delay it is the stationary gain on
 the predicted state [2]_.
@@ -27,18 +27,18 @@ def line_gain(
     final: Weights,
     delays: tuple[int, ...],
 ) -> FloatArray:
-    r"""Gain on the core's state and on the inputs that are under way.
+    r"""Gain for the core's state and the past inputs within the delays.
 
-    Call v_j[t] the input that acts t samples from now: ``v_j[t] = u_j[t - d_j]``. It is known for
+    Let v_j[t] be the input that acts t samples from now: ``v_j[t] = u_j[t - d_j]``. It is known for
     ``t < d_j`` and free from then on. After the longest delay T all inputs are free, and the
-    stationary regulator takes over with its cost P. From T back to the shortest delay each sample
-    is one step of the Riccati recursion for the inputs that are free at t; those that are under
-    way enter as known disturbances, by a term of the cost that is linear in the state:
+    stationary regulator with its cost P applies. From T back to the shortest delay each sample is
+    one step of the Riccati recursion for the inputs that are free at t; the known ones enter as
+    known disturbances, by a term of the cost that is linear in the state:
 
     .. math:: V_t(x) = x^T P_t x + 2 x^T S_t z + \dots, \quad z = [x_0; u_1[-1], u_1[-2] \dots]
 
-    A sweep forward then predicts ``x[t] = M_t z`` along the optimum and reads the row of input j
-    at ``t = d_j``.
+    A forward sweep then predicts ``x[t] = M_t z`` along the optimum and gives the row of input j at
+    ``t = d_j``.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def line_gain(
 
     Notes
     -----
-    ``(T - min(delays))`` steps with matrices of the core's size; the big Riccati equation has the
-    size of core and lines.
+    ``(T - min(delays))`` steps with matrices of the core's size; the full Riccati equation has the
+    size of core and delay lines.
     """
     n, m = B.shape
     d = np.array(delays, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Frequency response of a line of past samples with weights of their own.
+"""Frequency response of a delay line with individual weights.
 
 Our own: the closed form is the geometric series ``sum_{i=1..d} A^(i-1) z^-i = (z I - A)^-1 (I -
 z^-d A^d)``.
@@ -14,20 +14,20 @@ from .responses import frequency_response, schur_form
 CHUNK = 2048
 """Points that are evaluated together; bounds the memory of the powers."""
 LONG = 500
-"""Samples of a line from which the closed form takes over from the sum."""
+"""Length of a delay line from which on the closed form is used instead of the sum."""
 LOST = 1e-11
-"""Error, over the largest value that the sum can take, from which a point is summed after all."""
+"""Error, relative to the largest possible value of the sum, above which the sum is used."""
 
 
 class LineSum:
     r"""Evaluate :math:`\sum_{i=1}^{d} r_i z^{-i}` for columns r_i at many z.
 
-    Where the columns are pulse responses, ``r_i = C A^(i-1) B``, and only the last may differ,
-    a long line has a closed form, whose cost does not grow with d:
+    If the columns are pulse responses, ``r_i = C A^(i-1) B``, and only the last may differ, a long
+    delay line has a closed form, whose cost does not depend on d:
 
     .. math:: C (z I - A)^{-1} (B - z^{-d} A^d B) + (r_d - C A^{d-1} B) z^{-d}
 
-    Next to an eigenvalue of A both terms are large and cancel; there the sum is taken.
+    Near an eigenvalue of A both terms are large and cancel; the sum is used there.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class LineSum:
             here, there = np.moveaxis(frequency_response(form, B, C, none, z), 1, 0)
             behind = z ** (-self._length)
             out = here + (self._last - there) * behind
-            # Rounding of either term, n products each; not finite at an eigenvalue itself.
+            # Rounding of either term, with n products each; not finite at an eigenvalue itself.
             rough = np.abs(here).max(axis=0) * 1e-16 * B.shape[0]
         lost = ~(rough <= LOST * self._reach)
         out[:, lost] = self._summed(z[lost])
@@ -75,7 +75,7 @@ class LineSum:
 
 
 def _low_rank(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Write rows = mix @ few; all rows of a predictor come from one or two taps of its line."""
+    """Write rows = mix @ few; all rows of a predictor are combinations of one or two taps."""
     if rows.size == 0:
         return np.zeros((rows.shape[0], 0)), np.zeros((0, rows.shape[1]))
     U, s, V = np.linalg.svd(rows, full_matrices=False)

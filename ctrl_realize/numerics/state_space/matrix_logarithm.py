@@ -1,4 +1,4 @@
-"""Principal logarithm of a matrix, the same at every call.
+"""Principal logarithm of a matrix, reproducible in every call.
 
 References
 ----------
@@ -25,9 +25,9 @@ def principal_logarithm(A: FloatArray) -> FloatArray:
     """Find the real X with exp(X) = A whose eigenvalues have imaginary parts within +-pi.
 
     Inverse scaling and squaring [1]_: square roots of the triangular Schur factor until the Padé
-    approximant of degree 7 is exact to rounding, its diagonals from the eigenvalues themselves.
-    The matrices are small, so that norms of powers are computed; SciPy's `logm` estimates them
-    with numbers from NumPy's global generator.
+    approximant of degree 7 is exact to rounding, with diagonals from the eigenvalues themselves.
+    The matrices are small, so norms of powers are computed; SciPy's `logm` estimates them with
+    random numbers from NumPy's global generator.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ def _reach(R: ComplexArray) -> float:
 
 
 def _divided_difference(a: complex, b: complex) -> complex:
-    """(log b - log a) / (b - a), also where they are close (their eq. 5.6)."""
+    """(log b - log a) / (b - a), also if they are close (their eq. 5.6)."""
     if a == b:
         return 1 / a
     apart = np.log(b) - np.log(a)
-    if abs(apart) > 0.5:  # no digits cancel; on either side of the cut only this is right
+    if abs(apart) > 0.5:  # no cancellation; on different sides of the cut only this is valid
         return complex(apart / (b - a))
     return complex(2 * np.arctanh((b - a) / (b + a)) / (b - a))

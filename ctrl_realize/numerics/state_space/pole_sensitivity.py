@@ -1,7 +1,7 @@
-"""Small changes of a model: how its poles can move, what each move does, and the moved model.
+"""Small changes of a model: directions of pole moves, their effects, and the moved model.
 
 Our own: the derivatives are those of the logarithm of the factored transfer function, ``d log 1/(z
-- p) = dp / (z - p)``, the gain at z = 1 being kept.
+- p) = dp / (z - p)``, with constant gain at z = 1.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from .responses import markov
 Core = tuple[FloatArray, FloatArray, FloatArray, float]
 """A (n, n), B (n,), C (n,) and D of a discrete system of one channel."""
 Direction = tuple[str, complex, complex]
-"""What moves (``"speed"`` or ``"damping"``), the pole, and its change per unit of the move."""
+"""Kind of move (``"speed"`` or ``"damping"``), the pole, and its derivative w.r.t. the move."""
 FAITHFUL = 1e-6
-"""Error of the factored form, as a share of the largest Markov parameter, that is still used."""
+"""Largest error of the factored form, relative to the largest Markov parameter."""
 ON_CIRCLE = 1e-9
-"""A pole that has moved this close to the unit circle has no damping left."""
+"""A moved pole so close to the unit circle has no damping."""
 
 
 def pole_directions(poles: FloatArray | ComplexArray, dt: float) -> list[Direction]:
-    """Name the ways in which stable poles can move: (what, pole, change of the pole per unit).
+    """List the directions in which stable poles can move: (kind, pole, derivative of the pole).
 
-    A real pole has its ``"speed"`` (relative change of its time constant's inverse); a pair has
-    ``"speed"`` and ``"damping"`` (change of the damping ratio), stated for the member with
-    positive imaginary part. Poles at 1, at 0 and on the negative axis have no such direction.
+    A real pole has a ``"speed"`` (relative change of the inverse of its time constant); a pair has
+    ``"speed"`` and ``"damping"`` (change of the damping ratio), given for the pole with positive
+    imaginary part. Poles at 1, at 0 and on the negative axis have no such direction.
     """
     found: list[Direction] = []
     for p in np.asarray(poles, dtype=np.complex128):
@@ -52,10 +52,10 @@ def sensitivity_system(
     D: float,
     directions: list[Direction],
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Build the system from u to the core's output w and to its change along each direction.
+    """Build the system from u to the core's output w and to its derivative in each direction.
 
-    Moving a pole p of the factored transfer function by dp, gain at frequency 0 kept, multiplies
-    it by ``1 + dp / (z - p) - dp / (1 - p)``; a pair moves together.
+    Moving a pole p of the factored transfer function by dp with constant gain at frequency 0
+    multiplies it by ``1 + dp / (z - p) - dp / (1 - p)``; a pair moves together.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def sensitivity_system(
 def moved_core(
     core: Core, zeros: ComplexArray, directions: list[Direction], moves: FloatArray, dt: float
 ) -> tuple[Core, list[Direction]] | None:
-    """Move the poles of a core along their directions; zeros and gain at frequency 0 stay.
+    """Move the poles of a core along their directions; zeros and gain at frequency 0 are kept.
 
     Parameters
     ----------
@@ -111,8 +111,8 @@ def moved_core(
     Returns
     -------
     core, directions
-        The moved ones, directions in the same order; None where the core has no sum of simple
-        poles that reproduces it, and where a pole has gone where it cannot move from.
+        The moved ones, directions in the same order; None if a sum of simple poles does not
+        reproduce the core, or if a pole has moved to a place without a direction.
     """
     A, B, C, D = core
     poles = np.linalg.eigvals(A).astype(np.complex128)
@@ -130,14 +130,14 @@ def moved_core(
                 moved[k] = _moved_pole(moved[k], what, float(move), dt)
             elif pole.imag and np.isclose(near, np.conj(pole), rtol=1e-9, atol=0):
                 moved[k] = np.conj(_moved_pole(np.conj(moved[k]), what, float(move), dt))
-    # A pole that nothing moves may lie on the circle: an integrator's stays there.
+    # A pole without direction may be on the unit circle: that of an integrator stays there.
     if np.abs(moved[moved != poles]).max(initial=0.0) >= 1 - ON_CIRCLE:
         return None
     for what, pole, _ in directions:
         at = moved[int(np.abs(poles - pole).argmin())]
         same = [found for found in pole_directions(np.array([at]), dt) if found[0] == what]
         if not same:
-            # It has come to 0, or a pair to the real axis.
+            # It has reached 0, or a pair the real axis.
             return None
         fresh.append(same[0])
     free = np.abs(1 - poles) > 1e-9
@@ -148,11 +148,11 @@ def moved_core(
 
 def _moved_pole(pole: complex, what: str, move: float, dt: float) -> complex:
     if pole in (0, 1):
-        # where no speed and no damping moves it from
+        # a place without a direction for speed or damping
         return pole
     s = np.log(complex(pole)) / dt
     if what == "speed":
-        # e^100 times as fast is as good as at once
+        # e^100 times as fast is the same as instantaneous
         return complex(np.exp(s * np.exp(min(move, 100.0)) * dt))
     w = abs(s)
     zeta = min(max(-s.real / w + move, 0.0), 0.999)

@@ -62,14 +62,14 @@ def half_rule(
 ) -> tuple[float, FloatArray, float]:
     """Reduce prod(T s + 1) / prod(tau s + 1) exp(-theta s) to `order` lags and a dead time.
 
-    Leads are cancelled first against neighbouring lags (rules T1-T3). Then half of the largest
-    neglected lag goes to the smallest kept one and half to the dead time, which also takes all
+    Leads are cancelled first with neighbouring lags (rules T1-T3). Then half of the largest
+    neglected lag is added to the smallest kept one and half to the dead time, which also takes all
     further lags and all inverse-response time constants [1]_.
 
     Parameters
     ----------
     lags : ndarray, shape (n,)
-        tau > 0 in s; an integrator is not among them.
+        tau > 0 in s, without an integrator.
     leads : ndarray
         T > 0 in s of zeros in the left half plane.
     inverse : ndarray
@@ -77,16 +77,16 @@ def half_rule(
     dead_time : float
         theta in s.
     order : int
-        Lags to keep, an integrator not counted.
+        Number of lags to keep, without an integrator.
     integrating : bool, optional
-        An integrator takes part as an infinite lag.
+        An integrator is treated as an infinite lag.
 
     Returns
     -------
     factor : float
-        By which the gain changes (rules T1-T3).
+        Factor of the gain (rules T1-T3).
     lags : ndarray, shape (order,)
-        Largest first; zeros where there are fewer.
+        Largest first; zeros if there are fewer.
     dead_time : float
 
     References
@@ -101,7 +101,7 @@ def half_rule(
     if neglected:
         if order > 0:
             kept[-1] += neglected[0] / 2
-        # With order 0 the integrator, an infinite lag, takes the other half without a trace.
+        # With order 0 the other half is added to the integrator, an infinite lag, without effect.
         half = neglected[0] / 2 if order > 0 or integrating else neglected[0]
         theta += half + float(np.sum(neglected[1:]))
     return factor, np.array(kept), theta

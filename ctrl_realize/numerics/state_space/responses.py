@@ -1,9 +1,9 @@
 """Responses of discrete state-space models, without their delay chain.
 
-The transfer-function polynomial is never formed: with poles that crowd at z = 1, as those of
-oversampled records do, its coefficients lose all digits from order 10 on. Frequency responses
-go through the complex Schur form, time responses through block powers; both need no
-eigenvectors, so defective and unstable A are fine.
+The transfer-function polynomial is not formed: for poles clustered at z = 1, as those of
+oversampled records, its coefficients lose all digits from order 10 on. Frequency responses use the
+complex Schur form, time responses block powers; both need no eigenvectors, so a defective or
+unstable A is allowed.
 
 One decomposition for all frequencies as in [1]_, there with the Hessenberg form; balancing is that
 of [2]_.
@@ -26,7 +26,7 @@ from scipy.linalg import matrix_balance, schur
 from ..arrays import ComplexArray, FloatArray, block_powers
 
 BLOCK = 64
-"""Samples that are computed together; block powers are built by doubling up to here."""
+"""Samples that are computed together; the block powers are built by doubling."""
 
 
 Schur: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
@@ -37,9 +37,9 @@ def schur_form(A: FloatArray) -> Schur:
     """Return T, V and W with A = V T W, W = V^-1, T upper triangular.
 
     A is balanced first (Parlett and Reinsch, Numerische Mathematik 13, 1969): the Schur form is
-    exact to rounding of the largest entry of A, and series of controllers and plants in
-    companion form have entries from 1e-7 to 1e4, of which all count. Unbalanced the response of
-    such a loop is wrong by 7e-3.
+    accurate to rounding of the largest entry of A, while series of controllers and plants in
+    companion form have relevant entries from 1e-7 to 1e4. Without balancing the response of such a
+    loop is wrong by 7e-3.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def markov(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, count: in
         out = np.zeros((p, m, count))
         out[:, :, :1] = D[:, :, None]
         return out
-    # About as many rows as columns: the product of both then is nearly all of the work.
+    # About as many rows as columns: the product of both is then nearly all of the work.
     block = 1 << (((count - 2).bit_length() + 1) // 2)
     rows, jump = block_powers(C, A, block)
     columns, _ = block_powers(B.T, jump.T, -(-(count - 1) // block))
@@ -140,8 +140,8 @@ def step_response(
     ndarray, shape (p, m, count)
     """
     n, m = B.shape
-    # [[A, B], [0, I]] carries the held input: its Markov parameters are the step response,
-    # without the running sum that would lose digits in long records.
+    # [[A, B], [0, I]] includes the held input: its Markov parameters are the step response, without
+    # a running sum that would lose digits in long records.
     held = np.eye(n + m)
     held[:n, :n], held[:n, n:] = A, B
     start = np.eye(n + m)[:, n:]
@@ -164,7 +164,7 @@ def simulate(
     A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
     inputs : ndarray, shape (m, N)
     initial_state : ndarray, shape (n,), optional
-        Zero when absent.
+        Default: zero.
 
     Returns
     -------
@@ -201,7 +201,7 @@ def block_operators(
     ----------
     A, B, C, D : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
     length : int
-        A power of two; of any other length `jump` is too far a step.
+        A power of two; for any other length `jump` is too long a step.
 
     Returns
     -------

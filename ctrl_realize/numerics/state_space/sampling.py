@@ -51,9 +51,9 @@ def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray
 
 
 def split_dead_time(dead_time: float, dt: float) -> tuple[int, float]:
-    """Split a dead time into whole samples and a rest in 0..1 (a fraction of dt).
+    """Split a dead time into whole samples and a fraction of dt in 0..1.
 
-    A rest closer to a whole sample than rounding can tell is that whole sample.
+    A fraction that differs from a whole sample only by rounding becomes that whole sample.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def split_dead_time(dead_time: float, dt: float) -> tuple[int, float]:
 def sample_with_dead_time(
     A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, dt: float, dead_time: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, int]:
-    """Sample a continuous model whose input is held and then delayed by any dead time.
+    """Sample a continuous model with a hold and any dead time.
 
     With dead time (d + f) dt, 0 < f < 1, the held input that acts during a sample changes
     once, after f dt. With Gamma0 the integral of exp(A s) B over the rest (1-f) dt, the state
@@ -94,7 +94,7 @@ def sample_with_dead_time(
     A, B, C, D : ndarray
         Sampled core.
     delay : int
-        Whole samples that stand before it.
+        Whole samples of delay.
     """
     whole, rest = split_dead_time(dead_time, dt)
     if rest == 0.0:
@@ -116,7 +116,7 @@ def inverse_zero_order_hold(
 ) -> tuple[FloatArray, FloatArray]:
     """Find F, G with x' = F x + G u, held over `dt`, giving x[k+1] = A x[k] + B u[k].
 
-    The principal logarithm is taken: of all models with the same samples, the one whose poles lie
+    The principal logarithm is taken: of all models with the same samples, the one whose poles are
     below the Nyquist frequency. No eigenvalue of A may be zero or real and negative.
 
     Parameters
@@ -140,11 +140,11 @@ def inverse_zero_order_hold(
 def split_fraction(
     A: FloatArray, B: FloatArray, C: FloatArray, direct: float, dt: float
 ) -> tuple[FloatArray, FloatArray, float] | None:
-    """Read a fraction of a sample out of the direct term of a sampled model.
+    """Determine a fraction of a sample from the feedthrough of a sampled model.
 
-    A strictly proper model behind a dead time of (d + f) samples has, sampled, the delay d + 1
-    and the direct term C Gamma0, with Gamma0 the integral of exp(F s) G over the last (1 - f) dt
-    of a sample. This finds f in 0...1 from that.
+    A strictly proper model with a dead time of (d + f) samples has, when sampled, the delay d + 1
+    and the feedthrough C Gamma0, with Gamma0 the integral of exp(F s) G over the last (1 - f) dt of
+    a sample. This determines f in 0...1.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def split_fraction(
     Returns
     -------
     F, G, f
-        None where no fraction explains the direct term.
+        None if no fraction explains the feedthrough.
     """
     n = A.shape[0]
     F = principal_logarithm(A) / dt
@@ -176,7 +176,7 @@ def split_fraction(
         return None
 
     def direct_slope(f: float) -> float:
-        # Of several exact answers the one whose response starts most smoothly is meant.
+        # Of several exact solutions the one whose response starts most smoothly is chosen.
         return abs(float((C @ inputs(f))[0, 0]))
 
     best = min(roots, key=direct_slope)
@@ -184,7 +184,7 @@ def split_fraction(
 
 
 def _roots_in_unit_interval(function: Callable[[float], float], scale: float) -> list[float]:
-    """Roots in 0...1, pairs that nearly touch included."""
+    """Roots in 0...1, including nearly double ones."""
     grid = np.linspace(0, 1, 33)
     values = np.array([function(float(x)) for x in grid])
     nodes = list(zip(grid.tolist(), values.tolist(), strict=True))

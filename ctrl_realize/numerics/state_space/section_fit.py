@@ -1,10 +1,10 @@
-"""Output-error fit of a model of several channels, from a start that is roughly right.
+"""Output-error fit of a model with several channels, from an approximate initial model.
 
-The misfit is the likelihood of white noise of an unknown size in every output,
-``sum_a n_a log(rss_a / n_a) / 2``. The level of every output and the initial state of every
-record enter linearly and are eliminated (variable projection); the rest moves by damped
-Gauss-Newton steps. The sections leave two directions each in which B and C cancel: the damping
-keeps still there.
+The misfit is the likelihood of white noise of unknown variance in every output, ``sum_a n_a
+log(rss_a / n_a) / 2``. The level of every output and the initial state of every record enter
+linearly and are eliminated (variable projection); the other parameters are optimised by damped
+Gauss-Newton steps. Each section has two directions in which B and C cancel; the damping prevents
+steps along them.
 
 Prediction errors with one unknown variance for each output [1]_; elimination as in [2]_, steps as
 in [3]_.
@@ -35,10 +35,10 @@ from .sections import Motion, Sections, motion
 
 MOST_STEPS = 40
 ENOUGH = 0.01
-"""Gain of log likelihood below which a step is the last one: far inside what data can tell."""
+"""Increase of log likelihood below which the iteration ends: insignificant for any data."""
 _DAMPING = Damping(tries=16)
 _ROWS = 4096
-"""Samples whose derivatives are formed at once."""
+"""Number of samples whose derivatives are computed together."""
 LARGEST_POLE = 1 - 1e-7
 _AT_EDGE = 1e-9
 _FROM_OUTSIDE = 0.999  # where a pole of a start that is unstable begins
@@ -51,7 +51,7 @@ _EXACT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Inputs `v` (m, T) and outputs `y` (p, T); NaN in y takes a sample out."""
+    """Inputs `v` (m, T) and outputs `y` (p, T); NaN in y is a missing sample."""
 
     v: FloatArray
     y: FloatArray
@@ -59,9 +59,11 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class SectionFit:
-    """Fitted `model`; `variance` left of the `spread` (p,) of every output, `counts` samples.
+    """Fitted `model` with its residuals.
 
-    ``loss`` is minus the log likelihood up to a constant; `steps` the Gauss-Newton steps.
+    `variance` and `spread` (p,) are the variances of the residuals and of the outputs,
+    `counts` the numbers of samples. ``loss`` is minus the log likelihood up to a constant;
+    `steps` is the number of Gauss-Newton steps.
     """
 
     model: Sections
@@ -74,9 +76,11 @@ class SectionFit:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """A model, its signals from rest, residuals (zero where nothing was measured), and its misfit.
+    """A model with its signals for zero initial state, residuals and misfit.
 
-    `initial` (2 q,) are the states in which the experiments begin.
+    The residuals of missing samples are zero.
+
+    `initial` (2 q,) are the initial states of the experiments.
     """
 
     model: Sections
@@ -101,13 +105,13 @@ def fit_sections(
     ----------
     data : sequence of Experiment
     start : Sections
-        Its B and D are found anew, its poles are drawn inside the unit circle.
+        Its B and D are estimated again, its poles are moved inside the unit circle.
     feedthrough : bool
-        Whether D is free, else it is zero.
+        Whether D is free; otherwise it is zero.
     enough : float
-        Gain of log likelihood below which a step is the last one.
+        Increase of log likelihood below which the iteration ends.
     most : int
-        Steps at most.
+        Largest number of steps.
     """
     known = [np.isfinite(one.y) for one in data]
     counts = np.sum([k.sum(axis=1) for k in known], axis=0).astype(np.float64)
@@ -161,7 +165,7 @@ def fit_sections(
 
 
 def _inside(model: Sections, to: float) -> Sections:
-    """Draw poles that are beyond the largest one radially inside."""
+    """Move poles beyond the largest one radially inside."""
     if np.abs(model.poles).max(initial=0.0) <= LARGEST_POLE:
         return model
     a = model.a.copy()
@@ -175,14 +179,14 @@ def _inside(model: Sections, to: float) -> Sections:
 def _held(
     model: Sections, gram: FloatArray, slope: FloatArray, mask: NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
-    """Take out the directions in which poles at the edge of stability would leave it [4]_."""
+    """Remove the directions in which poles at the stability boundary would cross it [4]_."""
     place = np.cumsum(mask) - 1
     for i, (a1, a2) in enumerate(model.a):
         single = model.single and i == len(model.a) - 1
         poles = np.array([-a1]) if single else np.roots([1.0, a1, a2])
         for pole in poles[np.abs(poles) > LARGEST_POLE - _AT_EDGE]:
-            # How the modulus of the pole rises: that of a pair with a2, that of a real one as
-            # the polynomial falls there.
+            # Derivative of the pole's modulus: for a pair w.r.t. a2, for a real pole from the
+            # derivative of the polynomial.
             outward = np.zeros(slope.size)
             if single:
                 outward[place[2 * i]] = -np.sign(pole.real)
@@ -193,7 +197,7 @@ def _held(
             outward /= np.linalg.norm(outward)
             if outward @ slope > 0:
                 slope = slope - outward * (outward @ slope)
-                # What bends there stays, so that no rounding of nothing is divided by.
+                # Zero denominators are avoided for rounding errors.
                 bend = outward @ gram @ outward
                 gram = gram - np.outer(outward, outward @ gram)
                 gram = gram + np.outer(bend * outward - gram @ outward, outward)
@@ -218,9 +222,9 @@ def _basis(
 ) -> tuple[FloatArray, FloatArray]:
     """Orthonormal columns (p T, k) that span the weighted responses of `_linear`.
 
-    And (columns, k) by which parts of these become initial states and levels. Normal equations
-    would square their condition: of slow poles, whose responses are alike, too little would be
-    left to tell a minimum from what is beside it.
+    And (columns, k), by which their coefficients become initial states and levels. Normal equations
+    would square the condition number: for slow poles, whose responses are similar, the minimum
+    would not be found accurately.
     """
     p = known.shape[0]
     columns = _linear(model, moved, p) * known[:, None]
@@ -242,13 +246,13 @@ def _residual(
     known: NDArray[np.bool_],
     weights: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """What is left of the outputs with the best initial state and levels, and that state (2 q,)."""
+    """Residual of the outputs with the best initial state and levels, and that state (2 q,)."""
     root = np.sqrt(weights)[:, None]
     rest = (np.where(known, one.y - moved.output(model, one.v), 0.0) * root).ravel()
     basis, back = _basis(model, moved, known, weights)
     parts = rest @ basis
     left = rest - basis @ parts
-    left -= basis @ (left @ basis)  # the digits that the first time has lost
+    left -= basis @ (left @ basis)  # repeated, for the digits lost the first time
     initial = (back @ parts)[: model.a.size]
     return np.asarray(left.reshape(known.shape) / root), np.asarray(initial)
 
@@ -260,7 +264,7 @@ def _normal(
     weights: FloatArray,
     mask: NDArray[np.bool_],
 ) -> tuple[FloatArray, FloatArray]:
-    """Normal equations of the moving parameters, free of levels and initial states."""
+    """Normal equations of the remaining parameters, after elimination of levels and states."""
     count = int(mask.sum())
     gram, slope, size = np.zeros((count, count)), np.zeros(count), np.zeros(count)
     for one, rest, seen, left, initial in zip(
@@ -283,6 +287,6 @@ def _normal(
         gram += sums[:count, :count] - own @ own.T
         size += np.diag(sums)[:count]
         slope += sums[:count, -1] - own @ other
-    # A column that levels and initial states explain leaves rounding, of either sign.
+    # A column explained by levels and initial states leaves rounding errors of either sign.
     np.fill_diagonal(gram, np.maximum(np.diag(gram), _ROUNDING * size))
     return gram, slope

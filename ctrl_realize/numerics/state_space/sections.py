@@ -1,14 +1,14 @@
-r"""Models of several channels in second-order sections, and their derivatives as filtered signals.
+r"""Multivariable models in second-order sections; their derivatives as filtered signals.
 
 A model is a sum of sections with two states each,
 
     x_i[k+1] = A_i x_i[k] + B_i v[k],   y[k] = sum_i C_i x_i[k] + D v[k],
     A_i = [[0, 1], [-a2, -a1]],
 
-which holds two real poles as well as a complex pair, and lets one become the other. Every
-derivative of the output is a signal behind ``1 / (z^2 + a1 z + a2)``: a few filters of second
-order, where derivatives in all entries of A would take n^2 simulations. Of an odd order the last
-section has one state: its a2, the first row of its B and the first column of its C are zero.
+which represents two real poles as well as a complex pair. Every derivative of the output is a
+signal filtered by ``1 / (z^2 + a1 z + a2)``: a few second-order filters, where derivatives w.r.t.
+all entries of A would need n^2 simulations. For an odd order the last section has one state: its
+a2, the first row of its B and the first column of its C are zero.
 
 Derivatives by filters as in [1]_.
 
@@ -32,14 +32,14 @@ from ..arrays import ComplexArray, FloatArray
 Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 _SHAKEN = 1e-8
-"""Part of A by which it is changed where it has no full set of eigenvectors, or equal poles."""
+"""Relative change of A if it has no full set of eigenvectors, or equal poles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sections:
     """Denominators `a` (q, 2), `B` (q, 2, m), `C` (p, q, 2), `D` (p, m).
 
-    `single` tells that the last section has one state.
+    `single`: the last section has one state.
     """
 
     a: FloatArray
@@ -59,7 +59,7 @@ class Sections:
         return np.asarray(found, dtype=np.complex128)
 
     def matrices(self) -> Matrices:
-        """Return A, B, C, D, without the states that a single section does not have."""
+        """Return A, B, C, D, without the unused states of a single section."""
         p, q, _ = self.C.shape
         A = block_diag(*[np.array([[0.0, 1.0], [-a2, -a1]]) for a1, a2 in self.a])
         B, C = self.B.reshape(2 * q, -1), self.C.reshape(p, 2 * q)
@@ -93,7 +93,7 @@ class Sections:
 
 
 def in_sections(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> Sections:
-    """Take a model apart, poles in pairs: complex ones, and neighbours on the real axis."""
+    """Convert a model to sections: complex pairs, and pairs of neighbouring real poles."""
     poles, vectors = np.linalg.eig(A)
     apart = np.abs(poles[:, None] - poles + 9 * np.eye(len(A)))
     if apart.min(initial=1.0) < _SHAKEN or np.linalg.cond(vectors) > 1 / _SHAKEN:
@@ -128,7 +128,7 @@ def in_sections(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> S
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Signals of a model that starts at rest, and what its derivatives are made of.
+    """Signals of a model with zero initial state, and those for its derivatives.
 
     `states` (q, 2, T); `driven` (q, 2, 2, m, T): states for an entry (row, input) of B;
     `bent` (q, 2, 2, T): states by a1 and a2; `free` (q, 2, 2, T): states for an initial one.
@@ -157,7 +157,7 @@ class Motion:
         return np.concatenate([x.reshape(-1, count) for x in (bent, driven, own, direct)])
 
     def started(self, model: Sections, initial: FloatArray) -> Motion:
-        """Signals of the model when it does not begin at rest, but in a state (2 q,)."""
+        """Signals of the model for a nonzero initial state (2 q,)."""
         each = initial.reshape(-1, 2)
         states = self.states + np.einsum("qsrt,qr->qst", self.free, each)
         bent = [_bent(a1, a2, x) for (a1, a2), x in zip(model.a, states, strict=True)]
@@ -167,7 +167,7 @@ class Motion:
         """Outputs (p, 2 q, T) for every initial state."""
         p, q, _ = model.C.shape
         found = np.einsum("pqs,qsrt->pqrt", model.C, self.free).reshape(p, 2 * q, -1)
-        # Products of what has died away would be denormal numbers, on which processors are slow.
+        # Products of decayed values would be denormal numbers, which are slow.
         found[np.abs(found) < 1e-100] = 0.0
         return np.asarray(found)
 

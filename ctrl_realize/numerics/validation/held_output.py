@@ -1,7 +1,7 @@
-"""Outputs that stand still where a plant does not: held between samples, or at their limit.
+"""Outputs that are constant while the plant moves: held between samples, or at a limit.
 
-Our own rule: noise of one quantisation step [1]_ repeats a value seldom, a held output most of the
-time.
+Our own rule: noise of one quantisation step [1]_ rarely repeats a value, a held output does so most
+of the time.
 
 References
 ----------
@@ -29,9 +29,9 @@ differ by 12 % of their mean; of the steps of a held curve 30 % would be that ne
 
 
 def held_share(output: FloatArray, fitted: FloatArray) -> float:
-    """Part of the samples that repeat the one before while the model moves; 0 if it never does.
+    """Fraction of samples that repeat the previous one while the model moves; 0 if it never does.
 
-    Noise with a deviation of the quantisation step repeats 28 % of them.
+    Noise with a standard deviation of the quantisation step repeats 28 % of them.
     """
     held, moving = _held(output, fitted)
     if not moving.any() or moving.sum() < _FEWEST:
@@ -40,16 +40,16 @@ def held_share(output: FloatArray, fitted: FloatArray) -> float:
 
 
 def longest_hold(output: FloatArray, fitted: FloatArray) -> int:
-    """Longest time in samples for which an output is held while the model moves."""
+    """Longest time in samples for which an output is constant while the model moves."""
     starts, ends = _runs(_held(output, fitted)[0])
     return int((ends - starts).max(initial=0))
 
 
 def _held(output: FloatArray, fitted: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Samples (N - 1,) that repeat the one before, and those in which the model moves.
+    """Samples (N - 1,) that repeat the previous one, and those in which the model moves.
 
-    Rounding repeats a value for as long as the signal moves by less than a step of the converter:
-    only a value that stands while the model moves by more than that is held.
+    Rounding repeats a value as long as the signal moves by less than a quantisation step: an output
+    counts as held only if the model moves by more than that.
     """
     moves = np.abs(np.diff(fitted))
     moving = (moves >= _FAST * moves.max(initial=0.0)) & (moves > 0)
@@ -63,7 +63,7 @@ def _held(output: FloatArray, fitted: FloatArray) -> tuple[BoolArray, BoolArray]
 
 
 def _converter_step(output: FloatArray) -> float:
-    """Step of the converter, 0 where none shows; a record of few digits rounds it once more."""
+    """Quantisation step, 0 if there is none; a record with few digits rounds it once more."""
     gaps = np.diff(np.unique(output))
     gaps = gaps[gaps > rounding_error(output)]
     if gaps.size == 0:
@@ -75,13 +75,13 @@ def _converter_step(output: FloatArray) -> float:
 
 
 def _runs(true: BoolArray) -> tuple[IntArray, IntArray]:
-    """First positions of runs of True, and the positions behind them."""
+    """First positions of runs of True, and the positions after them."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
     return ends[::2], ends[1::2]
 
 
 def samples_at_limit(output: FloatArray) -> int:
-    """Count the samples in runs at the highest or lowest value of an output that has noise."""
+    """Count the samples in runs at the highest or lowest value of a noisy output."""
     same, nothing = _repeats(output), rounding_error(output)
     count = 0
     for limit in (output.max(), output.min()):
@@ -95,5 +95,5 @@ def samples_at_limit(output: FloatArray) -> int:
 
 
 def _repeats(output: FloatArray) -> BoolArray:
-    """Samples (N - 1,) that are the one before, but for rounding."""
+    """Samples (N - 1,) equal to the previous one, up to rounding."""
     return np.abs(np.diff(output)) <= rounding_error(output)

@@ -1,8 +1,8 @@
-"""Tests on what the past does not predict: does the input follow the output, is the plant linear?
+"""Tests based on innovations: does the input depend on the output, is the plant linear?
 
-The output is predicted from its own past and that of the input by one long regression, with no
-model of the plant in between. So the tests stay right where the model that was fitted is wrong:
-closed-loop records are often fitted by the controller turned round, which leaves no residual.
+The output is predicted from its own past and that of the input by one long regression, without a
+model of the plant. So the tests remain valid if the fitted model is wrong: in closed loop a fit may
+be that of the inverse controller, which leaves no residual.
 
 References
 ----------
@@ -50,13 +50,13 @@ _RANK = 1e-10  # of the largest singular value: rounding
 
 @dataclass(frozen=True, eq=False)
 class _Past:
-    """Regressors (rows, q) of what came before each of the samples `here`."""
+    """Regressors (rows, q): the past before each of the samples `here`."""
 
     here: IntArray
     columns: FloatArray
 
     def left(self, targets: FloatArray) -> tuple[FloatArray, int]:
-        """What the past leaves of targets (rows, k), and its rank."""
+        """Residual of targets (rows, k) after regression on the past, and its rank."""
         size = np.linalg.norm(self.columns, axis=0)
         scaled = self.columns / np.where(size > 0, size, 1.0)
         solution, _, rank, _ = np.linalg.lstsq(scaled, targets, rcond=_RANK)
@@ -64,26 +64,26 @@ class _Past:
 
 
 def feedback_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
-    """Chance that an input follows its output as it does, in open loop.
+    """P-value of the dependence of the input on the output, for an open loop.
 
-    In open loop the input knows nothing of the disturbance: what is new in the output has nothing
-    to do with what is new in the input now and after (Sims, Money, income, and causality, Am. Econ.
-    Rev. 62 (1972) 540-552; by innovations: Haugh, J. Am. Stat. Ass. 71 (1976) 378-385). Nor does
-    the output tell more of the input than that tells of itself (Granger, Econometrica 37 (1969)
-    424-438), as it does of a relay's. A plant that answers within the same sample looks like
-    feedback too.
+    In open loop the input does not depend on the disturbance: the innovations of the output are
+    independent of the present and future innovations of the input (Sims, Money, income, and
+    causality, Am. Econ. Rev. 62 (1972) 540-552; by innovations: Haugh, J. Am. Stat. Ass. 71 (1976)
+    378-385). Nor does the past output improve the prediction of the input (Granger, Econometrica 37
+    (1969) 424-438), as it does for a relay. A plant that responds within the same sample cannot be
+    distinguished from feedback.
 
     Parameters
     ----------
     output, drive : ndarray, shape (N,)
     past : int
-        Past inputs in the regression, which should reach beyond the dead time.
+        Number of past inputs in the regression, which should exceed the dead time.
 
     Returns
     -------
     float
-        Twice the smaller of the upper tails of two F distributions, at most 1; 1 where the record
-        is too short or where its own past tells the input.
+        Twice the smaller of the upper tails of two F distributions, at most 1; 1 if the record is
+        too short or its input is predictable.
     """
     known = _past(output, drive, past, _AHEAD)
     if known is None:
@@ -98,7 +98,7 @@ def feedback_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
 
 
 def _led(output: FloatArray, drive: FloatArray, past: int) -> float:
-    """Chance that outputs tell an input beyond its own past as they do (Granger)."""
+    """P-value of the prediction of the input by past outputs (Granger causality)."""
     here = np.arange(past, output.size)
     own = np.stack([np.ones(here.size), *(drive[here - i] for i in range(1, past + 1))], axis=1)
     outputs = np.stack([output[here - i] for i in range(_OUTPUTS)], axis=1)
@@ -109,24 +109,24 @@ def _led(output: FloatArray, drive: FloatArray, past: int) -> float:
 
 
 def nonlinear_chance(output: FloatArray, drive: FloatArray, past: int) -> tuple[float, float]:
-    """Chance that a linear plant's innovations go with products of past inputs, and their part.
+    """P-value of nonlinear terms for a linear plant, and their share of the innovations.
 
-    Means of the input over six pieces of the past, their products by two and their cubes are
-    added to the regression (a Volterra series with few parameters: Tsay, Nonlinearity tests for
-    time series, Biometrika 73 (1986) 461-466; Ljung, System Identification, 2nd ed., section
-    16.6, on residuals against other functions of the data).
+    Means of the input over six parts of the past, their products and cubes are added to the
+    regression (a Volterra series with few parameters: Tsay, Nonlinearity tests for time series,
+    Biometrika 73 (1986) 461-466; Ljung, System Identification, 2nd ed., section 16.6, on residuals
+    against other functions of the data).
 
     Parameters
     ----------
     output, drive : ndarray, shape (N,)
     past : int
-        Samples within which most of a response happens.
+        Number of samples within which most of the response occurs.
 
     Returns
     -------
     chance, part : float
-        Upper tail of the F distribution, and the part of the innovations' variance explained;
-        1 and 0 where the record is too short or where its own past tells the input.
+        Upper tail of the F distribution, and the fraction of the innovations' variance explained; 1
+        and 0 if the record is too short or its input is predictable.
     """
     known = _past(output, drive, past, 0)
     if known is None:
@@ -158,7 +158,7 @@ def _past(output: FloatArray, drive: FloatArray, past: int, ahead: int) -> _Past
 
 
 def _tamed(values: FloatArray) -> FloatArray:
-    """Cut what lies far out; an input that rests between its moves is left as it is."""
+    """Clip outliers; an input that is constant between its changes is not modified."""
     spread = mad_sigma(values)
     if spread <= _SPARSE * float(values.std()):
         return values
@@ -168,7 +168,7 @@ def _tamed(values: FloatArray) -> FloatArray:
 def _chance(
     columns: FloatArray, target: FloatArray, beside: FloatArray, taken: int
 ) -> tuple[float, float]:
-    """F test of columns beside others, `taken` parameters being used already."""
+    """F test of additional columns, with `taken` parameters already in use."""
     alone, first = _squares(beside, target)
     both, rank = _squares(np.column_stack([beside, columns]), target)
     freedom = target.size - rank - taken
@@ -179,7 +179,7 @@ def _chance(
 
 
 def _squares(columns: FloatArray, target: FloatArray) -> tuple[float, int]:
-    """Sum of squares that columns leave, and their rank."""
+    """Residual sum of squares of columns, and their rank."""
     if not columns.shape[1]:
         return float(target @ target), 0
     size = np.linalg.norm(columns, axis=0)

@@ -1,9 +1,9 @@
-"""Test whether a plant is unstable, on a record made while something else held it.
+"""Test for an unstable plant, from a record made in closed loop.
 
-Every structure that is fitted is stable, and follows an unstable plant in a closed loop as well
-as it can. One-step predictions know better: of an output ``y = (B u + C e) / A`` the regression on
-its own past and that of the input tends to ``A/C`` and ``B/C`` with a stable C [1]_, so that
-an unstable pole stays a zero of the polynomial of past outputs.
+All fitted structures are stable, and describe an unstable plant in a closed loop as well as they
+can. One-step prediction is different: for an output ``y = (B u + C e) / A`` the regression on its
+own past and that of the input tends to ``A/C`` and ``B/C`` with a stable C [1]_, so that an
+unstable pole remains a zero of the polynomial of past outputs.
 
 References
 ----------
@@ -28,25 +28,25 @@ _RANK = 1e-10  # of the largest singular value: rounding
 
 
 def unstable_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
-    """Chance that the output of a stable plant predicts itself as this one does.
+    """P-value of the regression on past outputs, for a stable plant.
 
-    The polynomial ``A(q) = 1 + a_1 q^-1 + ...`` of past outputs is positive at ``q = 1`` if all
-    its zeros are inside the unit circle, and negative if one real zero is outside. That is a t-test
-    of a sum of coefficients: of an autoregression alone it is the right-tailed test of Dickey and
+    The polynomial ``A(q) = 1 + a_1 q^-1 + ...`` of past outputs is positive at ``q = 1`` if all its
+    zeros are inside the unit circle, and negative if one real zero is outside. This is a t-test of
+    a sum of coefficients: for an autoregression alone it is the right-tailed test of Dickey and
     Fuller for explosive behaviour (Phillips, Wu and Yu, Int. Econ. Rev. 52 (2011) 201-226), whose
-    quantiles at a pole of 1 are less far out than Student's. Pairs of unstable poles are not told.
+    quantiles for a pole at 1 are smaller than Student's. Pairs of unstable poles are not detected.
 
     Parameters
     ----------
     output : ndarray, shape (N,)
     drive : ndarray, shape (N,) or (m, N)
     past : int
-        Past inputs in the regression, which should reach beyond the dead time.
+        Number of past inputs in the regression, which should exceed the dead time.
 
     Returns
     -------
     float
-        Lower tail of Student's distribution; 1 where the record is too short or has no noise.
+        Lower tail of Student's distribution; 1 if the record is too short or has no noise.
     """
     before = max(OWN_PAST, past)
     rows = output.size - before

@@ -1,4 +1,4 @@
-"""One record against the response of a model that is common to several.
+"""Response of one record relative to a model that is common to several.
 
 The test of homogeneity is that of [1]_; shift, gain and stretch come from the linear model [2]_
 about the common response.
@@ -29,11 +29,11 @@ _SETTLED = 1e-3  # samples, and part of the lags
 
 @dataclass(frozen=True, eq=False)
 class OwnResponse:
-    """One record against the common model, with standard errors.
+    """One record relative to the common model, with standard errors.
 
-    `shift` in s and `gain` (a ratio) are found together, the lags being common; `lag` is the ratio
-    of all time constants where delay and gain are the record's own too, and its error is relative.
-    `followed` is how much of the record the common model explains as it is, in percent.
+    `shift` in s and `gain` (a ratio) are estimated together, with common lags; `lag` is the ratio
+    of all time constants with delay and gain free too, and its error is relative. `followed` is the
+    fit percentage of the unchanged common model.
     """
 
     shift: float
@@ -46,9 +46,9 @@ class OwnResponse:
 
 
 def homogeneity(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
-    """Chi-square of estimates about their weighted mean, and the chance of a larger one.
+    """Chi-square of estimates about their weighted mean, and its p-value.
 
-    Estimates whose error is not finite say nothing.
+    Estimates with infinite errors are ignored.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def homogeneity(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
 def own_step_response(
     output: FloatArray, model: FloatArray, start: float, own: FloatArray, dt: float
 ) -> OwnResponse:
-    """Shift, scale and stretch the common response of a step until it fits one record best.
+    """Shift, scale and stretch the common response of a step to fit one record best.
 
     Parameters
     ----------
@@ -78,14 +78,14 @@ def own_step_response(
     model : ndarray, shape (N,), N >= n
         Response of the common model.
     start : float
-        Sample at which it begins to move.
+        Sample at which it starts to move.
     own : ndarray, shape (N, q)
-        What every record has for itself beside a drift: a level, hum, a free response.
+        Further effects in each record beside a drift: a level, hum, a free response.
     dt : float
         Sample time in s.
     """
     n = output.size
-    line = np.arange(n) / n  # drifts of the records may cancel in their mean
+    line = np.arange(n) / n  # drifts may cancel in the mean of the records
     beside = np.column_stack([line, own[:n]])
     reach = 0.2 * start + 20
     shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
@@ -109,7 +109,7 @@ def own_step_response(
 def _own_lags(
     output: FloatArray, model: FloatArray, start: float, beside: FloatArray, shift: float
 ) -> tuple[float, float]:
-    """Ratio of the time constants and its relative error, delay and gain being free as well."""
+    """Ratio of the time constants and its relative error, with free delay and gain."""
     stretch, error = 1.0, np.inf
     reach = 0.2 * start + 20
     for _ in range(_TURNS):
@@ -122,13 +122,13 @@ def _own_lags(
         error = float(errors[2]) / abs(gain)
         if abs(moves[0]) < _SETTLED and abs(moves[1]) < _SETTLED:
             return stretch, max(error, 1e-12)
-    return stretch, np.inf  # delay, gain and lags cannot be told apart
+    return stretch, np.inf  # delay, gain and lags are not distinguishable
 
 
 def _moved(
     model: FloatArray, n: int, start: float, shift: float, stretch: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Later and slower response, and its slopes by the shift and by the log of the stretch."""
+    """Delayed and stretched response, and its derivatives w.r.t. shift and log stretch."""
     index = np.arange(n, dtype=np.float64)
     behind = (index - start - shift) / stretch
     at = np.where(behind > 0, start + behind, index - shift)
@@ -139,7 +139,7 @@ def _moved(
 
 
 def _regression(columns: FloatArray, output: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Least squares and standard errors, correlation of the residual included."""
+    """Least squares and standard errors, including correlation of the residual."""
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
     scaled = columns / size

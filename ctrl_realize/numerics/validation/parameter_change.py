@@ -1,10 +1,10 @@
-"""Are gain and dead time the same in all of a record? A test on what a model leaves.
+"""Test of constant gain and dead time within a record, based on the residual of a model.
 
-What is left is regressed on the derivatives of the model by its gain and its dead time, for
-groups of samples: of one time, one level, one direction. Where one model holds for all of them
-the groups do not differ but by noise. (Lagrange multiplier test against parameters that change:
-Godfrey, Misspecification Tests in Econometrics, Cambridge 1988, chapter 4; with a transition
-variable: Terasvirta, J. Am. Stat. Ass. 89 (1994) 208-218.)
+The residual is regressed on the derivatives of the model w.r.t. gain and dead time, for groups of
+samples: of one time, one level, one direction. If one model holds for all of them the groups differ
+only by noise. (Lagrange multiplier test against changing parameters: Godfrey, Misspecification
+Tests in Econometrics, Cambridge 1988, chapter 4; with a transition variable: Terasvirta, J. Am.
+Stat. Ass. 89 (1994) 208-218.)
 
 References
 ----------
@@ -34,10 +34,10 @@ _LEAST_SHARE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ParameterChange:
-    """How much later and larger the response of each group is than the common model.
+    """Shift and scale of the response of each group relative to the common model.
 
-    ``shifts`` (g,) in samples and ``gains`` (g,) as a part of the common gain, with `errors` and
-    `gain_errors`; `chance` is that of groups of one plant differing as much.
+    ``shifts`` (g,) in samples and ``gains`` (g,) relative to the common gain, with `errors` and
+    `gain_errors`; `chance` is the p-value of such differences for a constant plant.
     """
 
     shifts: FloatArray
@@ -55,14 +55,14 @@ def parameter_change(
     Parameters
     ----------
     residual, fitted : ndarray, shape (N,)
-        What a model leaves, and its response.
+        Residual and response of the model.
     groups : ndarray of int, shape (N,)
-        Group of each sample, 0 ... g - 1.
+        Group number of each sample, 0 ... g - 1.
 
     Returns
     -------
     ParameterChange
-        None where fewer than two groups move enough, or samples are too few.
+        None if fewer than two groups move enough, or there are too few samples.
     """
     slope, size = _derivatives(fitted)
     energy = np.bincount(groups, slope**2)
@@ -101,12 +101,12 @@ def parameter_change(
 
 
 def _derivatives(fitted: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of a response by its delay in samples and by its relative gain."""
+    """Derivatives of a response w.r.t. its delay in samples and its relative gain."""
     return -np.gradient(fitted), fitted - np.mean(fitted)
 
 
 def whitened(columns: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray, int]:
-    """Columns and residual behind the filter that makes the residual white, and its size."""
+    """Columns and residual after the prewhitening filter, and the residual's size."""
     whitener = np.concatenate([[1.0], -autoregression(residual, _MOST_LAGS)])
     both = np.column_stack([columns, residual])
     white = lfilter(whitener, [1.0], both, axis=0)[whitener.size - 1 :]

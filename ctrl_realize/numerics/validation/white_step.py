@@ -1,11 +1,10 @@
 """One step of generalised least squares from an output-error fit.
 
-Output error weighs all errors alike and stays consistent in coloured noise, but far from the
-best: a slow disturbance may move a dead time by many of its standard errors. One Gauss-Newton step
-on data that the residual's own autoregression has made white is as good as the maximum of the
-likelihood (one-step estimator: Lehmann and Casella, Theory of Point Estimation, 2nd ed., section
-6.4); where it differs from least squares by more than noise, one of them is wrong (Hausman,
-Econometrica 46 (1978) 1251-1271).
+Output error weights all errors equally and is consistent for coloured noise, but not efficient: a
+slow disturbance may shift a dead time by many of its standard errors. One Gauss-Newton step on data
+prewhitened by the residual's autoregressive model is as efficient as maximum likelihood (one-step
+estimator: Lehmann and Casella, Theory of Point Estimation, 2nd ed., section 6.4); if it differs
+significantly from least squares, one of them is wrong (Hausman, Econometrica 46 (1978) 1251-1271).
 
 References
 ----------
@@ -31,7 +30,7 @@ from .parameter_change import whitened
 
 @dataclass(frozen=True)
 class WhiteStep:
-    """Dead time (s), gain and total delay (s) behind the step, with their standard errors."""
+    """Dead time (s), gain and total delay (s) after the step, with their standard errors."""
 
     dead_time: float
     dead_time_error: float
@@ -49,23 +48,23 @@ def white_step(
     poles: ComplexArray,
     numerator: FloatArray,
 ) -> WhiteStep | None:
-    """Take one step from exp(-dead time s) b(s) / a(s) to the model of generalised least squares.
+    """Take one step from exp(-dead time s) b(s) / a(s) to the generalised least-squares model.
 
     Parameters
     ----------
     measured, drive : ndarray, shape (N,)
-        Output, and the input, held from sample to sample.
+        Output, and the held input.
     dt, dead_time : float
         In s.
     poles : ndarray of complex, shape (n,)
         Roots of the monic a, none of them zero.
     numerator : ndarray
-        b from the lowest power on.
+        b, lowest power first.
 
     Returns
     -------
     WhiteStep
-        None where samples are too few or leave nothing.
+        None if there are too few samples or no residual.
     """
     a = np.real(np.poly(poles))[:0:-1]
     n, m = a.size, numerator.size
@@ -74,7 +73,7 @@ def white_step(
     time = np.linspace(0, 1, drive.size)
     own = np.column_stack([np.ones(time.size), time, _free(a, dt, drive.size)])
     response = states[:, :m] @ numerator
-    # What the first samples owe to an input before the record is a free response, and not much.
+    # The effect of the input before the record on the first samples is a small free response.
     residual = measured - response
     residual = residual - own @ np.linalg.lstsq(own, residual, rcond=None)[0]
     if not np.any(residual):
@@ -112,7 +111,7 @@ def white_step(
 
 
 def _gradients(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Derivatives of dead time, gain and total delay by (dead time, a, b), shape (3, 1 + n + m)."""
+    """Derivatives of dead time, gain and total delay w.r.t. (dead time, a, b), (3, 1 + n + m)."""
     n, m = a.size, b.size
     out = np.zeros((3, 1 + n + m))
     out[0, 0] = out[2, 0] = 1.0
@@ -131,7 +130,7 @@ def _states(
 ) -> FloatArray:
     """Response of s^i / a(s), i = 0 ... n - 1, to a held and delayed input, shape (N, n).
 
-    At rest at the input `first`; a fraction of a sample as by Astrom and Wittenmark,
+    Steady state at the input `first`; a fraction of a sample as in Astrom and Wittenmark,
     Computer-Controlled Systems, 3rd ed., section 2.3.
     """
     n = a.size
