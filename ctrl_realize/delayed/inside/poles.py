@@ -61,8 +61,9 @@ class InsidePoles(HostResponses, DelayOperators):
 
         Notes
         -----
-        Each is a root of the characteristic function to 1e-10. In discrete time up to 400 states all
-        poles are computed first; beyond, Newton's method starts from points around the unit circle.
+        Each is a root of the characteristic function to 1e-10. In discrete time with up to 400
+        states all poles are computed first; for more, Newton's method starts from points around
+        the unit circle.
         In continuous time it starts from the eigenvalues of a spectral discretisation of the delays
         [1]_.
 
