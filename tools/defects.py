@@ -119,7 +119,7 @@ DEFECTS = (
     _d("plausible structures", "structures that the data do not rule out leave the interval",
        "PLAUSIBLE = 10.0", "PLAUSIBLE = 0.01", "poles step_fit decisions", FITS),
     _d("least charge", "structures with needless zeros widen the interval of short records",
-       "more = max(LEAST_CHARGE - whole.penalty, 0.0)", "more = 0.0",
+       "more = max(LEAST_CHARGE - penalty, 0.0)", "more = 0.0",
        "step_fit decisions any_input", FITS),
     _d("open beginning", "a zero that imitates a smooth onset leaves the interval narrow",
        "open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0",

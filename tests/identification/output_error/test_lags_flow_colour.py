@@ -252,3 +252,18 @@ def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
     assert "generalised" not in fit.report()
     low, high = fit.delay_interval
     assert low <= 43 <= high
+
+
+@pytest.mark.parametrize(("size", "like"), [(1.0, True), (2.0, False)])
+def test_noise_that_only_the_response_has_is_not_made_white_with_the_colour_of_the_rest(size, like):
+    # slow noise throughout, and white noise while the output moves: where it is twice as large,
+    # the filter that makes the slow one white leaves more than three times the noise at rest
+    rng = np.random.default_rng(3)
+    k = np.arange(N)
+    noise = lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], rng.standard_normal(N + 400))[400:]
+    noise += size * ((k > BEFORE + 37) & (k < BEFORE + 437)) * rng.standard_normal(N)
+    y = rigs.exact_step(rigs.R1, (k - BEFORE - 37) * TS) + 0.005 * noise
+    fit = cr.fit_output_error(cr.Record(k * TS, 1.0 * (k >= BEFORE), y), **LAGS).fit
+    low, high = fit.delay_interval
+    assert ("generalised" in fit.report()) == like
+    assert low <= 37 <= high
