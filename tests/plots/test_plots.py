@@ -146,12 +146,6 @@ def settings_of_the_session():
     plt.close("all")
 
 
-@pytest.fixture
-def comparison():
-    plant = cr.delayed_ss(cr.bench.valve().truth.core, 37, dt=7.8125e-4)
-    return cr.design.compare_pid(plant, ["simc"])
-
-
 def test_the_style_holds_inside_and_the_users_settings_are_back_behind():
     mine = {"font.size": 7.5, "lines.linewidth": 0.3, "axes.grid": False, "text.color": "#123456"}
     mpl.rcParams.update(mine)

@@ -97,15 +97,6 @@ def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
     assert_array_equal(system.A, again.A)
 
 
-DT = 0.1
-TIME = DT * np.arange(200)
-
-
-def record(name="", step=-4.0, offset=0.0, **labels):
-    moved = step * (np.arange(200) >= 60)
-    return cr.Record(TIME, moved, offset + 2 * moved, name=name, **labels)
-
-
 RNG = np.random.default_rng(1)
 SISO = ct.ss([[0.9, 0.1], [0, 0.5]], [[0], [1]], [[1, 1 / 3]], 0.1, 7e-4)
 MIMO = ct.ss(*(RNG.standard_normal(shape) for shape in ((3, 3), (3, 2), (2, 3), (2, 2))), 0.1)
@@ -139,14 +130,6 @@ def test_unpacking_gives_the_model_bit_by_bit(system):
         assert twin.input_labels == system.input_labels
         assert twin.output_labels == system.output_labels
         assert twin.state_labels == system.state_labels
-
-
-@pytest.fixture(scope="module")
-def kept(tmp_path_factory):
-    made = step_record(noise=1e-3, before=400, after=1300)
-    record = cr.Record(made.time, made.input, made.output, name="r")
-    store = cr.io.CampaignStore(tmp_path_factory.mktemp("store"))
-    return cr.identify_campaign([record], method="paper", store=store)
 
 
 def quick(seed: int, wait: float = 0.0) -> cr.Record:

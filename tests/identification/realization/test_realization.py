@@ -128,6 +128,3 @@ def test_three_standard_deviations_are_needed_to_believe_it():
         assert uses_feedthrough(impulse(two, sign * 4.2426), 1, None) is False
         assert uses_feedthrough(impulse(two, sign * 4.2427), 1, None) is True
     assert uses_feedthrough(impulse(two, 9.0), 0, None) is False  # at its own sample
-
-
-# what is left

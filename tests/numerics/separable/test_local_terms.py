@@ -172,13 +172,6 @@ def test_a_free_response_is_predicted_at_every_sample():
     assert found == pytest.approx(means.output + free, abs=1e-10)
 
 
-# --- what the best of the candidates leaves
-
-
-def noise(size=1000, seed=0):
-    return np.random.default_rng(seed).standard_normal(size)
-
-
 def test_a_model_with_a_given_dead_time_is_the_best_one_with_it():
     window, _ = windows()
     kept = Candidate(ONE, TRUTH, 0.0)
@@ -196,6 +189,3 @@ def test_a_model_with_a_given_dead_time_is_the_best_one_with_it():
     starts = np.stack([np.full(3, 4.7), np.log(rates)], axis=1)
     slower, best, faster = evaluate(window.problem, ONE, starts).cost
     assert best < min(slower, faster)
-
-
-# --- residuals
