@@ -169,12 +169,12 @@ class HostResponses(DeferredMatrices):
         return omega[known], values[known]
 
     def _gain_is_gone(self, fastest: float) -> float:
-        """Find a frequency beyond which the gain of a continuous system decides about no margin."""
+        """Find a frequency above which the gain of a system is too low for any margin."""
         omega = fastest * np.geomspace(1e-3, 1e5, 4000)
         size = np.abs(self.horner(1j * omega, warn_infinite=False)[0, 0])
         (large,) = np.nonzero(
             ~(size < 0.1 * DECIDES * min(1.0, float(np.median(size[:100])) or 1.0))
-        )  # a gain that stays is looked at for ten times the fastest pole
+        )  # a gain that does not roll off is evaluated up to ten times the fastest pole
         last = int(large[-1]) if large.size else 0
         return float(omega[last + 1]) if last + 1 < omega.size else 10 * fastest
 

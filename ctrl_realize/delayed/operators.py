@@ -259,7 +259,7 @@ def common_dt(first: Any, second: Any) -> float:
 
 
 def _labels(system: Any, side: str, own: Sequence[str]) -> Sequence[str]:
-    """Signals of the other factor; those that python-control numbers give way to our own."""
+    """Signal names of the other factor; our own if python-control has numbered those."""
     labels: list[str] = getattr(system, side, list(own))
     numbered = all(label.endswith(f"[{i}]") for i, label in enumerate(labels))
     return own if numbered and len(labels) == len(own) else labels
@@ -287,7 +287,7 @@ def _product(second: DelayForm, first: DelayForm) -> DelayForm:
 
 
 def _single_product(second: DelayForm, first: DelayForm) -> DelayForm:
-    """Series of single channels, whose delays may stand anywhere: all of them at the input."""
+    """Series of single channels: all delays, wherever they are, are moved to the input."""
     (before, behind, core), (entry, exit_, other) = ends_apart(first), ends_apart(second)
     total = before[0] + behind[0] + entry[0] + exit_[0]
     line = forms.delayed_ends(*forms.gain_matrices(1.0), (total,), (0.0,))

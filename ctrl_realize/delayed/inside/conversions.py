@@ -21,7 +21,7 @@ from ..operators import DelayOperators, plain
 MAX_PADE_ORDER = 20
 
 IN_BAND = 0.1
-"""Part of the Nyquist frequency up to which the error of a sampled loop is stated."""
+"""Fraction of the Nyquist frequency up to which the error of a sampled loop is reported."""
 
 
 class InsideConversions(DelayOperators):
@@ -30,12 +30,12 @@ class InsideConversions(DelayOperators):
     internal_delays: tuple[float, ...]
 
     def pade(self, order: int = 5) -> ct.StateSpace:
-        """Replace each delay by its Pade approximant, of equal degrees.
+        """Replace each delay by its diagonal Pade approximant.
 
         Parameters
         ----------
         order : int, optional
-            1...20, of each delay; see `design.pade_ss`.
+            1...20, for each delay; see `design.pade_ss`.
 
         Returns
         -------
@@ -49,7 +49,7 @@ class InsideConversions(DelayOperators):
         """
         if self.dt:
             raise UnsuitableSystemError(
-                f"{self.name!r} is discrete: ct.ss(sys) has its delays as states, exactly"
+                f"{self.name!r} is discrete; ct.ss(sys) represents its delays exactly, as states"
             )
         count = whole(order, "order", 1, MAX_PADE_ORDER)
         form = self._form()
@@ -69,12 +69,12 @@ class InsideConversions(DelayOperators):
         return made
 
     def to_discrete(self, dt: float) -> Any:
-        """Sample behind a zero-order hold.
+        """Zero-order-hold equivalent.
 
-        Exact for delays that the inputs go into at once, as in a plant with dead time, or that
-        stand at the outputs; a single delay of one input and output may be any fraction of samples.
-        A loop through a dead time has no exact sampled form of its order: what goes into its delays
-        is then taken as straight between the samples, and a warning states the error.
+        Exact for delays at the inputs, as in a plant with dead time, or at the outputs. The delay
+        of a system with one input and one output need not be a whole number of samples. A loop
+        with dead time has no exact sampled model of finite order: the signals at the inputs of its
+        delays are interpolated linearly between samples, and a warning states the error.
 
         Parameters
         ----------
@@ -88,9 +88,9 @@ class InsideConversions(DelayOperators):
         Raises
         ------
         DelayRangeError
-            Delays that are no whole samples, of several channels or in a loop.
+            Delays in a loop or of several channels that are not whole samples.
         UnsuitableSystemError
-            A discrete system, or a fractional delay around a direct term.
+            A discrete system, or a fractional delay with direct feedthrough.
 
         Warns
         -----
@@ -106,7 +106,7 @@ class InsideConversions(DelayOperators):
         <DelayedStateSpace: u -> y, order 1, z^-3 (0.03 s), dt = 0.01 s>
         """
         if self.dt:
-            raise UnsuitableSystemError(f"{self.name!r} is discrete already")
+            raise UnsuitableSystemError(f"{self.name!r} is already discrete")
         step = positive(dt, "dt", "sample time in s")
         before, behind, rest = ends_apart(self._form())
         names = self.input_labels, self.output_labels
@@ -133,8 +133,8 @@ class InsideConversions(DelayOperators):
         fraction = split_dead_time(tau, step)[1]
         if fraction and np.any(core.D):
             raise UnsuitableSystemError(
-                f"the direct term jumps between two samples: the delay is {tau / step:.6g} samples "
-                f"of {step:g} s; choose dt so that it is a whole number"
+                f"with direct feedthrough, the output jumps between two samples: the delay is "
+                f"{tau / step:.6g} samples of {step:g} s; choose dt so that it is a whole number"
             )
         A, B, C, D, samples = sample_with_dead_time(core.A, core.B, core.C, core.D, step, tau)
         form = forms.delayed_ends(A, B, C, D, (float(samples),), (0.0,))
@@ -143,16 +143,15 @@ class InsideConversions(DelayOperators):
     def _state_error(self, made: Any, step: float) -> None:
         omega = np.linspace(0, IN_BAND * np.pi / step, 60)[1:]
         ours = self.horner(1j * omega, warn_infinite=False)
-        # what the hold alone does: its phase and gain
+        # frequency response of the hold alone
         hold = -np.expm1(-1j * omega * step) / (1j * omega * step)
         theirs = made.horner(np.exp(1j * omega * step), warn_infinite=False)
         error = np.abs(theirs - ours * hold).max(initial=0.0)
         warn_caller(
-            f"a loop through a dead time has no exact sampled form: up to a tenth of the Nyquist "
-            f"frequency ({omega[-1]:.3g} rad/s) the response is off by {error:.2g} at most, of "
-            f"{np.abs(ours).max(initial=0.0):.3g}; a shorter dt is closer. Sample the plant "
-            f"instead, "
-            "and close the loop in discrete time, where the controller is discrete",
+            f"a loop with dead time has no exact sampled model: up to a tenth of the Nyquist "
+            f"frequency ({omega[-1]:.3g} rad/s) the error of the response is at most {error:.2g}, "
+            f"for a largest value of {np.abs(ours).max(initial=0.0):.3g}; use a shorter dt, or, "
+            "for a discrete controller, sample the plant and close the loop in discrete time",
             ModelWarning,
         )
 
@@ -168,7 +167,7 @@ def _samples(tau: float, step: float) -> int:
 
 
 def _held_apart(form: DelayForm) -> DelayForm:
-    """Split delays that inputs go into at once: what is held before a delay is so behind it."""
+    """Split delays driven by inputs: a signal held before a delay is also held after it."""
     m, p, q = form.inputs, form.outputs, len(form.delays)
     split = [i for i in range(q) if np.any(form.D[p + i, :m]) and np.any(form.C[p + i])]
     C, D = form.C.copy(), form.D.copy()
@@ -189,15 +188,15 @@ def _held_apart(form: DelayForm) -> DelayForm:
 
 
 def _not_held(form: DelayForm) -> FloatArray:
-    """What goes into each delay beside the inputs, which are held: states and other delays."""
+    """Inputs of each delay that are not held: states and outputs of other delays."""
     below = slice(form.outputs, None)
     return np.hstack([form.C[below], form.D[below, form.inputs :]])
 
 
 def _held(form: DelayForm, step: float, held: list[bool]) -> DelayForm:
-    """Sample a core: inputs held, what comes out of other delays straight between samples.
+    """Sample a core with inputs held and outputs of delays linear between samples.
 
-    With w(t) = w0 + (w1 - w0) t / h the state x - G2 w of the first-order hold takes w1 into C and
+    With w(t) = w0 + (w1 - w0) t / h the state x - G2 w of the first-order hold moves w1 into C and
     D (Franklin, Powell and Workman, section 6.3.2).
     """
     n, m, q = form.states, form.inputs, len(form.delays)
@@ -220,7 +219,7 @@ def _exponential(M: FloatArray) -> FloatArray:
 
 
 def _closed_again(form: DelayForm, inner: tuple[float, ...]) -> DelayForm:
-    """Close the last inputs and outputs of a form through delays, beside those it has."""
+    """Close the last inputs and outputs of a form through additional delays."""
     q = len(inner)
     m, p, own = form.inputs - q, form.outputs - q, len(form.delays)
     columns = [*range(m), *range(m + q, m + q + own), *range(m, m + q)]

@@ -1,4 +1,4 @@
-"""Time responses of continuous systems with dead time: a delay differential equation is solved."""
+"""Time responses of continuous systems with dead time, from the delay differential equation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...numerics.internal_delays.equation import Solution, TooManyStepsError, so
 from .poles import InsidePoles
 
 POINTS = 401
-"""Times of a response when none are given."""
+"""Default number of points of a response."""
 
 TOLERANCE = 1e-8
 """Largest error of a response, relative to its largest value."""
@@ -35,7 +35,7 @@ class Motion(InsidePoles):
         squeeze: bool | None = None,
         transpose: bool = False,
     ) -> ct.TimeResponseData:
-        """Compute the response to any input; inputs are straight lines between the times."""
+        """Compute the response to any input, linear between the given times."""
         times = _checked_times(timepts, self.name)
         m = self.ninputs
         if callable(inputs):
@@ -138,22 +138,22 @@ class Motion(InsidePoles):
             )
         except TooManyStepsError as error:
             raise UnsuitableSystemError(
-                f"{error} steps, each no longer than the shortest delay "
-                f"({min(form.delays, default=0.0):g} s), are too many for {times[-1]:g} s: give "
-                "shorter timepts, or leave the shortest delay out (sys.pade makes it rational)"
+                f"{times[-1]:g} s need {error} steps, each no longer than the shortest delay "
+                f"({min(form.delays, default=0.0):g} s): give shorter timepts, omit the shortest "
+                "delay, or use a rational approximation (sys.pade)"
             ) from None
         size = float(np.abs(found.outputs).max(initial=0.0))
         if not found.error <= wanted * max(size, 1e-300) and size > 0:
             warn_caller(
-                f"the response changed by {found.error:.2g} when all steps were halved for the "
-                f"last "
-                f"time, of {size:.3g}; {wanted:g} of it was asked for. Give closer timepts",
+                f"when all steps were halved for the last time, the response changed by "
+                f"{found.error:.2g} of at most {size:.3g}; the relative tolerance is {wanted:g}. "
+                "Give closer timepts",
                 ModelWarning,
             )
         return found
 
     def _settling(self) -> float:
-        """Guess a time in s by which a response has settled, or shows that it does not."""
+        """Estimate a time in s at which a response has settled, or is seen not to settle."""
         poles = self.dominant_poles(4)
         rates = np.abs(poles.real[np.abs(poles.real) > 1e-6 * (np.abs(poles).max(initial=0.0))])
         slow = 6 / float(rates.min()) if rates.size else 0.0
@@ -173,7 +173,7 @@ def _checked_times(timepts: ArrayLike | None, name: str) -> FloatArray:
         raise DataError(f"{name!r} is continuous; give timepts, the times in s")
     times = finite(timepts, "timepts")
     if times.ndim != 1 or times.size < 2 or times[0] != 0 or np.any(np.diff(times) <= 0):
-        raise DataError("timepts must rise from 0 and be two at least")
+        raise DataError("timepts must increase from 0 and have at least two values")
     return times
 
 

@@ -19,7 +19,7 @@ FEW_STATES = 400
 """Number of states up to which zeros of several channels are computed from the matrices."""
 
 FIRST_POLES, MOST_POLES = 20, 640
-"""Right-most poles of a continuous loop that are looked for at first, and at most."""
+"""Number of right-most poles of a continuous loop: computed at first, and at most."""
 
 
 class InsidePoles(HostResponses, DelayOperators):
@@ -31,8 +31,8 @@ class InsidePoles(HostResponses, DelayOperators):
     def poles(self) -> ComplexArray:
         """All poles of a discrete system; the right-most ones of a continuous one.
 
-        A continuous loop with a dead time has infinitely many poles: all with positive real parts
-        are given, and at least 20. See `dominant_poles` for the slowest few.
+        A continuous loop with dead time has infinitely many poles: those with positive real part
+        are returned, and at least 20. See `dominant_poles` for the slowest few.
         """
         form = self._form()
         if self.dt:
@@ -47,7 +47,7 @@ class InsidePoles(HostResponses, DelayOperators):
     def dominant_poles(self, count: int = 10) -> ComplexArray:
         """Compute the poles that decay most slowly, or grow fastest.
 
-        In continuous time the right-most ones, in discrete time those of largest magnitude.
+        The right-most ones in continuous time, those of largest magnitude in discrete time.
 
         Parameters
         ----------
@@ -63,9 +63,8 @@ class InsidePoles(HostResponses, DelayOperators):
         -----
         Each is a root of the characteristic function to 1e-10. In discrete time with up to 400
         states all poles are computed first; for more, Newton's method starts from points around
-        the unit circle.
-        In continuous time it starts from the eigenvalues of a spectral discretisation of the delays
-        [1]_.
+        the unit circle. In continuous time it starts from the eigenvalues of a spectral
+        discretisation of the delays [1]_.
 
         References
         ----------
@@ -100,10 +99,11 @@ class InsidePoles(HostResponses, DelayOperators):
         return count == 0 and not marginal
 
     def neutral_gain(self) -> float:
-        """Gain at high frequency of the loops that only delays and gains are in; 0 without such.
+        """High-frequency gain of loops that consist only of delays and gains; 0 without such loops.
 
-        A continuous system with such loops is of neutral type. At 1 or more it has unstable poles
-        without end, or will have for slightly other delays [1]_. In discrete time always 0.
+        A continuous system with such loops is of neutral type. If the gain is 1 or more, it has
+        infinitely many unstable poles, or would have for slightly different delays [1]_. Always 0
+        in discrete time.
 
         References
         ----------
@@ -147,7 +147,7 @@ class InsidePoles(HostResponses, DelayOperators):
         return self._features()
 
     def zeros(self) -> ComplexArray:
-        """Finite zeros; of a continuous loop through a dead time those furthest to the right.
+        """Finite zeros; for a continuous loop with dead time the right-most ones.
 
         Raises
         ------

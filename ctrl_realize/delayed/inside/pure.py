@@ -24,7 +24,7 @@ class _InName(ct.TransferFunction):  # type: ignore[misc]  # control is untyped
     def num_array(self) -> Any:
         """Refused: a dead time has no polynomials."""
         raise UnsuitableSystemError(
-            "python-control asks for polynomials, which a dead time does not have. Write "
+            "python-control needs polynomials here, and a dead time has none. Write "
             "ct.margin(1 * P), cr.design.margins(P), ct.feedback(P * C) and (1 + L) ** -1"
         )
 
@@ -34,9 +34,9 @@ class _InName(ct.TransferFunction):  # type: ignore[misc]  # control is untyped
 class TransferDelay(DelaySystem, _InName):
     """Transfer function with dead time, such as ``ct.tf(...) * delay(0.3)``; see `delay`.
 
-    A `DelaySystem` that is a `control.TransferFunction` too, in name: transfer functions of
-    python-control ask no other class what ``C * P`` and ``C + P`` is. Such a product or sum, a
-    loop, is a `DelaySystem`, which `control.margin` takes.
+    A `DelaySystem` that is also a subclass of `control.TransferFunction`, since transfer functions
+    of python-control leave ``C * P`` and ``C + P`` to no other class. Such a product or sum is a
+    `DelaySystem`, which `control.margin` accepts.
     """
 
     def __mul__(self, other: Any) -> Any:
@@ -46,7 +46,7 @@ class TransferDelay(DelaySystem, _InName):
         return self._plant(super().__rmul__(other), other)
 
     def _plant(self, made: Any, other: Any) -> Any:
-        """Keep the class where a pure dead time meets what it delays."""
+        """Keep the class of the product of a pure dead time and a transfer function."""
         if self._core.nstates or not isinstance(other, ct.TransferFunction):
             return made
         names = {"inputs": made.input_labels, "outputs": made.output_labels}
@@ -54,25 +54,25 @@ class TransferDelay(DelaySystem, _InName):
 
 
 def delay(dead_time: float, dt: float | None = None, *, name: str | None = None) -> Any:
-    """Make a dead time, ``exp(-tau s)``, as a factor of other systems.
+    """Dead time ``exp(-tau s)``, to be multiplied with other systems.
 
     Parameters
     ----------
     dead_time : float
         In s, 0 or more.
     dt : float, optional
-        Sample time in s: a delay of whole samples then, z^-d.
+        Sample time in s; the delay is then z^-d with whole samples.
     name : str, optional
 
     Returns
     -------
     TransferDelay
-        A continuous `DelaySystem`, or with `dt` a `DelayedStateSpace`.
+        A continuous `DelaySystem`; a `DelayedStateSpace` if `dt` is given.
 
     Raises
     ------
     DelayRangeError
-        A negative dead time, or one that is no multiple of `dt`.
+        A negative dead time, or one that is not a multiple of `dt`.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def delay(dead_time: float, dt: float | None = None, *, name: str | None = None)
         if fraction:
             raise DelayRangeError(
                 f"dead_time={tau:g} s is {tau / step:.6g} samples of {step:g} s; a discrete delay "
-                "needs whole samples. Make the plant in continuous time and sample it, "
+                "needs whole samples. Define the plant in continuous time and sample it: "
                 "(ct.tf(...) * cr.delay(tau)).to_discrete(dt)"
             )
         return DelaySystem._kinds[ENDS](ct.ss([], [], [], 1.0, step), samples, **names)

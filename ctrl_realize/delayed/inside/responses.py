@@ -45,15 +45,15 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         Parameters
         ----------
         timepts : array_like
-            Times in s, rising from 0 (continuous time), or every sample.
+            Times in s, increasing from 0 (continuous time), or every sample.
         inputs : array_like or callable
-            Values at these times, in continuous time straight between them, or a function of an
-            array of times, shape (inputs, K).
+            Values at these times, linear between them in continuous time; or a function of an
+            array of K times that returns values of shape (inputs, K).
         *args, **settings
             ``squeeze`` and ``transpose``; in discrete time those of `control.forced_response`. In
-            continuous time also ``initial_state`` of the core, ``history``, what went into each
-            delay before time 0 (0, or one constant for each), and ``tolerance``, the largest error
-            relative to the largest output (1e-8).
+            continuous time also ``initial_state`` of the core; ``history``, the constant input of
+            each delay before time 0 (default 0); and ``tolerance``, the largest error relative to
+            the largest output (1e-8).
 
         Returns
         -------
@@ -62,7 +62,7 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         Notes
         -----
         In continuous time the delay differential equation is solved by the method of steps, with
-        all breaking points, and all steps are halved until the result stays [1]_.
+        all breaking points; all steps are halved until the result no longer changes [1]_.
 
         References
         ----------
@@ -76,9 +76,9 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
     def step_response(
         self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
     ) -> ct.TimeResponseData:
-        """Compute the step responses from rest, see `control.step_response`.
+        """Compute the step responses from zero initial state, see `control.step_response`.
 
-        In continuous time with ``tolerance`` as in `forced_response`.
+        In continuous time ``tolerance`` is accepted as in `forced_response`.
         """
         if self.dt:
             return super().step_response(timepts, *args, **settings)
@@ -87,9 +87,9 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
     def impulse_response(
         self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
     ) -> ct.TimeResponseData:
-        """Compute the impulse responses from rest, see `control.impulse_response`.
+        """Compute the impulse responses from zero initial state, see `control.impulse_response`.
 
-        In continuous time as the slope of the step response; impulses in the output are left out.
+        In continuous time the slope of the step response; impulses in the output are omitted.
         """
         if self.dt:
             return super().impulse_response(timepts, *args, **settings)

@@ -39,9 +39,9 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     Parameters
     ----------
     core : control.StateSpace
-        With p + q outputs and m + q inputs; continuous, or discrete with a sample time.
+        With p + q outputs and m + q inputs; continuous, or discrete with a known sample time.
     internal_delays : sequence of float, optional
-        The q delays, whole samples each of a discrete core, in s of a continuous one.
+        The q delays: whole samples for a discrete core, s for a continuous one.
     name, inputs, outputs : optional
         Names of the system, of its m inputs and of its p outputs, as for `control.ss`.
 
@@ -55,9 +55,9 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     ------
     UnsuitableSystemError
         A core that is not a state-space system, discrete without a sample time, or with fewer
-        signals than delays; also if the matrices of a continuous system are asked for.
+        signals than delays; also on access to the matrices of a continuous system.
     DelayRangeError
-        Delays below 0, or not whole samples of a discrete core.
+        Negative delays, or delays of a discrete core that are not whole samples.
 
     Notes
     -----
@@ -69,7 +69,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     responses, ``sys.step_response``, ``sys.forced_response``, ``sys.dominant_poles`` and all
     interconnections do not need them.
 
-    In continuous time there are no such matrices; asking for them is an error.
+    In continuous time there are no such matrices, and access to them raises an error.
 
     In ``K * sys`` and ``ct.feedback(K, sys)`` with a transfer function or plain system K,
     python-control uses the matrices: use ``sys * K``, ``ct.ss(K) * sys`` and ``ct.feedback(sys *
@@ -141,11 +141,11 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     def _make_matrices(self) -> Matrices:
         if not self.dt and self.internal_delays:
             raise UnsuitableSystemError(
-                f"{_who_asks()} A, B, C, D, which a dead time in continuous time does not have. "
-                "With a transfer function or plain system in front write P * C, P + C, "
-                "ct.ss(C) * P, cr.interconnect or (1 + L) ** -1 for ct.feedback(1, L); responses "
-                "in time are sys.step_response and sys.forced_response; sys.pade(order) is a "
-                "rational system, sys.to_discrete(dt) a sampled one"
+                f"{_who_asks()} needs A, B, C, D, which do not exist for a dead time in continuous "
+                "time. If a transfer function or plain system comes first, write P * C, P + C, "
+                "ct.ss(C) * P, cr.interconnect, or (1 + L) ** -1 for ct.feedback(1, L). For time "
+                "responses use sys.step_response and sys.forced_response, for a rational "
+                "approximation sys.pade(order), for a sampled model sys.to_discrete(dt)"
             )
         full = absorbed(self._form(), list(range(len(self.internal_delays))))
         return full.A, full.B, full.C, full.D
@@ -208,13 +208,13 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
 
 
 def _who_asks() -> str:
-    """Name the function of python-control that reads the matrices, the first one called."""
+    """Name the function of python-control that was called and needs the matrices."""
     frame, name = sys._getframe(1), ""
     while frame is not None:
         if frame.f_globals.get("__name__", "").startswith("control."):
             name = frame.f_code.co_name
         frame = frame.f_back  # type: ignore[assignment]
-    return f"python-control reads, in {name}," if name else "asked for"
+    return f"{name} of python-control" if name else "this"
 
 
 def _rebuild(

@@ -28,7 +28,7 @@ class Factor:
 
     ``response(w)`` and ``characteristic(w)`` take the shifted variable w = z - 1 (discrete) or w =
     s (continuous). Near z = 1, where the poles of oversampled systems are, z - 1 keeps its digits.
-    `hidden_delay` turns the response without standing apart; in samples, or s in continuous time.
+    `hidden_delay` is contained in the response; in samples, or in s in continuous time.
     """
 
     response: Callable[[ComplexArray], ComplexArray]

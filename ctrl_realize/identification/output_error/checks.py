@@ -151,9 +151,9 @@ def _noncausal(step: WhiteStep) -> list[Flag]:
         Flag(
             "noncausal",
             "the disturbances are coloured: weighted accordingly, the dead time is negative, "
-            f"-{in_time(-step.dead_time)} +- {in_time(error)}: the output leads the input, as it "
-            "does where an unmeasured signal moves both, where the loop is closed, or where input "
-            "and output have different clocks; dead time and lags are not those of the plant",
+            f"-{in_time(-step.dead_time)} +- {in_time(error)}: the output leads the input. Causes "
+            "are an unmeasured signal that acts on both, feedback, or different clocks of input "
+            "and output; dead time and lags are not those of the plant",
         )
     ]
 
