@@ -213,7 +213,6 @@ SWITCHES = (
         {f"{SEPARABLE}.dispersion:_CHARGE": value(0.0)},
         (f"{FITS}.selection:fit_flows",),
     ),
-    Switch("long chains taken for flows", {f"{FITS}.interval:_like_a_flow": giving(False)}),
     Switch(
         "open beginning behind a zero",
         {f"{FITS}.interval:_opened": lambda _: lambda low, high, *_rest: (low, high)},

@@ -6,14 +6,13 @@ import numpy as np
 
 from ..._wording import in_time, interval_in_time, time_within
 from ...numerics.arrays import FloatArray
-from ...numerics.output_error.interval import flow_lead
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
 from .model_flags import cancelled_pair, slow_modes, unresolved_gain
-from .words import ESTIMATE_WORDS, is_firm, model_words
+from .words import ESTIMATE_WORDS, is_firm
 
 # Thresholds for flags alone are a matter of presentation.
 _SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it counts as zero
@@ -177,12 +176,6 @@ def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
 
 
 def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
-    if fit.chain and fit.like_flow and not fit.endless:
-        return Flag(
-            "many_lags",
-            f"the best fit is a {model_words(fit.chain)}: an axial-dispersion model has the "
-            f"same response, with a dead time {in_time(flow_lead(fit.poles))} shorter{firm}",
-        )
     if not fit.endless:
         return None
     return Flag(

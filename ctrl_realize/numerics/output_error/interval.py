@@ -3,9 +3,8 @@
 Point 2 of the rule in `output_error`.
 
 Profile likelihoods [1]_ of all structures within a difference of criteria [2]_; joining them
-instead of using only the best one follows [3]_. `_UNSEEN` and `_LIKE_A_FLOW` are our own, and so is
-the widening for a zero: a zero can imitate the onset of a response, so that only the visible onset
-is known.
+instead of using only the best one follows [3]_. `_UNSEEN` and the widening for a zero are our
+own: a zero can imitate the onset of a response, so that only the visible onset is known.
 
 References
 ----------
@@ -22,9 +21,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from ..arrays import ComplexArray
 from ..constants import Z_95
 from ..separable.dispersion import DispersedFlow, flow_profile
 from ..separable.lag_chains import (
@@ -62,21 +58,6 @@ a zero."""
 _MOST_ROUNDS = 6
 """In which profiles are laid anew where they lead below a minimum."""
 
-_LIKE_A_FLOW = 6
-"""Lags of a chain from which on a flow that disperses looks the same, unless one was fitted and is
-out of the question. Ablation: long chains taken for flows."""
-_OUT_OF_QUESTION = 2 * PLAUSIBLE  # in the criterion
-
-
-def flow_lead(poles: ComplexArray) -> float:
-    r"""Time in s by which dispersion starts before a chain of lags with the same response.
-
-    n lags of T have the cumulants nT, nT^2, 2nT^3, 6nT^4 in time; a residence time with an inverse
-    Gaussian distribution of mean m and shape l has m, m^3/l, 3m^5/l^2, 15m^7/l^3. With m = 1.5 nT
-    and a dead time shorter by nT/2 the first three are equal and the fourth differs by a ninth.
-    """
-    return 0.5 * float(np.sum(1 / np.abs(poles)))
-
 
 def likelihood_fit(
     whole: WindowFit,
@@ -108,8 +89,6 @@ def likelihood_fit(
     high = max(chosen.dead_time, *(last for _, last in limits))
     if endless := still_improving(tanks):
         low = scales.earliest
-    if like_flow := _like_a_flow(choice, flows):
-        low = min(low, max(chosen.dead_time - flow_lead(chosen.poles), scales.earliest))
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start:
         low, high = _opened(low, high, chosen.dead_time, onset, scales)
@@ -136,7 +115,6 @@ def likelihood_fit(
         chain=choice.chain,
         other_models=tuple(others),
         endless=endless,
-        like_flow=like_flow,
         open_start=open_start,
         flows=tuple(flow for flow, _ in kept.flows),
         follows_flow=choice.flow is not None,
@@ -218,13 +196,6 @@ def _not_ruled_out(
 def _charged_level(whole: WindowFit, choice: Choice) -> float:
     """Value of the criterion relative to which structures are ruled out."""
     return choice.level + max(LEAST_CHARGE - whole.penalty, 0.0) * choice.parameters
-
-
-def _like_a_flow(choice: Choice, flows: Sequence[DispersedFlow]) -> bool:
-    """Whether the model is a chain so long that it may be dispersion, with none ruled out."""
-    if choice.chain is None or choice.model.structure.order < _LIKE_A_FLOW:
-        return False
-    return not flows or min(flow.delta_bic for flow in flows) <= _OUT_OF_QUESTION
 
 
 def _opened(

@@ -122,16 +122,15 @@ class OutputErrorEstimate:
     The model is exp(-L s) b(s) / a(s), L the dead time: `numerator` lists b from the lowest power
     on, `poles` are the roots of the monic a. `misfit` is residual over noise in means over bins.
     `chain`: the chain of lags that the model is, if it is one; `endless`: chains of lags fit the
-    better the longer they are, so that all of it may be lags; `like_flow`: no step tells the chain
-    from a flow that disperses; `open_start`: how smoothly the response begins is open; `relaxing`:
-    the plant was moving before the step, and its free response was fitted along. `flows` that
-    disperse are not ruled out; with `follows_flow` the dead time is that of the best of them, and
-    the lags behind it follow it. `other_models` are those that are not in the table of structures
-    and not ruled out. `std` is that of the chosen structure. `whitened`: coloured noise was made
-    white, by what it is at rest. `static` is the gain of the model, `alike` those of the other
-    structures that are not ruled out and resolve one, each with its evidence over the model's.
-    `better` is a structure that rules out those that were asked for; `close` are decisions that
-    rounding may turn.
+    better the longer they are, so that all of it may be lags; `open_start`: how smoothly the
+    response begins is open; `relaxing`: the plant was moving before the step, and its free response
+    was fitted along. `flows` that disperse are not ruled out; with `follows_flow` the dead time is
+    that of the best of them, and the lags behind it follow it. `other_models` are those that are
+    not in the table of structures and not ruled out. `std` is that of the chosen structure.
+    `whitened`: coloured noise was made white, by what it is at rest. `static` is the gain of the
+    model, `alike` those of the other structures that are not ruled out and resolve one, each with
+    its evidence over the model's. `better` is a structure that rules out those that were asked for;
+    `close` are decisions that rounding may turn.
     """
 
     dead_time: float
@@ -152,7 +151,6 @@ class OutputErrorEstimate:
     latest: float
     chain: LagChain | None = None
     endless: bool = False
-    like_flow: bool = False
     open_start: bool = False
     relaxing: bool = False
     flows: tuple[DispersedFlow, ...] = ()

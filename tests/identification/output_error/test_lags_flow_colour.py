@@ -100,16 +100,6 @@ def test_a_plant_with_a_zero_is_covered_and_one_without_is_not_called_open(quiet
     assert "onset_open" not in codes(quiet_valve.fit)
 
 
-def test_a_chain_of_seven_lags_in_noise_may_be_a_flow_that_begins_half_of_its_lags_earlier():
-    noisy, quiet = (
-        cr.fit_output_error(chain_record(7, 20.0, noise)).fit for noise in (0.01, 0.002)
-    )
-    for fit, told in ((noisy, True), (quiet, False)):
-        lead = 0.5 * np.sum(1 / np.abs(fit.poles)) / fit.dt
-        assert ("many_lags" in {flag.code for flag in fit.flags}) == told
-        assert (fit.interval[0] / fit.dt <= fit.delay - lead + 1e-6) == told
-
-
 DELAY = 37.0
 
 
