@@ -77,11 +77,15 @@ def _row(rule: str, touched: int, rows: list[Seen], base: dict[str, Seen]) -> st
 
     cells.append(both(lambda some: str(sum(not one.held for one in some))))
     cells.append(both(lambda some: str(sum(one.silent for one in some))))
-    cells.append(both(lambda some: f"{np.median([one.width for one in some]):.2g}"))
-    cells.append(both(lambda some: f"{np.median([abs(one.error) for one in some]):.2g}"))
+    cells.append(both(lambda some: _median([one.width for one in some if not one.refused])))
+    cells.append(both(lambda some: _median([abs(one.error) for one in some if not one.refused])))
     spent = sum(one.cpu for one in rows) / max(sum(base[one.name].cpu for one in rows), 1e-9)
     cells.append(f"{spent:.2f}" if rows else "-")
     return "| " + " | ".join(cells) + " |"
+
+
+def _median(values: list[float]) -> str:
+    return f"{np.median(values):.2g}" if values else "refused"
 
 
 def moved(one: Seen, other: Seen) -> bool:
