@@ -122,6 +122,20 @@ def test_dominant_poles_of_a_long_loop_are_roots_of_its_equation():
     assert ct.feedback(cr.delayed_ss(ct.ss(a, 1, 0.009, 0, DT), d)).is_stable()
 
 
+@pytest.mark.parametrize(("seed", "delays"), [(0, [700]), (1, [250, 301]), (2, [90, 200, 333])])
+def test_dominant_poles_of_random_long_loops_are_the_largest_of_all(seed, delays):
+    rng = np.random.default_rng(seed)
+    q = len(delays)
+    A = rng.standard_normal((3, 3))
+    A *= 0.98 / np.abs(np.linalg.eigvals(A)).max()
+    B, C, D = (0.3 * rng.standard_normal(shape) for shape in ((3, 1 + q), (1 + q, 3), (1 + q,) * 2))
+    loop = cr.DelaySystem(ct.ss(A, B, C, D, DT), delays)
+    sizes = np.sort(np.abs(loop.poles()))[::-1]
+    found = np.abs(loop.dominant_poles(8))
+    assert_allclose(found, sizes[: found.size], rtol=1e-9)
+    assert loop.is_stable() == (sizes[0] < 1)
+
+
 def test_zeros_of_a_loop_are_those_of_its_parts():
     plant = cr.delayed_ss(ct.ss(ct.zpk([0.3], [0.8, 0.9], 0.05, dt=DT)), 25)
     loop = ct.feedback(plant, cr.delayed_ss(PI, 3))

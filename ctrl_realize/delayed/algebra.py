@@ -10,7 +10,8 @@ import numpy as np
 from ..errors import OptionError
 from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from .chains import common
-from .operators import DelayOperators, is_linear
+from .operands import is_linear
+from .operators import DelayOperators
 from .parts import CoreAndDelays, named
 
 _ENDS = ("prefix", "suffix")

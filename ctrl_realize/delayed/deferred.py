@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import DelayRangeError
 from ..numerics.arrays import FloatArray
+from ..numerics.internal_delays.form import DelayForm
 from .chains import Matrices
 
 MAX_STATES = 20_000
@@ -37,6 +38,10 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
         self.nstates = nstates
         self._state_names = None
         self._augmented = None
+
+    @abstractmethod
+    def _form(self) -> DelayForm:
+        """Return core and delays, with those at the ends as further channels."""
 
     @abstractmethod
     def _make_matrices(self) -> Matrices:

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
-from .operators import common_dt, form_of, plain
+from .operands import common_dt, form_of, plain
 
 
 def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:

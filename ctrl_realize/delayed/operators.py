@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import control as ct
 import numpy as np
 
-from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.internal_delays.merging import ends_apart, merged
 from .deferred import DeferredMatrices
-from .parts import check_entries
+from .operands import (
+    Numbers,
+    common_dt,
+    everywhere,
+    form_of,
+    is_linear,
+    is_single,
+    labels_of,
+    plain,
+    product,
+    shapes,
+)
 
 ENDS, INSIDE = "ends", "inside"
-
-Numbers = (int, float, np.number)
 
 
 class DelayOperators(DeferredMatrices):
@@ -34,10 +42,6 @@ class DelayOperators(DeferredMatrices):
         super().__init_subclass__(**settings)
         if kind is not None:
             DelayOperators._kinds[kind] = cls
-
-    @abstractmethod
-    def _form(self) -> DelayForm:
-        """Return core and delays, with those at the ends as further channels."""
 
     def _joined(
         self,
@@ -82,12 +86,12 @@ class DelayOperators(DeferredMatrices):
         if theirs is None:
             return NotImplemented
         # a system of one input and output is added to every entry, as in python-control
-        if _is_single(theirs) and not _is_single(mine) and not isinstance(other, np.ndarray):
-            theirs = _everywhere(theirs, mine)
-        elif _is_single(mine) and not _is_single(theirs):
-            mine = _everywhere(mine, theirs)
+        if is_single(theirs) and not is_single(mine) and not isinstance(other, np.ndarray):
+            theirs = everywhere(theirs, mine)
+        elif is_single(mine) and not is_single(theirs):
+            mine = everywhere(mine, theirs)
         if (mine.outputs, mine.inputs) != (theirs.outputs, theirs.inputs):
-            raise OptionError(f"systems {_shapes(mine, theirs)} cannot be added")
+            raise OptionError(f"systems {shapes(mine, theirs)} cannot be added")
         total = forms.parallel(mine, theirs)
         dt = common_dt(self, other)
         return self._joined(total, dt, self.input_labels, self.output_labels)
@@ -106,18 +110,18 @@ class DelayOperators(DeferredMatrices):
         theirs = self._other(other)
         if theirs is None:
             return NotImplemented
-        labels = _labels(other, "input_labels", self.input_labels)
-        product = _product(self._form(), theirs)
-        return self._joined(product, common_dt(self, other), labels, self.output_labels)
+        labels = labels_of(other, "input_labels", self.input_labels)
+        series = product(self._form(), theirs)
+        return self._joined(series, common_dt(self, other), labels, self.output_labels)
 
     def __rmul__(self, other: Any) -> Any:
         """Series: first this system, then `other`."""
         theirs = self._other(other)
         if theirs is None:
             return NotImplemented
-        labels = _labels(other, "output_labels", self.output_labels)
-        product = _product(theirs, self._form())
-        return self._joined(product, common_dt(self, other), self.input_labels, labels)
+        labels = labels_of(other, "output_labels", self.output_labels)
+        series = product(theirs, self._form())
+        return self._joined(series, common_dt(self, other), self.input_labels, labels)
 
     def __pow__(self, power: Any) -> Any:
         """Power; -1 is the inverse, if that is proper."""
@@ -186,124 +190,25 @@ class DelayOperators(DeferredMatrices):
         return self._joined(chosen, common_dt(self, other))
 
 
-def plain(form: DelayForm, dt: float) -> ct.StateSpace:
-    """Make the core of a form as a system of python-control."""
-    return ct.StateSpace(form.A, form.B, form.C, form.D, dt, remove_useless_states=False)
+class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+    """Controller whose operators leave systems with delays to those, which keep them."""
 
+    def __mul__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, DelayOperators) else super().__mul__(other)
 
-def is_linear(system: Any) -> bool:
-    """Whether an object can be converted to a form."""
-    if isinstance(system, (np.ndarray, np.number)):
-        return bool(np.isrealobj(system))
-    return isinstance(system, (int, float, ct.StateSpace, ct.TransferFunction))
+    def __add__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, DelayOperators) else super().__add__(other)
 
+    def __sub__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, DelayOperators) else super().__sub__(other)
 
-def form_of(system: Any) -> DelayForm:
-    """Convert a linear system, a number or a matrix to a form.
-
-    Raises
-    ------
-    UnsuitableSystemError
-        Anything else, an improper transfer function, or entries that are not finite.
-    """
-    if isinstance(system, DelayOperators):
-        return system._form()
-    if not is_linear(system):
-        raise UnsuitableSystemError(
-            f"got a {type(system).__name__}; expected a control.StateSpace, a TransferFunction, a "
-            "number or a matrix"
-        )
-    check_entries(system)
-    if isinstance(system, ct.TransferFunction):
-        _check_proper(system)
-        system = ct.ss(system)
-    if isinstance(system, ct.StateSpace):
-        A, B, C, D = (np.asarray(M, np.float64) for M in _matrices(system))
-        return DelayForm(A, B, C, D)
-    return forms.static(np.atleast_2d(np.asarray(system, dtype=np.float64)))
-
-
-def _matrices(system: ct.StateSpace) -> tuple[Any, ...]:
-    return system.A, system.B, system.C, system.D
-
-
-def _check_proper(system: ct.TransferFunction) -> None:
-    for nums, dens in zip(system.num, system.den, strict=True):
-        for num, den in zip(nums, dens, strict=True):
-            if np.trim_zeros(num, "f").size > np.trim_zeros(den, "f").size:
-                raise UnsuitableSystemError(
-                    f"{system.name!r} has more zeros than poles; expected a proper system. Add a "
-                    "derivative filter"
-                )
-
-
-def common_dt(first: Any, second: Any) -> float:
-    """Common time base of two systems; numbers and systems without one adopt the other.
-
-    Raises
-    ------
-    UnsuitableSystemError
-        Continuous and discrete, or different sample times.
-    """
-    bases: list[Any] = [getattr(system, "dt", None) for system in (first, second)]
-    for base, other in (bases, bases[::-1]):
-        if base is None or (base is True and other not in (None, 0, 0.0)):
-            return float(other)
-    if bool(bases[0]) != bool(bases[1]) or not np.isclose(bases[0], bases[1], rtol=1e-6, atol=0.0):
-        words = " and ".join(f"dt = {base:g} s" if base else "continuous" for base in bases)
-        raise UnsuitableSystemError(
-            f"the systems have different time bases: {words}. Sample the continuous one "
-            "(sys.to_discrete(dt), design.to_discrete)"
-        )
-    return float(bases[0])
-
-
-def _labels(system: Any, side: str, own: Sequence[str]) -> Sequence[str]:
-    """Signal names of the other factor; our own if python-control has numbered those."""
-    labels: list[str] = getattr(system, side, list(own))
-    numbered = all(label.endswith(f"[{i}]") for i, label in enumerate(labels))
-    return own if numbered and len(labels) == len(own) else labels
-
-
-def _is_single(form: DelayForm) -> bool:
-    return form.inputs == form.outputs == 1
-
-
-def _everywhere(single: DelayForm, other: DelayForm) -> DelayForm:
-    return forms.through(single, np.ones((other.outputs, 1)), np.ones((1, other.inputs)))
-
-
-def _product(second: DelayForm, first: DelayForm) -> DelayForm:
-    """Series; a system of one input and output is applied to each channel, as in python-control."""
-    if _is_single(second) and first.outputs != 1:
-        second = _repeated(second, first.outputs)
-    elif _is_single(first) and second.inputs != 1:
-        first = _repeated(first, second.inputs)
-    if _is_single(second) and _is_single(first):
-        return _single_product(second, first)
-    if second.inputs != first.outputs:
-        raise OptionError(f"systems {_shapes(second, first)} cannot be multiplied")
-    return forms.series(second, first)
-
-
-def _single_product(second: DelayForm, first: DelayForm) -> DelayForm:
-    """Series of single channels: all delays, wherever they are, are moved to the input."""
-    (before, behind, core), (entry, exit_, other) = ends_apart(first), ends_apart(second)
-    total = before[0] + behind[0] + entry[0] + exit_[0]
-    line = forms.delayed_ends(*forms.gain_matrices(1.0), (total,), (0.0,))
-    return forms.series(forms.series(other, core), line)
-
-
-def _repeated(single: DelayForm, count: int) -> DelayForm:
-    form = single
-    for _ in range(count - 1):
-        form = forms.append(form, single)
-    return form
-
-
-def _shapes(left: DelayForm, right: DelayForm) -> str:
-    one, other = (left.outputs, left.inputs), (right.outputs, right.inputs)
-    return f"of (outputs, inputs) {one} and {other}"
+    def feedback(self, other: Any = 1, sign: float = -1) -> Any:
+        """Close `other` around this controller; see `control.feedback`."""
+        if not isinstance(other, DelayOperators):
+            return super().feedback(other, sign)
+        inside = DelayOperators._kinds[INSIDE]
+        names = {"inputs": self.input_labels, "outputs": self.output_labels}
+        return inside(plain(form_of(self), self.dt), (), **names).feedback(other, sign)
 
 
 def _algebraic(what: str) -> UnsuitableSystemError:
@@ -311,18 +216,3 @@ def _algebraic(what: str) -> UnsuitableSystemError:
         f"{what} close an algebraic loop that has no solution, or many (I - D2 D1 is singular): "
         "the loop answers itself without any delay. Put a delay or a lag into it"
     )
-
-
-def whole_samples(delays: Sequence[float], dt: float) -> None:
-    """Refuse delays of a discrete system that are not whole samples.
-
-    Raises
-    ------
-    DelayRangeError
-    """
-    for delay in delays:
-        if delay != int(delay):
-            raise DelayRangeError(
-                f"a delay is {delay:g} samples of {dt:g} s; a discrete system needs whole samples. "
-                "Make the system in continuous time and sample it, sys.to_discrete(dt)"
-            )

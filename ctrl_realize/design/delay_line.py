@@ -14,17 +14,20 @@ from numpy.typing import ArrayLike
 
 from .._shown import as_asked, html_card, text_card
 from .._wording import in_time
-from ..delayed import DelayedStateSpace
-from ..delayed.deferred import DeferredMatrices
+from ..delayed.operators import DelayOperators
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
+from ..numerics.internal_delays.form import DelayForm
 from ..numerics.state_space.line_sums import CHUNK, LineSum
 from ..numerics.state_space.responses import frequency_response, schur_form
 
 Pulses = tuple[FloatArray, FloatArray, FloatArray]
 """A (n, n), B (n, 1) and C (rows, n) of a pulse response."""
 
+DIES_OUT = 0.999999
+"""Largest pole of a response that may be taken as the difference of two endless ones."""
 
-class DelayLineController(DeferredMatrices):
+
+class DelayLineController(DelayOperators):
     """Discrete controller with a delay line of its past outputs; a `control.StateSpace`.
 
     States ``[x; u[k-1] ... u[k-d]]``; with v the line::
@@ -95,10 +98,10 @@ class DelayLineController(DeferredMatrices):
         )
         self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
         self._pulses = None if pulses is None else tuple(read_only(M) for M in pulses)
-        self._form = schur_form(self._parts[0])
+        self._schur = schur_form(self._parts[0])
         self._taps = LineSum(np.vstack([E, h]), pulses)
         self.line_length = d
-        self.inner_poles: ComplexArray = np.diag(self._form[0]).copy()
+        self.inner_poles: ComplexArray = np.diag(self._schur[0]).copy()
         self._locked = True
 
     def _make_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -126,9 +129,30 @@ class DelayLineController(DeferredMatrices):
             "more slowly, for a controller with a shorter line"
         )
 
-    def __mul__(self, other: Any) -> Any:
-        """Series: first `other`, then the controller. A plant with dead time keeps it."""
-        return NotImplemented if isinstance(other, DelayedStateSpace) else super().__mul__(other)
+    def _form(self) -> DelayForm:
+        """Core and delay: one delay if the line is the truncated response of stable modes.
+
+        ``sum_i C_p A_p^(i-1) B_p u[k-i]`` over the line is the response of these modes to u, less
+        what is left of it d samples later.
+        """
+        A, B, C, D, E, h = self._parts
+        n, d = E.shape
+        if d == 0:
+            return DelayForm(A, B, C, D)
+        if self._pulses is None or _radius(self._pulses[0]) > DIES_OUT:
+            return DelayForm(*self._make_matrices())
+        A_p, B_p, C_p = self._pulses
+        taps = np.vstack([E, h])
+        power = np.linalg.matrix_power(A_p, d - 1) @ B_p
+        last = taps[:, -1:] - C_p @ power
+        r = A_p.shape[0]
+        # states [x; x_p], inputs [e; w], outputs [u; z] with z = u and w = u[k-d]
+        row = np.hstack([C, C_p[n:]]), np.hstack([D, last[n:]])
+        full_A = np.block([[A, C_p[:n]], [np.zeros((r, n)), A_p]])
+        full_B = np.block([[B, last[:n]], [np.zeros((r, 1)), -A_p @ power]])
+        full_A[n:] += B_p @ row[0]
+        full_B[n:] += B_p @ row[1]
+        return DelayForm(full_A, full_B, np.vstack([row[0]] * 2), np.vstack([row[1]] * 2), (d,))
 
     def __repr__(self) -> str:
         return as_asked(self)
@@ -212,7 +236,7 @@ class DelayLineController(DeferredMatrices):
             # At an inner pole (z = 1 with a PI controller) both are infinite.
             with np.errstate(divide="ignore", invalid="ignore"):
                 rows = frequency_response(
-                    self._form, np.hstack([B, eye]), C, np.hstack([D, np.zeros((1, n))]), points
+                    self._schur, np.hstack([B, eye]), C, np.hstack([D, np.zeros((1, n))]), points
                 )[0]
                 forward[part] = rows[0]
                 back[part] = 1 - line[-1] - np.sum(rows[1:] * line[:-1], axis=0)
@@ -226,6 +250,10 @@ class DelayLineController(DeferredMatrices):
             out = forward / back
         out[~np.isfinite(out)] = complex(np.inf, np.nan)
         return np.asarray(out[None, None, :], dtype=np.complex128)
+
+
+def _radius(A: FloatArray) -> float:
+    return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
 
 
 def _rebuild(

@@ -8,9 +8,12 @@ import control as ct
 import numpy as np
 
 from .._checks import band
-from ..delayed import DelayedStateSpace
+from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.parts import check_entries
 from ..errors import OptionError, UnsuitableSystemError
+
+FEW_STATES = 200
+"""Number of states up to which internal delays are taken as states."""
 
 
 def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedStateSpace:
@@ -32,6 +35,12 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
         )
     if isinstance(system, DelayedStateSpace):
         return system
+    if isinstance(system, DelaySystem) and (not system.dt or system.nstates > FEW_STATES):
+        raise UnsuitableSystemError(
+            f"{purpose} needs a discrete system with its delays at inputs and outputs; "
+            f"{system.name!r} has {'internal delays' if system.dt else 'continuous time'}"
+            + ("" if system.dt else ": sample it with sys.to_discrete(dt)")
+        )
     if system.dt is None or system.dt is True or not system.dt > 0:
         raise UnsuitableSystemError(
             f"{purpose} needs a discrete system with a sample time; {system.name!r} has "

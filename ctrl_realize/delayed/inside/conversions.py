@@ -16,7 +16,8 @@ from ...numerics.internal_delays.form import DelayForm
 from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.state_space.fractional_delay import pade_ladder
 from ...numerics.state_space.sampling import sample_with_dead_time, split_dead_time
-from ..operators import DelayOperators, plain
+from ..operands import plain
+from ..operators import DelayOperators
 
 MAX_PADE_ORDER = 20
 

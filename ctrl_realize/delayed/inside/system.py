@@ -7,7 +7,6 @@ sums of those.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
@@ -15,15 +14,18 @@ import control as ct
 import numpy as np
 
 from ..._checks import real, system_name
-from ...errors import DelayRangeError, UnsuitableSystemError
+from ...errors import UnsuitableSystemError
 from ...numerics.arrays import IntArray
 from ...numerics.internal_delays.form import DelayForm
+from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.recurrence import absorbed
 from ...numerics.internal_delays.response import Response
 from ..chains import Matrices
-from ..operators import INSIDE, DelayOperators, whole_samples
-from ..parts import MAX_DELAY, check_entries, named, signal_names
+from ..operands import plain
+from ..operators import INSIDE, DelayOperators
+from ..parts import named, signal_names
 from .cards import InsideCards
+from .checks import check_core, check_delays, who_asks
 from .conversions import InsideConversions
 from .responses import InsideResponses
 
@@ -102,9 +104,9 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         inputs: str | Sequence[str] | None = None,
         outputs: str | Sequence[str] | None = None,
     ) -> None:
-        dt = _check_core(core)
+        dt = check_core(core)
         delays = tuple(real(d, "internal_delays", "delays >= 0") for d in internal_delays)
-        _check_delays(delays, core, dt)
+        check_delays(delays, core, dt)
         if dt:
             delays = tuple(int(d) for d in delays)
         q = len(delays)
@@ -138,10 +140,25 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         core = self._core
         return DelayForm(core.A, core.B, core.C, core.D, self.internal_delays)
 
+    def delay_apart(self) -> tuple[DelaySystem, float]:
+        """Split a system of one input and output into what is left and the dead time before it.
+
+        Returns
+        -------
+        rest : DelaySystem
+            Without delays if all of them are before or behind it.
+        delay : float
+            In samples, or s in continuous time.
+        """
+        before, behind, rest = ends_apart(self._form())
+        core = plain(rest, self.dt)
+        names = {"inputs": self.input_labels, "outputs": self.output_labels}
+        return DelaySystem(core, rest.delays, **names), before[0] + behind[0]
+
     def _make_matrices(self) -> Matrices:
         if not self.dt and self.internal_delays:
             raise UnsuitableSystemError(
-                f"{_who_asks()} needs A, B, C, D, which do not exist for a dead time in continuous "
+                f"{who_asks()} needs A, B, C, D, which do not exist for a dead time in continuous "
                 "time. If a transfer function or plain system comes first, write P * C, P + C, "
                 "ct.ss(C) * P, cr.interconnect, or (1 + L) ** -1 for ct.feedback(1, L). For time "
                 "responses use sys.step_response and sys.forced_response, for a rational "
@@ -207,16 +224,6 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         return copy
 
 
-def _who_asks() -> str:
-    """Name the function of python-control that was called and needs the matrices."""
-    frame, name = sys._getframe(1), ""
-    while frame is not None:
-        if frame.f_globals.get("__name__", "").startswith("control."):
-            name = frame.f_code.co_name
-        frame = frame.f_back  # type: ignore[assignment]
-    return f"{name} of python-control" if name else "this"
-
-
 def _rebuild(
     kind: type[DelaySystem],
     matrices: tuple[Any, ...],
@@ -239,38 +246,3 @@ def _ends_of(system: DelaySystem) -> ct.StateSpace:
     ends: IntArray = np.zeros((system.noutputs, system.ninputs), dtype=np.int64)
     names = {"inputs": system.input_labels, "outputs": system.output_labels}
     return ct.StateSpace([], [], [], ends, system.dt, name=system.name, **names)
-
-
-def _check_core(core: Any) -> float:
-    if not isinstance(core, ct.StateSpace):
-        raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}; expected a control.StateSpace (ct.ss converts)"
-        )
-    if isinstance(core, DelayOperators):
-        raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}, which has delays of its own; expected a plain "
-            "control.StateSpace"
-        )
-    if core.dt is None or core.dt is True:
-        raise UnsuitableSystemError(
-            f"the core's dt is {core.dt!r}; expected a sample time in s, or 0 for continuous time"
-        )
-    check_entries(core)
-    return float(core.dt)
-
-
-def _check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float) -> None:
-    if len(delays) > min(core.ninputs, core.noutputs):
-        raise UnsuitableSystemError(
-            f"{len(delays)} delays need as many inputs and outputs of the core, which has "
-            f"{core.ninputs} inputs and {core.noutputs} outputs"
-        )
-    if any(delay < 0 for delay in delays):
-        raise DelayRangeError(f"internal_delays={delays}; expected delays >= 0")
-    if dt:
-        whole_samples(delays, dt)
-        if sum(delays) > MAX_DELAY:
-            raise DelayRangeError(
-                f"the delays are {delays} samples; at most {MAX_DELAY} are allowed. Use a longer "
-                "sample time"
-            )

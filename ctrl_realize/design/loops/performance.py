@@ -10,8 +10,8 @@ import numpy as np
 
 from ..._checks import positive
 from ..._wording import in_time
-from ...delayed import DelayedStateSpace
-from ...errors import ModelWarning, UnsuitableSystemError
+from ...delayed import DelayedStateSpace, DelaySystem
+from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.loops.circle import damped_circle, step_on_circle
@@ -23,6 +23,8 @@ LONGEST = 2**19
 """Largest number of samples of a response."""
 SETTLED = 1e-4
 """Relative range of the last part of a response that counts as settled."""
+POINTS, DOUBLINGS = 2001, 8
+"""Samples of the responses of a continuous loop, and how often their time is doubled."""
 SETTLING_BAND = 0.02
 """Distance from the final value, relative to it, within which a response counts as settled."""
 
@@ -103,13 +105,14 @@ def step_responses(
 
 @single_threaded
 def performance(
-    plant: DelayedStateSpace, controller: Any, total_time: float | None = None
+    plant: DelayedStateSpace | DelaySystem, controller: Any, total_time: float | None = None
 ) -> Performance:
     """Compute the closed-loop responses to steps of set-point and load at the plant input.
 
     Parameters
     ----------
-    plant : DelayedStateSpace
+    plant : DelayedStateSpace or DelaySystem
+        Discrete; or a continuous `DelaySystem`, whose delay differential equation is solved.
     controller : system or float
         Of the plant's sample time, with negative feedback.
     total_time : float, optional
@@ -152,6 +155,8 @@ def performance(
     guess = None if total_time is None else positive(total_time, "total_time", "time in s")
     warn_unresolved(plant)
     loop = loop_time(plant, controller)
+    if not plant.dt:
+        return continuous_performance(plant, controller, guess or loop)
     setpoint, load, settled = settled_responses(plant, controller, guess or loop)
     if not settled:
         warnings.warn(
@@ -164,8 +169,34 @@ def performance(
     return measured(setpoint, load, float(plant.dt))
 
 
-def plant_time(plant: DelayedStateSpace) -> float:
+def continuous_performance(plant: DelaySystem, controller: Any, total_time: float) -> Performance:
+    """Characteristics of the responses of a continuous loop, sampled `POINTS` times."""
+    loop = (plant * controller).feedback(1)
+    to_load = plant.feedback(controller)
+    end = 4 * total_time
+    for _ in range(DOUBLINGS):
+        times = np.linspace(0, end, POINTS)
+        setpoint = np.asarray(loop.step_response(times, tolerance=SETTLED / 100).outputs)
+        load = np.asarray(to_load.step_response(times, tolerance=SETTLED / 100).outputs)
+        tail = slice(-POINTS // 20, None)
+        left = max(np.ptp(setpoint[tail]), np.ptp(load[tail]) / max(np.abs(load).max(), 1e-300))
+        if left < SETTLED:
+            break
+        end *= 2
+    else:
+        warn_caller(
+            f"the loop has not settled after {end / 2:g} s; its errors are those up to then",
+            ModelWarning,
+        )
+    return measured(setpoint, load, float(times[1]))
+
+
+def plant_time(plant: DelayedStateSpace | DelaySystem) -> float:
     """Guess the settling time of a plant: dead time and twice its slowest lag, in s."""
+    if isinstance(plant, DelaySystem):
+        features, wait = plant.features()
+        rates = -features.real[features.real < -1e-9 * np.abs(features).max(initial=1.0)]
+        return wait + 2 / float(rates.min(initial=np.inf)) + 4 * float(plant.dt)
     poles = np.abs(plant.delay_free.poles())
     slow = poles[poles < 1 - 1e-9]
     slowest = -1 / np.log(slow.max()) if slow.size and slow.max() > 0 else 1.0

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..._checks import positive
 from ..._wording import in_time
-from ...delayed import DelayedStateSpace, delayed_ss
+from ...delayed import DelayedStateSpace, DelaySystem, delay, delayed_ss
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -99,6 +99,8 @@ class ContinuousModel(Result):
     >>> model = cr.design.to_continuous(plant)
     >>> print(f"{model.dead_time:.4f} s", model.core.poles().real.round(6))
     0.0289 s [-12.5]
+    >>> ct.feedback(model.system)
+    <DelaySystem: u -> y, order 1, internal delay 0.0289 s, continuous>
     """
 
     core: ct.StateSpace
@@ -113,6 +115,21 @@ class ContinuousModel(Result):
         core = self.core
         parts = (core.A, core.B, core.C, core.D, core.name, core.input_labels, core.output_labels)
         return _rebuild_model, (*parts, self.dead_time, self.dt)
+
+    @property
+    def system(self) -> DelaySystem:
+        """Core and dead time as one continuous system, exact in loops; see `DelaySystem`."""
+        core = self.core
+        late = DelaySystem(core)
+        if self.dead_time:
+            late = late * (np.eye(core.ninputs) * delay(self.dead_time))
+        return DelaySystem(
+            late.core,
+            late.internal_delays,
+            name=core.name,
+            inputs=core.input_labels,
+            outputs=core.output_labels,
+        )
 
     def pade(self, order: int = 5) -> ct.StateSpace:
         """Continuous system with the dead time as a Pade approximant, see `pade_ss`."""
@@ -252,7 +269,7 @@ def to_discrete(
 
     Parameters
     ----------
-    core : control.StateSpace, control.TransferFunction or ContinuousModel
+    core : control.StateSpace, control.TransferFunction, ContinuousModel or DelaySystem
     dead_time : float, optional
         In s; default: that of a `ContinuousModel`, else 0. To replace the dead time of a model,
         give `dt` as well.
@@ -292,6 +309,18 @@ def to_discrete(
         dead_time = core.dead_time if dead_time is None else dead_time
         dt = core.dt if dt is None else dt
         core = core.core
+    if isinstance(core, DelaySystem):
+        if dead_time:
+            raise OptionError(
+                f"dead_time={dead_time!r} with a system that has its own; multiply it by "
+                "delay(dead_time)"
+            )
+        sampled = core.to_discrete(positive(dt, "dt", "sample time in s"))
+        if not isinstance(sampled, DelayedStateSpace):
+            raise UnsuitableSystemError(
+                f"{core.name!r} has delays inside; sys.to_discrete(dt) gives a DelaySystem"
+            )
+        return sampled.replace(**names)
     step = positive(dt, "dt", "sample time in s")
     system = proper_ss(core, "to_discrete")
     if system.isdtime(strict=True):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, overload
 
 import control as ct
 import numpy as np
 
 from ..._checks import positive
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.state_space import responses
@@ -17,6 +17,7 @@ from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
 from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system, same_rate
 from .checked import CheckedController
+from .continuous_smith import continuous_smith_predictor
 from .predictor_filter import predictor_filter, removed_part
 
 ON_CIRCLE = 1e-9
@@ -70,14 +71,36 @@ class SmithPredictor(CheckedController):
         }
 
 
+@overload
 def smith_predictor(
-    system: DelayedStateSpace,
+    system: DelaySystem,
     controller: Any,
     *,
     filter_time: float | None = None,
     remove_slow: bool | None = None,
     name: str = "smith",
-) -> SmithPredictor:
+) -> DelaySystem: ...
+
+
+@overload
+def smith_predictor(
+    system: ct.StateSpace,
+    controller: Any,
+    *,
+    filter_time: float | None = None,
+    remove_slow: bool | None = None,
+    name: str = "smith",
+) -> SmithPredictor: ...
+
+
+def smith_predictor(
+    system: Any,
+    controller: Any,
+    *,
+    filter_time: float | None = None,
+    remove_slow: bool | None = None,
+    name: str = "smith",
+) -> SmithPredictor | DelaySystem:
     """Make a Smith predictor for a controller designed for the delay-free core.
 
     The result C_s is used like any controller, ``loop = system * C_s`` with negative feedback.
@@ -87,10 +110,11 @@ def smith_predictor(
 
     Parameters
     ----------
-    system : DelayedStateSpace
-        The plant, one input and one output, stable or with one integrator.
+    system : DelayedStateSpace or DelaySystem
+        The plant, one input and one output, stable or with one integrator. A continuous
+        `DelaySystem` must be stable, with its dead time at input or output.
     controller : control.StateSpace, control.TransferFunction or float
-        Controller designed for ``system.delay_free``, of the same sample time.
+        Controller designed for the plant without dead time, of the same time base.
     filter_time : float, optional
         Time constant in s of the filter on the prediction error. It makes the loop robust to a
         wrong dead time or gain, and slows down load rejection; the set-point response is then
@@ -98,21 +122,22 @@ def smith_predictor(
     remove_slow : bool, optional
         Remove poles slower than the dead time from the predictor, so that the response to loads
         decays with the controller rather than with the plant (for lag-dominated cores). An
-        integrator is always removed.
+        integrator is always removed. Discrete plants only.
     name : str, optional
 
     Returns
     -------
-    SmithPredictor
+    SmithPredictor or DelaySystem
         A `control.StateSpace` from error to plant input. Its `check` is a `LoopCheck` of the
-        closed loop with `system` itself.
+        closed loop with `system` itself. For a continuous plant a `DelaySystem`, whose internal
+        delay is the dead time.
 
     Raises
     ------
     UnsuitableSystemError
         An unstable core, whose modes would be hidden and grow inside the predictor. An integrating
-        core without `filter_time`, for the same reason. A continuous, improper or multi-channel
-        system. A controller that makes the loop with `system` itself unstable.
+        core without `filter_time`, for the same reason. An improper or multi-channel system, or
+        one with delays in a loop. A controller that makes the loop with `system` itself unstable.
     OptionError
         An invalid filter.
 
@@ -151,7 +176,20 @@ def smith_predictor(
     12
     >>> cr.design.margins(plant, predictor)
     <Margins stable: gain 2.387, phase 64.42 deg, modulus 0.5772, delay 0.1622 s>
+
+    In continuous time:
+
+    >>> plant = ct.tf([1], [0.08, 1]) * cr.delay(0.1)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([0.16, 2.0], [0.08, 0]))
+    >>> predictor
+    <DelaySystem 'smith': e -> u, order 2, internal delay 0.1 s, continuous>
+    >>> cr.design.margins(plant, predictor).stable
+    True
     """
+    if isinstance(system, DelaySystem) and not system.dt:
+        if remove_slow:
+            raise OptionError("remove_slow is for discrete plants (sys.to_discrete)")
+        return continuous_smith_predictor(system, controller, filter_time, name)
     plant = delayed_system(system, "a Smith predictor")
     check_sign(plant, "a Smith predictor")
     warn_unresolved(plant, predicts=True)

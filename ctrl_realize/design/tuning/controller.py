@@ -5,13 +5,12 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..._checks import one_of, positive, real
 from ..._shown import as_asked, html_card, text_card
 from ..._wording import in_time
-from ...delayed import DelayedStateSpace
+from ...delayed.operators import BesideDelays
 from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ..loops.loop_check import LoopCheck
@@ -20,7 +19,7 @@ from ..models.process_model import ProcessModel
 DISCRETIZATIONS = ("tustin", "forward", "backward")
 
 
-class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
+class PIDController(BesideDelays):
     """PID controller in ideal form, continuous or discrete; a `control.StateSpace`.
 
     Continuous: ``kp (1 + 1/(ti s) + td s / (tf s + 1))`` from error to plant input. Discrete: the
@@ -164,10 +163,6 @@ class PIDController(ct.StateSpace):  # type: ignore[misc]  # control is untyped
 
     def __deepcopy__(self, memo: dict[int, Any]) -> PIDController:
         return self._again()
-
-    def __mul__(self, other: Any) -> Any:
-        """Series: first `other`, then the controller. A plant with dead time keeps it."""
-        return NotImplemented if isinstance(other, DelayedStateSpace) else super().__mul__(other)
 
     def __repr__(self) -> str:
         return as_asked(self)

@@ -2,8 +2,9 @@
 
 A loop with a long delay has nearly all of its poles next to the unit circle, about evenly spaced:
 Newton's method from points on the circle, and from points beside it where z^d is as large as the
-loop's gain, finds those of largest size. How many lie
-outside follows from the argument principle alone, without any pole [1]_; the starts are our own.
+loop's gain, finds those of largest magnitude. The argument principle [1]_ tells whether these are
+all; if not, as for several long delays, all poles are computed. The starts are our own. How many
+poles are unstable follows from the argument principle alone.
 
 References
 ----------
@@ -24,6 +25,9 @@ from .response import CHUNK, characteristic_matrices
 
 ALL = 400
 """Number of poles up to which all are found together in a few hundredths of a second."""
+
+MULTIPLE = 1e-7
+"""Relative distance below which two roots count as one, possibly a multiple one."""
 
 RESIDUAL = 1e-10
 """Relative Newton step below which a point counts as a pole."""
@@ -59,7 +63,9 @@ def dominant_discrete_poles(form: DelayForm, count: int) -> ComplexArray:
 
 def largest(poles: ComplexArray, count: int) -> ComplexArray:
     """Sort poles by size and take the first ones; one more where a pair would be split."""
-    order = np.lexsort((-poles.imag, -poles.real, -np.round(np.abs(poles), 12)))
+    # rounded, so that the two of a pair stay together
+    sizes, real = np.round(np.abs(poles), 12), np.round(poles.real, 10)
+    order = np.lexsort((-poles.imag, -real, -sizes))
     poles = poles[order]
     if 0 < count < poles.size and poles[count - 1].imag > 1e-9 * abs(poles[count - 1]):
         count += 1
@@ -72,16 +78,68 @@ def _largest(part: DelayForm, total: int, count: int) -> ComplexArray:
     own = np.linalg.eigvals(part.A).astype(np.complex128)
     gain = np.clip(_loop_gain(part, circle), 1e-3, 1e3)
     moved = circle * gain ** (1 / max(part.delays))
-    starts = np.concatenate([circle, moved, own[own.imag >= 0] * (1 + 1e-6) + 1e-9])
+    starts = np.concatenate([circle, moved])
     step = newton_steps(part, starts, discrete=True)
     ahead = starts - step
     # A step longer than the spacing of the poles leads to another start's pole.
     near = np.isfinite(step) & (np.abs(step) < np.maximum(20 / total, 1e-3))
     ahead, kept = ahead[near], 8 * count + 40
     ahead = ahead[np.argsort(-np.abs(ahead))][:kept]
+    # poles of the core as they are, and with the loop closed by delays of 0: poles that the delays
+    # hardly move, as those of a Smith predictor's loop
+    slow = np.concatenate([own, _without_delays(part)])
+    slow = np.asarray(slow[slow.imag >= 0] * (1 + 1e-6) + 1e-9, dtype=np.complex128)
     roots, last = newton_polished(part, ahead, discrete=True)
-    roots = roots[last < RESIDUAL]
-    return with_pairs(apart(roots))
+    still, moves = newton_polished(part, slow, discrete=True, steps=30)
+    # A double root, of a plant and its model, is found to the root of the rounding error.
+    stays = (moves < RESIDUAL) | ((moves < MULTIPLE) & (np.abs(still - slow) < 100 * MULTIPLE))
+    found = np.concatenate([still[stays], roots[last < RESIDUAL]])
+    roots = with_pairs(apart(found, MULTIPLE))
+    return roots if _complete(part, roots, count) else discrete_poles(part)
+
+
+def _complete(part: DelayForm, roots: ComplexArray, count: int) -> bool:
+    """Whether as many roots were found outside of a circle as there are by the argument principle.
+
+    The circle is laid through the widest gap behind the roots that are wanted.
+    """
+    sizes = np.sort(np.abs(roots))[::-1]
+    if sizes.size <= count + 1:
+        return False
+    tail = sizes[count : count + 40]
+    at = int(np.argmax(tail[:-1] - tail[1:]))
+    radius = float(tail[at] + tail[at + 1]) / 2
+    return int(np.sum(sizes > radius)) == count_outside(part, radius)
+
+
+def count_outside(part: DelayForm, radius: float) -> int:
+    """Count the poles of a discrete system outside a circle by the argument principle."""
+    form = schur_form(part.A)
+    d = np.array(part.delays)
+    outside = int(np.sum(np.abs(np.diag(form[0])) > radius))
+
+    def curve(angle: FloatArray) -> ComplexArray:
+        z = radius * np.exp(1j * angle)
+        core = frequency_response(form, part.B, part.C, part.D, z)
+        # I - z^-d M, for a radius below 1 times its power d: positive, so it turns alike
+        late = np.exp(-1j * np.outer(angle, d)) * min(1.0, 1 / radius) ** d
+        held = min(1.0, radius) ** d
+        M = np.moveaxis(core, -1, 0)
+        loop = np.eye(d.size) * held - late[:, :, None] * M
+        return np.asarray(loop[:, 0, 0] if d.size == 1 else np.linalg.det(loop))
+
+    grid = np.linspace(0, np.pi, 2 * int(d.sum()) + 400)
+    _, values = follow(curve, grid)
+    return outside - round(half_turns(values))
+
+
+def _without_delays(part: DelayForm) -> ComplexArray:
+    """Poles of a loop if its delays were 0; none where that loop has no solution."""
+    loop = np.eye(len(part.delays)) - part.D
+    if np.linalg.cond(loop) > 1e12:
+        return np.zeros(0, dtype=np.complex128)
+    A = part.A + part.B @ np.linalg.solve(loop, part.C)
+    return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
 
 
 def _loop_gain(part: DelayForm, points: ComplexArray) -> FloatArray:

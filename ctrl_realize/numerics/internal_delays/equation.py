@@ -216,26 +216,23 @@ def _stepped(
     inner = mesh[:-1, None] + lengths[:, None] * NODES
     # The end of a step belongs to it: a jump there is the next one's.
     inside = np.where(NODES == 1.0, inner - 1e-9 * lengths[:, None], inner)
-    u = inputs(inside.ravel()).reshape(m, S, K)
+    u = np.ascontiguousarray(inputs(inside.ravel()).reshape(m, S, K).transpose(1, 2, 0))
     where, weights = _past(form, mesh, lengths, inner)
-    z = np.zeros((S + 1, K, q))
-    z[-1] = history  # index -1: before time 0
+    z = np.zeros((S + 1, q, K))
+    z[-1] = history[:, None]  # index -1: before time 0
     y = np.empty((S, K, p))
-    seen = np.hstack([form.C, form.D])
-    known = np.empty((K, m + q))
+    known = np.empty(n + K * (m + q))
+    known[:n] = state
+    drive = known[n:].reshape(K, m + q)
     channel = np.arange(q)
     for s in range(S):
-        known[:, :m] = u[:, s].T
+        drive[:, :m] = u[s]
         if q:
-            # (K nodes, q) from the nodes of the step that each one fell into
-            found = z[where[s]][:, channel, :, channel]  # (q, K, K)
-            known[:, m:] = np.einsum("qjk,jqk->jq", found, weights[s])
-        from_state, from_inputs = matrices[same[s]]
-        x = from_state @ state + (from_inputs @ known.ravel())
-        states = np.vstack([state, x.reshape(K - 1, n)])
-        out = np.hstack([states, known]) @ seen.T
-        y[s], z[s] = out[:, :p], out[:, p:]
-        state = states[-1]
+            drive[:, m:] = (z[where[s], channel] * weights[s]).sum(axis=-1)
+        found = matrices[same[s]] @ known
+        seen = found[n:].reshape(K, p + q)
+        y[s], z[s] = seen[:, :p], seen[:, p:].T
+        known[:n] = found[:n]
     at = np.searchsorted(mesh, times + SNAP * (mesh[-1] or 1.0), side="right") - 1
     at = np.clip(at, 0, S - 1)
     local = np.clip((times - mesh[at]) / lengths[at], 0.0, 1.0)
@@ -245,14 +242,17 @@ def _stepped(
     return np.asarray(np.einsum("tk,tkp->pt", weights_there, y[at]), dtype=np.float64)
 
 
-def _step_matrices(form: DelayForm, step: float) -> tuple[FloatArray, FloatArray]:
-    """States at the stages from the state at the start, and from what drives at the nodes."""
-    n, width = form.states, form.B.shape[1]
+def _step_matrices(form: DelayForm, step: float) -> FloatArray:
+    """State at the end and signals at the nodes, from the state at the start and what drives."""
+    n, width, K = form.states, form.B.shape[1], STAGES + 1
     left = np.eye(STAGES * n) - step * np.kron(INTEGRALS, form.A)
-    drive = np.zeros((STAGES * n, (STAGES + 1) * width))
-    drive[:, width:] = step * np.kron(INTEGRALS, form.B)
-    both = np.linalg.solve(left, np.hstack([np.kron(np.ones((STAGES, 1)), np.eye(n)), drive]))
-    return both[:, :n], both[:, n:]
+    right = np.zeros((STAGES * n, n + K * width))
+    right[:, :n] = np.kron(np.ones((STAGES, 1)), np.eye(n))
+    right[:, n + width :] = step * np.kron(INTEGRALS, form.B)
+    states = np.vstack([np.eye(n, n + K * width), np.linalg.solve(left, right)])
+    signals = np.kron(np.eye(K), form.C) @ states
+    signals[:, n:] += np.kron(np.eye(K), form.D)
+    return np.vstack([states[states.shape[0] - n :], signals])
 
 
 def _past(

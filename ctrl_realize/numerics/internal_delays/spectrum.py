@@ -132,7 +132,8 @@ def rightmost_zeros(form: DelayForm, count: int) -> ComplexArray:
 def in_order(poles: ComplexArray, count: int) -> ComplexArray:
     """Sort by falling real part, and take the first ones; one more lest a pair be split."""
     scale = float(np.abs(poles).max(initial=0.0)) or 1.0
-    order = np.lexsort((-poles.imag, np.abs(poles.imag), -np.round(poles.real / scale, 13)))
+    real, turn = np.round(poles.real / scale, 11), np.round(np.abs(poles.imag) / scale, 11)
+    order = np.lexsort((-poles.imag, turn, -real))
     poles = poles[order]
     if 0 < count < poles.size and poles[count - 1].imag > 1e-9 * abs(poles[count - 1]):
         count += 1

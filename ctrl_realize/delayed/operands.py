@@ -1,0 +1,156 @@
+"""Operands of the operators: their forms, time bases and sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ..numerics.internal_delays import form as forms
+from ..numerics.internal_delays.form import DelayForm
+from ..numerics.internal_delays.merging import ends_apart
+from .deferred import DeferredMatrices
+from .parts import check_entries
+
+Numbers = (int, float, np.number)
+
+
+def plain(form: DelayForm, dt: float) -> ct.StateSpace:
+    """Make the core of a form as a system of python-control."""
+    return ct.StateSpace(form.A, form.B, form.C, form.D, dt, remove_useless_states=False)
+
+
+def is_linear(system: Any) -> bool:
+    """Whether an object can be converted to a form."""
+    if isinstance(system, (np.ndarray, np.number)):
+        return bool(np.isrealobj(system))
+    return isinstance(system, (int, float, ct.StateSpace, ct.TransferFunction))
+
+
+def form_of(system: Any) -> DelayForm:
+    """Convert a linear system, a number or a matrix to a form.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Anything else, an improper transfer function, or entries that are not finite.
+    """
+    if isinstance(system, DeferredMatrices):
+        return system._form()
+    if not is_linear(system):
+        raise UnsuitableSystemError(
+            f"got a {type(system).__name__}; expected a control.StateSpace, a TransferFunction, a "
+            "number or a matrix"
+        )
+    check_entries(system)
+    if isinstance(system, ct.TransferFunction):
+        _check_proper(system)
+        system = ct.ss(system)
+    if isinstance(system, ct.StateSpace):
+        A, B, C, D = (np.asarray(M, np.float64) for M in _matrices(system))
+        return DelayForm(A, B, C, D)
+    return forms.static(np.atleast_2d(np.asarray(system, dtype=np.float64)))
+
+
+def _matrices(system: ct.StateSpace) -> tuple[Any, ...]:
+    return system.A, system.B, system.C, system.D
+
+
+def _check_proper(system: ct.TransferFunction) -> None:
+    for nums, dens in zip(system.num, system.den, strict=True):
+        for num, den in zip(nums, dens, strict=True):
+            if np.trim_zeros(num, "f").size > np.trim_zeros(den, "f").size:
+                raise UnsuitableSystemError(
+                    f"{system.name!r} has more zeros than poles; expected a proper system. Add a "
+                    "derivative filter"
+                )
+
+
+def common_dt(first: Any, second: Any) -> float:
+    """Common time base of two systems; numbers and systems without one adopt the other.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Continuous and discrete, or different sample times.
+    """
+    bases: list[Any] = [getattr(system, "dt", None) for system in (first, second)]
+    for base, other in (bases, bases[::-1]):
+        if base is None or (base is True and other not in (None, 0, 0.0)):
+            return float(other)
+    if bool(bases[0]) != bool(bases[1]) or not np.isclose(bases[0], bases[1], rtol=1e-6, atol=0.0):
+        words = " and ".join(f"dt = {base:g} s" if base else "continuous" for base in bases)
+        raise UnsuitableSystemError(
+            f"the systems have different time bases: {words}. Sample the continuous one "
+            "(sys.to_discrete(dt), design.to_discrete)"
+        )
+    return float(bases[0])
+
+
+def labels_of(system: Any, side: str, own: Sequence[str]) -> Sequence[str]:
+    """Signal names of the other factor; our own if python-control has numbered those."""
+    labels: list[str] = getattr(system, side, list(own))
+    numbered = all(label.endswith(f"[{i}]") for i, label in enumerate(labels))
+    return own if numbered and len(labels) == len(own) else labels
+
+
+def is_single(form: DelayForm) -> bool:
+    """Whether a system has one input and one output."""
+    return form.inputs == form.outputs == 1
+
+
+def everywhere(single: DelayForm, other: DelayForm) -> DelayForm:
+    """Put a system of one input and output into every entry, as many as another one has."""
+    return forms.through(single, np.ones((other.outputs, 1)), np.ones((1, other.inputs)))
+
+
+def product(second: DelayForm, first: DelayForm) -> DelayForm:
+    """Series; a system of one input and output is applied to each channel, as in python-control."""
+    if is_single(second) and first.outputs != 1:
+        second = _repeated(second, first.outputs)
+    elif is_single(first) and second.inputs != 1:
+        first = _repeated(first, second.inputs)
+    if is_single(second) and is_single(first):
+        return _single_product(second, first)
+    if second.inputs != first.outputs:
+        raise OptionError(f"systems {shapes(second, first)} cannot be multiplied")
+    return forms.series(second, first)
+
+
+def _single_product(second: DelayForm, first: DelayForm) -> DelayForm:
+    """Series of single channels: all delays, wherever they are, are moved to the input."""
+    (before, behind, core), (entry, exit_, other) = ends_apart(first), ends_apart(second)
+    total = before[0] + behind[0] + entry[0] + exit_[0]
+    line = forms.delayed_ends(*forms.gain_matrices(1.0), (total,), (0.0,))
+    return forms.series(forms.series(other, core), line)
+
+
+def _repeated(single: DelayForm, count: int) -> DelayForm:
+    form = single
+    for _ in range(count - 1):
+        form = forms.append(form, single)
+    return form
+
+
+def shapes(left: DelayForm, right: DelayForm) -> str:
+    """Write the sizes of two systems, for messages."""
+    one, other = (left.outputs, left.inputs), (right.outputs, right.inputs)
+    return f"of (outputs, inputs) {one} and {other}"
+
+
+def whole_samples(delays: Sequence[float], dt: float) -> None:
+    """Refuse delays of a discrete system that are not whole samples.
+
+    Raises
+    ------
+    DelayRangeError
+    """
+    for delay in delays:
+        if delay != int(delay):
+            raise DelayRangeError(
+                f"a delay is {delay:g} samples of {dt:g} s; a discrete system needs whole samples. "
+                "Make the system in continuous time and sample it, sys.to_discrete(dt)"
+            )

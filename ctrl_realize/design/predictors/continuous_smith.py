@@ -1,0 +1,72 @@
+"""Smith predictors in continuous time: controllers with an internal delay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._checks import positive
+from ...delayed import DelaySystem
+from ...errors import OptionError, UnsuitableSystemError
+from ..loops.margins import margins
+from ..siso import proper_ss
+
+ON_AXIS = 1e-9
+
+
+def continuous_smith_predictor(
+    plant: DelaySystem, controller: Any, filter_time: float | None, name: str
+) -> DelaySystem:
+    """Make ``C F / (1 + C (G - F G exp(-tau s)))`` of a plant ``G exp(-tau s)``, exactly.
+
+    One copy of the core serves both models, and the dead time is an internal delay.
+    """
+    if not plant.issiso():
+        raise UnsuitableSystemError(
+            f"a Smith predictor needs one input and one output; {plant.name!r} has "
+            f"{plant.ninputs} inputs and {plant.noutputs} outputs"
+        )
+    core, dead_time = plant.delay_apart()
+    if core.internal_delays:
+        raise UnsuitableSystemError(
+            f"{plant.name!r} has internal delays {plant.internal_delays} s; a Smith predictor "
+            "needs a plant with its dead time at the input or output"
+        )
+    unstable = core.core.poles()
+    unstable = unstable[unstable.real > -ON_AXIS * (1 + np.abs(unstable))]
+    if unstable.size:
+        raise UnsuitableSystemError(
+            f"the core has a pole at s = {complex(unstable[0]):.6g}: a Smith predictor contains "
+            "its modes uncontrolled, so they drift or grow there. Sample the plant "
+            "(sys.to_discrete) for design.smith_predictor with filter_time or design.lqg"
+        )
+    if isinstance(controller, (int, float)):
+        controller = ct.ss([], [], [], float(controller), 0)
+    primary = proper_ss(controller, "a Smith predictor")
+    if not primary.isctime():
+        raise UnsuitableSystemError(
+            f"the controller has dt={primary.dt!r}, the plant is continuous; expected a continuous "
+            "controller"
+        )
+    filtered: Any = 1.0
+    if filter_time is not None:
+        filtered = ct.ss(ct.tf([1], [positive(filter_time, "filter_time", "time in s"), 1]))
+    late = filtered * _delay(dead_time)
+    # the inner loop sees G (1 - F exp(-tau s)), with one G
+    made = (DelaySystem(ct.ss(primary))).feedback((1 - late) * core) * filtered
+    found = margins(plant, made)
+    if not found.stable:
+        raise UnsuitableSystemError(
+            "the closed loop with the Smith predictor is unstable. It is that of the core and the "
+            "controller: choose a controller that stabilizes the core without dead time"
+        )
+    names = {"inputs": ["e"], "outputs": plant.input_labels, "name": name}
+    return DelaySystem(made.core, made.internal_delays, **names)
+
+
+def _delay(dead_time: float) -> DelaySystem:
+    if dead_time == 0:
+        raise OptionError("the plant has no dead time to predict over; use the controller itself")
+    return DelaySystem(ct.StateSpace([], [], [], [[0.0, 1.0], [1.0, 0.0]], 0), [dead_time])
