@@ -16,7 +16,13 @@ FOLDERS = (
     "numerics/separable",
     "numerics/signals",
     "numerics/validation",
+    "numerics/hankel",
+    "numerics/regression",
+    "numerics/state_space",
+    "identification",
     "identification/output_error",
+    "identification/state_space_fit",
+    "identification/step",
 )
 MODULES = [path for folder in FOLDERS for path in sorted((PACKAGE / folder).glob("*.py"))]
 

@@ -18,7 +18,7 @@ from ...numerics.state_space.sections import Sections, in_sections
 
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20)
 """Orders that are tried in increasing order, until three in a row bring no improvement."""
-PATIENCE = 3
+PATIENCE = 3  # see above
 ENOUGH_SAMPLES = 20000
 """Number of samples for the choice of order and delays; the last fit uses all."""
 PER_PARAMETER = 3

@@ -59,7 +59,7 @@ DENSE_FALLBACK_SIZE = 1500
 FLOOR = 1e-14
 """Residual relative to the largest singular value that counts as rounding."""
 
-MAX_STEPS = 400
+MAX_STEPS = 400  # time and memory: both vectors of every step are kept
 
 REST_TOL = 0.02
 """Accuracy of the first truncated singular value."""

@@ -39,7 +39,7 @@ COARSE = 100
 FLOOR = 1e-13
 """Least noise variance, relative to that of the output: rounding of the sums."""
 
-_WORST = 1e300
+_WORST = 1e300  # misfit of a prior too wide to be computed
 _ROUNDING = 1e-13
 """Added to the squares, relative to their mean, so that rounding makes none negative."""
 

@@ -66,7 +66,7 @@ def split_modes(
     return part1, part2
 
 
-MAX_DOUBLINGS = 60
+MAX_DOUBLINGS = 60  # 2^60 samples: no pole that a double tells from 1 is slower
 
 
 def gramian_factor(A: FloatArray, B: FloatArray) -> FloatArray:

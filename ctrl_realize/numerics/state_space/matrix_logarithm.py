@@ -16,7 +16,7 @@ from scipy.linalg import schur, solve_triangular, sqrtm
 
 from ..arrays import ComplexArray, FloatArray
 
-_DEGREE = 7
+_DEGREE = 7  # of the Pade approximant, which reaches to
 _REACH = 0.288  # theta_7 in Table 2.1 of Al-Mohy and Higham
 _MOST_ROOTS = 64
 

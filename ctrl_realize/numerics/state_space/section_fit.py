@@ -33,18 +33,18 @@ from ..arrays import FloatArray
 from ..regression.marquardt import Damping, damped_step, descend
 from .sections import Motion, Sections, motion
 
-MOST_STEPS = 40
+MOST_STEPS = 40  # at most
 ENOUGH = 0.01
 """Increase of log likelihood below which the iteration ends: insignificant for any data."""
-_DAMPING = Damping(tries=16)
+_DAMPING = Damping(tries=16)  # shorter steps at most, before a fit ends
 _ROWS = 4096
 """Number of samples whose derivatives are computed together."""
-LARGEST_POLE = 1 - 1e-7
-_AT_EDGE = 1e-9
+LARGEST_POLE = 1 - 1e-7  # slower than any record shows: 1e7 samples to decay to 37 %
+_AT_EDGE = 1e-9  # distance from it at which a pole is held there
 _FROM_OUTSIDE = 0.999  # where a pole of a start that is unstable begins
 _DEPENDENT = 1e-10
 """Part of the largest singular value of responses below which one of them is a sum of others."""
-_ROUNDING = 1e-13
+_ROUNDING = 1e-13  # relative
 _EXACT = 1e-12
 """Least residual, as a part of the output: what rounding leaves."""
 
