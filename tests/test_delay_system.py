@@ -13,7 +13,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ctrl_realize.errors import (
+    DelayRangeError,
+    ModelWarning,
+    OptionError,
+    UnsuitableSystemError,
+)
 
 DT = 0.1
 Z = np.exp(1j * np.geomspace(0.05, 0.97 * np.pi / DT, 25) * DT)
@@ -270,6 +275,31 @@ def test_encirclements_count_the_unstable_poles(d, gain):
     unstable = int(np.sum(np.abs(loop.poles()) > 1))
     assert ct.nyquist_response(L).count == unstable
     assert loop.is_stable() == (unstable == 0) == (gain < 1)
+
+
+def test_polynomials_of_a_loop_are_warned_of():
+    loop = ct.feedback(cr.delayed_ss(LAG, 60, dt=DT))
+    filter_ = ct.tf([0.5], [1, -0.5], DT)
+    for ask in (lambda: filter_ * loop, lambda: ct.feedback(filter_, loop), lambda: ct.tf(loop)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            ask()
+        said = [str(one.message) for one in caught if one.category is ModelWarning]
+        assert any("sys * tf" in words and "dominant_poles" in words for words in said)
+    for right in (loop * filter_, ct.ss(filter_) * loop):
+        assert_allclose(right(Z), loop(Z) * filter_(Z), rtol=1e-9)
+
+
+def test_bandwidth_is_where_the_gain_has_dropped():
+    for loop, at in (
+        (ct.feedback(cr.delayed_ss(LAG, 300, dt=0.001) * 0.5), lambda w: np.exp(1j * w * 0.001)),
+        (ct.feedback(LAG * cr.delay(0.3) * 0.5), lambda w: 1j * w),
+    ):
+        w = loop.bandwidth()
+        assert abs(loop(at(w))) == pytest.approx(abs(loop.dcgain()) * 10 ** (-3 / 20), rel=1e-9)
+        # the first such frequency
+        below = np.array([at(x) for x in np.linspace(1e-3, 0.999 * w, 200)])
+        assert np.abs(loop(below)).min() > abs(loop.dcgain()) * 10 ** (-3 / 20)
 
 
 def test_a_loop_with_an_integrator_has_its_static_gain():

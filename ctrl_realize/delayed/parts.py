@@ -67,7 +67,7 @@ class CoreAndDelays(DeferredMatrices):
     @property
     def A(self) -> FloatArray:
         """Dynamics matrix of ``[core; chains]``, read-only."""
-        _warn_of_a_transfer_function(self.nstates - self._core.nstates)
+        warn_of_a_transfer_function(self.nstates - self._core.nstates)
         return self._matrices()[0]
 
     @property
@@ -190,7 +190,7 @@ def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter:
     return [letter] if list(core) == generic and len(generic) == 1 else list(core)
 
 
-def _warn_of_a_transfer_function(registers: int) -> None:
+def warn_of_a_transfer_function(registers: int) -> None:
     """Warn if python-control computes a polynomial of a long delay line; called when A is read."""
     if registers <= HARMLESS:
         return
@@ -199,10 +199,10 @@ def _warn_of_a_transfer_function(registers: int) -> None:
         return
     warn_caller(
         f"python-control forms polynomials with {registers} delay registers here; from about "
-        "50 on these are numerically meaningless, and so are the results. Instead of "
-        "a root locus use sys.poles() of ct.feedback(k * sys) or cr.design.margins(sys), "
-        "instead of "
-        "ct.tf(sys) use sys.to_tf(), and with a transfer function sys * tf, sys + tf, "
-        "ct.ss(tf) * sys and ct.feedback(ct.ss(tf), sys)",
+        "50 on these are numerically meaningless, and so are the results. Instead of a root locus "
+        "use ct.feedback(k * sys).dominant_poles() or cr.design.margins(sys), instead of "
+        "ct.tf(sys) "
+        "use sys.to_tf() where the delay is not in a loop, and with a transfer function sys * tf, "
+        "sys + tf, ct.ss(tf) * sys and ct.feedback(ct.ss(tf), sys)",
         ModelWarning,
     )

@@ -35,6 +35,7 @@ CORES = {
     "mimo": _stable(4, 2, 2, 2, direct=True),
     "wide": _stable(3, 2, 3, 3, direct=False),
 }
+LOOP = "loop"  # around the core of one input and output: its delay is an internal one
 OTHER = _stable(2, 1, 1, 5, direct=True)
 OTHER_TF = ct.tf([0.5, 0.1], [1, -0.4], DT)
 OTHER_MIMO = _stable(3, 2, 2, 6, direct=True)
@@ -42,7 +43,11 @@ OTHER_MIMO = _stable(3, 2, 2, 6, direct=True)
 
 def pair(core: str, delay: int) -> tuple[cr.DelayedStateSpace, ct.StateSpace]:
     """Ours, and python-control's with the same matrices, names and labels."""
-    ours = cr.delayed_ss(CORES[core], delay, name="plant")
+    if core == LOOP:
+        ours = ct.feedback(cr.delayed_ss(0.1 * CORES["siso"], delay), OTHER)
+        ours.update_names(name="plant")
+    else:
+        ours = cr.delayed_ss(CORES[core], delay, name="plant")
     theirs = ct.StateSpace(
         *(np.array(M) for M in (ours.A, ours.B, ours.C, ours.D)),
         ours.dt,

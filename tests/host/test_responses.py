@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 import pytest
 
-from tests.host.pairs import CORES, DELAYS, DT, GRID, OTHER, assert_same, pair, quietly
+from tests.host.pairs import CORES, DELAYS, DT, GRID, LOOP, OTHER, assert_same, pair, quietly
 
 N = 90
 T = DT * np.arange(N)
@@ -94,9 +94,13 @@ CASES = [
     if operation.startswith("any") or core == "siso"
 ]
 
+CASES = [(core, operation, delay) for core, operation in CASES for delay in DELAYS]
+CASES += [
+    (LOOP, operation, 37) for operation in ALL if operation.startswith(("any", "one channel"))
+]
 
-@pytest.mark.parametrize("delay", DELAYS)
-@pytest.mark.parametrize(("core", "operation"), CASES)
+
+@pytest.mark.parametrize(("core", "operation", "delay"), CASES)
 def test_the_answer_is_that_of_state_space(core, operation, delay):
     ours, theirs = pair(core, delay)
     assert_same(quietly(ALL[operation], ours), quietly(ALL[operation], theirs))

@@ -6,8 +6,9 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from scipy.optimize import brentq
 
-from ..._checks import whole
+from ..._checks import real, whole
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays import characteristic, dominant, spectrum
 from ...numerics.internal_delays.form import inverse
@@ -114,18 +115,44 @@ class InsidePoles(HostResponses, DelayOperators):
         return 0.0 if self.dt else spectrum.neutral_gain(self._form())
 
     def _unstable(self) -> tuple[int, bool]:
+        return dominant.unstable_count(self._form(), self._grid(), dt=float(self.dt))
+
+    def _grid(self) -> FloatArray:
+        """Frequencies in rad/s at which no turn of the response is missed."""
         features, wait = self._features()
-        dt = float(self.dt)
         sizes = np.abs(features)
-        form = self._form()
-        if dt:
-            top = np.pi / dt
+        if self.dt:
+            top = np.pi / float(self.dt)
         else:
             top = float(sizes.max(initial=1 / wait if wait else 1.0))
-            top = dominant.settled_frequency(form, top)
+            top = dominant.settled_frequency(self._form(), top)
         low = 1e-3 * min(float(sizes[sizes > 0].min(initial=top)), 1 / wait if wait else top)
-        grid: FloatArray = frequency_grid(low, top, features, wait)
-        return dominant.unstable_count(form, grid, dt=dt)
+        return frequency_grid(low, top, features, wait)
+
+    def bandwidth(self, dbdrop: float = -3) -> float:
+        """Lowest frequency in rad/s at which the gain is `dbdrop` dB below that at 0."""
+        if not self.issiso():
+            raise TypeError("system should be a SISO system")
+        drop = real(dbdrop, "dbdrop", "drop of the gain in dB, below 0")
+        if drop >= 0:
+            raise ValueError("expecting dbdrop be a negative scalar in dB")
+        level = abs(self.dcgain()) * 10 ** (drop / 20)
+        if not np.isfinite(level):
+            return float("nan")
+
+        def excess(omega: Any) -> Any:
+            s = 1j * np.atleast_1d(omega)
+            points = np.exp(s * float(self.dt)) if self.dt else s
+            return np.abs(self.horner(points, warn_infinite=False)[0, 0]) - level
+
+        grid = self._grid()
+        (below,) = np.nonzero(excess(grid) < 0)
+        if below.size == 0:
+            return float("inf")
+        first = int(below[0])
+        if first == 0:
+            return float(grid[0])
+        return float(brentq(lambda w: float(excess(w)[0]), grid[first - 1], grid[first]))
 
     def characteristic(self, x: ComplexArray) -> ComplexArray:
         """Evaluate a function whose zeros are the poles, and which has no unstable poles.

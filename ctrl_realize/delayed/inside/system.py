@@ -15,7 +15,7 @@ import numpy as np
 
 from ..._checks import real, system_name
 from ...errors import UnsuitableSystemError
-from ...numerics.arrays import IntArray
+from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.internal_delays.form import DelayForm
 from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.recurrence import absorbed
@@ -23,7 +23,7 @@ from ...numerics.internal_delays.response import Response
 from ..chains import Matrices
 from ..operands import plain
 from ..operators import INSIDE, DelayOperators
-from ..parts import named, signal_names
+from ..parts import named, signal_names, warn_of_a_transfer_function
 from .cards import InsideCards
 from .checks import check_core, check_delays, who_asks
 from .conversions import InsideConversions
@@ -135,6 +135,12 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     def core(self) -> ct.StateSpace:
         """The delay-free core, with the delays' inputs and outputs after the others."""
         return self._core
+
+    @property
+    def A(self) -> FloatArray:
+        """Dynamics matrix of ``[core; delays]``, read-only; discrete systems only."""
+        warn_of_a_transfer_function(self.nstates - self._core.nstates)
+        return self._matrices()[0]
 
     def _form(self) -> DelayForm:
         core = self._core
