@@ -41,7 +41,7 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
 
     @abstractmethod
     def _form(self) -> DelayForm:
-        """Return core and delays, with those at the ends as further channels."""
+        """Return core and delays, those at inputs and outputs as additional channels."""
 
     @abstractmethod
     def _make_matrices(self) -> Matrices:

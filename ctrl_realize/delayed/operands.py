@@ -19,7 +19,7 @@ Numbers = (int, float, np.number)
 
 
 def plain(form: DelayForm, dt: float) -> ct.StateSpace:
-    """Make the core of a form as a system of python-control."""
+    """Convert the core of a form to a system of python-control."""
     return ct.StateSpace(form.A, form.B, form.C, form.D, dt, remove_useless_states=False)
 
 
@@ -103,7 +103,7 @@ def is_single(form: DelayForm) -> bool:
 
 
 def everywhere(single: DelayForm, other: DelayForm) -> DelayForm:
-    """Put a system of one input and output into every entry, as many as another one has."""
+    """Repeat a system with one input and one output in every entry of the size of another."""
     return forms.through(single, np.ones((other.outputs, 1)), np.ones((1, other.inputs)))
 
 
@@ -136,13 +136,13 @@ def _repeated(single: DelayForm, count: int) -> DelayForm:
 
 
 def shapes(left: DelayForm, right: DelayForm) -> str:
-    """Write the sizes of two systems, for messages."""
+    """Text with the sizes of two systems, for error messages."""
     one, other = (left.outputs, left.inputs), (right.outputs, right.inputs)
     return f"of (outputs, inputs) {one} and {other}"
 
 
 def whole_samples(delays: Sequence[float], dt: float) -> None:
-    """Refuse delays of a discrete system that are not whole samples.
+    """Check that delays of a discrete system are whole samples.
 
     Raises
     ------
@@ -152,5 +152,5 @@ def whole_samples(delays: Sequence[float], dt: float) -> None:
         if delay != int(delay):
             raise DelayRangeError(
                 f"a delay is {delay:g} samples of {dt:g} s; a discrete system needs whole samples. "
-                "Make the system in continuous time and sample it, sys.to_discrete(dt)"
+                "Define the system in continuous time and sample it: sys.to_discrete(dt)"
             )

@@ -191,7 +191,7 @@ class DelayOperators(DeferredMatrices):
 
 
 class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
-    """Controller whose operators leave systems with delays to those, which keep them."""
+    """Controller that leaves operations with delayed systems to their operators."""
 
     def __mul__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, DelayOperators) else super().__mul__(other)

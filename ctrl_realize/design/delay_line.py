@@ -24,7 +24,7 @@ Pulses = tuple[FloatArray, FloatArray, FloatArray]
 """A (n, n), B (n, 1) and C (rows, n) of a pulse response."""
 
 DIES_OUT = 0.999999
-"""Largest pole of a response that may be taken as the difference of two endless ones."""
+"""Largest pole of a response that may be computed as the difference of two infinite ones."""
 
 
 class DelayLineController(DelayOperators):

@@ -13,7 +13,7 @@ from ..delayed.parts import check_entries
 from ..errors import OptionError, UnsuitableSystemError
 
 FEW_STATES = 200
-"""Number of states up to which internal delays are taken as states."""
+"""Number of states up to which internal delays are converted to states."""
 
 
 def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedStateSpace:

@@ -1,4 +1,4 @@
-"""Checks of cores and delays, and who asks for matrices that there are not."""
+"""Checks of cores and delays, and errors for matrices that do not exist."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def check_core(core: Any) -> float:
         )
     if isinstance(core, DeferredMatrices):
         raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}, which has delays of its own; expected a plain "
+            f"core is a {type(core).__name__}, which already has delays; expected a plain "
             "control.StateSpace"
         )
     if core.dt is None or core.dt is True:
@@ -48,7 +48,7 @@ def check_core(core: Any) -> float:
 
 
 def check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float) -> None:
-    """Refuse negative delays, more than the core has signals, and fractions of samples.
+    """Check delays: not negative, whole samples, and no more than the core has signals.
 
     Raises
     ------

@@ -147,7 +147,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         return DelayForm(core.A, core.B, core.C, core.D, self.internal_delays)
 
     def delay_apart(self) -> tuple[DelaySystem, float]:
-        """Split a system of one input and output into what is left and the dead time before it.
+        """Split a system with one input and one output into its core and the dead time before it.
 
         Returns
         -------

@@ -24,7 +24,7 @@ LONGEST = 2**19
 SETTLED = 1e-4
 """Relative range of the last part of a response that counts as settled."""
 POINTS, DOUBLINGS = 2001, 8
-"""Samples of the responses of a continuous loop, and how often their time is doubled."""
+"""Samples of the responses of a continuous loop, and how often their duration is doubled."""
 SETTLING_BAND = 0.02
 """Distance from the final value, relative to it, within which a response counts as settled."""
 
@@ -185,7 +185,7 @@ def continuous_performance(plant: DelaySystem, controller: Any, total_time: floa
         end *= 2
     else:
         warn_caller(
-            f"the loop has not settled after {end / 2:g} s; its errors are those up to then",
+            f"the loop has not settled after {end / 2:g} s; its errors are those up to this time",
             ModelWarning,
         )
     return measured(setpoint, load, float(times[1]))

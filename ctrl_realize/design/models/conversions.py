@@ -312,13 +312,13 @@ def to_discrete(
     if isinstance(core, DelaySystem):
         if dead_time:
             raise OptionError(
-                f"dead_time={dead_time!r} with a system that has its own; multiply it by "
+                f"dead_time={dead_time!r} with a system that already has one; multiply it by "
                 "delay(dead_time)"
             )
         sampled = core.to_discrete(positive(dt, "dt", "sample time in s"))
         if not isinstance(sampled, DelayedStateSpace):
             raise UnsuitableSystemError(
-                f"{core.name!r} has delays inside; sys.to_discrete(dt) gives a DelaySystem"
+                f"{core.name!r} has internal delays; sys.to_discrete(dt) returns a DelaySystem"
             )
         return sampled.replace(**names)
     step = positive(dt, "dt", "sample time in s")

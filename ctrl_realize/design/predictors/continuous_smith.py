@@ -39,7 +39,7 @@ def continuous_smith_predictor(
     if unstable.size:
         raise UnsuitableSystemError(
             f"the core has a pole at s = {complex(unstable[0]):.6g}: a Smith predictor contains "
-            "its modes uncontrolled, so they drift or grow there. Sample the plant "
+            "uncontrolled copies of its modes, which drift or grow. Sample the plant "
             "(sys.to_discrete) for design.smith_predictor with filter_time or design.lqg"
         )
     if isinstance(controller, (int, float)):
