@@ -172,7 +172,7 @@ BAD = {
     "dead time twice": (
         lambda: design.to_discrete(P, 0.1, 0.1),
         OptionError,
-        "that has its own",
+        "that already has one",
     ),
     "dead time of a discrete loop": (
         lambda: design.margins(ct.feedback(PLANT), dead_time=0.1),
