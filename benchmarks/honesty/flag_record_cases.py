@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import control as ct
 import numpy as np
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
@@ -26,8 +28,31 @@ def _case(code: str, due: World, not_due: World, result: str = "fit_output_error
     return FlagCase(result, code, names[0], fitted(due), names[1], fitted(not_due))
 
 
+def recorded_late(samples: int) -> Run:
+    """Three levels into a lag behind five samples in slow noise, the input stored too late."""
+
+    def run(seed: int) -> Codes:
+        rng, size = np.random.default_rng([seed, 42]), 800
+        u = np.repeat(rng.choice([-1.0, 0.0, 1.0], size // 20 + 2), 20)[: size + 40]
+        plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.1, dt=0.02)
+        noise = lfilter([1.0], [1, -0.97], rng.standard_normal(size + 40))
+        y = np.ravel(plant.simulate(u)) + 0.05 * noise
+        stored = u[40 - samples : size - samples], y[40:size]
+        return codes(cr.fit_output_error(cr.Record(0.02 * np.arange(size - 40), *stored)).fit)
+
+    return run
+
+
 MOVING = "fit_output_error, moving input"
 CASES = [
+    FlagCase(
+        MOVING,
+        "noncausal",
+        "input stored ten samples late",
+        recorded_late(10),
+        "input stored in time",
+        recorded_late(0),
+    ),
     _case("gain_not_resolved", steps.ends_while_rising, described.one_lag),
     _case("not_settled", steps.ends_while_rising, described.two_lags),
     _case("held_output", sensors.analyser, described.fine_converter),
