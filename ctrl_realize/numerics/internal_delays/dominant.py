@@ -101,12 +101,13 @@ def _largest(part: DelayForm, total: int, count: int) -> ComplexArray:
 def _complete(part: DelayForm, roots: ComplexArray, count: int) -> bool:
     """Whether as many roots were found outside of a circle as there are by the argument principle.
 
-    The circle is laid through the widest gap behind the roots that are wanted.
+    The circle is laid through the widest gap next to the roots that are wanted: further on single
+    roots may be missing.
     """
     sizes = np.sort(np.abs(roots))[::-1]
     if sizes.size <= count + 1:
         return False
-    tail = sizes[count : count + 40]
+    tail = sizes[count : count + 8]
     at = int(np.argmax(tail[:-1] - tail[1:]))
     radius = float(tail[at] + tail[at + 1]) / 2
     return int(np.sum(sizes > radius)) == count_outside(part, radius)
