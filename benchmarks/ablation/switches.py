@@ -252,6 +252,11 @@ SWITCHES = (
         (f"{FITS}.step_data:first_motion",),
     ),
     Switch(
+        "start at the ringing",
+        {f"{SEPARABLE}.window:_ringing": giving(0.0)},
+        called=True,
+    ),
+    Switch(
         "hopeless searches skipped",
         {f"{SEPARABLE}.structures:_worth_a_search": giving(True)},
     ),

@@ -5,10 +5,8 @@ One record of a family each, beside those of test_flags; `benchmarks.worlds` cou
 
 from __future__ import annotations
 
-import control as ct
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.worlds import described, driven, loops, sensors, steps
@@ -80,20 +78,6 @@ def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
     low, high = fit.interval
     assert low <= fit.dead_time <= high
     assert low <= case.dead_time
-
-
-@pytest.mark.parametrize(("late", "told"), [(0, False), (10, True)])
-def test_an_input_that_is_recorded_late_is_told(late, told):
-    rng = np.random.default_rng(2)
-    dt, size = 0.02, 800
-    u = np.repeat(rng.choice([-1.0, 0, 1.0], size // 20 + 2), 20)[: size + 40]
-    plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.1, dt=dt)
-    noise = lfilter([1.0], [1, -0.97], rng.standard_normal(size + 40))
-    y = np.ravel(plant.simulate(u)) + 0.05 * noise
-    record = cr.Record(dt * np.arange(size - 40), u[40 - late : size - late], y[40:size])
-    found = {flag.code for flag in cr.fit_output_error(record).fit.flags}
-    assert "coloured_residual" in found
-    assert ("noncausal" in found) == told
 
 
 @pytest.mark.parametrize("amplitude", [16, 2.0])

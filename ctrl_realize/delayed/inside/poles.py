@@ -64,7 +64,7 @@ class InsidePoles(HostResponses, DelayOperators):
         -----
         Each is a root of the characteristic function to 1e-10. In discrete time with up to 400
         states, and mostly with several long delays too, all poles are computed first (0.2 s for
-        1000 of them, 20 s for 10 000); otherwise Newton's method starts from points around the
+        1000 of them, a minute for 10 000); otherwise Newton's method starts from points around the
         unit circle, and the argument principle checks that none is missing. In continuous time it
         starts from the eigenvalues of a spectral discretisation of the delays [1]_.
 

@@ -59,7 +59,8 @@ class Scales:
 
     `onset` is when it starts to move, `rise` the time from there to 63 % of its final value,
     `length` the duration of the record after the change of the input, `dt` the sample time.
-    `latest` and `earliest` bound the dead time.
+    `latest` and `earliest` bound the dead time; `ringing` is an angular frequency that stands out
+    of the residual of a first-order fit, or 0.
     """
 
     onset: float
@@ -68,6 +69,7 @@ class Scales:
     dt: float
     latest: float
     earliest: float = 0.0
+    ringing: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ def search(
 ) -> dict[Structure, Candidate]:
     """Find the best fit of every structure.
 
-    Each starts from two dead times for each of up to four sets of poles, and from the optima of the
+    Each starts from two dead times for each of up to five sets of poles, and from the optima of the
     neighbouring structures (one zero fewer, one pole fewer).
 
     Parameters
@@ -254,7 +256,7 @@ def pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
 
 
 def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
-    """Equal lags; one slow; one very slow; an oscillatory pair."""
+    """Equal lags; one slow; one very slow; an oscillatory pair; a pair at `ringing`."""
     rise = 1.0 / scales.rise
     patterns = [
         -np.linspace(0.8, 1.2, order) * order * rise,
@@ -266,6 +268,9 @@ def _pole_patterns(order: int, scales: Scales) -> list[ComplexArray]:
         rest = -np.geomspace(3, 5, order - 2) * rise
         pair = 1.3 * rise * np.array([-0.2 + 0.98j, -0.2 - 0.98j])
         found.append(np.concatenate([pair, rest]))
+        if scales.ringing > 0:
+            pair = scales.ringing * np.array([-0.1 + 0.995j, -0.1 - 0.995j])
+            found.append(np.concatenate([pair, rest]))
     return found
 
 

@@ -44,6 +44,7 @@ from .structures import (
 from .varpro import Problem, Structure, evaluate, respond
 
 _PASSES = 2  # of modified residuals; see `fit_window`
+_LONG = 2**18  # samples that tell a frequency, for time and memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +196,9 @@ def fit_window(
     """
     sigma, quantum = noise
     problem = window.problem
+    rough = search(problem, [Structure(1, 1)], scales)[Structure(1, 1)]
+    error = window.output - window.predict(problem, rough)
+    scales = replace(scales, ringing=_ringing(error[window.start :], scales.dt))
     candidates = search(problem, structures, scales)
     passes = _PASSES if huber else 0
     rivals: dict[Structure, float] = {}
@@ -321,3 +325,14 @@ def _clipped(error: FloatArray, least: float) -> FloatArray:
 def _wild(error: FloatArray) -> bool:
     """Whether there are more residuals beyond four sigma than in Gaussian noise."""
     return bool(np.mean(np.abs(error) > 4 * mad_sigma(error)) > 0.002)
+
+
+def _ringing(error: FloatArray, dt: float) -> float:
+    """Angular frequency that stands out of what a first-order fit leaves over."""
+    if error.size < 16:
+        return 0.0
+    # A length with a large prime factor takes many times the time and memory; a long residual
+    # need not be looked at to its last samples.
+    count = error.size if error.size < _LONG else 2 ** int(np.log2(error.size))
+    lines = np.abs(np.fft.rfft(error[:count] - error.mean()))
+    return float(2 * np.pi * (int(np.argmax(lines[2:])) + 2) / (count * dt))
