@@ -326,6 +326,7 @@ def test_memory_grows_with_the_delay_and_not_with_its_square():
     assert peak < 3e7  # the matrix alone has 8e8
 
 
+TWO = np.array([[1.0, 0.2], [0.1, 1.0]])
 BAD = {
     "algebraic loop": (lambda: ct.feedback(cr.delayed_ss(PI, 0), -2.5), "algebraic loop"),
     "algebraic loop by names": (
@@ -346,6 +347,13 @@ BAD = {
     "improper": (lambda: cr.delayed_ss(PI, 3) + ct.tf([1, 0], [1], DT), "more zeros than poles"),
     "not finite": (lambda: cr.delayed_ss(PI, 3) + np.nan, "non-finite"),
     "no system": (lambda: cr.interconnect([PI, "plant"]), "str"),
+    "zeros": (
+        lambda: ct.feedback(
+            cr.delayed_ss(ct.ss(np.diag([0.5, 0.6]), np.eye(2), TWO, np.zeros((2, 2)), DT), 300),
+            np.eye(2),
+        ).zeros(),
+        "602 states.*400 at most.*longer sample time",
+    ),
 }  # fmt: skip
 
 

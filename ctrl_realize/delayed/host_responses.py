@@ -38,8 +38,43 @@ class HostResponses(DeferredMatrices):
         """Compute the outputs (p, N) from zero initial state."""
 
     @abstractmethod
-    def _features(self) -> tuple[ComplexArray, float]:
+    def features(self) -> tuple[ComplexArray, float]:
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
+
+    def simulate(self, inputs: ArrayLike) -> FloatArray:
+        """Compute the response to any input from zero initial state, sample by sample.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (N,) or (inputs, N)
+
+        Returns
+        -------
+        ndarray, shape (N,) or (outputs, N)
+
+        Raises
+        ------
+        DataError
+            A wrong number of inputs, or values that are not finite real numbers.
+        UnsuitableSystemError
+            A continuous system.
+        """
+        self._refuse_continuous("forced_response")
+        given = finite(inputs, "inputs")
+        rows = np.atleast_2d(given)
+        if rows.ndim != 2 or rows.shape[0] != self.ninputs:
+            raise DataError(
+                f"inputs has shape {given.shape}; expected ({self.ninputs}, N)"
+                + (" or (N,)" if self.ninputs == 1 else "")
+            )
+        out = self._simulated(rows)
+        return out[0] if self.issiso() and given.ndim == 1 else out
+
+    def _refuse_continuous(self, instead: str) -> None:
+        if not self.dt:
+            raise UnsuitableSystemError(
+                f"{self.name!r} is continuous and has no samples; use sys.{instead}(timepts)"
+            )
 
     def forced_response(
         self, timepts: ArrayLike | None = None, inputs: ArrayLike = 0.0, *args: Any, **settings: Any
@@ -98,6 +133,12 @@ class HostResponses(DeferredMatrices):
         drive = np.zeros((m, m, times.size))
         drive[np.arange(m), np.arange(m)] = signal
         outputs = np.stack([self._simulated(drive[:, j]) for j in range(m)], axis=1)
+        return self._unit_responses(times, outputs, drive, kind, **settings)
+
+    def _unit_responses(
+        self, times: FloatArray, outputs: FloatArray, drive: FloatArray, kind: str, **settings: Any
+    ) -> ct.TimeResponseData:
+        """Response data, one trace for each input, as python-control makes them."""
         return ct.TimeResponseData(
             times,
             outputs,
@@ -107,7 +148,7 @@ class HostResponses(DeferredMatrices):
             output_labels=self.output_labels,
             sysname=self.name,
             trace_labels=[f"From {label}" for label in self.input_labels],
-            trace_types=[kind] * m,
+            trace_types=[kind] * self.ninputs,
             plot_inputs=False,
             **settings,
         )
@@ -151,7 +192,7 @@ class HostResponses(DeferredMatrices):
 
     def _followed(self) -> tuple[FloatArray, ComplexArray]:
         """Frequencies so close that the response between them can be interpolated."""
-        features, wait = self._features()
+        features, wait = self.features()
         sizes = np.abs(features)
         sizes = sizes[sizes > 0]
         dt = float(self.dt)

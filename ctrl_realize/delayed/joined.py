@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
-from .operands import common_dt, form_of, plain
+from .operands import common_dt, form_of
 
 
 def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
@@ -64,14 +64,11 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     except np.linalg.LinAlgError:
         raise UnsuitableSystemError(
             "the direct terms of the systems close an algebraic loop that has no solution, or "
-            "many: "
-            "put a delay or a lag into it"
+            "many: put a delay or a lag into it"
         ) from None
     loop = forms.through(loop, of_outputs + of_inputs @ gain, into)
     total = forms.parallel(loop, forms.static(of_inputs @ into))
-    # a system without delays provides the methods for a form
-    maker = DelaySystem(plain(forms.static(np.zeros((1, 1))), dt))
-    return maker._joined(
+    return DelaySystem._joined(
         total, dt, list(wired.input_labels), list(wired.output_labels), name=wired.name
     )
 

@@ -47,7 +47,7 @@ def form_of(system: Any) -> DelayForm:
         )
     check_entries(system)
     if isinstance(system, ct.TransferFunction):
-        _check_proper(system)
+        check_proper(system, "an interconnection")
         system = ct.ss(system)
     if isinstance(system, ct.StateSpace):
         A, B, C, D = (np.asarray(M, np.float64) for M in _matrices(system))
@@ -59,13 +59,19 @@ def _matrices(system: ct.StateSpace) -> tuple[Any, ...]:
     return system.A, system.B, system.C, system.D
 
 
-def _check_proper(system: ct.TransferFunction) -> None:
+def check_proper(system: ct.TransferFunction, purpose: str) -> None:
+    """Check that no entry of a transfer function has more zeros than poles.
+
+    Raises
+    ------
+    UnsuitableSystemError
+    """
     for nums, dens in zip(system.num, system.den, strict=True):
         for num, den in zip(nums, dens, strict=True):
             if np.trim_zeros(num, "f").size > np.trim_zeros(den, "f").size:
                 raise UnsuitableSystemError(
-                    f"{system.name!r} has more zeros than poles; expected a proper system. Add a "
-                    "derivative filter"
+                    f"{purpose} needs a proper system; {system.name!r} has more zeros than "
+                    "poles. Add a derivative filter"
                 )
 
 
@@ -124,8 +130,7 @@ def _single_product(second: DelayForm, first: DelayForm) -> DelayForm:
     """Series of single channels: all delays, wherever they are, are moved to the input."""
     (before, behind, core), (entry, exit_, other) = ends_apart(first), ends_apart(second)
     total = before[0] + behind[0] + entry[0] + exit_[0]
-    line = forms.delayed_ends(*forms.gain_matrices(1.0), (total,), (0.0,))
-    return forms.series(forms.series(other, core), line)
+    return forms.series(forms.series(other, core), forms.lines((total,)))
 
 
 def _repeated(single: DelayForm, count: int) -> DelayForm:

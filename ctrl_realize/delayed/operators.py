@@ -43,8 +43,9 @@ class DelayOperators(DeferredMatrices):
         if kind is not None:
             DelayOperators._kinds[kind] = cls
 
+    @classmethod
     def _joined(
-        self,
+        cls,
         form: DelayForm,
         dt: float,
         inputs: Sequence[str] | None = None,
@@ -66,8 +67,8 @@ class DelayOperators(DeferredMatrices):
             if not rest.delays:
                 core = plain(rest, dt)
                 whole = [int(d) for d in before], [int(d) for d in behind]
-                return self._kinds[ENDS](core, whole[0], output_delay=whole[1], **labels)
-        return self._kinds[INSIDE](plain(form, dt), form.delays, **labels)
+                return cls._kinds[ENDS](core, whole[0], output_delay=whole[1], **labels)
+        return cls._kinds[INSIDE](plain(form, dt), form.delays, **labels)
 
     def _other(self, other: Any) -> DelayForm | None:
         """Form of the other operand; None if it has its own operator, or is not a system."""
@@ -153,11 +154,10 @@ class DelayOperators(DeferredMatrices):
         if (back.inputs, back.outputs) != (forward.outputs, forward.inputs):
             raise ct.ControlDimension(
                 f"feedback around {forward.outputs} outputs and {forward.inputs} inputs by a "
-                f"system "
-                f"of {back.outputs} outputs and {back.inputs} inputs"
+                f"system of {back.outputs} outputs and {back.inputs} inputs"
             )
         try:
-            form = merged(forms.feedback(forward, back, float(sign)))
+            form = forms.feedback(forward, back, float(sign))
         except np.linalg.LinAlgError:
             raise _algebraic("the direct terms of both") from None
         return self._joined(form, common_dt(self, other), self.input_labels, self.output_labels)

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import finite, whole
-from ..errors import DataError
+from .._checks import whole
 from ..numerics.arrays import ComplexArray, FloatArray, later
 from ..numerics.state_space import responses
 from .chains import powers
@@ -61,39 +60,14 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         """
         return self._with_delay(responses.step_response, whole(count, "count", 1))
 
-    def simulate(self, inputs: ArrayLike) -> FloatArray:
-        """Compute the response to any input from zero initial state, delay included.
-
-        Parameters
-        ----------
-        inputs : array_like, shape (N,) or (inputs, N)
-
-        Returns
-        -------
-        ndarray, shape (N,) or (outputs, N)
-
-        Raises
-        ------
-        DataError
-            A wrong number of inputs, or values that are not finite real numbers.
-        """
-        given = finite(inputs, "inputs")
-        rows = np.atleast_2d(given)
-        if rows.ndim != 2 or rows.shape[0] != self.ninputs:
-            raise DataError(
-                f"inputs has shape {given.shape}; expected ({self.ninputs}, N)"
-                + (" or (N,)" if self.ninputs == 1 else "")
-            )
-        out = self._simulated(rows)
-        return out[0] if self.issiso() and given.ndim == 1 else out
-
     def _simulated(self, inputs: FloatArray) -> FloatArray:
         held = np.stack([later(u, d) for u, d in zip(inputs, self.input_delays, strict=True)])
         core = self._core
         out = responses.simulate(core.A, core.B, core.C, core.D, held)
         return np.stack([later(y, q) for y, q in zip(out, self.output_delays, strict=True)])
 
-    def _features(self) -> tuple[ComplexArray, float]:
+    def features(self) -> tuple[ComplexArray, float]:
+        """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
         poles = self._core.poles()
         poles = poles[np.abs(poles) > 0.05]
         wait = float(np.max(self.delay)) * self.dt

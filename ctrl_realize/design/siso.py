@@ -9,6 +9,7 @@ import numpy as np
 
 from .._checks import band
 from ..delayed import DelayedStateSpace, DelaySystem
+from ..delayed.operands import check_proper
 from ..delayed.parts import check_entries
 from ..errors import OptionError, UnsuitableSystemError
 
@@ -56,13 +57,7 @@ def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
         return system
     if isinstance(system, ct.TransferFunction):
         check_entries(system)
-        for row_num, row_den in zip(system.num, system.den, strict=True):
-            for num, den in zip(row_num, row_den, strict=True):
-                if np.trim_zeros(num, "f").size > np.trim_zeros(den, "f").size:
-                    raise UnsuitableSystemError(
-                        f"{purpose} needs a proper system; {system.name!r} has more zeros "
-                        "than poles. Add a derivative filter"
-                    )
+        check_proper(system, purpose)
         return ct.ss(system)
     raise UnsuitableSystemError(f"{purpose} needs a linear system; got a {type(system).__name__}")
 

@@ -95,19 +95,8 @@ class Motion(InsidePoles):
                 slope=kind == "impulse",
             ).outputs
             drive[j, j] = 1.0
-        return ct.TimeResponseData(
-            times,
-            outputs,
-            inputs=drive if kind == "step" else None,
-            issiso=self.issiso(),
-            input_labels=self.input_labels if kind == "step" else None,
-            output_labels=self.output_labels,
-            sysname=self.name,
-            trace_labels=[f"From {label}" for label in self.input_labels],
-            trace_types=[kind] * m,
-            plot_inputs=False,
-            squeeze=squeeze,
-            transpose=transpose,
+        return self._unit_responses(
+            times, outputs, drive, kind, squeeze=squeeze, transpose=transpose
         )
 
     def _solved(

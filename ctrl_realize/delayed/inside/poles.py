@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..._checks import real, whole
+from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays import characteristic, dominant, spectrum
 from ...numerics.internal_delays.form import inverse
@@ -119,7 +120,7 @@ class InsidePoles(HostResponses, DelayOperators):
 
     def _grid(self) -> FloatArray:
         """Frequencies in rad/s at which no turn of the response is missed."""
-        features, wait = self._features()
+        features, wait = self.features()
         sizes = np.abs(features)
         if self.dt:
             top = np.pi / float(self.dt)
@@ -170,16 +171,12 @@ class InsidePoles(HostResponses, DelayOperators):
         """
         return dominant.characteristic(self._form(), x, discrete=bool(self.dt))
 
-    def features(self) -> tuple[ComplexArray, float]:
-        """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
-        return self._features()
-
     def zeros(self) -> ComplexArray:
         """Finite zeros; for a continuous loop with dead time the right-most ones.
 
         Raises
         ------
-        NotImplementedError
+        UnsuitableSystemError
             Several channels with long delays.
         """
         form = self._form()
@@ -203,9 +200,10 @@ class InsidePoles(HostResponses, DelayOperators):
             if found:
                 return zeros
         if self.nstates > FEW_STATES:
-            raise NotImplementedError(
-                f"zeros of {self.nstates} states are not found where some of them are multiple, or "
-                "the system has several inputs and outputs"
+            raise UnsuitableSystemError(
+                f"{self.name!r} has {self.nstates} states; with several inputs and outputs, or "
+                f"with multiple zeros, zeros are computed for {FEW_STATES} at most. Use a longer "
+                "sample time, or the zeros of single channels (sys[i, j].zeros())"
             )
         return np.asarray(super().zeros(), dtype=np.complex128)
 
@@ -214,7 +212,7 @@ class InsidePoles(HostResponses, DelayOperators):
         with np.errstate(divide="ignore", invalid="ignore"):
             return super().damp()
 
-    def _features(self) -> tuple[ComplexArray, float]:
+    def features(self) -> tuple[ComplexArray, float]:
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
         dt = float(self.dt)
         poles = np.concatenate([self._core.poles(), self.dominant_poles(6)])

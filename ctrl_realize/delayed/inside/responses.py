@@ -8,8 +8,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import finite, whole
-from ...errors import DataError, UnsuitableSystemError
+from ..._checks import whole
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays.recurrence import recurrence
 from ...numerics.internal_delays.response import Response
@@ -114,39 +113,6 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         ndarray, shape (count,) or (outputs, inputs, count)
         """
         return self._one_by_one(np.ones(whole(count, "count", 1)), "step_response")
-
-    def simulate(self, inputs: ArrayLike) -> FloatArray:
-        """Compute the response to any input from zero initial state, sample by sample.
-
-        Parameters
-        ----------
-        inputs : array_like, shape (N,) or (inputs, N)
-
-        Returns
-        -------
-        ndarray, shape (N,) or (outputs, N)
-
-        Raises
-        ------
-        DataError
-            A wrong number of inputs, or values that are not finite real numbers.
-        """
-        self._refuse_continuous("forced_response")
-        given = finite(inputs, "inputs")
-        rows = np.atleast_2d(given)
-        if rows.ndim != 2 or rows.shape[0] != self.ninputs:
-            raise DataError(
-                f"inputs has shape {given.shape}; expected ({self.ninputs}, N)"
-                + (" or (N,)" if self.ninputs == 1 else "")
-            )
-        out = recurrence(self._form(), rows)
-        return out[0] if self.issiso() and given.ndim == 1 else out
-
-    def _refuse_continuous(self, instead: str) -> None:
-        if not self.dt:
-            raise UnsuitableSystemError(
-                f"{self.name!r} is continuous and has no samples; use sys.{instead}(timepts)"
-            )
 
     def _one_by_one(self, signal: FloatArray, instead: str) -> FloatArray:
         self._refuse_continuous(instead)

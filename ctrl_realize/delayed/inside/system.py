@@ -183,8 +183,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     def _without_matrices(self) -> str:
         return (
             "sys(z), sys.step_response, sys.forced_response and sys.dominant_poles need no "
-            "matrices; "
-            "a longer sample time has fewer states"
+            "matrices; a longer sample time has fewer states"
         )
 
     def _isstatic(self) -> bool:

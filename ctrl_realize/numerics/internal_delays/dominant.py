@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..loops.crossings import follow, half_turns
 from ..state_space.responses import frequency_response, schur_form
-from .characteristic import DENSE, discrete_poles, loops, newton_polished, newton_steps
+from .characteristic import discrete_poles, loops, newton_polished, newton_steps
 from .form import DelayForm
 from .response import CHUNK, characteristic_matrices
 
@@ -54,9 +54,7 @@ def dominant_discrete_poles(form: DelayForm, count: int) -> ComplexArray:
     found = [np.zeros(0, dtype=np.complex128)]
     for part in loops(form):
         total = part.states + int(sum(part.delays))
-        short = (
-            total <= max(ALL, DENSE) or not part.delays or (not np.any(part.D) and not part.states)
-        )
+        short = total <= ALL or not part.delays or (not np.any(part.D) and not part.states)
         found.append(discrete_poles(part) if short else _largest(part, total, count))
     return largest(np.concatenate(found), count)
 

@@ -72,11 +72,6 @@ class DelayForm:
         )
 
 
-def gain_matrices(gain: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """A, B, C and D of a number."""
-    return np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[gain]])
-
-
 def static(D: FloatArray) -> DelayForm:
     """Make the form of a gain."""
     p, m = D.shape
@@ -93,11 +88,11 @@ def delayed_ends(
 ) -> DelayForm:
     """Make the form of a system with delays at its inputs and outputs, none where they are 0."""
     core = DelayForm(A, B, C, D)
-    ends = through(_lines(behind), np.eye(len(behind)), np.eye(len(behind)))
-    return series(ends, series(core, _lines(before)))
+    ends = through(lines(behind), np.eye(len(behind)), np.eye(len(behind)))
+    return series(ends, series(core, lines(before)))
 
 
-def _lines(delays: tuple[float, ...]) -> DelayForm:
+def lines(delays: tuple[float, ...]) -> DelayForm:
     """Parallel pure delays, one for each signal."""
     count = len(delays)
     late = [i for i, delay in enumerate(delays) if delay > 0]
@@ -146,7 +141,7 @@ def closed(form: DelayForm, gain: FloatArray) -> DelayForm:
     numpy.linalg.LinAlgError
         I - D11 gain is singular: the loop without delays has no solution, or many.
     """
-    m, p, q = form.inputs, form.outputs, len(form.delays)
+    m, p = form.inputs, form.outputs
     D1 = form.D[:p]
     loop = np.eye(p) - D1[:, :m] @ gain
     _check_regular(loop)
@@ -158,7 +153,7 @@ def closed(form: DelayForm, gain: FloatArray) -> DelayForm:
     add = form.D[:, :m]
     B, C, D = form.B + into @ back[:, n:], form.C + add @ back[:, :n], form.D + add @ back[:, n:]
     C[:p], D[:p] = seen[:, :n], seen[:, n:]
-    return DelayForm(form.A + into @ back[:, :n], B, C, D, (*form.delays,) if q else ())
+    return DelayForm(form.A + into @ back[:, :n], B, C, D, form.delays)
 
 
 def series(second: DelayForm, first: DelayForm) -> DelayForm:
