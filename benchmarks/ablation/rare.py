@@ -6,6 +6,7 @@ import numpy as np
 
 from benchmarks.worlds.simulation import (
     Case,
+    binary,
     coloured,
     drawn,
     levels,
@@ -88,6 +89,31 @@ def waves_on_a_canal(rng: Rng) -> Case:
     return plant.case(record(u, y + 0.01 * np.ptp(y) * noise))
 
 
+def far_away(rng: Rng) -> Case:
+    """A fast lag behind a dead time of 1 to 2.4 s, an input that moves every sample or two."""
+    plant = drawn(rng, ((0.02, 0.1),), (1.0, 2.4))
+    u = binary(rng, 1200, int(rng.integers(1, 3)))
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 0.05)))
+
+
+def slow_disturbance(rng: Rng) -> Case:
+    """A slow sine, or AR(1) noise with a pole at 0.998, as large as a third of the response."""
+    plant, u = drawn(rng, ((0.05, 0.15), (0.1, 0.25)), (0.12, 0.3)), binary(rng, 1500, 8)
+    y = noisy(rng, stepped(rng, plant, u))
+    turns = np.arange(u.size) / rng.uniform(500, 1500) + rng.uniform()
+    sine = np.sin(2 * np.pi * turns)
+    slow = sine if rng.uniform() < 0.5 else coloured(rng, u.size, 0.998)
+    return plant.case(record(u, y + 0.3 * np.ptp(y) * slow))
+
+
+def wandering_output(rng: Rng) -> Case:
+    """One lag, a coloured input, and a random walk of 5 % of the response a sample, 300 samples."""
+    plant, u = drawn(rng, ((0.03, 0.06),), (0.02, 0.05)), coloured(rng, 300, 0.9)
+    y = stepped(rng, plant, u)
+    walk = np.cumsum(rng.standard_normal(u.size)) + rng.standard_normal(u.size)
+    return plant.case(record(u, y + 0.05 * float(np.std(y)) * walk))
+
+
 WORLDS = (
     tanks_in_a_row,
     settling_in_a_long_rest,
@@ -97,4 +123,7 @@ WORLDS = (
     steps_of_a_converter,
     unequal_sensors,
     waves_on_a_canal,
+    far_away,
+    slow_disturbance,
+    wandering_output,
 )

@@ -271,10 +271,16 @@ SWITCHES = (
         called=True,
     ),
     Switch(
+        "profiles followed below a minimum",
+        {f"{FITS}.interval:lower_minima": giving({})},
+    ),
+    Switch(
         "held output",
         {f"{PUBLIC}.checks:_held_flags": giving(([], 0.0))},
     ),
-    Switch("step of generalised least squares", {f"{PUBLIC}.checks:_white": giving(None)}),
+    Switch(
+        "step of generalised least squares", {f"{PUBLIC}.checks:generalised_step": giving(None)}
+    ),
     MODES,
     Switch(
         "slow cosines",

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
 
 from ..._wording import in_time
 from ...data import Record
@@ -18,8 +17,8 @@ from ...numerics.constants import Z_95
 from ...numerics.validation.held_output import held_share, longest_hold, samples_at_limit
 from ...numerics.validation.innovations import nonlinear_chance
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
-from ...numerics.validation.white_step import WhiteStep, white_step
 from ...results import Flag
+from .coloured_checks import coloured_flags, generalised_step
 from .loop_flags import RARE, REGRESSED, feedback_flags, past_inputs, unstable_flags
 from .result import OutputErrorFit
 
@@ -35,9 +34,6 @@ _EXPLAINED = 0.05
 """Fraction of the residual that products of inputs must explain for a flag."""
 _REACHED = 1.5
 """Total delays covered by products of inputs, so that they do not replace missing lags."""
-_TWO_SIDED = Z_95
-_OFF = 0.2
-"""Relative difference of gains or total delays for a flag."""
 _MOST_SAMPLES = 20_000  # of a record that are tested, to limit the time
 
 
@@ -76,12 +72,12 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             low = max(low - hold, 0.0)
         if stepped:
             flags += _earlier_input(fit, codes)
-        step = _white(fit, shown) if alone and "coloured_residual" in codes else None
+        coloured = alone and "coloured_residual" in codes
+        step = generalised_step(fit, shown.output, shown.drive) if coloured else None
         if step is not None:
-            low = max(min(low, step.dead_time - _TWO_SIDED * step.dead_time_error), 0.0)
-            high = max(high, step.dead_time + _TWO_SIDED * step.dead_time_error)
-            flags += _white_flags(fit, step)
-            flags += _noncausal(step)
+            low = max(min(low, step.dead_time - Z_95 * step.dead_time_error), 0.0)
+            high = max(high, step.dead_time + Z_95 * step.dead_time_error)
+            flags += coloured_flags(fit, step)
         # Parts of one step are not several responses.
         if not loop and not (stepped and _moves(shown.drive) < 2):
             flags += against_one_model(shown, fit.delay)
@@ -112,50 +108,6 @@ def _shown(fit: OutputErrorFit) -> Shown:
     count = min(fit.measured.size, _MOST_SAMPLES)
     drive = np.ravel(record.input)[first : first + count]
     return Shown(fit.measured[:count], fit.fitted[:count], drive)
-
-
-def _white(fit: OutputErrorFit, shown: Shown) -> WhiteStep | None:
-    """One step of generalised least squares, from a fit with coloured residual."""
-    if not np.all(fit.poles) or not fit.gain:
-        return None
-    lead = fit.gain * float(np.real(np.prod(-fit.poles) / np.prod(-fit.zeros)))
-    numerator = lead * np.atleast_1d(np.real(np.poly(fit.zeros)))[::-1]
-    step = white_step(shown.output, shown.drive, fit.dt, fit.dead_time, fit.poles, numerator)
-    reach = max(fit.total_delay, fit.dead_time)
-    # Farther away, one step of a linearisation is not a valid estimate.
-    return step if step is None or abs(step.dead_time - fit.dead_time) <= reach else None
-
-
-def _white_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
-    gains = abs(step.gain - fit.gain) + _TWO_SIDED * step.gain_error
-    totals = abs(step.total - fit.total_delay) + _TWO_SIDED * step.total_error
-    if gains <= _OFF * abs(fit.gain) and totals <= _OFF * abs(fit.total_delay):
-        return []
-    gain, total = _TWO_SIDED * step.gain_error, _TWO_SIDED * step.total_error
-    return [
-        Flag(
-            "gain_not_resolved",
-            "the disturbances are coloured: weighted accordingly, gain and total delay are "
-            f"{step.gain:.3g} +- {gain:.2g} and {in_time(step.total)} -+ {in_time(total)}: "
-            "neither is well determined; use a longer record, or one with smaller "
-            "disturbances",
-        )
-    ]
-
-
-def _noncausal(step: WhiteStep) -> list[Flag]:
-    if not step.dead_time_error or ndtr(step.dead_time / step.dead_time_error) >= RARE:
-        return []
-    error = _TWO_SIDED * step.dead_time_error
-    return [
-        Flag(
-            "noncausal",
-            "the disturbances are coloured: weighted accordingly, the dead time is negative, "
-            f"-{in_time(-step.dead_time)} +- {in_time(error)}: the output leads the input. Causes "
-            "are an unmeasured signal that acts on both, feedback, or different clocks of input "
-            "and output; dead time and lags are not those of the plant",
-        )
-    ]
 
 
 def _moves(drive: FloatArray) -> int:

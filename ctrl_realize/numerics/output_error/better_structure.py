@@ -18,7 +18,8 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import ALL_STRUCTURES, PLAUSIBLE, Candidate, needless_parameters, search
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
-from .result import StructureFit, profile_of
+from .profiles import profile_of
+from .result import StructureFit
 
 _MOST_ORDER = ALL_STRUCTURES[-1].order  # highest order that is tried
 

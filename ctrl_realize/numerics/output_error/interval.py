@@ -36,18 +36,8 @@ from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, pla
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
 from .margins import CloseDecision, close_choices, close_exclusions
-from .result import (
-    DelayInterval,
-    OtherModel,
-    OutputErrorEstimate,
-    Profile,
-    StructureFit,
-    assembled,
-    curves,
-    laid_profiles,
-    lower_minima,
-    solved_profiles,
-)
+from .profiles import Profile, curves, laid_profiles, lower_minima, solved_profiles
+from .result import DelayInterval, OtherModel, OutputErrorEstimate, StructureFit, assembled
 from .selection import Choice, choose_model
 
 _UNSEEN = 3.0

@@ -61,7 +61,8 @@ from .better_structure import better_structure
 from .coloured import in_coloured_noise
 from .interval import likelihood_fit
 from .margins import close_to
-from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled, profile_of
+from .profiles import profile_of
+from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
 

@@ -7,11 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.output_error.result import (
-    DelayInterval,
-    laid_profiles,
-    lower_minima,
-)
+from ctrl_realize.numerics.output_error.profiles import laid_profiles, lower_minima
+from ctrl_realize.numerics.output_error.result import DelayInterval
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.structures import Scales
 from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate

@@ -1,0 +1,83 @@
+"""Profiles of the dead time of several structures of one record.
+
+Profile likelihoods [1]_; which ends are solved for, and that a profile which leads below a minimum
+is followed there, are rules of our own.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..separable.compared_fits import settled
+from ..separable.profile import Points, dead_time_profile, profile_curve, profile_points, with_ends
+from ..separable.profile_ends import profile_limits
+from ..separable.structures import Candidate
+from ..separable.varpro import Structure
+from ..separable.window import WindowFit
+
+_LOWER = 0.01
+"""Variances by which a profile must lead below a minimum to be followed.
+
+Ablation: profiles followed below a minimum."""
+_ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
+
+Profile: TypeAlias = tuple[FloatArray, FloatArray]
+"""Dead times, and the misfit at each; see `dead_time_profile`."""
+
+
+def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
+    """Misfit over the dead time of one candidate of a window."""
+    return dead_time_profile(whole.problem, candidate, whole.variance, whole.scales)
+
+
+def laid_profiles(whole: WindowFit, structures: Sequence[Structure]) -> dict[Structure, Points]:
+    """Profile points of structures, from their minima."""
+    setting = whole.variance, whole.scales
+    return {s: profile_points(whole.problem, whole.candidates[s], *setting) for s in structures}
+
+
+def solved_profiles(
+    whole: WindowFit, points: dict[Structure, Points], chosen: Structure
+) -> dict[Structure, Points]:
+    """Profile points, with the ends of the intervals that may be ends of all of them.
+
+    Between the points of a profile its ends are known to a few parts in a hundred; those of the
+    chosen structure, and those that lie as far out as any, are solved for.
+    """
+    setting = whole.variance, whole.scales
+    limits = {s: profile_limits(*profile) for s, profile in curves(whole, points).items()}
+    # None are left where a dispersed flow rules out every structure.
+    low = min((first for first, _ in limits.values()), default=np.inf)
+    high = max((last for _, last in limits.values()), default=-np.inf)
+    found = dict(points)
+    for s, (first, last) in limits.items():
+        margin = _ROUGHLY * (last - first)
+        ends = s == chosen or first - margin <= low, s == chosen or last + margin >= high
+        if any(ends):
+            found[s] = with_ends(whole.problem, points[s], *setting, ends)
+    return found
+
+
+def curves(whole: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Profile]:
+    """Misfit over the dead time of structures with these profile points."""
+    setting = whole.variance, whole.scales
+    return {s: profile_curve(own, whole.candidates[s], *setting) for s, own in points.items()}
+
+
+def lower_minima(whole: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Candidate]:
+    """Minima to which profiles lead that are lower than those that the searches have found."""
+    found = {}
+    for s, own in points.items():
+        best = min(own.values(), key=lambda point: point.cost)
+        if whole.candidates[s].cost - best.cost > _LOWER * whole.variance:
+            found[s] = settled(whole.problem, best, whole.scales)
+    return found
