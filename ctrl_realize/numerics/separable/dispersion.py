@@ -346,5 +346,5 @@ class _FlowFit:
         values = np.zeros(time.size)
         begun = time > 0
         passed, modes = flow_modes(time[begun], mean, spread, poles)
-        values[begun] = gain[0, 0] * passed + (modes @ residues[0, :, 0]).real
+        values[begun] = gain[0] * passed + (modes @ residues[0, :, 0]).real
         return values

@@ -37,26 +37,30 @@ def poles_from_parameters(theta: FloatArray) -> tuple[ComplexArray, ComplexArray
         ``derivative[b, i, q]`` is d poles[b, i] / d theta[b, q].
     """
     batch, order = theta.shape
-    poles = np.empty((batch, order), dtype=np.complex128)
-    derivative = np.zeros((batch, order, order), dtype=np.complex128)
     start = order % 2
-    if start:
-        poles[:, 0] = derivative[:, 0, 0] = -np.exp(theta[:, 0])
-    first = np.arange(start, order, 2)
-    second = first + 1
-    omega, zeta = np.exp(theta[:, first]), np.exp(theta[:, second])
+    value = np.exp(theta)
+    omega, zeta = value[:, start::2], value[:, start + 1 :: 2]
     square = zeta**2 - 1.0
     near = np.abs(square) < _GAP**2 / 4
-    square = np.where(near, np.where(square < 0, -1, 1) * _GAP**2 / 4, square)
+    if near.any():
+        square = np.where(near, np.where(square < 0, -1, 1) * _GAP**2 / 4, square)
     root = np.sqrt(square.astype(np.complex128))
+    far = zeta + root
+    poles = np.empty((batch, order), dtype=np.complex128)
     # -omega (zeta - root) = -omega / (zeta + root): no cancellation.
-    slow = omega * np.where(square > 0, -1.0 / (zeta + root), -zeta + root)
-    fast = omega * -(zeta + root)
-    poles[:, first] = derivative[:, first, first] = slow
-    poles[:, second] = derivative[:, second, first] = fast
-    turn = zeta / root
-    derivative[:, first, second] = zeta * omega * (-1.0 + turn)
-    derivative[:, second, second] = zeta * omega * (-1.0 - turn)
+    poles[:, start::2] = omega * np.where(square > 0, -1.0 / far, root - zeta)
+    poles[:, start + 1 :: 2] = -omega * far
+    derivative = np.zeros((batch, order, order), dtype=np.complex128)
+    if start:
+        poles[:, 0] = derivative[:, 0, 0] = -value[:, 0]
+    # The elements of the 2 x 2 blocks on the diagonal: rows are poles, columns omega and zeta.
+    block = derivative.reshape(batch, -1)[:, start * (order + 1) :]
+    every = 2 * (order + 1)
+    turn, scale = zeta / root, zeta * omega
+    block[:, ::every] = poles[:, start::2]
+    block[:, order::every] = poles[:, start + 1 :: 2]
+    block[:, 1::every] = scale * (turn - 1.0)
+    block[:, order + 1 :: every] = -scale * (turn + 1.0)
     return _separate(poles), derivative
 
 

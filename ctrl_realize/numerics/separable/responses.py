@@ -90,34 +90,28 @@ class StepSequence:
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for every bin; see `HeldInput`."""
         # Real exponentials take a third of the time of complex ones.
-        rates = poles if np.any(poles.imag) else poles.real
+        rates = poles if poles.imag.any() else poles.real
         since = self.first - tau[:, None]
         here = self._arrived(since)
-        last = self._arrived(since + self.dt * (self.width - 1))
-        level, total, stretch = self._carried(rates)
-        start = np.concatenate([[np.inf], self.moves])
+        held = self._carried(rates)
         row = np.arange(tau.size)[:, None]
-        elapsed = np.where(here > 0, since - start[here], 0.0)[:, :, None]
-        decay = np.exp(elapsed * rates[:, None, :])
-        static, mode = level[here], total[row, here] * decay
-        slope = stretch[row, here] * decay + elapsed * mode
+        static, mode, slope = self._decayed(held, rates[:, None], since, row, here)
         widths, kind = self._kinds
-        if widths[-1] > 1:
-            mean, turn = _geometric_mean(rates[:, None] * self.dt, widths[:, None])
-            slope = slope * mean[:, kind] + mode * (self.dt * turn)[:, kind]
-            mode = mode * mean[:, kind]
-        row, column = np.nonzero(here != last)
+        if widths[-1] == 1:
+            return static, mode, slope
+        mean, turn = _geometric_mean(rates[:, None] * self.dt, widths[:, None])
+        mean = mean[:, kind]
+        slope = slope * mean + mode * (self.dt * turn)[:, kind]
+        mode = mode * mean
+        row, column = np.nonzero(here != self._arrived(since + self._lengths))
         if row.size:
             # The samples of all bins during which a change arrives, concatenated.
             count = self.width[column]
             ends = np.cumsum(count)
             within = np.arange(ends[-1]) - np.repeat(ends - count, count)
             when = np.repeat(since[row, column], count) + self.dt * within
-            owner, here = np.repeat(row, count), self._arrived(when)
-            elapsed = np.where(here > 0, when - start[here], 0.0)[:, None]
-            decay = np.exp(elapsed * rates[owner])
-            part = total[owner, here] * decay
-            parts = (level[here], part, stretch[owner, here] * decay + elapsed * part)
+            owner = np.repeat(row, count)
+            parts = self._decayed(held, rates[owner], when, owner, self._arrived(when))
             for values, samples in zip((static, mode, slope), parts, strict=True):
                 sums = np.add.reduceat(samples, ends - count, axis=0)
                 values[row, column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
@@ -129,15 +123,39 @@ class StepSequence:
         widths, kind = np.unique(self.width, return_inverse=True)
         return widths, kind
 
+    @cached_property
+    def _lengths(self) -> FloatArray:
+        """Time from the first to the last sample of every bin."""
+        return self.dt * (self.width - 1)
+
+    @cached_property
+    def _steps(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times at which a change has arrived, times of the changes, and levels after them."""
+        # For a dead time of whole samples rounding must not decide what has arrived.
+        arrivals = self.moves + _TOGETHER * self.dt
+        level = np.concatenate([[0.0], np.cumsum(self.sizes)])
+        return arrivals, np.concatenate([[np.inf], self.moves]), level
+
     def _arrived(self, since: FloatArray) -> IntArray:
         """Count the changes that have arrived at delayed times (B, m)."""
-        # For a dead time of whole samples rounding must not decide what has arrived.
-        return np.searchsorted(self.moves + _TOGETHER * self.dt, since, side="left").astype(
-            np.int64
-        )
+        return np.searchsorted(self._steps[0], since, side="left")
 
-    def _carried(self, rates: FloatArray | ComplexArray) -> tuple[FloatArray, Any, Any]:
-        """Sum of the changes up to each arrival, decayed to then; entry 0 is before the first."""
+    def _decayed(
+        self, held: tuple[Any, Any], rates: Any, when: FloatArray, row: IntArray, here: IntArray
+    ) -> Modes:
+        """H, E and T at delayed times, `here` changes after the first state of `_carried`."""
+        _, start, level = self._steps
+        total, stretch = held
+        elapsed = np.where(here > 0, when - start[here], 0.0)[..., None]
+        decay = np.exp(elapsed * rates)
+        mode = total[row, here] * decay
+        slope = elapsed * mode
+        if self.moves.size > 1:  # after a single change nothing has decayed
+            slope += stretch[row, here] * decay
+        return level[here], mode, slope
+
+    def _carried(self, rates: FloatArray | ComplexArray) -> tuple[Any, Any]:
+        """Sums for E and T up to each arrival, decayed to then; entry 0 is before the first."""
         count = self.moves.size + 1
         total = np.zeros((rates.shape[0], count, rates.shape[1]), dtype=rates.dtype)
         stretch = np.zeros_like(total)
@@ -147,17 +165,20 @@ class StepSequence:
             decay = np.exp(gap * rates)
             stretch[:, i] = (stretch[:, i - 1] + gap * total[:, i - 1]) * decay
             total[:, i] = total[:, i - 1] * decay + self.sizes[i - 1]
-        return np.concatenate([[0.0], np.cumsum(self.sizes)]), total, stretch
+        return total, stretch
 
 
 def _geometric_mean(x: Any, count: IntArray) -> tuple[Any, Any]:
     """Mean over k = 0...count - 1 of exp(k x), and its derivative with respect to x."""
-    small = np.abs(x * count) < 1e-4
-    ratio, power = np.expm1(x), np.expm1(x * count)
+    total = x * count
+    ratio, power = np.expm1(x), np.expm1(total)
     mean = power / (count * ratio)
     turn = (power + 1 - mean * (ratio + 1)) / ratio
-    half, third = (count - 1) / 2, (count - 1) * (2 * count - 1) / 6
-    return np.where(small, 1 + half * x, mean), np.where(small, half + third * x, turn)
+    small = np.abs(total) < 1e-4
+    if small.any():
+        half, third = (count - 1) / 2, (count - 1) * (2 * count - 1) / 6
+        return np.where(small, 1 + half * x, mean), np.where(small, half + third * x, turn)
+    return mean, turn
 
 
 @dataclass(frozen=True, eq=False)

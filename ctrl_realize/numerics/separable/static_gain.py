@@ -179,7 +179,7 @@ def _reached(poles: ComplexArray, numerator: FloatArray, length: float) -> float
     """Value of the step response of b(s)/a(s) after a time."""
     residues, level, _ = partial_fractions(poles[None], np.ones(1), numerator.size)
     modes = np.exp(poles * length) @ residues[0]
-    return float((modes.real + level[0]) @ numerator)
+    return float(modes.real @ numerator + level[0] * numerator[0])
 
 
 def _told(theta: FloatArray, numerator: FloatArray, length: float) -> tuple[float, float, float]:

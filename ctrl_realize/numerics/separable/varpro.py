@@ -137,23 +137,25 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     batch = parameters.shape[0]
     free, dfree = poles_from_parameters(parameters[:, 1:])
     known = problem.known
-    poles = np.concatenate([free, np.tile(known.poles, (batch, 1))], axis=1)
+    poles = free
+    if known.poles.size:
+        poles = np.concatenate([free, np.tile(known.poles, (batch, 1))], axis=1)
     static, mode, slope = problem.drive.modes(parameters[:, 0], poles)
     residues, gain, dresidues = partial_fractions(poles, known.numerator, count)
     # Columns scaled to equal norm: the powers of s differ by many decades.
-    size = np.abs(residues).sum(axis=1) + np.abs(gain)
-    basis = (
-        _real_product(mode, residues / size[:, None]) + static[:, :, None] * (gain / size)[:, None]
-    )
-    fixed = np.broadcast_to(problem.regressors, (batch, *problem.regressors.shape))
-    columns = problem.weighted(np.concatenate([basis, fixed], axis=2))
+    size = np.abs(residues).sum(axis=1)
+    size[:, 0] += np.abs(gain)
+    columns = np.empty((batch, problem.data.size, count + problem.regressors.shape[1]))
+    columns[:, :, :count] = _real_product(mode, residues / size[:, None])
+    columns[:, :, 0] += static * (gain / size[:, 0])[:, None]
+    columns[:, :, count:] = problem.regressors
+    columns = problem.weighted(columns)
     data = np.broadcast_to(problem.weighted_data, (batch, problem.data.size))
     own = None
     if problem.segments is not None:
         own = problem.local_terms(free)
         forced, whole = columns, data
         columns, data = own.without(columns), own.without(data[:, :, None])[:, :, 0]
-    # Variable projection: residual = (I - Q Q') data (Golub and Pereyra 1973).
     # Variable projection: residual = (I - Q Q') data (Golub and Pereyra 1973).
     norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
     norm[norm == 0] = 1.0
@@ -163,15 +165,16 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     linear = solve_upper(r, inside) / norm
     numerator = linear[:, :count] / size
 
-    derivative = np.empty((batch, problem.data.size, 1 + n))
     amplitudes = np.einsum("bjk,bk->bj", residues, numerator)
-    derivative[:, :, 0] = -_real_product(mode, (amplitudes * poles)[:, :, None])[:, :, 0]
-    moved = _moved_amplitudes(poles, amplitudes, dresidues, numerator)[:, :, :n] @ dfree
-    stretch = np.zeros_like(moved)
-    stretch[:, :n] = amplitudes[:, :n, None] * dfree
+    # Columns of E: the derivatives w.r.t. the dead time and through the amplitudes.
+    through = np.empty((batch, poles.shape[1], 1 + n), dtype=np.complex128)
+    through[:, :, 0] = -amplitudes * poles
+    through[:, :, 1:] = _moved_amplitudes(poles, amplitudes, dresidues, numerator)[:, :, :n] @ dfree
+    derivative = _real_product(mode, through)
+    stretch = amplitudes[:, :n, None] * dfree
     level = np.einsum("bj,bjq->bq", -1.0 / free, dfree).real
-    level *= (gain[:, 0] * numerator[:, 0])[:, None]
-    derivative[:, :, 1:] = _real_product(mode, moved) + _real_product(slope, stretch)
+    level *= (gain * numerator[:, 0])[:, None]
+    derivative[:, :, 1:] += _real_product(slope[:, :, :n], stretch)
     derivative[:, :, 1:] += static[:, :, None] * level[:, None]
     derivative = problem.weighted(derivative)
     if own is not None:
@@ -198,7 +201,7 @@ def respond(
     free = poles_from_parameters(parameters[None, 1:])[0]
     poles = np.concatenate([free, known.poles[None]], axis=1)
     residues, gain, _ = partial_fractions(poles, known.numerator, numerator.size)
-    amplitudes, level = residues[0] @ numerator, gain[0] @ numerator
+    amplitudes, level = residues[0] @ numerator, gain[0] * numerator[0]
     parts = []
     for piece in drive.pieces():
         static, mode, _ = piece.modes(parameters[:1], poles)
@@ -211,26 +214,24 @@ def partial_fractions(
 ) -> tuple[ComplexArray, FloatArray, ComplexArray]:
     """Expand s^i K(s) / (s a(s)), i = 0...count - 1.
 
-    Returns the residues s^(i-1) K / a' at the poles (B, J, count), the static gains (B, count),
-    and d(s^(i-1) K)/ds over a' at the poles.
+    Returns the residues s^(i-1) K / a' at the poles (B, J, count), the static gain (B,) of the
+    first, that of the others being zero, and d(s^(i-1) K)/ds over a' at the poles.
     """
-    batch, n = poles.shape
+    n = poles.shape[1]
     gap = poles[:, :, None] - poles[:, None, :]
     gap[:, np.arange(n), np.arange(n)] = 1.0
     slope = gap.prod(axis=2)
-    i = np.arange(count)
-    power = poles[:, :, None] ** (i - 1)
-    if known.size == 1:
-        residues = power * (known[0] / slope)[:, :, None]
-        gain = np.zeros((batch, count))
-        gain[:, 0] = known[0] / np.prod(-poles, axis=1).real
-        return residues, gain, (i - 1) * residues / poles[:, :, None]
-    value = np.polyval(known, poles)
+    value = known[0] if known.size == 1 else np.polyval(known, poles)
+    gain = known[-1] / np.prod(-poles, axis=1).real
+    exponent = np.arange(-1, count - 1)
+    power = np.empty((*poles.shape, count), dtype=np.complex128)
+    power[:, :, 0], power[:, :, 1:2] = 1.0 / poles, 1.0
+    for i in range(2, count):
+        power[:, :, i] = power[:, :, i - 1] * poles
     residues = power * (value / slope)[:, :, None]
-    turn = np.polyval(np.polyder(known), poles)
-    dresidues = (i - 1) * residues / poles[:, :, None] + power * (turn / slope)[:, :, None]
-    gain = np.zeros((batch, count))
-    gain[:, 0] = known[-1] / np.prod(-poles, axis=1).real
+    dresidues = exponent * residues / poles[:, :, None]
+    if known.size > 1:
+        dresidues += power * (np.polyval(np.polyder(known), poles) / slope)[:, :, None]
     return residues, gain, dresidues
 
 
@@ -242,9 +243,12 @@ def _moved_amplitudes(
 ) -> ComplexArray:
     """Derivatives of amplitudes (rows j) w.r.t. poles (columns k), shape (B, J, J)."""
     n = poles.shape[1]
-    own = np.eye(n, dtype=bool)
-    inverse = 1.0 / np.where(own, 1.0, poles[:, :, None] - poles[:, None, :])
+    own = np.arange(n)
+    gap = poles[:, :, None] - poles[:, None, :]
+    gap[:, own, own] = 1.0
+    inverse = 1.0 / gap
+    inverse[:, own, own] = 0.0
     moved = amplitudes[:, :, None] * inverse
-    crowd = np.where(own, 0.0, inverse).sum(axis=2)
-    moved[:, own] = np.einsum("bjk,bk->bj", dresidues, numerator) - amplitudes * crowd
+    through = np.einsum("bjk,bk->bj", dresidues, numerator)
+    moved[:, own, own] = through - amplitudes * inverse.sum(axis=2)
     return np.asarray(moved)

@@ -167,7 +167,7 @@ def test_partial_fractions_add_up(known):
     for row, p in enumerate(poles):
         for i in range(residues.shape[2]):
             whole = s ** (i - 1) * np.polyval(known, s) / np.prod(s - p)
-            parts = gain[row, i] / s + np.sum(residues[row, :, i] / (s - p))
+            parts = (i == 0) * gain[row] / s + np.sum(residues[row, :, i] / (s - p))
             assert parts == pytest.approx(whole, rel=1e-12)
             # the derivative of its numerator, s^(i-1) K, at every pole; over a' there
             slope = np.array([np.prod(x - np.delete(p, j)) for j, x in enumerate(p)])
