@@ -79,7 +79,7 @@ DEFECTS = (
        'level = np.einsum("bj,bjq->bq", -1.0 / free, dfree).real',
        'level = np.einsum("bj,bjq->bq", 1.0 / free, dfree).real', "varpro local_terms", KERNELS),
     _d("slope with the delay", "the derivative of the response with the delay has the wrong sign",
-       "derivative[:, :, 0] = -_real_product(", "derivative[:, :, 0] = _real_product(",
+       "through[:, :, 0] = -amplitudes * poles", "through[:, :, 0] = amplitudes * poles",
        "varpro", KERNELS),
     _d("no projection", "gains count as known where the delay's deviation is computed",
        "jacobian = derivative - q @ (np.swapaxes(q, 1, 2) @ derivative)", "jacobian = derivative",

@@ -54,7 +54,7 @@ def poles_from_parameters(theta: FloatArray) -> tuple[ComplexArray, ComplexArray
     if start:
         poles[:, 0] = derivative[:, 0, 0] = -value[:, 0]
     # The elements of the 2 x 2 blocks on the diagonal: rows are poles, columns omega and zeta.
-    block = derivative.reshape(batch, -1)[:, start * (order + 1) :]
+    block = derivative.reshape(batch, order**2)[:, start * (order + 1) :]
     every = 2 * (order + 1)
     turn, scale = zeta / root, zeta * omega
     block[:, ::every] = poles[:, start::2]

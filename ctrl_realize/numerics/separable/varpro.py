@@ -155,7 +155,8 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     if problem.segments is not None:
         own = problem.local_terms(free)
         forced, whole = columns, data
-        columns, data = own.without(columns), own.without(data[:, :, None])[:, :, 0]
+        left = own.without(np.concatenate([columns, data[:, :, None]], axis=2))
+        columns, data = left[:, :, :-1], left[:, :, -1]
     # Variable projection: residual = (I - Q Q') data (Golub and Pereyra 1973).
     norm = np.sqrt(np.einsum("bmk,bmk->bk", columns, columns))
     norm[norm == 0] = 1.0
