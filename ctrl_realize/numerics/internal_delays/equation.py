@@ -14,6 +14,8 @@ References
    equations, Computing 67 (2001) 1-12, doi:10.1007/s006070170013.
 .. [2] A. Bellen and M. Zennaro, Numerical Methods for Delay Differential Equations, Oxford
    University Press 2003, chapters 2 and 3, doi:10.1093/acprof:oso/9780198506546.001.0001.
+.. [3] J.-P. Berrut and L. N. Trefethen, Barycentric Lagrange interpolation, SIAM Review 46 (2004)
+   501-517, doi:10.1137/S0036144502417715.
 """
 
 from __future__ import annotations
@@ -175,7 +177,7 @@ NODES = np.concatenate([[0.0], POINTS])
 """Points of a step at which signals are kept, its start among them."""
 
 _BARYCENTRIC = 1 / np.prod(NODES[:, None] - NODES[None, :] + np.eye(NODES.size), axis=1)
-
+"""Weights of the nodes in the barycentric formula of interpolation [3]_."""
 
 _RATIOS = _BARYCENTRIC[None, :] / _BARYCENTRIC[:, None]
 SLOPES = _RATIOS / (NODES[:, None] - NODES[None, :] + np.eye(NODES.size))

@@ -22,8 +22,8 @@ from ..arrays import ComplexArray, FloatArray
 
 Curve = Callable[[FloatArray], ComplexArray]
 
-POINTS_PER_TURN = 16
-MAX_REFINEMENTS = 24
+POINTS_PER_TURN = 16  # of the phase of a delay: 0.4 rad, less than what `follow` asks for
+MAX_REFINEMENTS = 24  # halvings: an interval is then a ten-millionth of what it was
 
 
 def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: float) -> FloatArray:

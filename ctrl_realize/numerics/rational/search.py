@@ -25,10 +25,10 @@ from .starts import delay_grid, grown_starts, starting_points
 
 DEFAULT_ORDERS = range(1, 5)
 """Default orders; larger ones are tried if the largest of these is the best."""
-_LARGEST_ORDER = 10
-_LARGEST_FROM_GRID = 3
-_STEPS_OF_ONE = 8
-_KEPT = 2
+_LARGEST_ORDER = 10  # unless a larger one is asked for: time
+_LARGEST_FROM_GRID = 3  # order up to which a linear problem finds the poles; see `starts`
+_STEPS_OF_ONE = 8  # order up to which real poles are added too, which takes twice the time
+_KEPT = 2  # fits of every order that are extended: time
 
 
 def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:

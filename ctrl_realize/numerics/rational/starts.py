@@ -92,16 +92,16 @@ def relocate_poles(
     return np.asarray(-np.maximum(np.abs(moved.real), floor) + 1j * moved.imag)
 
 
-_RELOCATIONS = 8
-_MAX_STARTS = 4
-_MAX_DELAYS = 64
-_PER_TURN = 4
-_MAX_TRIED = 4000
-_POINTS_BELOW = 8
-_DAMPINGS = (0.01, 0.1, 0.6)
-_GRID = 16
-_PEAKS = 8
-_KEPT = 2
+_RELOCATIONS = 8  # time; of 220 starts for a valve and a motor 165 had converged before
+_MAX_STARTS, _MAX_DELAYS, _MAX_TRIED = 4, 64, 4000
+"""Minima over the dead time that are refined, dead times for which poles are sought, and dead times
+whose remaining phase is computed: time. They cost a fit, a linear problem and a sum each."""
+_PER_TURN = 4  # dead times in a turn of the phase at the top: two for every minimum of the misfit
+_POINTS_BELOW = 8  # points in the lowest band: an order of 3 and a dead time need 7 coefficients
+_DAMPINGS = (0.01, 0.1, 0.6)  # of an added pair, a decade apart: the fit moves it
+_GRID, _PEAKS = 16, 8
+"""Frequencies at which poles are added: spread over the band, and peaks of the misfit. Time."""
+_KEPT = 2  # extensions that are refined: time
 
 
 def delay_grid(data: FRFData, order: int) -> FloatArray:

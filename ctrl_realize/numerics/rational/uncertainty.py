@@ -23,6 +23,8 @@ from .fit import FRFData, RationalFit, refine
 from .model import full_jacobian, project
 
 _LEAST_INFORMATION = 1e-10
+"""Singular value, over the largest, of scaled columns that is rounding: the data do not determine
+the parameter."""
 
 
 def covariance(data: FRFData, fit: RationalFit, scale: float) -> FloatArray:
