@@ -39,7 +39,7 @@ def in_time(seconds: float, digits: int = 3) -> str:
     if seconds == 0:
         return "0 s"
     factor, name = time_unit(abs(seconds))
-    return f"{_plainly(seconds * factor, digits)} {name}"
+    return f"{plainly(seconds * factor, digits)} {name}"
 
 
 def poles_in_words(poles: Iterable[complex]) -> str:
@@ -62,7 +62,7 @@ def _pole_in_words(pole: complex) -> str:
         return "integrator"
     size = abs(pole)
     if pole.imag > 0:
-        return f"pair at {_plainly(size / (2 * np.pi), 3)} Hz (damping {-pole.real / size:.2g})"
+        return f"pair at {plainly(size / (2 * np.pi), 3)} Hz (damping {-pole.real / size:.2g})"
     return f"{'lag' if pole.real < 0 else 'growing in'} {in_time(1 / size)}"
 
 
@@ -142,8 +142,15 @@ def numbers_alike(values: Iterable[float], low: float, high: float) -> list[str]
     return ["0" if value == 0 else f"{value:.{decimals}f}" for value in several]
 
 
-def _plainly(value: float, digits: int) -> str:
-    """Write a number without an exponent if its digits allow it."""
+def plainly(value: float, digits: int) -> str:
+    """Write a number without an exponent below a million.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import plainly
+    >>> plainly(153.2, 2), plainly(1.532, 2), plainly(15.32e6, 3)
+    ('153', '1.5', '1.53e+07')
+    """
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .._wording import plainly
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
 from ..numerics.constants import Z_95
@@ -88,7 +89,7 @@ def chosen_model(
         flags.append(
             Flag(
                 "misfit",
-                f"the residual is {misfit:.2g} times the measured noise: the plant is not "
+                f"the residual is {plainly(misfit, 2)} times the measured noise: the plant is not "
                 f"exactly of order {n}, or is nonlinear; the interval is widened accordingly",
             )
         )

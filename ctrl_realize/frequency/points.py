@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 
 from .._checks import band, one_of
+from .._wording import plainly
 from ..data import MeasuredFRF
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
@@ -83,8 +84,8 @@ def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
     power = float(np.mean(np.abs(response / sigma) ** 2))
     if power < 1 + _SIGNIFICANT / np.sqrt(response.size):
         raise DataError(
-            f"the response is {np.sqrt(power):.2g} times its standard deviation, as for pure "
-            "noise: the input does not excite the output at these frequencies; choose "
+            f"the response is {plainly(np.sqrt(power), 2)} times its standard deviation, as for "
+            "pure noise: the input does not excite the output at these frequencies; choose "
             "another band or measure longer"
         )
 

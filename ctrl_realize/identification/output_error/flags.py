@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..._wording import in_time, interval_in_time, time_within
+from ..._wording import in_time, interval_in_time, plainly, time_within
 from ...numerics.arrays import FloatArray
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate
@@ -129,8 +129,8 @@ def _misfit(fit: OutputErrorEstimate) -> Flag | None:
     return Flag(
         "structured_misfit",
         "no model fits down to the noise level (the residual, averaged over bins, is "
-        f"{fit.normalized_rms:.2g} times the noise): the plant is nonlinear or has unmodelled "
-        "dynamics; "
+        f"{plainly(fit.normalized_rms, 2)} times the noise): the plant is nonlinear or has "
+        "unmodelled dynamics; "
         + (
             "the dead time is the median of five delay estimates and the interval is their range"
             if fit.delay_estimates

@@ -6,7 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._wording import in_time, interval_in_time, number_within, poles_in_words, time_within
+from ..._wording import (
+    in_time,
+    interval_in_time,
+    number_within,
+    plainly,
+    poles_in_words,
+    time_within,
+)
 from ...data import Record
 from ...numerics.arrays import ComplexArray, FloatArray, locked
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
@@ -259,7 +266,7 @@ class OutputErrorFit(FractionalDelayFit):
 
     def __repr__(self) -> str:
         low, high = self.interval
-        level = "noise" if self.at_noise_level else f"{self.normalized_rms:.2g} x noise"
+        level = "noise" if self.at_noise_level else f"{plainly(self.normalized_rms, 2)} x noise"
         return (
             f"<OutputErrorFit {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, "
             f"order {self.order}, "
@@ -296,7 +303,7 @@ class OutputErrorFit(FractionalDelayFit):
             (
                 "residual",
                 f"{self.residual:.3g}, noise {self.noise:.3g} "
-                f"(normalised rms {self.normalized_rms:.3g})",
+                f"(normalised rms {plainly(self.normalized_rms, 3)})",
             ),
         ]
         rows += [

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..._wording import plainly
 from ...numerics.arrays import FloatArray
 from ...numerics.regression.recursive import DelayBank
 from ...numerics.state_space.pole_sensitivity import Core, Direction
@@ -188,7 +189,7 @@ def too_loud(found: Solution, noise: float, limit: float) -> str:
     if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
         return ""
     return (
-        f"the track is lost: the residual, {left:.3g}, is {left / noise:.2g} times the "
+        f"the track is lost: the residual, {left:.3g}, is {plainly(left / noise, 2)} times the "
         "noise of the model. The delay may be outside the range of candidates, the plant "
         "may have changed, or a disturbance may drift; reset() restarts the tracker"
     )
