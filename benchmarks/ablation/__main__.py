@@ -1,8 +1,9 @@
-"""Make the table of rules: ``python -m benchmarks.ablation``.
+"""Make the tables of rules: ``python -m benchmarks.ablation``.
 
 Every rule is switched off by itself, and the records that it touches are identified again, at most
 `MOST` of each kind. CPU time is that of `identify`, over that with all rules on, on the same
-records.
+records. With `--made-for` each of the rules for rare records is tried on records of its own world
+alone: what it does where it is needed.
 """
 
 from __future__ import annotations
@@ -22,12 +23,14 @@ import ctrl_realize as cr
 from benchmarks.honesty.trial import quietly
 from benchmarks.worlds.judge import DELAY
 
-from .cases import Case, cases
+from . import rare
+from .cases import Case, cases, of_world
 from .page import KINDS, Seen, page
 from .switches import MODES, SWITCHES, Switch
 from .touched import watched
 
-PAGE = Path(__file__).parents[2] / "docs" / "ablation_table.md"
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE, OWN_WORLDS = DOCS / "ablation_table.md", DOCS / "ablation_worlds_table.md"
 MOST, FEW = 6, 12
 """Records of a kind on which a rule is tried, evenly among those that it touches; where these are
 few, all of them."""
@@ -39,10 +42,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1, help="records of each simulated kind")
     parser.add_argument("--only", nargs="+", help="rules whose name contains one of these")
     parser.add_argument("--store", type=Path, help="file of finished records, one line each")
-    parser.add_argument("--output", type=Path, default=PAGE, help="Markdown file to write")
+    parser.add_argument("--made-for", type=int, metavar="N", help="N records of each rule's world")
+    parser.add_argument("--output", type=Path, help="Markdown file to write, instead of the page")
     given = parser.parse_args()
     seen = stored(given.store)
-    every = tuple(cases(given.seeds))
     rules = [
         rule
         for rule in SWITCHES[1:]
@@ -55,6 +58,17 @@ def main() -> None:
             with given.store.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(one)) + "\n")
 
+    if given.made_for:
+        own = in_own_worlds(rules, given.made_for)
+        for rule, case in own:
+            for one in (BASE, rule):
+                if (one.name, case.name) not in seen:
+                    keep(judged(one, case))
+        wanted = {(one.name, case.name) for rule, case in own for one in (BASE, rule)}
+        found = [one for key, one in seen.items() if key in wanted]
+        write(found, given.output or OWN_WORLDS, all_rules=False)
+        return
+    every = tuple(cases(given.seeds))
     for case in in_turn(every):
         if (BASE.name, case.name) not in seen:
             keep(judged(BASE, case))
@@ -65,8 +79,25 @@ def main() -> None:
     for case, rule in pairs(every, rules, seen):
         if (rule.name, case.name) not in seen:
             keep(judged(rule, case))
-    text = "\n".join(page(list(seen.values()), [rule.name for rule in SWITCHES], MODES.name))
-    given.output.write_text(text, encoding="utf-8")
+    names = {case.name for case in every}
+    write([one for one in seen.values() if one.name in names], given.output or PAGE)
+
+
+def write(seen: list[Seen], output: Path, *, all_rules: bool = True) -> None:
+    """Write the table of what was judged."""
+    names = [rule.name for rule in SWITCHES]
+    lines = page(seen, names, MODES.name, all_rules=all_rules)
+    output.write_text("\n".join(lines), encoding="utf-8")
+
+
+def in_own_worlds(rules: list[Switch], count: int) -> list[tuple[Switch, Case]]:
+    """Rules for rare records, with some records of the world that each was made for."""
+    return [
+        (rule, of_world("rare", rare.MADE_FOR[rule.name], seed))
+        for rule in rules
+        if rule.name in rare.MADE_FOR
+        for seed in range(count)
+    ]
 
 
 def in_turn(every: tuple[Case, ...]) -> Iterator[Case]:

@@ -55,23 +55,23 @@ def cases(seeds: int) -> Iterator[Case]:
             for plant in PLANTS:
                 yield _step("lags", kind, plant, noise, seed)
         for world in STEPPED:
-            yield _of_world("lags", world, seed)
+            yield of_world("lags", world, seed)
         for plant in (*WRONG, *MORE_WRONG):
             yield _step("wrong", "wrong structure", plant, 0.005, seed)
         for world in steps.WORLDS:
-            yield _of_world("wrong", world, seed)
+            yield of_world("wrong", world, seed)
         for slope in ("drift", "drift that ends"):
             yield _drifting(slope, seed)
         for world in sensors.WORLDS:
-            yield _of_world("disturbed", world, seed)
+            yield of_world("disturbed", world, seed)
         for world in (*DRIVEN, *driven.WORLDS[::2]):
-            yield _of_world("driven", world, seed)
+            yield of_world("driven", world, seed)
         for core, noise in ((None, 0.02), (TWO_MODES, 0.05), (MANY_LAGS, 0.01)):
             for kind in ("white", "coloured"):
                 yield _driven(kind, noise, seed, core)
     for seed in range(2 * seeds):
         for world in rare.WORLDS:
-            yield _of_world("rare", world, seed)
+            yield of_world("rare", world, seed)
         for plant in WRONG[:3] + MORE_WRONG:
             yield _step("rare", "wrong structure", plant, (0.001, 0.02)[seed % 2], seed)
     for one in peers.records(DATA) if DATA.is_dir() else ():
@@ -87,7 +87,7 @@ def _step(group: str, kind: str, plant: str, noise: float, seed: int) -> Case:
     return Case(name, group, case.record, (truth, truth), case.record.dt)
 
 
-def _of_world(group: str, world: World, seed: int) -> Case:
+def of_world(group: str, world: World, seed: int) -> Case:
     case = world(np.random.default_rng([seed, zlib.crc32(world.__name__.encode())]))
     dt = case.records.dt if isinstance(case.records, cr.Record) else case.records[0].dt
     return Case(

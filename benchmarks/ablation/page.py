@@ -42,11 +42,14 @@ class Seen:
         return not self.held and not self.doubted and not self.refused
 
 
-def page(seen: list[Seen], rules: list[str], modes: str) -> list[str]:
-    """Write the table, a rule in a row; all but `modes` are tried without it on driven records."""
+def page(seen: list[Seen], rules: list[str], modes: str, *, all_rules: bool = True) -> list[str]:
+    """Write the table, a rule in a row; all but `modes` are tried without it on driven records.
+
+    Without `all_rules` those that were not tried are left out.
+    """
     base = {one.name: one for one in seen if one.rule == rules[0]}
     counts = {kind: sum(one.kind == kind for one in base.values()) for kind in KINDS}
-    many = ", ".join(f"{counts[kind]} {kind}" for kind in KINDS)
+    many = ", ".join(f"{counts[kind]} {kind}" for kind in KINDS if counts[kind])
     lines = [
         f"*`python -m benchmarks.ablation`, {date.today().isoformat()}, ctrl_realize "
         f"{cr.__version__}, Python {platform.python_version()}, numpy {np.__version__}, scipy "
@@ -61,7 +64,9 @@ def page(seen: list[Seen], rules: list[str], modes: str) -> list[str]:
     for rule in rules[1:]:
         rows = [one for one in seen if one.rule == rule and one.name in base]
         touched = sum(rule in one.touched for one in base.values())
-        if rows or touched:
+        if rows or (touched and all_rules):
+            if not all_rules:
+                touched = sum(rule in base[one.name].touched for one in rows)
             lines.append(_row(rule, touched, rows, base if rule == modes else plain))
     return [*lines, ""]
 

@@ -114,6 +114,17 @@ def wandering_output(rng: Rng) -> Case:
     return plant.case(record(u, y + 0.05 * float(np.std(y)) * walk))
 
 
+def noise_of_the_response(rng: Rng) -> Case:
+    """Slow noise of 0.5 % throughout; in the response white noise, two to four times as large."""
+    plant, u = drawn(rng, ((0.03, 0.1),), (0.2, 0.5)), step(1200, 600)
+    y = stepped(rng, plant, u)
+    noise = coloured(rng, u.size, 0.95)
+    noise /= float(np.std(noise))
+    moving = np.abs(np.gradient(y)) > 1e-6 * np.ptp(y)
+    noise += float(rng.uniform(2.0, 4.0)) * moving * rng.standard_normal(u.size)
+    return plant.case(record(u, y + 0.005 * np.ptp(y) * noise))
+
+
 WORLDS = (
     tanks_in_a_row,
     settling_in_a_long_rest,
@@ -126,4 +137,22 @@ WORLDS = (
     far_away,
     slow_disturbance,
     wandering_output,
+    noise_of_the_response,
 )
+
+MADE_FOR = {
+    "unlike residual left alone": noise_of_the_response,
+    "noise made white": waves_on_a_canal,
+    "colour of the noise at rest": slow_noise_in_a_short_rest,
+    "chains of equal lags": tanks_in_a_row,
+    "chains that still improve": tanks_in_a_row,
+    "first motion in means": little_step_in_noise,
+    "exponential before the step": settling_in_a_long_rest,
+    "hum": humming,
+    "coarse converter": steps_of_a_converter,
+    "slow cosines": slow_disturbance,
+    "start from the correlation": far_away,
+    "start at the ringing": wandering_output,
+    "records weighted by their noise": unequal_sensors,
+}
+"""Rules, and the world that each was made for."""
