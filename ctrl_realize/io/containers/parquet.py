@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 AnyArray = np.ndarray[Any, np.dtype[Any]]
 
 _FREE_BYTES = 64 * 2**20
-_MAX_RATIO = 10_000
+_MAX_RATIO = 1_000
 """Largest ratio of unpacked to packed size. Runs of equal values take no space in a file, but a
-measurement has more: beside a two-level input there is a noisy output."""
+measurement has more: beside a two-level input of 8 bytes a sample there is a noisy output, of which
+a bit at least stays, so that three columns are packed to less than a two-hundredth."""
 _OBJECT_BYTES = 64
 """Memory of a cell that becomes a Python object: a pointer and a small object."""
 
@@ -49,7 +50,7 @@ class LateColumn(Column):
 def read_parquet(path: Path, *, max_bytes: float) -> Table:
     """Find the columns of a Parquet file; their cells are read on demand.
 
-    All columns together may take `max_bytes`, and at most ten thousand times the size of the file:
+    All columns together may take `max_bytes`, and at most a thousand times the size of the file:
     runs of equal values are packed so well that a few kB may fill any memory.
 
     Raises
