@@ -65,6 +65,10 @@ TABLES = {
     "worlds": ("docs/worlds_table.md", "python -m benchmarks.worlds"),
     "kernels": ("docs/kernels_table.md", "python -m benchmarks.kernels"),
     "ablation": ("docs/ablation_table.md", "python -m benchmarks.ablation"),
+    "ablation_worlds": (
+        "docs/ablation_worlds_table.md",
+        "python -m benchmarks.ablation --made-for 6",
+    ),
     "campaign": (
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",

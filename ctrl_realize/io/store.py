@@ -145,9 +145,13 @@ class CampaignStore:
                 path.unlink()
 
     def forget_attempts(self) -> None:
-        """Remove the marks of running records, when the caller stops the run."""
-        for path in self.folder.glob("tried-*.txt"):
-            path.unlink(missing_ok=True)
+        """Remove the marks of running records, when the caller stops the run.
+
+        So are files that a process was killed over while it wrote them.
+        """
+        for left in ("tried-*.txt", ".tried-*.tmp", ".row-*.tmp"):
+            for path in self.folder.glob(left):
+                path.unlink(missing_ok=True)
 
 
 def _count(path: Path) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from inspect import signature
 from typing import Unpack
 
@@ -84,8 +85,9 @@ def identify_campaign(
                 f"records[{position}] is a {type(source).__name__}; expected a Record, or a "
                 "function that returns one (functools.partial(read_record, path))"
             )
-    found = identified(sources, n_jobs, method, options, store)
-    rows = dict(_with_bar(found, len(sources), progress))
+    # Closed before anything else happens: an interruption may come while a row is counted.
+    with closing(identified(sources, n_jobs, method, options, store)) as found:
+        rows = dict(_with_bar(found, len(sources), progress))
     in_order = tuple(rows[position] for position in range(len(sources)))
     return Campaign(in_order, tuple(sources), method, options)
 

@@ -8,7 +8,7 @@ process is killed again gives a row with that error, and the others continue.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
@@ -25,7 +25,7 @@ def identified(
     method: Method,
     options: IdentifyOptions,
     store: RowStore | None,
-) -> Iterator[tuple[int, CampaignRow]]:
+) -> Generator[tuple[int, CampaignRow], None, None]:
     """Identify records with joblib; yield position and row of each as it is finished."""
     from joblib import Parallel, delayed  # not needed for a single record
 
