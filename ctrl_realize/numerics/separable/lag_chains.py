@@ -158,12 +158,15 @@ def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
 
 
 def still_improving(chains: Sequence[LagChain]) -> bool:
-    """Whether the fit would improve beyond the longest chain, by a parabola of the last three."""
+    """Whether the fit would improve beyond the longest chain, by a parabola of the last three.
+
+    Where the plant is such a chain every lag improves the fit.
+    """
     if not chains or chains[-1].candidate.structure.order < LONGEST:
         return False
     first, middle, last = (chain.criterion for chain in chains[-3:])
     bend = first - 2 * middle + last
-    return last < middle and (bend <= 0 or (middle - last) / bend > 1.0)
+    return last < middle < first and (bend <= 0 or (middle - last) / bend > 1.0)
 
 
 def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArray]:
