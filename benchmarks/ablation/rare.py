@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.worlds import steps
 from benchmarks.worlds.simulation import (
     Case,
     binary,
@@ -125,6 +126,12 @@ def noise_of_the_response(rng: Rng) -> Case:
     return plant.case(record(u, y + 0.005 * np.ptp(y) * noise))
 
 
+def faster_than_a_sample(rng: Rng) -> Case:
+    """One lag of a fifth to four fifths of a sample, 1 % noise."""
+    plant, u = drawn(rng, ((0.002, 0.008),), (0.05, 0.3)), step(400, 150)
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 0.01)))
+
+
 WORLDS = (
     tanks_in_a_row,
     settling_in_a_long_rest,
@@ -146,6 +153,8 @@ MADE_FOR = {
     "colour of the noise at rest": slow_noise_in_a_short_rest,
     "chains of equal lags": tanks_in_a_row,
     "chains that still improve": tanks_in_a_row,
+    "modes of diffusion": steps.wall,
+    "slower poles beside zeros": faster_than_a_sample,
     "first motion in means": little_step_in_noise,
     "exponential before the step": settling_in_a_long_rest,
     "hum": humming,
