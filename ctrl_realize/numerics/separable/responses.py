@@ -101,8 +101,9 @@ class StepSequence:
             return static, mode, slope
         mean, turn = _geometric_mean(rates[:, None] * self.dt, widths[:, None])
         mean = mean[:, kind]
-        slope = slope * mean + mode * (self.dt * turn)[:, kind]
-        mode = mode * mean
+        slope *= mean
+        slope += mode * (self.dt * turn)[:, kind]
+        mode *= mean
         row, column = np.nonzero(here != self._arrived(since + self._lengths))
         if row.size:
             # The samples of all bins during which a change arrives, concatenated.
@@ -145,14 +146,16 @@ class StepSequence:
     ) -> Modes:
         """H, E and T at delayed times, `here` changes after the first state of `_carried`."""
         _, start, level = self._steps
-        total, stretch = held
         elapsed = np.where(here > 0, when - start[here], 0.0)[..., None]
-        decay = np.exp(elapsed * rates)
-        mode = total[row, here] * decay
-        slope = elapsed * mode
-        if self.moves.size > 1:  # after a single change nothing has decayed
-            slope += stretch[row, here] * decay
-        return level[here], mode, slope
+        static, mode = level[here], np.exp(elapsed * rates)
+        if self.moves.size == 1:
+            mode *= static[..., None]  # nothing has decayed before
+            return static, mode, elapsed * mode
+        total, stretch = held
+        slope = stretch[row, here] * mode
+        mode *= total[row, here]
+        slope += elapsed * mode
+        return static, mode, slope
 
     def _carried(self, rates: FloatArray | ComplexArray) -> tuple[Any, Any]:
         """Sums for E and T up to each arrival, decayed to then; entry 0 is before the first."""
