@@ -232,6 +232,7 @@ def conditions(row: Row, inside: Path, where: Path, base: Path) -> dict[str, str
     if variables.get("NPY_DISABLE_CPU_FEATURES") == "ALL":
         variables["NPY_DISABLE_CPU_FEATURES"] = call(inside, "-c", FEATURES, cwd=base).stdout
     if variables.get("LC_ALL") == GERMAN:
+        (base / "locales").mkdir(exist_ok=True)
         made = call(
             "localedef", "-i", "de_DE", "-f", "UTF-8", base / "locales" / GERMAN, cwd=base
         ) if shutil.which("localedef") else None  # fmt: skip
