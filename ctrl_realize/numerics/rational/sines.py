@@ -116,27 +116,25 @@ def fit_sines(
     n_columns = 4 if drift else 3
     freedom = np.maximum(count - n_columns - (0.5 if free_frequency else 0.0), 1.0)[:, None]
 
-    basis, coefficients, residual = _project(local, data, omega, kept, drift)
+    at = _project(local, data, omega, kept, drift)
     if free_frequency:
         floor = np.finfo(float).eps ** 2 * (data**2).sum(axis=2) + np.finfo(float).tiny
         for iteration in range(_MAX_ITERATIONS):
             if iteration in (0, 2):
-                weights = 1.0 / np.maximum((residual**2).sum(axis=2) / freedom, floor)
-            step, curvature = _frequency_step(
-                local, omega, kept, basis, coefficients, residual, weights
-            )
+                weights = 1.0 / np.maximum((at.residual**2).sum(axis=2) / freedom, floor)
+            step, _ = _frequency_step(local, at, weights)
             # A step longer than a fraction of the line width would leave the minimum.
             limit = 1.0 / span
             step = np.clip(step, -limit, limit)
             omega = omega + step
-            basis, coefficients, residual = _project(local, data, omega, kept, drift)
+            at = _project(local, data, omega, kept, drift)
             if iteration > 2 and np.all(np.abs(step) * span < 1e-11):
                 break
-        weights = freedom / np.maximum((residual**2).sum(axis=2), floor)
-        _, curvature = _frequency_step(local, omega, kept, basis, coefficients, residual, weights)
+        weights = freedom / np.maximum((at.residual**2).sum(axis=2), floor)
+        _, curvature = _frequency_step(local, at, weights)
         omega_std = 1.0 / np.sqrt(curvature)
 
-    return _collect(local, omega, kept, coefficients, residual, freedom, centre, omega_std)
+    return _collect(local, omega, kept, at, freedom, centre, omega_std)
 
 
 def dominant_frequency(signals: FloatArray, dt: float) -> FloatArray:
@@ -174,10 +172,20 @@ def dominant_frequency(signals: FloatArray, dt: float) -> FloatArray:
     return np.asarray((peak + np.clip(offset, -0.5, 0.5)) * 2 * np.pi / (n_fft * dt))
 
 
+@dataclass(frozen=True, eq=False)
+class _Projection:
+    """Columns of the model (B, N, P), orthonormal basis, coefficients (B, C, P), and residual."""
+
+    columns: FloatArray
+    basis: FloatArray
+    coefficients: FloatArray
+    residual: FloatArray
+
+
 def _project(
     local: FloatArray, data: FloatArray, omega: FloatArray, kept: FloatArray, drift: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Solve for the linear parameters: orthonormal basis, coefficients (B, C, P), residual."""
+) -> _Projection:
+    """Solve for the linear parameters: cosine, sine, level and slope."""
     angle = omega[:, None] * local
     columns = [np.cos(angle), np.sin(angle), np.ones_like(angle)]
     if drift:
@@ -186,26 +194,19 @@ def _project(
     basis, triangle = np.linalg.qr(design)
     projected = data @ basis
     coefficients = np.linalg.solve(triangle[:, None], projected[..., None])[..., 0]
-    residual = data - projected @ basis.transpose(0, 2, 1)
-    return basis, coefficients, residual
+    return _Projection(design, basis, coefficients, data - projected @ basis.transpose(0, 2, 1))
 
 
 def _frequency_step(
-    local: FloatArray,
-    omega: FloatArray,
-    kept: FloatArray,
-    basis: FloatArray,
-    coefficients: FloatArray,
-    residual: FloatArray,
-    weights: FloatArray,
+    local: FloatArray, at: _Projection, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Gauss-Newton step of the common frequency, and the information on it."""
-    angle = omega[:, None] * local
-    sine, cosine = np.sin(angle) * local * kept, np.cos(angle) * local * kept
-    slope = coefficients[..., 1:2] * cosine[:, None] - coefficients[..., 0:1] * sine[:, None]
-    slope = slope - (slope @ basis) @ basis.transpose(0, 2, 1)
+    cosine, sine = at.columns[:, :, 0] * local, at.columns[:, :, 1] * local
+    slope = at.coefficients[..., 1:2] * cosine[:, None]
+    slope -= at.coefficients[..., 0:1] * sine[:, None]
+    slope -= (slope @ at.basis) @ at.basis.transpose(0, 2, 1)
     curvature = (weights * (slope**2).sum(axis=2)).sum(axis=1)
-    gradient = (weights * (slope * residual).sum(axis=2)).sum(axis=1)
+    gradient = (weights * (slope * at.residual).sum(axis=2)).sum(axis=1)
     curvature = np.maximum(curvature, np.finfo(float).tiny)
     return gradient / curvature, curvature
 
@@ -214,22 +215,21 @@ def _collect(
     local: FloatArray,
     omega: FloatArray,
     kept: FloatArray,
-    coefficients: FloatArray,
-    residual: FloatArray,
+    at: _Projection,
     freedom: FloatArray,
     centre: FloatArray,
     omega_std: FloatArray,
 ) -> SineFit:
     """Convert the result from centred time back to the caller's, with its covariance."""
-    noise_variance = (residual**2).sum(axis=2) / freedom
+    coefficients = at.coefficients
+    noise_variance = (at.residual**2).sum(axis=2) / freedom
     phasor_local = coefficients[..., 0] - 1j * coefficients[..., 1]
     turn = np.exp(-1j * omega * centre)
     has_slope = coefficients.shape[2] == 4
     slope = coefficients[..., 3] if has_slope else np.zeros(noise_variance.shape)
     offset = coefficients[..., 2] - slope * centre[:, None]
 
-    angle = omega[:, None] * local
-    design = np.stack([np.cos(angle), -np.sin(angle)], axis=2) * kept[:, :, None]
+    design = at.columns[:, :, :2] * [1.0, -1.0]
     others = _level_basis(local, kept, has_slope)
     design = design - others @ (others.transpose(0, 2, 1) @ design)
     local_covariance = np.linalg.inv(design.transpose(0, 2, 1) @ design)
