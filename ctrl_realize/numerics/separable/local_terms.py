@@ -230,7 +230,7 @@ def _normalised(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
 def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:
     """Solve R x = b for a batch, R from columns of norm 1; unresolved components are 0."""
     if np.abs(np.einsum("bii->bi", r)).min(initial=1.0) > 1e-12:
-        return np.linalg.solve(r, right[:, :, None])[:, :, 0]
+        return np.asarray(np.linalg.solve(r, right[:, :, None])[:, :, 0], dtype=np.float64)
     x = np.zeros_like(right)
     for i in range(right.shape[1] - 1, -1, -1):
         rest = right[:, i] - np.einsum("bj,bj->b", r[:, i, i + 1 :], x[:, i + 1 :])

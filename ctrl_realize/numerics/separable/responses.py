@@ -127,7 +127,7 @@ class StepSequence:
     @cached_property
     def _lengths(self) -> FloatArray:
         """Time from the first to the last sample of every bin."""
-        return self.dt * (self.width - 1)
+        return np.asarray(self.dt * (self.width - 1), dtype=np.float64)
 
     @cached_property
     def _steps(self) -> tuple[FloatArray, FloatArray, FloatArray]:
