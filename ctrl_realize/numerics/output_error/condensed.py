@@ -72,8 +72,7 @@ class CondensedInput:
         static, mode, slope = SampledInput(pulse, self.dt).modes(tau, poles)
         parts = [static[:, :, None], mode.real, mode.imag, slope.real, slope.imag]
         wide = np.concatenate(parts, axis=2).transpose(1, 0, 2)
-        seen = self.factor @ wide.reshape(wide.shape[0], -1)
-        seen = seen.reshape(-1, *wide.shape[1:]).transpose(1, 0, 2)
+        seen = np.tensordot(self.factor, wide, axes=1).transpose(1, 0, 2)
         count = poles.shape[1]
         real, imag, turn, twist = (
             seen[:, :, 1 + i * count : 1 + (i + 1) * count] for i in range(4)

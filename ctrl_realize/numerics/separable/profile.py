@@ -107,6 +107,8 @@ def profile_points(
         near = np.concatenate([np.arange(1, grid.size), np.arange(grid.size - 1)])
         wanted = np.minimum(cost[at], cost[near]) < level + _HIGH * variance
         at, near = at[wanted], near[wanted]
+        if not at.size:
+            break  # all of the grid lies outside of the interval
         starts = fitted[near]
         starts[:, 0] = grid[at]
         moved, new = followed(starts)

@@ -85,6 +85,19 @@ def test_all_samples_of_a_long_record_count():
     assert np.std(fit.measured - fit.fitted) < 1.1 * noise / np.sqrt(1 - colour**2)
 
 
+def test_more_lags_than_a_long_record_shows_are_fitted():
+    # Two of the three lags are nearly nothing: the misfit is steep beside its minimum.
+    rng = np.random.default_rng(1)
+    k = np.arange(30_000)
+    waves = zip((1, 2, 5, 10, 20, 40, 80), rng.uniform(0, 2 * np.pi, 7), strict=True)
+    u = np.sum([np.sin(2e-4 * np.pi * f * k + phase) for f, phase in waves], axis=0)
+    y = cr.delayed_ss(lag(5.0), dead_time=DELAY * DT, dt=DT).simulate(u)
+    y += 0.05 * rng.standard_normal(u.size)
+    fit = cr.fit_output_error(cr.Record(k * DT, u, y), structures=[(3, 3)]).fit
+    assert fit.total_delay == pytest.approx(DELAY * DT + 1 / (10 * np.pi), abs=1e-3)
+    assert fit.delay < DELAY
+
+
 def test_a_long_record_of_a_slow_plant_is_cut_and_says_so():
     slow = lag(0.02)  # responses of 5000 samples
     u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 100), 60)
