@@ -15,6 +15,7 @@ from unittest import mock
 
 import numpy as np
 
+from ctrl_realize.numerics.output_error.selection import flows_of
 from ctrl_realize.numerics.separable.structures import PLAUSIBLE, choose, needless_parameters
 
 Change = Callable[[Any], Any]
@@ -96,6 +97,17 @@ def _third_lag_amid(views: Any) -> Any:
     def made(*args: Any) -> Any:
         *others, (key, _) = views(*args)
         return (*others, (key, sorted(at for _, at in others)[2]))
+
+    return made
+
+
+def _constant_rest(noise: Any) -> Any:
+    """Take a constant rest for one without noise."""
+
+    def made(before: Any, record: Any, quantum: float) -> Any:
+        if before.size >= 8 and np.ptp(before) == 0:
+            return quantum / np.sqrt(12), 0.0
+        return noise(before, record, quantum)
 
     return made
 
@@ -236,8 +248,21 @@ SWITCHES = (
     Switch("exponential before the step", {f"{FITS}.step_data:relaxation": giving(None)}),
     Switch(
         "slope that was nothing",
-        {f"{FITS}.step_data:_BRIEF": value(0.0)},
-        (f"{FITS}.step_data:StepData.explanations",),
+        {f"{FITS}.step_data:StepData.explanations": _only(lambda way: way.drift or way.relaxing)},
+    ),
+    Switch(
+        "strong evidence of a motion",
+        {f"{STEP}:_STRONG": value(0.0)},
+        (f"{STEP}:_explained",),
+    ),
+    Switch(
+        "no dispersion where rounding is coarse",
+        {f"{STEP}:_flows": lambda _: lambda _data, whole, chains: flows_of(whole, chains)},
+    ),
+    Switch("estimates against a pinned likelihood", {f"{STEP}:_pinned": giving(False)}),
+    Switch(
+        "noise of a rest that is constant",
+        {f"{FITS}.step_data:rest_noise": _constant_rest},
     ),
     Switch("drift", {f"{PUBLIC}.fit:step_data": _without_drift}),
     Switch("hum", {f"{FITS}.step_data:hum_frequencies": giving([])}),

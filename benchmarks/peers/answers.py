@@ -11,13 +11,17 @@ from scipy.signal import lfilter, oaconvolve
 
 @dataclass(frozen=True)
 class Answer:
-    """A delay in samples (None where the way estimates none) and a model of the scaled record."""
+    """A delay in samples (None where the way estimates none) and a model of the scaled record.
+
+    `flags` are the codes of what the way says against its own result.
+    """
 
     delay: float | None
     response: Callable[[np.ndarray], np.ndarray]
     """Frequencies in Hz to complex gains."""
     simulate: Callable[[np.ndarray], np.ndarray]
     """Input, from rest, to output."""
+    flags: tuple[str, ...] = ()
 
 
 def of_polynomials(delay: float | None, b: np.ndarray, f: np.ndarray, dt: float) -> Answer:

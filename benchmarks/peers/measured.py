@@ -26,8 +26,15 @@ SAMPLES = {
     "air_duct": (10.0, 13.0),
     "heating_system": (0.5, 2.2),
     "rlc_zero_delay": (-1.0, 1.0),
+    "two_cart_drive": (0.9, 3.4),
+    "sbhs_heater": (1.0, 4.5),
+    "hdd_arm": (0.8, 3.2),
+    "tclab": (0.0, 5.0),
 }
-SETS = ("dc_motor_tacho", "air_duct", "wis_canal", "heating_system", "rlc_zero_delay")
+FIRST = ("dc_motor_tacho", "air_duct", "wis_canal", "heating_system", "rlc_zero_delay")
+"""Plants that most rules of `identify` were made with."""
+SETS = (*FIRST, "two_cart_drive", "sbhs_heater", "hdd_arm", "tclab")
+_NO_STEPS = ("frf", "mimo", "prbs_irregular")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +61,7 @@ class Measured:
 def records(folder: Path) -> tuple[Measured, ...]:
     """Read all records of a folder that has one folder for each plant."""
     paths = [path for name in SETS for path in sorted((folder / name).glob("*.csv"))]
-    return tuple(_read(path) for path in paths if path.stem != "frf")
+    return tuple(_read(path) for path in paths if path.stem not in _NO_STEPS)
 
 
 def _read(path: Path) -> Measured:

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 import ctrl_realize as cr
 
 from .answers import Answer, of_matrices, of_polynomials, of_step
+from .starts import STARTS, from_many_starts
 from .tasks import ORDER, Task
 
 RUNNERS: dict[str, Callable[[Task], Answer]] = {}
@@ -37,6 +38,7 @@ def of_system(delay: float, system: Any, task: Task) -> Answer:
         delay,
         lambda hz: task.gain * system(np.exp(2j * np.pi * hz * task.dt)),
         lambda u: task.gain * np.asarray(system.simulate(u)),
+        tuple(flag.code for flag in system.fit.flags) if hasattr(system, "fit") else (),
     )
 
 
@@ -143,6 +145,12 @@ def scipy_second_order(task: Task) -> Answer:
         lambda s: gain * np.exp(-s * tau) / ((1 + a * s) * (1 + ratio * a * s)),
         task.dt,
     )
+
+
+@runner(f"SciPy: least_squares from {STARTS} starts", "scipy", "order of `identify`, any zeros")
+def scipy_many_starts(task: Task) -> Answer:
+    order = cr.identify(task.record).fit.structure[0]
+    return from_many_starts(task, order)
 
 
 def best_delay(

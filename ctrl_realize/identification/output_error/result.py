@@ -214,7 +214,7 @@ class OutputErrorFit(FractionalDelayFit):
     def delay_estimates(self) -> dict[str, float]:
         """Dead times in s by six methods; the last one only contributes to the interval.
 
-        Empty if the residual is at noise level.
+        Empty if the dead time is that of the likelihood.
         """
         return {ESTIMATE_WORDS[key]: delay for key, delay in self.estimate.delay_estimates}
 

@@ -55,7 +55,7 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
 
 def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     s = fit.structure
-    simple = " with up to three poles" if fit.delay_estimates else ""
+    simple = "" if fit.adequate or not fit.delay_estimates else " with up to three poles"
     kind = (
         model_words(fit.chain)
         if fit.chain
@@ -75,10 +75,14 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             else f"{kind}: the only structure that was tried"
         ]
     if fit.delay_estimates:
-        reasons.append(
-            "dead time: median of five delay estimates, since no model fits down to the noise level"
+        why = (
+            "a likelihood that is flat down to the earliest dead time has its maximum there, and "
+            "the estimates agree on a later one"
+            if fit.adequate
+            else "no model fits down to the noise level"
         )
-    else:
+        reasons.append(f"dead time: median of five delay estimates, since {why}")
+    if fit.adequate or not fit.delay_estimates:
         reasons.append(_interval_of(fit))
     if fit.open_start:
         reasons.append(

@@ -108,7 +108,8 @@ class DelayInterval(NamedTuple):
 class OutputErrorEstimate:
     """Dead time and model of one record; see the rule in `output_error`.
 
-    ``low <= dead_time <= high``. `views` are (key, dead time), empty where the model is adequate.
+    ``low <= dead_time <= high``. `delay_estimates` are (key,
+    dead time), empty where the dead time is that of the likelihood.
     The model is exp(-L s) b(s) / a(s), L the dead time: `numerator` lists b from the lowest power
     on, `poles` are the roots of the monic a. `misfit` is residual over noise in means over bins.
     `chain`: the chain of lags that the model is, if it is one; `endless`: chains of lags fit the

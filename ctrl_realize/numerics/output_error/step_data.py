@@ -36,7 +36,6 @@ from ..signals.step_sequence import input_moves
 
 _BINS_RELAXING = 60  # of a rest in which the output comes to rest, so that lags show in it
 _MANY = 100  # samples at rest in which dither would show more than two levels
-_BRIEF = 0.05  # of the samples that follow the step; ablation: slope that was nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +95,12 @@ class StepData:
     def explanations(self) -> list[StepData]:
         """Models of a slope before the step: drift, free response of the plant, or none.
 
-        A drift continues to the end. No drift is also tried if the baseline is shorter than a
-        twentieth of the rest.
+        A drift continues to the end.
         """
         if not self.drift:
             return [self]
-        ways = [self, replace(self, drift=0.0, relaxing=True)]
-        if self.edge <= _BRIEF * (self.output.size - self.edge):
-            ways.append(replace(self, drift=0.0))
-        return ways
+        still = replace(self, drift=0.0)
+        return [self, replace(still, relaxing=True), still]
 
 
 def step_data(

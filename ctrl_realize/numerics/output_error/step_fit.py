@@ -3,17 +3,22 @@
 The rule:
 
 0. The output before the step is modelled as noise, hum, a drift, or the free response of the
-   plant, as chosen by the information criterion.
+   plant, as chosen by the information criterion; drift and free response need strong evidence.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
-   is the model, and its residual is compared with the noise before the step or, if that is
-   not much larger, with the residual long after the step. If it is at noise level and the noise was
-   coloured before the step already, all structures are fitted again with prewhitening.
+   is the model, and its residual is compared with the noise before the step. A residual that is not
+   much larger counts as noise, too, if it is white or no larger than that long after the step. If
+   the residual is at noise level and the noise was coloured before the step already, all structures
+   are fitted again with prewhitening.
 2. If the residual is at noise level, the dead time is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, including
    chains of four to eight nearly equal lags, diffusion and axial dispersion. If dispersion fits
-   clearly better than any lags, its dead time is used. A zero can imitate a smooth onset: if the
-   best structure has one, the interval extends to a sample after the visible onset, and to
-   three times the distance between dead time and onset before the dead time.
+   clearly better than any lags, and rounding is not coarse, its dead time is used. A zero can
+   imitate a smooth onset: if the best structure has one, the interval extends to a sample after the
+   visible onset, and to three times the distance between dead time and onset before the dead time.
+   Where the residual is correlated or coarsely rounded, the likelihood may be flat down to the
+   earliest dead time and have its maximum there, although the first 15 % of the response alone tell
+   the dead time more closely: the dead time is then the median of the estimates of point 3, if most
+   of them agree; the interval is not changed.
 3. Otherwise a likelihood does not describe the error. Five estimates are made: the visible onset, a
    first- and a second-order model of the first 15 % of the response, and the best models of up
    to three poles of the first 63 % and of all of it. The dead time is their median.
@@ -37,6 +42,8 @@ References
    doi:10.1214/aos/1176344136.
 .. [4] S. Bjorklund and L. Ljung, A review of time-delay estimation techniques, Proc. 42nd IEEE
    Conf. Decision and Control (2003) 2502-2507, doi:10.1109/CDC.2003.1272997.
+.. [5] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
+   doi:10.1080/01621459.1995.10476572.
 """
 
 from __future__ import annotations
@@ -48,6 +55,9 @@ import numpy as np
 
 from ..constants import Z_95
 from ..separable.compared_fits import at_dead_time
+from ..separable.dispersion import DispersedFlow
+from ..separable.lag_chains import LagChain
+from ..separable.profile import dead_time_error
 from ..separable.structures import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
@@ -72,6 +82,16 @@ known from 30 samples at rest is off by 13 % (one standard deviation). Ablation:
 likelihood always)."""
 
 _WILD = 3.0  # standard deviations at which residuals are cut where explanations are compared
+
+_STRONG = 6.0
+"""Difference of criteria that is strong evidence ([5]_, section 3.2). Ablation: strong evidence of
+a motion."""
+
+_PINNED = 0.25
+"""Distance of the dead time from the earliest one, where a likelihood interval ends, in its widths,
+up to which it counts as pinned there. Ablation: estimates against a pinned likelihood."""
+_LAGS = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
+"""Structures of the early models. Ablation: views (the likelihood always)."""
 
 _LOUDER = 4.0
 """How much louder noise may be after the step than before it: slow noise shows little of itself in
@@ -130,28 +150,39 @@ def fit_step_record(
         return likelihood_fit(
             whole, adequate=adequate, relaxing=data.relaxing, better=better, near=near
         )
+    likely: OutputErrorEstimate | None = None
     if adequate:
         assert data.motion is not None
-        onset = data.motion.onset * data.dt
         chains = chains_of(whole)
-        return likelihood_fit(
+        likely = likelihood_fit(
             whole,
             adequate=True,
             chains=chains,
-            flows=flows_of(whole, chains),
-            onset=onset,
+            flows=_flows(data, whole, chains),
+            onset=data.motion.onset * data.dt,
             relaxing=data.relaxing,
             near=near,
         )
-    whole = among(whole, SIMPLE_STRUCTURES)
-    chosen = whole.best_of({s: whole.criterion[s] for s in SIMPLE_STRUCTURES})
-    views = _views(data, chosen, latest, factor, huber)
-    found = _robust_fit(whole, chosen, views, relaxing=data.relaxing)
+        if not _pinned(likely, data, plain):
+            return likely
+    early = _fit_until(data, stop_at(data, 0.15), _LAGS, latest, factor, huber)
+    if likely is not None and not _closer(early, likely):
+        return likely
+    simple = among(plain, SIMPLE_STRUCTURES)
+    chosen = simple.best_of({s: simple.criterion[s] for s in SIMPLE_STRUCTURES})
+    rise = _fit_until(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, factor, huber)
+    views = _views(data, early, rise, chosen, latest)
+    if likely is not None:
+        return _moved(likely, plain, views) if _later(likely, views) else likely
+    found = _robust_fit(simple, chosen, views, relaxing=data.relaxing)
     return replace(found, close=near)
 
 
 def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
-    """Choose between models of the samples before the step, by an information criterion."""
+    """Choose between models of the samples before the step, by an information criterion.
+
+    A motion that goes on after the step needs strong evidence: it changes the gain of the model.
+    """
     closest = min((whole for _, whole in ways), key=lambda whole: whole.sigma)
     worst = _WILD * closest.sigma
 
@@ -161,7 +192,8 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
         error = whole.window.output - whole.window.predict(whole.problem, whole.best)
         squares = float(np.sum(np.clip(error, -worst, worst) ** 2))
         terms = best.order + best.zeros + (best.order if data.relaxing else bool(data.drift))
-        return squares / closest.variance + closest.penalty * terms + needless_parameters(best)
+        value = squares / closest.variance + closest.penalty * terms + needless_parameters(best)
+        return value + (_STRONG if data.drift or data.relaxing else 0.0)
 
     return min(ways, key=criterion)[0]
 
@@ -172,6 +204,8 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
         return True
     if whole.normalized_rms > ADEQUATE * data.colour * _LOUDER:
         return False
+    if whole.correlation == 1.0:
+        return True
     state = evaluate(whole.problem, whole.best.structure, whole.best.parameters[None])
     assert whole.window.bins is not None
     first = whole.window.bins.first
@@ -183,6 +217,55 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
     # The error of a wrong model decays: it is in the first half.
     late = late[late.size // 2 :]
     return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
+
+
+def _flows(data: StepData, whole: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
+    """Dispersion, unless rounding decides on how smoothly a response begins."""
+    return [] if data.coarse else flows_of(whole, chains)
+
+
+def _pinned(found: OutputErrorEstimate, data: StepData, whole: WindowFit) -> bool:
+    """Whether a likelihood is flat down to the earliest dead time, and its maximum there.
+
+    So it may be where the residual is quantised, or correlated in a way that is not known.
+    """
+    white = not data.coarse and whole.correlation == 1.0
+    lags = found.chain is None and not found.follows_flow
+    if white or found.whitened or not lags or found.low > whole.scales.earliest:
+        return False
+    return bool(found.dead_time - found.low < _PINNED * (found.high - found.low))
+
+
+def _closer(early: WindowFit, found: OutputErrorEstimate) -> bool:
+    """Whether the first part of the response alone, with three lags, tells the dead time better."""
+    error = dead_time_error(early.problem, early.candidates[_LAGS[-1]], early.variance)
+    return bool(2 * Z_95 * error < found.high - found.low)
+
+
+def _later(found: OutputErrorEstimate, views: tuple[tuple[RobustKey, float], ...]) -> bool:
+    """Whether most delay estimates agree that the output moves later."""
+    dead_times = np.array([at for _, at in views[:-1]])
+    middle = np.median(dead_times)
+    return bool(middle - found.dead_time > 2 * np.median(np.abs(dead_times - middle)))
+
+
+def _moved(
+    found: OutputErrorEstimate, whole: WindowFit, views: tuple[tuple[RobustKey, float], ...]
+) -> OutputErrorEstimate:
+    """Put the dead time at the median of the delay estimates; the interval is not changed."""
+    dead_time = float(np.clip(np.median([at for _, at in views[:-1]]), found.low, found.high))
+    own = whole.candidates[found.structure]
+    fixed = at_dead_time(whole.problem, own, whole.scales, dead_time)
+    state = evaluate(whole.problem, fixed.structure, fixed.parameters[None])
+    return replace(
+        found,
+        dead_time=dead_time,
+        poles=fixed.poles,
+        numerator=state.numerator[0],
+        fitted=whole.window.predict(whole.problem, fixed),
+        static=whole.static(fixed),
+        delay_estimates=views,
+    )
 
 
 def _robust_fit(
@@ -221,20 +304,18 @@ def _fit_until(
 
 
 def _views(
-    data: StepData, whole: Candidate, latest: float | None, known: KnownFactor, huber: bool
+    data: StepData, early: WindowFit, rise: WindowFit, whole: Candidate, latest: float | None
 ) -> tuple[tuple[RobustKey, float], ...]:
     """Six estimates in s with independent errors; the sixth only widens the interval."""
     assert data.motion is not None
-    lags = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
-    early = _fit_until(data, stop_at(data, 0.15), lags, latest, known, huber)
-    rise = _fit_until(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, known, huber)
     onset = data.motion.onset * data.dt
+    one, two, three = (early.candidates[lags].dead_time for lags in _LAGS)
     return (
         ("onset", onset if latest is None else min(onset, latest)),
-        ("one_lag_early", early.candidates[lags[0]].dead_time),
-        ("two_lags_early", early.candidates[lags[1]].dead_time),
+        ("one_lag_early", one),
+        ("two_lags_early", two),
         # by the criterion alone: the first part of a response does not show the gain
         ("model_of_rise", rise.candidates[choose(rise.criterion)].dead_time),
         ("model_of_record", whole.dead_time),
-        ("three_lags_early", early.candidates[lags[2]].dead_time),
+        ("three_lags_early", three),
     )

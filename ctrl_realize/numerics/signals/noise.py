@@ -102,8 +102,9 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
     Parameters
     ----------
     before : ndarray, shape (P,)
-        Samples before the step. With fewer than 8, the noise is estimated from the third
-        differences of the record, which are insensitive to anything smooth.
+        Samples before the step. With fewer than 8, or if they are all equal (a converter that
+        does not move, or padding), the noise is estimated from the third differences of the
+        record, which are insensitive to anything smooth.
     record : ndarray, shape (N,)
         The whole record.
     quantum : float
@@ -116,7 +117,7 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
         Slope per sample, 0 if it is below five standard errors, which are larger for slow noise.
     """
     floor = quantum / np.sqrt(12)
-    if before.size < _FEW:
+    if before.size < _FEW or np.ptp(before) <= rounding_error(record):
         # 1, -3, 3, -1: white noise has 20 times its variance in these differences.
         third = np.diff(record, 3) / np.sqrt(20)
         return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0

@@ -1,0 +1,105 @@
+"""Dead times of a few samples, where noise at rest, rounding or friction decide on the estimate."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+
+
+def response(lags, delay, n=700, edge=150):
+    """Input and clean output of a step through lags, sampled with 1 s."""
+    plant = ct.tf([1.0], [1.0])
+    for lag in lags:
+        plant = plant * ct.tf([1.0], [lag, 1.0])
+    u = np.where(np.arange(n) < edge, 0.0, 1.0)
+    return u, np.asarray(cr.delayed_ss(plant, dead_time=delay, dt=1.0).simulate(u))
+
+
+def fitted(u, y):
+    return cr.fit_output_error(cr.Record(np.arange(u.size, dtype=float), u, y)).fit
+
+
+def codes(fit):
+    return [flag.code for flag in fit.flags]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_padded_rest_is_no_rest_without_noise(seed):
+    u, y = response((20.0, 8.0), 5.3)
+    y += 0.01 * np.random.default_rng(seed).standard_normal(y.size)
+    y[:150] = 0.0
+    fit = fitted(u, y)
+    assert "structured_misfit" not in codes(fit)
+    assert fit.at_noise_level
+    assert fit.residual == pytest.approx(0.01, rel=0.1)
+    assert fit.interval[0] <= 5.3 <= fit.interval[1]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_white_noise_that_comes_with_the_motion_is_noise(seed):
+    # The record ends before the response settles, so that no noise at rest follows it.
+    u, y = response((80.0, 30.0), 12.6, n=400)
+    k = np.arange(u.size)
+    noise = np.random.default_rng(seed).standard_normal(u.size)
+    fit = fitted(u, y + np.where(k < 150, 0.004, 0.01) * noise)
+    assert fit.at_noise_level
+    assert "structured_misfit" not in codes(fit)
+    assert fit.interval[0] <= 12.6 <= fit.interval[1]
+
+
+@pytest.mark.parametrize(("lags", "delay", "seed"), [((20.0, 8.0), 5.0, 1), ((20.0, 8.0), 2.3, 1)])
+def test_rounding_is_not_taken_for_dispersion(lags, delay, seed):
+    # Where each level begins is all that is known; the beginning is between two of them.
+    rng = np.random.default_rng([seed, int(delay * 10), 3])
+    u, y = response(lags, delay)
+    level = rng.uniform(-0.5, 0.5)
+    y = np.round((y + level + 0.004 * rng.standard_normal(y.size)) / 0.02) * 0.02
+    fit = fitted(u, y)
+    assert {"coarse_quantisation", "no_delay_resolved"} <= set(codes(fit))
+    assert "dispersed_flow" not in codes(fit)
+    assert abs(fit.dead_time - delay) < 0.5
+    assert fit.interval[0] <= delay <= fit.interval[1]
+
+
+def drive(seed, dead_time, friction, slow):
+    """A drive with dry friction and a flexible shaft, in slow noise; a differenced encoder."""
+    rng = np.random.default_rng(seed)
+    n, edge, within = 1180, 200, 20
+    own, other, twist = -1.0, -1.0, 0.0
+    stiff, h = 2 * np.pi / 280, 1 / within
+    speed = np.empty(n)
+    for k in range(n):
+        speed[k] = own
+        for i in range(within):
+            torque = (1 + friction) * (-1.0 if k + i * h < edge + dead_time else 1.0)
+            spring = stiff**2 * twist + 0.06 * stiff * (own - other)
+            own += h * ((torque - own - friction * np.tanh(50 * own)) / 30 - 0.4 * spring)
+            twist += h * (own - other)
+            other += h * (spring - 0.0005 * np.tanh(20 * other))
+    noise = slow * lfilter([np.sqrt(1 - 0.97**2)], [1, -0.97], rng.standard_normal(n))
+    noise += 0.0125 * rng.standard_normal(n)
+    u = np.where(np.arange(n) < edge, -1.0, 1.0)
+    return cr.Record(1e-3 * np.arange(n), u, np.round((speed + noise) / 0.025) * 0.025)
+
+
+@pytest.mark.parametrize(
+    ("seed", "samples", "friction", "slow"), [(15, 1.5, 0.4, 0.03), (16, 1.5, 0.2, 0.05)]
+)
+def test_a_likelihood_that_is_flat_down_to_nothing_gives_way_to_the_first_motion(
+    seed, samples, friction, slow
+):
+    fit = cr.fit_output_error(drive(seed, samples, friction, slow)).fit
+    assert fit.at_noise_level
+    assert len(fit.delay_estimates) == 6
+    five = sorted(list(fit.delay_estimates.values())[:5])
+    assert fit.dead_time == pytest.approx(five[2])
+    assert abs(fit.delay - samples) < 0.8
+    # What the likelihood cannot rule out stays in the interval.
+    assert fit.interval[0] == 0
+    assert fit.delay_interval[1] > samples + 0.5
+    assert any("agree on a later one" in choice for choice in fit.choices)
+    assert "estimates_disagree" in codes(fit)
