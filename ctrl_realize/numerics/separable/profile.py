@@ -100,22 +100,27 @@ def profile_points(
         )
 
     fitted, cost = followed(starts)
+    new_start = np.ones(grid.size, dtype=np.bool_)
     for _ in range(_SWEEPS):
         # Starting from the optimum may lead to a local minimum; the result at each point is used as
         # start for its neighbours.
         at = np.concatenate([np.arange(grid.size - 1), np.arange(1, grid.size)])
         near = np.concatenate([np.arange(1, grid.size), np.arange(grid.size - 1)])
         wanted = np.minimum(cost[at], cost[near]) < level + _HIGH * variance
+        # A start that was followed before leads where it led before.
+        wanted &= new_start[near]
         at, near = at[wanted], near[wanted]
         if not at.size:
-            break  # all of the grid lies outside of the interval
+            break  # also where all of the grid lies outside of the interval
         starts = fitted[near]
         starts[:, 0] = grid[at]
         moved, new = followed(starts)
         before = cost.copy()
+        new_start = np.zeros(grid.size, dtype=np.bool_)
         for row in np.argsort(-new):
             if new[row] < cost[at[row]]:
                 fitted[at[row]], cost[at[row]] = moved[row], new[row]
+                new_start[at[row]] = True
         if np.all(before - cost <= _SAME * variance):
             break
     points = {
