@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.worlds import steps
+from benchmarks.worlds import sensors, steps
 from benchmarks.worlds.simulation import (
+    DT,
     Case,
     binary,
     coloured,
@@ -126,6 +127,55 @@ def noise_of_the_response(rng: Rng) -> Case:
     return plant.case(record(u, y + 0.005 * np.ptp(y) * noise))
 
 
+def padded_rest(rng: Rng) -> Case:
+    """Samples before the step are the first value, repeated; 1 % noise from then on."""
+    plant, u = drawn(rng), step(600, 150)
+    y = noisy(rng, stepped(rng, plant, u), 0.01)
+    y[:150] = y[0]
+    return plant.case(record(u, y))
+
+
+def louder_from_the_step_on(rng: Rng) -> Case:
+    """Noise of 0.5 %, from the step on two to three times as much; the record ends in the rise."""
+    plant, u = drawn(rng, ((0.5, 1.0), (0.2, 0.4))), step(400, 150)
+    y = stepped(rng, plant, u)
+    noise = rng.standard_normal(u.size)
+    noise[150:] *= float(rng.uniform(2.0, 3.0))
+    return plant.case(record(u, y + 0.005 * np.ptp(y) * noise))
+
+
+def rest_like_a_slope(rng: Rng) -> Case:
+    """AR(1) noise with a pole at 0.995 and 2 % of the step, 100 samples of rest."""
+    plant, u = drawn(rng), step(700, 100)
+    y = stepped(rng, plant, u)
+    noise = coloured(rng, u.size, 0.995)
+    return plant.case(record(u, noisy(rng, y + 0.02 * np.ptp(y) * noise / np.std(noise), 0.003)))
+
+
+def drive_with_friction(rng: Rng) -> Case:
+    """A drive with dry friction, a flexible shaft and a differenced encoder; slow noise of 2.5 %.
+
+    The dead time is one to three samples.
+    """
+    count, edge, within = 1180, 200, 20
+    dead_time, friction = float(rng.uniform(1, 3)), float(rng.uniform(0.2, 0.4))
+    own, other, twist = -1.0, -1.0, 0.0
+    stiff, h = 2 * np.pi / 280, 1 / within
+    speed = np.empty(count)
+    for k in range(count):
+        speed[k] = own
+        for i in range(within):
+            torque = (1 + friction) * (-1.0 if k + i * h < edge + dead_time else 1.0)
+            spring = stiff**2 * twist + 0.06 * stiff * (own - other)
+            own += h * ((torque - own - friction * np.tanh(50 * own)) / 30 - 0.4 * spring)
+            twist += h * (own - other)
+            other += h * (spring - 0.0005 * np.tanh(20 * other))
+    noise = coloured(rng, count, 0.97)
+    noise = 0.05 * noise / np.std(noise) + 0.0125 * rng.standard_normal(count)
+    u = np.where(np.arange(count) < edge, -1.0, 1.0)
+    return Case(record(u, np.round((speed + noise) / 0.025) * 0.025), DT * dead_time)
+
+
 def faster_than_a_sample(rng: Rng) -> Case:
     """One lag of a fifth to four fifths of a sample, 1 % noise."""
     plant, u = drawn(rng, ((0.002, 0.008),), (0.05, 0.3)), step(400, 150)
@@ -163,5 +213,11 @@ MADE_FOR = {
     "start from the correlation": far_away,
     "start at the ringing": wandering_output,
     "records weighted by their noise": unequal_sensors,
+    "noise of a rest that is constant": padded_rest,
+    "louder noise after the step": louder_from_the_step_on,
+    "strong evidence of a motion": rest_like_a_slope,
+    "slope that was nothing": rest_like_a_slope,
+    "no dispersion where rounding is coarse": sensors.coarse,
+    "estimates against a pinned likelihood": drive_with_friction,
 }
 """Rules, and the world that each was made for."""

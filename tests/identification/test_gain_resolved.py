@@ -197,3 +197,15 @@ def test_the_gas_furnace_has_the_gain_of_box_and_jenkins(shared_data):
     assert low <= -3.28 <= high
     with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
         cr.design.pid(cr.identify(record, structures=[(2, 1)]))
+
+
+def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
+    # The gain falls to a half during the record: no model leaves white noise.
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.choice([-1.0, 1.0], 40), 15)
+    y = cr.design.ProcessModel(gain=2.0, lag=30.0, dead_time=8.0).system(1.0).simulate(u)
+    y = y * np.linspace(1, 0.5, u.size) + 0.005 * rng.standard_normal(u.size)
+    system = cr.identify(cr.Record(np.arange(u.size) * 1.0, u, y))
+    assert {"coloured_residual", "gain_not_resolved"} <= codes(system)
+    told = next(flag.message for flag in system.fit.flags if flag.code == "gain_not_resolved")
+    assert "structures that the data cannot rule out have gains of" in told
