@@ -76,6 +76,7 @@ TABLES = {
     "loops": ("docs/loops_table.md", "python -m benchmarks.loops"),
     "fuzz": ("docs/fuzz_table.md", "python3 tools/fuzz_table.py"),
     "peers": ("docs/peers_table.md", "python -m benchmarks.peers simulated"),
+    "crossed": ("docs/crossed_table.md", "python -m benchmarks.peers crossed"),
     "peers_measured": ("docs/peers_measured_table.md", "python -m benchmarks.peers measured"),
 }
 (GENERATED / "tables").mkdir(exist_ok=True)

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from .answers import Answer
+from .crossed import crossed_table
 from .measured import FIRST, SETS, Measured, records
 from .runners import GIVEN, PACKAGE, RUNNERS
 from .starts import STARTS
@@ -242,7 +243,7 @@ def made(command: str) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("table", choices=("simulated", "measured"))
+    parser.add_argument("table", choices=("simulated", "measured", "crossed"))
     parser.add_argument("--seeds", type=int, default=10, help="simulated records for each cell")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the measured records")
     parser.add_argument("--output", type=Path, help="Markdown file to write")
@@ -256,6 +257,18 @@ def main() -> None:
             "none) / median over the records of the relative error of the frequency response, "
             f"root mean square over 0.1-13 Hz. {arguments.seeds} simulated records a cell; true "
             f"delay {DELAY} samples. Told the delay roughly: 26 delays around it, 25 to 50. "
+        )
+    elif arguments.table == "crossed":
+
+        def ask(name: str, one: Measured) -> Answer | None:
+            found = answer_of(name, one.task)
+            return None if isinstance(found, str) else found[0]
+
+        lines = crossed_table(records(arguments.data), ask)
+        note = (
+            "Each cell: median over all pairs of different records of a plant of the fit in "
+            "percent (NRMSE after the step, offset taken off) of one record by the model of the "
+            "other, as it is / with the best gain for that record. Way told the order: 3. "
         )
     else:
         every = records(arguments.data)

@@ -79,6 +79,7 @@ def _marginal(fit: OutputErrorEstimate) -> Flag | None:
         "structure": "{} fits as well as the one chosen",
         "ruled_out": "{} is at the limit of what the data rule out",
         "adequate": "the residual is at the limit of what counts as noise",
+        "likelihood": "the dead time is at the limit between the likelihood and several estimates",
     }
     found = [
         words[one.key].format(

@@ -18,7 +18,7 @@ CLOSE = 1e-3
 """Distance from a threshold, as a part of it, within which a decision is called close. Structures
 compare by the part of `PLAUSIBLE` by which their criteria differ: a hundredth of a variance."""
 
-DecisionKey: TypeAlias = Literal["structure", "ruled_out", "adequate"]
+DecisionKey: TypeAlias = Literal["structure", "ruled_out", "adequate", "likelihood"]
 
 
 @dataclass(frozen=True)

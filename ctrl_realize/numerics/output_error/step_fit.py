@@ -57,7 +57,6 @@ from ..constants import Z_95
 from ..separable.compared_fits import at_dead_time
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain
-from ..separable.profile import dead_time_error
 from ..separable.structures import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
@@ -69,6 +68,7 @@ from ..separable.varpro import KnownFactor, Structure, evaluate
 from ..separable.window import WindowFit, among, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
+from .flat_likelihood import closer, later, moved, pinned, told
 from .interval import likelihood_fit
 from .margins import close_to
 from .profiles import profile_of
@@ -87,9 +87,6 @@ _STRONG = 6.0
 """Difference of criteria that is strong evidence ([5]_, section 3.2). Ablation: strong evidence of
 a motion."""
 
-_PINNED = 0.25
-"""Distance of the dead time from the earliest one, where a likelihood interval ends, in its widths,
-up to which it counts as pinned there. Ablation: estimates against a pinned likelihood."""
 _LAGS = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
 """Structures of the early models. Ablation: views (the likelihood always)."""
 
@@ -163,17 +160,24 @@ def fit_step_record(
             relaxing=data.relaxing,
             near=near,
         )
-        if not _pinned(likely, data, plain):
+        at_the_end = pinned(likely, data, plain)
+        likely = told(likely, at_the_end)
+        if at_the_end > 1:
             return likely
     early = _fit_until(data, stop_at(data, 0.15), _LAGS, latest, factor, huber)
-    if likely is not None and not _closer(early, likely):
-        return likely
+    if likely is not None:
+        nearer = closer(early, _LAGS[-1], likely)
+        likely = told(likely, nearer)
+        if nearer > 1:
+            return likely
     simple = among(plain, SIMPLE_STRUCTURES)
     chosen = simple.best_of({s: simple.criterion[s] for s in SIMPLE_STRUCTURES})
     rise = _fit_until(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, factor, huber)
     views = _views(data, early, rise, chosen, latest)
     if likely is not None:
-        return _moved(likely, plain, views) if _later(likely, views) else likely
+        agreed = later(likely, views)
+        likely = told(likely, agreed)
+        return likely if agreed > 1 else moved(likely, plain, views)
     found = _robust_fit(simple, chosen, views, relaxing=data.relaxing)
     return replace(found, close=near)
 
@@ -222,50 +226,6 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
 def _flows(data: StepData, whole: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
     """Dispersion, unless rounding decides on how smoothly a response begins."""
     return [] if data.coarse else flows_of(whole, chains)
-
-
-def _pinned(found: OutputErrorEstimate, data: StepData, whole: WindowFit) -> bool:
-    """Whether a likelihood is flat down to the earliest dead time, and its maximum there.
-
-    So it may be where the residual is quantised, or correlated in a way that is not known.
-    """
-    white = not data.coarse and whole.correlation == 1.0
-    lags = found.chain is None and not found.follows_flow
-    if white or found.whitened or not lags or found.low > whole.scales.earliest:
-        return False
-    return bool(found.dead_time - found.low < _PINNED * (found.high - found.low))
-
-
-def _closer(early: WindowFit, found: OutputErrorEstimate) -> bool:
-    """Whether the first part of the response alone, with three lags, tells the dead time better."""
-    error = dead_time_error(early.problem, early.candidates[_LAGS[-1]], early.variance)
-    return bool(2 * Z_95 * error < found.high - found.low)
-
-
-def _later(found: OutputErrorEstimate, views: tuple[tuple[RobustKey, float], ...]) -> bool:
-    """Whether most delay estimates agree that the output moves later."""
-    dead_times = np.array([at for _, at in views[:-1]])
-    middle = np.median(dead_times)
-    return bool(middle - found.dead_time > 2 * np.median(np.abs(dead_times - middle)))
-
-
-def _moved(
-    found: OutputErrorEstimate, whole: WindowFit, views: tuple[tuple[RobustKey, float], ...]
-) -> OutputErrorEstimate:
-    """Put the dead time at the median of the delay estimates; the interval is not changed."""
-    dead_time = float(np.clip(np.median([at for _, at in views[:-1]]), found.low, found.high))
-    own = whole.candidates[found.structure]
-    fixed = at_dead_time(whole.problem, own, whole.scales, dead_time)
-    state = evaluate(whole.problem, fixed.structure, fixed.parameters[None])
-    return replace(
-        found,
-        dead_time=dead_time,
-        poles=fixed.poles,
-        numerator=state.numerator[0],
-        fitted=whole.window.predict(whole.problem, fixed),
-        static=whole.static(fixed),
-        delay_estimates=views,
-    )
 
 
 def _robust_fit(
