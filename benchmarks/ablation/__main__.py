@@ -41,6 +41,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1, help="records of each simulated kind")
     parser.add_argument("--only", nargs="+", help="rules whose name contains one of these")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, help="kinds of records, not all")
     parser.add_argument("--store", type=Path, help="file of finished records, one line each")
     parser.add_argument("--made-for", type=int, metavar="N", help="N records of each rule's world")
     parser.add_argument("--output", type=Path, help="Markdown file to write, instead of the page")
@@ -68,7 +69,9 @@ def main() -> None:
         found = [one for key, one in seen.items() if key in wanted]
         write(found, given.output or OWN_WORLDS, all_rules=False)
         return
-    every = tuple(cases(given.seeds))
+    every = tuple(
+        case for case in cases(given.seeds) if not given.kinds or case.kind in given.kinds
+    )
     for case in in_turn(every):
         if (BASE.name, case.name) not in seen:
             keep(judged(BASE, case))
@@ -80,7 +83,9 @@ def main() -> None:
         if (rule.name, case.name) not in seen:
             keep(judged(rule, case))
     names = {case.name for case in every}
-    write([one for one in seen.values() if one.name in names], given.output or PAGE)
+    wanted = [rule.name for rule in (BASE, *rules)]
+    found = [one for one in seen.values() if one.name in names and one.rule in wanted]
+    write(found, given.output or PAGE, all_rules=not given.only)
 
 
 def write(seen: list[Seen], output: Path, *, all_rules: bool = True) -> None:

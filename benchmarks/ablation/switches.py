@@ -259,7 +259,7 @@ SWITCHES = (
         "no dispersion where rounding is coarse",
         {f"{STEP}:_flows": lambda _: lambda _data, whole, chains: flows_of(whole, chains)},
     ),
-    Switch("estimates against a pinned likelihood", {f"{STEP}:pinned": giving(float("inf"))}),
+    Switch("estimates against a pinned likelihood", {f"{STEP}:pinned": giving(2.0)}),
     Switch(
         "noise of a rest that is constant",
         {f"{FITS}.step_data:rest_noise": _constant_rest},
