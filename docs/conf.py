@@ -69,6 +69,11 @@ TABLES = {
         "docs/ablation_worlds_table.md",
         "python -m benchmarks.ablation --made-for 6",
     ),
+    "ablation_measured": (
+        "docs/ablation_measured_table.md",
+        "python -m benchmarks.ablation --kinds measured --only ... "
+        "--output docs/ablation_measured_table.md",
+    ),
     "campaign": (
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",

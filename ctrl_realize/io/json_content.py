@@ -1,7 +1,8 @@
-"""Read values from parsed JSON with unknown content."""
+"""Read values from JSON with unknown content."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -12,6 +13,11 @@ from ..errors import FileFormatError
 from ..numerics.arrays import FloatArray
 
 MAX_TEXT = 1000
+
+
+def parsed(text: str) -> Any:
+    """Parse JSON; infinite numbers, NaN and keys that occur twice are a ValueError."""
+    return json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
 
 
 def field(content: Mapping[str, Any], key: str, kind: Any) -> Any:
@@ -48,6 +54,16 @@ def whole_numbers(content: Mapping[str, Any], key: str, count: int) -> list[int]
     return values
 
 
+def finite_numbers(content: Mapping[str, Any], key: str) -> list[float]:
+    """Return a list of finite numbers, none negative."""
+    values: list[Any] = field(content, key, list)
+    if not all(type(value) in (int, float) and _is_finite(value) for value in values):
+        raise FileFormatError(f"{key!r} must contain finite numbers")
+    if min(values, default=0) < 0:
+        raise FileFormatError(f"{key!r} must contain non-negative numbers")
+    return values
+
+
 def matrix(content: Mapping[str, Any], key: str, shape: tuple[int, int]) -> FloatArray:
     """Return a matrix of finite numbers from a list of its rows."""
     rows: list[Any] = field(content, key, list)
@@ -72,3 +88,14 @@ def _is_finite(value: int | float) -> bool:
 def _is_text(value: str) -> bool:
     """Refuse very long names, and lone surrogates, which cannot be printed or written."""
     return len(value) <= MAX_TEXT and not any("\ud800" <= letter <= "\udfff" for letter in value)
+
+
+def _refuse_constant(text: str) -> float:
+    raise ValueError(f"{text} is not a finite number")
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) != len(pairs):
+        raise ValueError("a key occurs twice")
+    return content

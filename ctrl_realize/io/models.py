@@ -9,22 +9,33 @@ import os
 import platform
 from collections.abc import Mapping
 from importlib import metadata
-from typing import Any
+from typing import Any, TypeAlias
 
 import control as ct
 import numpy as np
 
 from .._checks import whole
-from ..delayed import DelayedStateSpace
+from ..delayed import DelayedStateSpace, DelaySystem
+from ..delayed.inside.pure import TransferDelay
 from ..errors import CtrlRealizeError, FileFormatError, OptionError
 from .atomic import write_text
 from .checks import usable_file
-from .json_content import boolean_free, field, matrix, texts, whole_numbers
+from .json_content import (
+    boolean_free,
+    field,
+    finite_numbers,
+    matrix,
+    parsed,
+    texts,
+    whole_numbers,
+)
 from .stored_fit import summary_from_json, summary_of, summary_to_json
 
 FORMAT = "ctrl_realize model"
 SCHEMA = 1
 MAX_MODEL_BYTES = 64 * 2**20
+Model: TypeAlias = DelayedStateSpace | DelaySystem
+"""What a file may contain."""
 _PACKAGES = ("ctrl-realize", "control", "numpy", "scipy")
 
 
@@ -38,16 +49,16 @@ def save_model(
 ) -> None:
     """Write a model to a JSON file.
 
-    Core matrices, delays, sample time, names and labels are stored exactly; of `system.fit` its
-    report, flags and main numbers. Package versions and a SHA-256 checksum are included, so that a
-    damaged or edited file is recognised. The file is written atomically.
+    Core matrices, delays (internal ones, too), sample time, names and labels are stored exactly; of
+    `system.fit` its report, flags and main numbers. Package versions and a SHA-256 checksum are
+    included, so that a damaged or edited file is recognised. The file is written atomically.
 
     Parameters
     ----------
     path : path-like
         File to write; an existing one is replaced.
-    system : DelayedStateSpace or control.StateSpace
-        Discrete model with a sample time; a plain one is stored with delay 0.
+    system : DelayedStateSpace, DelaySystem or control.StateSpace
+        A plain model must be discrete, with a sample time, and is stored with delay 0.
     created : str, optional
         Date to store; default: none, so that equal models give equal files.
     settings : mapping, optional
@@ -58,7 +69,7 @@ def save_model(
     Raises
     ------
     UnsuitableSystemError
-        A system that is not a discrete state-space model with a sample time.
+        A system that is none of these.
     OptionError
         Settings other than plain numbers and text, or matrices that are not finite.
     OSError
@@ -79,7 +90,7 @@ def save_model(
     write_text(path, model_to_text(system, created=created, settings=settings, note=note))
 
 
-def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -> DelayedStateSpace:
+def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -> Model:
     """Read a model that `save_model` wrote.
 
     No code from the file is executed. A file that is truncated, edited, of a later version or not a
@@ -95,7 +106,7 @@ def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -
 
     Returns
     -------
-    DelayedStateSpace
+    DelayedStateSpace or DelaySystem
         As it was saved. If it had a `fit`, this is a `FitSummary` (report, flags and main numbers).
 
     Raises
@@ -140,7 +151,7 @@ def model_to_text(
 ) -> str:
     """Return a model as the text that `save_model` writes."""
     model = system
-    if not isinstance(system, DelayedStateSpace):
+    if not isinstance(system, DelayedStateSpace | DelaySystem):
         # anything but a system is refused by DelayedStateSpace
         name = system.name if isinstance(system, ct.InputOutputSystem) else None
         model = DelayedStateSpace(system, name=name)
@@ -148,7 +159,7 @@ def model_to_text(
         "format": FORMAT,
         "schema": SCHEMA,
         "model": _model_content(model),
-        "fit": summary_to_json(summary_of(model.fit)),
+        "fit": summary_to_json(summary_of(getattr(model, "fit", None))),
         "provenance": {
             "versions": _versions(),
             "created": created,
@@ -166,10 +177,10 @@ def model_to_text(
     return text + "\n"
 
 
-def model_from_text(text: str, *, max_states: int | None = None) -> DelayedStateSpace:
+def model_from_text(text: str, *, max_states: int | None = None) -> Model:
     """Make a model from the text that `save_model` has written; see `load_model`."""
     try:
-        content = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
+        content = parsed(text)
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"not a model file, or truncated: {error}") from error
     try:
@@ -182,10 +193,22 @@ def model_from_text(text: str, *, max_states: int | None = None) -> DelayedState
         raise FileFormatError(str(error)) from error
 
 
-def _model_content(model: DelayedStateSpace) -> dict[str, Any]:
-    core = model.delay_free
+def _model_content(model: Model) -> dict[str, Any]:
+    inside = isinstance(model, DelaySystem)
+    core = model.core if isinstance(model, DelaySystem) else model.delay_free
     states = core.state_labels
     named = states != [f"x[{i}]" for i in range(core.nstates)]
+    delays: dict[str, Any] = (
+        {
+            "internal_delays": list(model.internal_delays),
+            **({"transfer_function": True} if isinstance(model, TransferDelay) else {}),
+        }
+        if inside
+        else {
+            "input_delays": list(model.input_delays),
+            "output_delays": list(model.output_delays),
+        }
+    )
     return {
         "name": model.name,
         "inputs": list(model.input_labels),
@@ -193,54 +216,62 @@ def _model_content(model: DelayedStateSpace) -> dict[str, Any]:
         **({"states": states} if named else {}),
         "order": core.nstates,
         "dt": float(core.dt),
-        "input_delays": list(model.input_delays),
-        "output_delays": list(model.output_delays),
-        "A": np.asarray(core.A).tolist(),
-        "B": np.asarray(core.B).tolist(),
-        "C": np.asarray(core.C).tolist(),
-        "D": np.asarray(core.D).tolist(),
+        **delays,
+        **{letter: np.asarray(getattr(core, letter)).tolist() for letter in "ABCD"},
     }
 
 
-def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> DelayedStateSpace:
+def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> Model:
     model = field(content, "model", dict)
     inputs, outputs = texts(model, "inputs"), texts(model, "outputs")
+    if not inputs or not outputs:
+        raise FileFormatError("the model has no inputs or outputs")
+    name = field(model, "name", str)
+    if any("." in one for one in (name, *inputs, *outputs)):
+        raise FileFormatError("a name contains a dot, which is not allowed in names of models")
+    names: dict[str, Any] = {"name": name, "inputs": inputs, "outputs": outputs}
+    dt = float(boolean_free(model, "dt", int | float))
+    if "internal_delays" in model:
+        if not 0 <= dt < float("inf"):
+            raise FileFormatError(f"dt={dt} is neither a sample time nor 0 for continuous time")
+        internal = finite_numbers(model, "internal_delays")
+        core = _core(model, dt, len(inputs) + len(internal), len(outputs) + len(internal))
+        _check_states(core.nstates + (sum(internal) if dt else 0), max_states)
+        kind = TransferDelay if model.get("transfer_function") is True else DelaySystem
+        return kind(core, internal, **names)
+    if not 0 < dt < float("inf"):
+        raise FileFormatError(f"dt={dt} is not a sample time")
+    before = whole_numbers(model, "input_delays", len(inputs))
+    behind = whole_numbers(model, "output_delays", len(outputs))
+    core = _core(model, dt, len(inputs), len(outputs))
+    _check_states(core.nstates + sum(before) + sum(behind), max_states)
+    fit = summary_from_json(content.get("fit"))
+    return DelayedStateSpace(core, before, output_delay=behind, fit=fit, **names)
+
+
+def _core(model: Mapping[str, Any], dt: float, ninputs: int, noutputs: int) -> ct.StateSpace:
     order = boolean_free(model, "order", int)
-    if order < 0 or not inputs or not outputs:
-        raise FileFormatError("the model has no inputs or outputs, or a negative order")
+    if order < 0:
+        raise FileFormatError("the model has a negative order")
     states = texts(model, "states") if "states" in model else order
     if isinstance(states, list) and len(states) != order:
         raise FileFormatError(f"{len(states)} names for {order} states")
     shapes = {
         "A": (order, order),
-        "B": (order, len(inputs)),
-        "C": (len(outputs), order),
-        "D": (len(outputs), len(inputs)),
+        "B": (order, ninputs),
+        "C": (noutputs, order),
+        "D": (noutputs, ninputs),
     }
     matrices = [matrix(model, letter, shape) for letter, shape in shapes.items()]
-    dt = float(boolean_free(model, "dt", int | float))
-    before = whole_numbers(model, "input_delays", len(inputs))
-    behind = whole_numbers(model, "output_delays", len(outputs))
-    n_states = order + sum(before) + sum(behind)
-    if max_states is not None and n_states > max_states:
+    return ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False)
+
+
+def _check_states(count: float, limit: int | None) -> None:
+    if limit is not None and count > limit:
         raise FileFormatError(
-            f"the model has {n_states} states, delays included; the limit is "
-            f"max_states={max_states} (the matrix takes {8e-6 * n_states**2:.0f} MB)"
+            f"the model has {count:.0f} states, delays included; the limit is "
+            f"max_states={limit} (the matrix takes {8e-6 * count**2:.0f} MB)"
         )
-    if not 0 < dt < float("inf"):
-        raise FileFormatError(f"dt={dt} is not a sample time")
-    name = field(model, "name", str)
-    if any("." in one for one in (name, *inputs, *outputs)):
-        raise FileFormatError("a name contains a dot, which is not allowed in names of models")
-    return DelayedStateSpace(
-        ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False),
-        before,
-        output_delay=behind,
-        fit=summary_from_json(content.get("fit")),
-        name=name,
-        inputs=inputs,
-        outputs=outputs,
-    )
 
 
 def _check_origin(content: object) -> None:
@@ -279,14 +310,3 @@ def _versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             versions[package] = "unknown"
     return versions
-
-
-def _refuse_constant(text: str) -> float:
-    raise ValueError(f"{text} is not a finite number")
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    content = dict(pairs)
-    if len(content) != len(pairs):
-        raise ValueError("a key occurs twice")
-    return content

@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from ..delayed import DelayedStateSpace
 from ..errors import DataError, FileFormatError, OptionError
 from ..identification.campaign.packed_model import PackedModel
 from ..identification.campaign.rows import CampaignRow, versions
@@ -181,6 +182,8 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         low, high = (float(text) for text in field(content, name, list))
         intervals[name] = (low, high)
     system = model_from_text(json.dumps(field(content, "model", dict)))
+    if not isinstance(system, DelayedStateSpace):
+        raise FileFormatError("a row with a model that no record gives")
     flags = tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list))
     if system.fit is not None and system.fit.flags == flags:
         flags = system.fit.flags  # once in memory
