@@ -259,7 +259,12 @@ SWITCHES = (
         "no dispersion where rounding is coarse",
         {f"{STEP}:_flows": lambda _: lambda _data, whole, chains: flows_of(whole, chains)},
     ),
-    Switch("estimates against a pinned likelihood", {f"{STEP}:pinned": giving(2.0)}),
+    Switch(
+        "estimates against a pinned likelihood",
+        {f"{STEP}:pinned": giving(2.0)},
+        (f"{STEP}:moved",),
+        called=True,
+    ),
     Switch(
         "noise of a rest that is constant",
         {f"{FITS}.step_data:rest_noise": _constant_rest},

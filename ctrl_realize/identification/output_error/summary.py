@@ -76,8 +76,8 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
         ]
     if fit.delay_estimates:
         why = (
-            "a likelihood that is flat down to the earliest dead time has its maximum there, and "
-            "the estimates agree on a later one"
+            "the likelihood is flat down to the earliest dead time and has its maximum there, and "
+            "most of the estimates agree on a later one"
             if fit.adequate
             else "no model fits down to the noise level"
         )
