@@ -277,6 +277,10 @@ SWITCHES = (
         {f"{FITS}.step_data:StepData.coarse": lambda _: property(lambda _data: False)},
     ),
     Switch(
+        "correlation in units of weight",
+        {f"{SEPARABLE}.window:weighted_correlation": lambda _: lambda time, _counted: time},
+    ),
+    Switch(
         "first motion in means",
         {f"{NUMERICS}.signals.onset:_SMOOTHINGS": value((1,))},
         (f"{FITS}.step_data:first_motion",),

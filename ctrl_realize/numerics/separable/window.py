@@ -78,6 +78,18 @@ class Window:
     own: Segments | None = None
     samples: int | None = None
 
+    @cached_property
+    def counted(self) -> float:
+        """Sum of the weights of the means after the step, over that of their samples.
+
+        Below 1 where means of coarsely rounded samples weigh less than their number.
+        """
+        if self.bins is None:
+            return 1.0
+        after = self.bins.first >= self.start
+        weights = float(np.sum(self.problem.root_weight[after] ** 2))
+        return weights / max(float(np.sum(self.bins.width[after])), 1.0)
+
     def with_output(self, values: FloatArray) -> Problem:
         """Return the problem for other values (N,)."""
         means = values if self.bins is None else self.bins.average(values)
@@ -127,7 +139,9 @@ class WindowFit:
     @property
     def variance(self) -> float:
         """Variance per sample, including correlation."""
-        colour = self.correlation if self.colour is None else self.colour
+        colour = self.colour
+        if colour is None:
+            colour = weighted_correlation(self.correlation, self.window.counted)
         return (self.sigma**2 + self.rounding**2) * colour
 
     @property
@@ -171,6 +185,14 @@ class WindowFit:
         """Information criterion of other candidates on the same data."""
         values = criteria(candidates, self.variance, self.independent)
         return {s: value + self.problem.local_count(s.order) for s, value in values.items()}
+
+
+def weighted_correlation(correlation: float, counted: float) -> float:
+    """Correlation time in units of weight, of which few samples of it may have been given already.
+
+    Ablation: correlation in units of weight.
+    """
+    return max(correlation * counted, 1.0)
 
 
 def fit_window(
@@ -250,10 +272,11 @@ class _Left:
     lost: int
     independent: float
     rivals: dict[Structure, float]
+    counted: float
 
     @property
     def variance(self) -> float:
-        return self.level**2 * self.correlation
+        return self.level**2 * weighted_correlation(self.correlation, self.counted)
 
 
 def _left(
@@ -295,7 +318,9 @@ def _left(
     wild = _wild(error)
     kept -= error
     kept += window.output
-    return _Left(best, kept, wild, max(level, floor), correlation, lost, independent, rivals)
+    return _Left(
+        best, kept, wild, max(level, floor), correlation, lost, independent, rivals, window.counted
+    )
 
 
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:

@@ -103,3 +103,23 @@ def test_a_likelihood_that_is_flat_down_to_nothing_gives_way_to_the_first_motion
     assert fit.delay_interval[1] > samples + 0.5
     assert any("agree on a later one" in choice for choice in fit.choices)
     assert "estimates_disagree" in codes(fit)
+
+
+@pytest.mark.parametrize(("seed", "slow", "step"), [(1, 0.01, 0.03), (0, 0.02, 0.05)])
+def test_a_resonance_is_seen_through_slow_noise_and_a_coarse_encoder(seed, slow, step):
+    # Rounding is alike in neighbouring samples, and so is slow noise: counted twice, there would
+    # be too few independent samples to tell a resonance of 10 %.
+    rng = np.random.default_rng(seed)
+    k = np.arange(1180)
+    after = np.clip(k - 202.5, 0, None)
+    ringing = np.exp(-after / 500) * np.sin(2 * np.pi * after / 280) * -np.expm1(-after / 60)
+    clean = -np.expm1(-after / 25) + 0.1 * ringing
+    noise = slow * lfilter([np.sqrt(1 - 0.99**2)], [1, -0.99], rng.standard_normal(k.size))
+    noise += 0.4 * step * rng.standard_normal(k.size)
+    u = np.where(k >= 200, 1.0, 0.0)
+    record = cr.Record(1e-3 * k, u, np.round((clean + noise) / step) * step)
+    system = cr.identify(record)
+    error = system.simulate(u) - clean
+    assert np.std(error) < 0.04 * np.std(clean)
+    assert abs(system.fit.delay - 2.5) < 0.5
+    assert system.fit.delay_interval[0] <= 2.5 <= system.fit.delay_interval[1]
