@@ -122,6 +122,7 @@ print("unchanged")
 def run(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run code in a fresh interpreter, in another folder, with the package on its path."""
     environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
+    environment.pop("KMP_DUPLICATE_LIB_OK", None)  # other packages set it where tests run
     return subprocess.run(
         [sys.executable, "-W", "error::UserWarning:ctrl_realize", "-c", code],
         cwd=folder,

@@ -8,12 +8,11 @@ order of summation may change the last digits.
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar
-
-from threadpoolctl import ThreadpoolController
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -21,6 +20,7 @@ T = TypeVar("T")
 # The setting is global: only one Python thread at a time may save and restore it, otherwise two
 # overlapping ones could leave it at one. It is never waited for.
 _LIMITING = Lock()
+_OF_OPENMP = "KMP_DUPLICATE_LIB_OK"
 
 
 @functools.cache
@@ -28,6 +28,12 @@ def _controller() -> Any:
     """BLAS libraries of NumPy and SciPy; finding them takes 15 ms and is done once."""
     import scipy.linalg  # noqa: F401 - brings its own BLAS
 
+    # The import sets a variable of Intel's OpenMP, for this process and those that it starts.
+    before = os.environ.get(_OF_OPENMP)
+    from threadpoolctl import ThreadpoolController
+
+    if before is None:
+        os.environ.pop(_OF_OPENMP, None)
     return ThreadpoolController().select(user_api="blas")
 
 
