@@ -27,7 +27,7 @@ _NEAR = 0.05  # variances: predicted decrease at which Newton's steps take over
 _NO_WAY = 0.03  # of the distance to a level, as predicted decrease, at which it is not reached
 _DAMPING = 1e-4  # of the first step, in squared columns of the Jacobian
 _LONGEST_STEP = 1.0  # of a logarithmic parameter
-_MOST_TURNS = 25
+_MOST_TURNS = 100
 _NOTHING = 1e-10  # of the largest column of the Jacobian: a direction of rounding
 _MOST_PINS = 3
 
@@ -77,16 +77,24 @@ def polish(
     # A fixed dead time: given, or at a kink towards which the cost decreases on both sides.
     pinned = np.full(count, dead_time_fixed)
     crossed = np.zeros(count, dtype=np.bool_)
+    at_kink = np.full(count, np.inf)
     pins = np.where(dead_time_fixed, _MOST_PINS, 0) * np.ones(count, dtype=np.int64)
+    # A dead time that has crossed samples one after the other may cross several at once.
+    reach, heading = np.zeros(count), np.zeros(count, dtype=np.int64)
     active: IntArray = np.arange(count)
     for _ in range(_MOST_TURNS):
         at = x[active]
-        low, high = cell(at, bounds, dt, pinned[active])
+        low, high = cell(at, bounds, dt, pinned[active], reach[active])
         downhill = np.einsum("bmp,bm->bp", jacobian[active], residual[active])
         over = leaving(at, downhill, low, high, bounds, pinned[active])
         free = ~((at <= low) & (downhill < 0) | (at >= high) & (downhill > 0) | (low >= high))
-        step, predicted = _step(residual[active], jacobian[active], free, damping[active])
+        step, predicted = _step_to(
+            residual[active], jacobian[active], free, damping[active], low[:, 0] - at[:, 0],
+            high[:, 0] - at[:, 0],
+        )  # fmt: skip
         trial = np.clip(at + step, low, high)
+        wide = reach[active] > 0
+        trial[wide, 0] = beside_a_sample(trial[wide, 0], bounds, dt)
         # On both sides of a sample the cost decreases towards it.
         kink = (over != 0) & crossed[active]
         turn = (over != 0) & ~kink
@@ -97,7 +105,12 @@ def polish(
         gained = cost[active] - moved.cost
         tiny = predicted <= IN_ROUNDING * cost[active]
         better = (gained > 0) | (tiny & (gained >= -IN_ROUNDING * cost[active])) | turn
-        up, down = active[better], active[~better & ~kink]
+        up, down = active[better], active[~better & ~kink & ~wide]
+        onward = turn & (over == heading[active])
+        reach[active] = np.where(
+            onward | (wide & better), 2 * reach[active] + 1, reach[active] // 4
+        )
+        heading[active[over != 0]] = over[over != 0]
         x[up], cost[up] = trial[better], moved.cost[better]
         residual[up], jacobian[up] = moved.residual[better], moved.jacobian[better]
         usual = better & ~turn
@@ -108,15 +121,16 @@ def polish(
         damping[down] *= growth[down]
         growth[down] *= 2.0
         crossed[active] = turn
-        pinned[active[kink]] = True
+        pinned[active[kink]], at_kink[active[kink]] = True, cost[active[kink]]
         enough = _NEAR / problem.data.size * cost[active]
         if dead_time_fixed and level is not None:
             enough = np.maximum(enough, _NO_WAY * np.abs(cost[active] - level))
         elif not dead_time_fixed:
             enough = np.maximum(enough, _NO_WAY * (cost[active] - cost.min()))
-        done = ~turn & ~kink & (predicted <= enough)
-        # The other parameters have changed since: test the kink once more.
+        done = ~turn & ~kink & (better | ~wide) & (predicted <= enough)
+        # Where the other parameters have changed since, the kink is tested once more.
         again = done & pinned[active] & (pins[active] < _MOST_PINS)
+        again &= at_kink[active] - cost[active] > enough
         pinned[active[again]] = False
         pins[active[again]] += 1
         active = active[~((done & ~again) | (damping[active] > 1e12))]
@@ -125,6 +139,29 @@ def polish(
     if not dead_time_fixed:
         x[:, 0] = np.clip(snapped(x[:, 0], dt), bounds.low[0], bounds.high[0])
     return x, cost
+
+
+def _step_to(
+    residual: FloatArray,
+    jacobian: FloatArray,
+    free: BoolArray,
+    damping: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Damped step; where the dead time would leave its bounds, the best one with it at a bound."""
+    step, predicted = _step(residual, jacobian, free, damping)
+    reached = np.clip(step[:, 0], low, high)
+    cut = free[:, 0] & (reached != step[:, 0])
+    if cut.any():
+        move = reached[cut, None] * jacobian[cut, :, 0]
+        others = free[cut]
+        others[:, 0] = False
+        step[cut], gained = _step(residual[cut] - move, jacobian[cut], others, damping[cut])
+        step[cut, 0] = reached[cut]
+        gained += np.einsum("bm,bm->b", move, 2 * residual[cut] - move)
+        predicted[cut] = np.maximum(gained, 0.0)
+    return step, predicted
 
 
 def _step(

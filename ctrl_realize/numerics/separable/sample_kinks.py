@@ -16,13 +16,13 @@ BESIDE = 1e-8
 
 
 def cell(
-    at: FloatArray, bounds: Bounds, dt: float, pinned: BoolArray
+    at: FloatArray, bounds: Bounds, dt: float, pinned: BoolArray, beyond: FloatArray | float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds of every row; those of its dead time are the neighbouring samples."""
+    """Bounds of every row; those of its dead time are `beyond` samples from the neighbouring."""
     low, high = (np.tile(bound, (len(at), 1)) for bound in (bounds.low, bounds.high))
     sample = np.ceil(at[:, 0] / dt)
-    low[:, 0] = np.maximum(low[:, 0], (sample - 1 + BESIDE) * dt)
-    high[:, 0] = np.minimum(high[:, 0], (sample - BESIDE) * dt)
+    low[:, 0] = np.maximum(low[:, 0], (sample - 1 - beyond + BESIDE) * dt)
+    high[:, 0] = np.minimum(high[:, 0], (sample + beyond - BESIDE) * dt)
     held = pinned | (low[:, 0] > high[:, 0])
     low[held, 0] = high[held, 0] = at[held, 0]
     return low, high

@@ -118,6 +118,17 @@ def test_all_starts_come_to_one_minimum():
         assert_allclose(x, fits[0][0], atol=1e-5)
 
 
+def test_a_dead_time_that_crosses_a_hundred_samples_ends_where_one_beside_it_does():
+    problem, scales = problem_of((30.0, 60.0), dead_time=140.3)
+    structure = Structure(2, 2)
+    bounds = parameter_bounds(structure, scales)
+    starts = np.array([start(at, 30.0, 60.0) for at in (140.0, 40.0)])
+    near, far = (polish(problem, structure, one[None], bounds, scales.dt) for one in starts)
+    # within the decrease at which Newton's method takes over, 0.05 variances
+    assert far[1][0] - near[1][0] < 0.1 * LOW_NOISE**2
+    assert abs(far[0][0, 0] - near[0][0, 0]) < 0.1
+
+
 @pytest.mark.parametrize(("order", "degree"), [(2, 2), (2, 1), (3, 3), (3, 2)])
 def test_at_the_minimum_nothing_slopes(order, degree):
     problem, scales = problem_of()
