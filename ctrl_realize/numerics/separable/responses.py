@@ -93,7 +93,7 @@ class StepSequence:
         rates = poles if poles.imag.any() else poles.real
         since = self.first - tau[:, None]
         here = self._arrived(since)
-        held = self._carried(rates)
+        held = self._carried(rates) if self.moves.size > 1 else None
         row = np.arange(tau.size)[:, None]
         static, mode, slope = self._decayed(held, rates[:, None], since, row, here)
         widths, kind = self._kinds
@@ -142,13 +142,18 @@ class StepSequence:
         return np.searchsorted(self._steps[0], since, side="left")
 
     def _decayed(
-        self, held: tuple[Any, Any], rates: Any, when: FloatArray, row: IntArray, here: IntArray
+        self,
+        held: tuple[Any, Any] | None,
+        rates: Any,
+        when: FloatArray,
+        row: IntArray,
+        here: IntArray,
     ) -> Modes:
         """H, E and T at delayed times, `here` changes after the first state of `_carried`."""
         _, start, level = self._steps
         elapsed = np.where(here > 0, when - start[here], 0.0)[..., None]
         static, mode = level[here], np.exp(elapsed * rates)
-        if self.moves.size == 1:
+        if held is None:
             mode *= static[..., None]  # nothing has decayed before
             return static, mode, elapsed * mode
         total, stretch = held

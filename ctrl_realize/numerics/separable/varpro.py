@@ -175,7 +175,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     stretch = amplitudes[:, :n, None] * dfree
     level = np.einsum("bj,bjq->bq", -1.0 / free, dfree).real
     level *= (gain * numerator[:, 0])[:, None]
-    derivative[:, :, 1:] += _real_product(slope[:, :, :n], stretch)
+    derivative[:, :, 1:] += _real_product(slope, stretch)
     derivative[:, :, 1:] += static[:, :, None] * level[:, None]
     derivative = problem.weighted(derivative)
     if own is not None:
@@ -189,10 +189,13 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
 
 
 def _real_product(modes: Any, weights: ComplexArray) -> FloatArray:
-    """Real part of modes (B, m, J) times weights (B, J, k); real modes have real weights."""
-    if np.iscomplexobj(modes):
-        return np.asarray((modes @ weights).real)
-    return np.asarray(modes @ weights.real)
+    """Real part of the first modes (B, m, J) times weights (B, j, k), real for real modes."""
+    if not np.iscomplexobj(modes):
+        return np.asarray(modes[:, :, : weights.shape[1]] @ weights.real)
+    # Re(E w) = Re(E) Re(w) - Im(E) Im(w), as one product of real matrices.
+    parts = np.stack([weights.real, -weights.imag], axis=2)
+    real = modes.view(np.float64)[:, :, : 2 * weights.shape[1]]
+    return np.asarray(real @ parts.reshape(weights.shape[0], -1, weights.shape[2]))
 
 
 def respond(
