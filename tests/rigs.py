@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import control as ct
 import numpy as np
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
@@ -55,6 +56,31 @@ def exact_step(plant: ct.TransferFunction, time: np.ndarray) -> np.ndarray:
     after = np.clip(time, 0, None)
     values = gain + (residues[:, None] * np.exp(np.outer(poles, after))).sum(axis=0).real
     return np.where(time > 0, values, 0.0)
+
+
+def drive_with_friction(
+    rng: np.random.Generator, dead_time: float, friction: float, slow: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Input and speed of a drive with dry friction and a flexible shaft, dead time in samples.
+
+    Slow noise of standard deviation `slow`; the speed is that of a differenced encoder.
+    """
+    count, edge, within = 1180, 200, 20
+    own, other, twist = -1.0, -1.0, 0.0
+    stiff, h = 2 * np.pi / 280, 1 / within
+    speed = np.empty(count)
+    for k in range(count):
+        speed[k] = own
+        for i in range(within):
+            torque = (1 + friction) * (-1.0 if k + i * h < edge + dead_time else 1.0)
+            spring = stiff**2 * twist + 0.06 * stiff * (own - other)
+            own += h * ((torque - own - friction * np.tanh(50 * own)) / 30 - 0.4 * spring)
+            twist += h * (own - other)
+            other += h * (spring - 0.0005 * np.tanh(20 * other))
+    noise = slow * lfilter([np.sqrt(1 - 0.97**2)], [1, -0.97], rng.standard_normal(count))
+    noise += 0.0125 * rng.standard_normal(count)
+    u = np.where(np.arange(count) < edge, -1.0, 1.0)
+    return u, np.round((speed + noise) / 0.025) * 0.025
 
 
 def step_record(

@@ -17,6 +17,7 @@ from benchmarks.worlds.simulation import (
     step,
     stepped,
 )
+from tests import rigs
 
 Rng = np.random.Generator
 
@@ -157,23 +158,8 @@ def drive_with_friction(rng: Rng) -> Case:
 
     The dead time is one to three samples.
     """
-    count, edge, within = 1180, 200, 20
     dead_time, friction = float(rng.uniform(1, 3)), float(rng.uniform(0.2, 0.4))
-    own, other, twist = -1.0, -1.0, 0.0
-    stiff, h = 2 * np.pi / 280, 1 / within
-    speed = np.empty(count)
-    for k in range(count):
-        speed[k] = own
-        for i in range(within):
-            torque = (1 + friction) * (-1.0 if k + i * h < edge + dead_time else 1.0)
-            spring = stiff**2 * twist + 0.06 * stiff * (own - other)
-            own += h * ((torque - own - friction * np.tanh(50 * own)) / 30 - 0.4 * spring)
-            twist += h * (own - other)
-            other += h * (spring - 0.0005 * np.tanh(20 * other))
-    noise = coloured(rng, count, 0.97)
-    noise = 0.05 * noise / np.std(noise) + 0.0125 * rng.standard_normal(count)
-    u = np.where(np.arange(count) < edge, -1.0, 1.0)
-    return Case(record(u, np.round((speed + noise) / 0.025) * 0.025), DT * dead_time)
+    return Case(record(*rigs.drive_with_friction(rng, dead_time, friction, 0.05)), DT * dead_time)
 
 
 def faster_than_a_sample(rng: Rng) -> Case:

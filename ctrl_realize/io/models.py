@@ -150,16 +150,17 @@ def model_to_text(
     note: str = "",
 ) -> str:
     """Return a model as the text that `save_model` writes."""
-    model = system
+    model: Model = system
     if not isinstance(system, DelayedStateSpace | DelaySystem):
         # anything but a system is refused by DelayedStateSpace
         name = system.name if isinstance(system, ct.InputOutputSystem) else None
         model = DelayedStateSpace(system, name=name)
+    fit = model.fit if isinstance(model, DelayedStateSpace) else None
     content = {
         "format": FORMAT,
         "schema": SCHEMA,
         "model": _model_content(model),
-        "fit": summary_to_json(summary_of(getattr(model, "fit", None))),
+        "fit": summary_to_json(summary_of(fit)),
         "provenance": {
             "versions": _versions(),
             "created": created,
@@ -194,21 +195,20 @@ def model_from_text(text: str, *, max_states: int | None = None) -> Model:
 
 
 def _model_content(model: Model) -> dict[str, Any]:
-    inside = isinstance(model, DelaySystem)
-    core = model.core if isinstance(model, DelaySystem) else model.delay_free
-    states = core.state_labels
-    named = states != [f"x[{i}]" for i in range(core.nstates)]
-    delays: dict[str, Any] = (
-        {
-            "internal_delays": list(model.internal_delays),
-            **({"transfer_function": True} if isinstance(model, TransferDelay) else {}),
-        }
-        if inside
-        else {
+    delays: dict[str, Any]
+    if isinstance(model, DelaySystem):
+        core = model.core
+        delays = {"internal_delays": list(model.internal_delays)}
+        if isinstance(model, TransferDelay):
+            delays["transfer_function"] = True
+    else:
+        core = model.delay_free
+        delays = {
             "input_delays": list(model.input_delays),
             "output_delays": list(model.output_delays),
         }
-    )
+    states = core.state_labels
+    named = states != [f"x[{i}]" for i in range(core.nstates)]
     return {
         "name": model.name,
         "inputs": list(model.input_labels),

@@ -56,8 +56,7 @@ def unresolved_gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
     gain, total = _gain_and_total(fit)
     gains = np.array([gain, *(line.gain for line in kept)])
     totals = np.array([total, *(line.total_delay for line in kept)])
-    robust = fit.delay_estimates and not fit.adequate
-    if robust or not (_apart(gains) or _apart(totals)):
+    if fit.robust or not (_apart(gains) or _apart(totals)):
         return None
     return Flag(
         "gain_not_resolved",

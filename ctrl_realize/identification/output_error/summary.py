@@ -55,7 +55,7 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
 
 def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     s = fit.structure
-    simple = "" if fit.adequate or not fit.delay_estimates else " with up to three poles"
+    simple = " with up to three poles" if fit.robust else ""
     kind = (
         model_words(fit.chain)
         if fit.chain
@@ -76,13 +76,13 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
         ]
     if fit.delay_estimates:
         why = (
-            "the likelihood is flat down to the earliest dead time and has its maximum there, and "
-            "most of the estimates agree on a later one"
-            if fit.adequate
-            else "no model fits down to the noise level"
+            "no model fits down to the noise level"
+            if fit.robust
+            else "the likelihood is flat down to the earliest dead time and has its maximum there, "
+            "and most of the estimates agree on a later one"
         )
         reasons.append(f"dead time: median of five delay estimates, since {why}")
-    if fit.adequate or not fit.delay_estimates:
+    if not fit.robust:
         reasons.append(_interval_of(fit))
     if fit.open_start:
         reasons.append(

@@ -108,10 +108,10 @@ class DelayInterval(NamedTuple):
 class OutputErrorEstimate:
     """Dead time and model of one record; see the rule in `output_error`.
 
-    ``low <= dead_time <= high``. `delay_estimates` are (key,
-    dead time), empty where the dead time is that of the likelihood.
-    The model is exp(-L s) b(s) / a(s), L the dead time: `numerator` lists b from the lowest power
-    on, `poles` are the roots of the monic a. `misfit` is residual over noise in means over bins.
+    ``low <= dead_time <= high``. `delay_estimates` are (key, dead time), empty where the dead time
+    is that of the likelihood. The model is exp(-L s) b(s) / a(s), L the dead time: `numerator`
+    lists b from the lowest power on, `poles` are the roots of the monic a. `normalized_rms` is
+    residual over noise in means over bins; `adequate` tells that the residual counts as noise.
     `chain`: the chain of lags that the model is, if it is one; `endless`: chains of lags fit the
     better the longer they are, so that all of it may be lags; `open_start`: how smoothly the
     response begins is open; `relaxing`: the plant was moving before the step, and its free response
@@ -152,6 +152,11 @@ class OutputErrorEstimate:
     alike: tuple[tuple[StaticGain, float], ...] = ()
     better: StructureFit | None = None
     close: tuple[CloseDecision, ...] = ()
+
+    @property
+    def robust(self) -> bool:
+        """Whether the interval, too, is that of the delay estimates and not of a likelihood."""
+        return bool(self.delay_estimates) and not self.adequate
 
     @property
     def gain_ends(self) -> tuple[float, float]:

@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
+from tests import rigs
 
 
 def response(lags, delay, n=700, edge=150):
@@ -65,34 +66,14 @@ def test_rounding_is_not_taken_for_dispersion(lags, delay, seed):
     assert fit.interval[0] <= delay <= fit.interval[1]
 
 
-def drive(seed, dead_time, friction, slow):
-    """A drive with dry friction and a flexible shaft, in slow noise; a differenced encoder."""
-    rng = np.random.default_rng(seed)
-    n, edge, within = 1180, 200, 20
-    own, other, twist = -1.0, -1.0, 0.0
-    stiff, h = 2 * np.pi / 280, 1 / within
-    speed = np.empty(n)
-    for k in range(n):
-        speed[k] = own
-        for i in range(within):
-            torque = (1 + friction) * (-1.0 if k + i * h < edge + dead_time else 1.0)
-            spring = stiff**2 * twist + 0.06 * stiff * (own - other)
-            own += h * ((torque - own - friction * np.tanh(50 * own)) / 30 - 0.4 * spring)
-            twist += h * (own - other)
-            other += h * (spring - 0.0005 * np.tanh(20 * other))
-    noise = slow * lfilter([np.sqrt(1 - 0.97**2)], [1, -0.97], rng.standard_normal(n))
-    noise += 0.0125 * rng.standard_normal(n)
-    u = np.where(np.arange(n) < edge, -1.0, 1.0)
-    return cr.Record(1e-3 * np.arange(n), u, np.round((speed + noise) / 0.025) * 0.025)
-
-
 @pytest.mark.parametrize(
     ("seed", "samples", "friction", "slow"), [(15, 1.5, 0.4, 0.03), (16, 1.5, 0.2, 0.05)]
 )
 def test_a_likelihood_that_is_flat_down_to_nothing_gives_way_to_the_first_motion(
     seed, samples, friction, slow
 ):
-    fit = cr.fit_output_error(drive(seed, samples, friction, slow)).fit
+    u, y = rigs.drive_with_friction(np.random.default_rng(seed), samples, friction, slow)
+    fit = fitted(u, y)
     assert fit.at_noise_level
     assert len(fit.delay_estimates) == 6
     five = sorted(list(fit.delay_estimates.values())[:5])
