@@ -13,6 +13,7 @@ from benchmarks.ablation.switches import SWITCHES
 PACKAGE = Path(__file__).parents[1] / "ctrl_realize"
 FOLDERS = (
     "numerics/output_error",
+    "numerics/joint",
     "numerics/separable",
     "numerics/signals",
     "numerics/validation",
@@ -24,6 +25,7 @@ FOLDERS = (
     "numerics/state_space",
     "identification",
     "identification/output_error",
+    "identification/joint",
     "identification/state_space_fit",
     "identification/step",
 )

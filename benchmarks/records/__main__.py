@@ -2,7 +2,7 @@
 
 Data are simulated; CPU time of the process, one call each. ``python -m benchmarks.records
 measured`` prints how well halves of measured records are predicted, beside subspace methods, and
-``responses`` what measured frequency responses gave.
+``responses`` what measured frequency responses gave, ``joint`` what they gave with step records.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
-from . import measured, responses
+from . import joint, measured, responses
 
 
 def cpu(work: Callable[[], object]) -> float:
@@ -80,7 +80,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    tables = {"measured": measured.table, "responses": responses.table}
+    tables = {"measured": measured.table, "responses": responses.table, "joint": joint.table}
     asked = [tables[word] for word in sys.argv[1:] if word in tables]
     for made in asked:
         print(made())

@@ -4,6 +4,8 @@ from .campaign.campaign import Campaign as Campaign
 from .campaign.rows import CampaignRow as CampaignRow
 from .campaign.run import identify_campaign as identify_campaign
 from .impulse.from_io import impulse_from_io as impulse_from_io
+from .joint.fit import fit_joint as fit_joint
+from .joint.result import JointFit as JointFit
 from .methods import identify as identify
 from .output_error.fit import fit_output_error as fit_output_error
 from .output_error.result import OutputErrorFit as OutputErrorFit

@@ -17,6 +17,7 @@ from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..paper import SETTINGS
+from .joint.fit import fit_joint
 from .model_class import with_modes_judged
 from .output_error.fit import MOST_ORDER, fit_output_error
 from .output_error.result import OutputErrorFit
@@ -66,6 +67,7 @@ def identify(
     cutoff_hz: float | Literal["auto"] | None = "auto",
     samples: int | None = None,
     feedthrough: bool | None = None,
+    frf: ct.FrequencyResponseData | None = None,
 ) -> DelayedStateSpace:
     """Identify a model with dead time from one record, or from several of one plant.
 
@@ -90,12 +92,16 @@ def identify(
         For ``"output_error"``, see `fit_output_error`.
     cutoff_hz, samples, feedthrough : optional
         For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
+    frf : MeasuredFRF, optional
+        Measured frequency response of the same plant, which is fitted together with the records;
+        see `fit_joint`.
 
     Returns
     -------
     DelayedStateSpace
         Its `.fit` is an `OutputErrorFit` or a `DelayScan`, or a `StateSpaceFit` for several
-        channels and where a model of lags with dead time is not adequate (see Notes);
+        channels and where a model of lags with dead time is not adequate (see Notes), or a
+        `JointFit` if `frf` is given;
         `.fit.report()` states what was chosen and why. The preceding steps are kept:
         ``.fit.impulse.step.record`` for the scans, ``.fit.records`` for the fit.
 
@@ -144,6 +150,15 @@ def identify(
     fit_only = {"known": known is not None, "structures": structures is not None}
     fit_only |= {"loss": loss != "huber", "noise": noise != "auto"}
     fit_only["include_known"] = include_known
+    if frf is not None and method == "output_error":
+        given = [name for name, used in (scan_only | fit_only).items() if used]
+        if strange := [name for name in given if name != "structures"]:
+            raise OptionError(
+                f"{', '.join(strange)}: not an argument with frf; expected order, structures or "
+                "max_delay; fit the records alone with the others"
+            )
+        return fit_joint(record, frf, structures=_requested(order, structures), max_delay=max_delay)
+    fit_only["frf"] = frf is not None
     strange = [
         name
         for name, given in (scan_only if method == "output_error" else fit_only).items()
@@ -202,12 +217,19 @@ def fit_records(
     **options: Any,
 ) -> DelayedStateSpace:
     """Output-error fit with the arguments of `identify`; several records are fitted together."""
-    if order is not None:
-        if structures is not None:
-            raise OptionError("expected order or structures, got both")
-        order = whole(order, "order", 1, MOST_ORDER)
-        structures = [(order, degree) for degree in range(1, order + 1)]
-    return fit_output_error(records, structures=structures, **options)
+    return fit_output_error(records, structures=_requested(order, structures), **options)
+
+
+def _requested(
+    order: int | None, structures: Sequence[tuple[int, int]] | None
+) -> Sequence[tuple[int, int]] | None:
+    """Structures that are asked for, by themselves or by an order."""
+    if order is None:
+        return structures
+    if structures is not None:
+        raise OptionError("expected order or structures, got both")
+    order = whole(order, "order", 1, MOST_ORDER)
+    return [(order, degree) for degree in range(1, order + 1)]
 
 
 def _scan(

@@ -16,6 +16,7 @@ from .json_content import MAX_TEXT, field
 
 _METHODS = {
     "OutputErrorFit": "output-error fit of the raw record",
+    "JointFit": "output-error fit of raw records and a frequency response",
     "StateSpaceFit": "state-space fit of all channels",
     "DelayScan": "delay scan by approximate realization",
     "Realization": "approximate realization",

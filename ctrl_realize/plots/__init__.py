@@ -6,7 +6,7 @@ from .campaigns import campaign_plot
 from .delays import bootstrap_plot, delay_comparison_plot, track_plot
 from .dispatch import draw
 from .fits import dead_time_plot, fit_plot
-from .frequencies import frf_fit_plot, frf_plot, truth_plot
+from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
 from .loops import closed_loop_plot, margins_plot
 from .records import onset_plot, record_plot, step_plot
@@ -32,6 +32,7 @@ __all__ = [
     "hankel_plot",
     "impulse_estimate_plot",
     "impulse_plot",
+    "joint_fit_plot",
     "margins_plot",
     "mimo_realization_plot",
     "onset_plot",

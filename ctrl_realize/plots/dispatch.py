@@ -10,6 +10,7 @@ import control as ct
 from .. import errors
 from ..data.frf import MeasuredFRF
 from ..data.step import StepResponse
+from ..identification.joint.result import JointFit
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.realization.delay_scan_result import DelayScan
 from ..identification.realization.result import Realization
@@ -17,7 +18,7 @@ from ..io.stored_fit import FitSummary
 from .campaigns import campaign_plot
 from .delays import bootstrap_plot, delay_comparison_plot, track_plot
 from .fits import fit_plot
-from .frequencies import frf_fit_plot, frf_plot, truth_plot
+from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
 from .loops import margins_plot
 from .records import record_plot, step_plot
@@ -100,6 +101,7 @@ for _plot in (
 
 # for functions with more than one kind
 draw.register(OutputErrorFit, fit_plot)
+draw.register(JointFit, joint_fit_plot)
 draw.register(DelayScan, delay_plot)
 draw.register(MeasuredFRF, frf_plot)
 draw.register(Realization, singular_value_plot)

@@ -64,7 +64,7 @@ def fit_plot(
         ax, 3, title=title, default_title=_name(result),
         size=(8.0, 4.8 + rows), heights=(2.2, 1.2, rows), sharex=False,
     ) as axes:  # fmt: skip
-        lines = _data_and_model(axes[0], axes[1], result, **kwargs)
+        lines = data_and_model(axes[0], axes[1], result, **kwargs)
         evidence = _evidence(axes[2], result)
         return style.finished(
             axes, [*lines, evidence], loc="lower right" if rising else "upper right"
@@ -121,9 +121,10 @@ def _name(result: OutputErrorFit) -> str:
     return result.records[0].name if result.records else ""
 
 
-def _data_and_model(
+def data_and_model(
     upper: Axes, lower: Axes, result: OutputErrorFit, **kwargs: Any
 ) -> list[list[Line2D]]:
+    """Draw data and model of the records, and below what is left, with the noise."""
     factor, unit = axis_time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
     time = factor * result.time
     looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}

@@ -1,4 +1,4 @@
-"""Plots of frequency responses: measured ones with coherence, and models."""
+"""Plots of frequency responses: measured ones with coherence, models, and joint fits."""
 
 from __future__ import annotations
 
@@ -12,9 +12,13 @@ from matplotlib.lines import Line2D
 
 from ..bench.truth import ValveTruth
 from ..data import MeasuredFRF
+from ..delayed import DelayedStateSpace
+from ..errors import OptionError
 from ..frequency.frf_fit import FRFFit
+from ..identification.joint.result import JointFit
 from ..numerics.arrays import FloatArray
 from . import style
+from .fits import data_and_model
 from .frf_comparison import FITTED, TRUSTED_COHERENCE, Curve, curves_of
 from .names import plain
 from .shared_docs import documented
@@ -22,6 +26,7 @@ from .style import decibel, frequency_axis, phase_ticks
 
 _FEW_POINTS = 60
 """Number of measured points up to which they are drawn as dots, too."""
+_FINE = 400  # points of the curve of a joint model
 
 
 @documented("sequence of two Axes, or of three with a coherence,")
@@ -126,6 +131,63 @@ def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct
     return frf_plot([measured, fitted], ax=ax, dead_time=fit.dead_time, **kwargs)
 
 
+@documented("sequence of four Axes")
+def joint_fit_plot(
+    fit: JointFit | DelayedStateSpace,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw records and frequency response with the model that was fitted to both.
+
+    The records and their residual above, gain and phase below, with the 95 % bands of the points.
+
+    Parameters
+    ----------
+    fit : JointFit, or model with one as its `fit`
+    **kwargs
+        Line properties of the model's response to the records.
+
+    Raises
+    ------
+    OptionError
+        The model was not fitted to records and a frequency response.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> bench = cr.bench.valve()
+    >>> frf = bench.truth.frf(np.geomspace(0.1, 10.0, 20))
+    >>> sys = cr.identify(bench.step_record(16, rng=5), frf=frf)
+    >>> cplt = cr.plots.joint_fit_plot(sys)
+    >>> cplt.figure.axes[-1].get_ylabel()
+    'phase [deg]'
+    """
+    result = fit.fit if isinstance(fit, DelayedStateSpace) else fit
+    if not isinstance(result, JointFit):
+        raise OptionError(f"got {fit!r}, which has no joint fit; use identify(record, frf=frf)")
+    points = result.frf_fit
+    hz = points.frequency_hz
+    grid = np.geomspace(hz[0], hz[-1], _FINE)
+    measured = MeasuredFRF(points.measured, hz, name=points.name or "measured")
+    model = MeasuredFRF(result.response(2 * np.pi * grid), grid, name=f"{FITTED} {result.order}")
+    name = result.records[0].name if result.records else ""
+    with style.canvas(
+        ax, 4, title=title, default_title=name, size=(8.0, 9.0),
+        heights=(2.0, 1.0, 1.6, 1.6), sharex=False,
+    ) as axes:  # fmt: skip
+        lines = data_and_model(axes[0], axes[1], result, **kwargs)
+        below = frf_plot([measured, model], ax=axes[2:], dead_time=result.dead_time)
+        part = result.agreement.radius / np.abs(points.measured)
+        _band(axes[2], hz, 20 * np.log10(1 + part), -20 * np.log10(np.maximum(1 - part, 1e-3)))
+        angle = np.degrees(np.arcsin(np.minimum(part, 1.0)))
+        _band(axes[3], hz, angle, angle)
+        lines += [list(row) for row in below.lines.ravel()]
+        return style.finished(axes, lines, loc="lower right")
+
+
 @documented("sequence of two Axes")
 def truth_plot(truth: ValveTruth, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
     """Draw the frequency response of a simulated valve, without noise.
@@ -145,6 +207,12 @@ def truth_plot(truth: ValveTruth, *, ax: style.AxesLike = None, **kwargs: Any) -
     """
     frf = truth.frf(np.geomspace(0.1, 50.0, 500))
     return frf_plot(frf, ax=ax, dead_time=truth.dead_time, **kwargs)
+
+
+def _band(axes: Axes, hz: FloatArray, above: FloatArray, below: FloatArray) -> None:
+    """Draw bars about the measured points, which are the first line."""
+    middle = np.asarray(axes.get_lines()[0].get_ydata(), dtype=np.float64)
+    axes.vlines(hz, middle - below, middle + above, color=style.NOISE, linewidth=2.0, zorder=1)
 
 
 def _looks(curve: Curve, models: int) -> dict[str, Any]:

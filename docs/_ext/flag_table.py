@@ -15,6 +15,7 @@ RAISED_BY = {
     "frequency/frf_selection": "fit_frf",
     "identification/campaign": "identify_campaign",
     "identification/impulse": "impulse_from_io",
+    "identification/joint": "identification.fit_joint",
     "identification/long_records": "fit_state_space",
     "identification/methods": "identify",
     "identification/model_class": "identify",
@@ -32,6 +33,11 @@ COMPOSED = {
     "outliers": "… sample(s), the first at index …, are …, far from the others: if this value "
     "marks missing data, interpolate these samples before the fit",
     "outlying_records": "outlying records, excluded from the mean: …",
+    "frf_contradicts_records": "records and frequency response have no common model (likelihood "
+    "ratio …): the joint model is outside of the 95 % circles of … points of the frequency "
+    "response, by most at …, mainly from … to …, and is up to … residuals of the records away from "
+    "their own model, mainly at …. Neither another gain nor another dead time explains it: the dynamics "
+    "differ. The interval spans those of each alone",
     "structured_misfit": "no model fits down to the noise level: the plant is nonlinear or has "
     "unmodelled dynamics; the dead time is the median of five delay estimates and the interval is "
     "their range",

@@ -44,6 +44,13 @@ def measured_frf() -> cr.MeasuredFRF:
     return cr.MeasuredFRF(2 * np.exp(-0.0289 * s) / (0.08 * s + 1) ** 2 + noise, f)
 
 
+def joint_frf() -> cr.MeasuredFRF:
+    f = np.geomspace(0.1, 2, 12)
+    s = 2j * np.pi * f
+    noise = 0.01 * np.random.default_rng(0).standard_normal((12, 2)) @ [1, 1j]
+    return cr.MeasuredFRF(3 * np.exp(-0.125 * s) / (0.4 * s + 1) + noise, f)
+
+
 def tracked() -> cr.DelayedStateSpace:
     tracker = DelayTracker(PLANT, max_delay=20, forgetting_time=3.0)
     u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 25)
@@ -54,6 +61,7 @@ def tracked() -> cr.DelayedStateSpace:
 
 MADE = {
     "output error": lambda: cr.fit_output_error(STEP, structures=[(1, 1)]),
+    "joint": lambda: cr.identify(STEP, frf=joint_frf(), order=1),
     "scan": lambda: cr.identify(STEP, method="scan", order=1),
     "realization": lambda: cr.realize(PULSE, 1, delay=37, dt=DT),
     "several channels": lambda: realize_mimo(PULSE, 1, dt=DT),

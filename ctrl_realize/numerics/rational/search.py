@@ -193,10 +193,14 @@ def correlation_cost(data: FRFData, fit: RationalFit) -> float:
         data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
     ).residual
     points = data.s.size
-    residual = stacked[:points] + 1j * stacked[points:]
+    return points_as_one(stacked[:points] + 1j * stacked[points:])
+
+
+def points_as_one(residual: ComplexArray) -> float:
+    """Return how many neighbours of weighted residuals (K,) count as one independent point."""
     power = float(np.sum(np.abs(residual) ** 2))
     neighbours = float(np.sum((residual[1:] * residual[:-1].conj()).real))
     correlation = float(np.clip(neighbours / power if power > 0 else 0.0, 0.0, 0.95))
-    if correlation < 2 / np.sqrt(points):
+    if correlation < 2 / np.sqrt(residual.size):
         return 1.0
     return (1 + correlation) / (1 - correlation)

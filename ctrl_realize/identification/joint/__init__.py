@@ -1,0 +1,1 @@
+"""Models fitted to time records and a frequency response together."""

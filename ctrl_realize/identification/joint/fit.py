@@ -1,0 +1,241 @@
+"""One model of time records and a measured frequency response."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import control as ct
+import numpy as np
+
+from ...data import Record
+from ...data.given import as_records
+from ...delayed import DelayedStateSpace, delayed_ss, fit_of
+from ...frequency.fit_frf import fit_frf
+from ...frequency.frf_fit import FRFFit
+from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.blas_threads import single_threaded
+from ...numerics.constants import SMALLEST
+from ...numerics.joint.fit import joint_fit
+from ...numerics.joint.frf_rows import MeasuredPoints
+from ...numerics.joint.own_effects import EffectKey, with_random_effects
+from ...numerics.joint.record_part import RecordPart, sampled_data, sampled_part, step_part
+from ...numerics.output_error.step_data import StepData, bare_data
+from ...numerics.rational.search import points_as_one
+from ...numerics.separable.varpro import Structure
+from ..output_error.fit import fit_output_error
+from ..output_error.repeat_flags import BY_CHANCE
+from ..output_error.result import OutputErrorFit
+from ..output_error.summary import fitted_core
+from .flags import joint_flags
+from .result import JointFit
+
+_MOST_ORDER = 4  # of a frequency response; it takes 2 order + 1 points
+_LEAST = 1e-6  # of the response: noise of exact points, for which the weights must be finite
+
+
+@single_threaded
+def fit_joint(
+    records: Record | Sequence[Record],
+    frf: ct.FrequencyResponseData,
+    *,
+    structures: Sequence[tuple[int, int]] | None = None,
+    max_delay: int | None = None,
+    weighting: Literal["auto", "std", "relative", "uniform"] = "auto",
+    hold: Literal["auto", "zoh"] | None = "auto",
+    band_hz: tuple[float, float] | None = None,
+) -> DelayedStateSpace:
+    """Fit one model with dead time to time records and a frequency response of the same plant.
+
+    Maximum likelihood with independent noise in both [1]_: every residual counts in units of its
+    own noise. Both are fitted alone first, by `fit_output_error` and `fit_frf`, which determines
+    noise that was not measured. The joint model is then compared with the two alone.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        One input, one output; see `fit_output_error`.
+    frf : MeasuredFRF
+        One input, one output, at least 3 points. Any `control.FrequencyResponseData`.
+    structures : sequence of (order, relative degree), optional
+        Structures to try; default: those of `fit_output_error`.
+    max_delay : int, optional
+        Largest delay in samples of the records.
+    weighting, hold, band_hz : optional
+        See `fit_frf`. With ``hold="zoh"`` and an FRF without sample time, that of the records is
+        the hold's.
+
+    Returns
+    -------
+    DelayedStateSpace
+        With the sample time of the records; ``.fit`` is a `JointFit`.
+
+    Raises
+    ------
+    DataError, NoStepError, UnsuitableSystemError, OptionError, OrderError
+        See `fit_output_error` and `fit_frf`.
+
+    Notes
+    -----
+    Whether the two have one model is tested by the likelihood ratio of common parameters against
+    parameters of each (as an F ratio [2]_ if the noise of the FRF was estimated from its fit). If
+    the probability is below 1 % for all structures that are not ruled out, the flag
+    ``"frf_contradicts_records"`` says where they contradict each other, and whether another gain or
+    another dead time of the FRF explains it; the interval then spans those of both alone.
+
+    Gains, dead times and time constants that differ between the records by more than their noise
+    enter with the standard error of their mean [3]_. The noise of the records counts as white, with
+    a variance that is enlarged by its correlation. Of long records with an input other than a step
+    a part is used.
+
+    References
+    ----------
+    .. [1] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd
+       ed., Wiley 2012, chapter 9, doi:10.1002/9781118287422.
+    .. [2] G. C. Chow, Tests of equality between sets of coefficients in two linear regressions,
+       Econometrica 28 (1960) 591-605, doi:10.2307/1910133.
+    .. [3] N. M. Laird and J. H. Ware, Random-effects models for longitudinal data, Biometrics 38
+       (1982) 963-974, doi:10.2307/2529876.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> rng = np.random.default_rng(1)
+    >>> t = 0.01 * np.arange(600)
+    >>> y = np.where(t < 1.125, 0.0, 3 * -np.expm1(-(t - 1.125) / 0.4))
+    >>> record = cr.Record(t, t >= 0.995, y + 0.02 * rng.standard_normal(t.size))
+    >>> f = np.geomspace(0.1, 5, 20)
+    >>> s = 2j * np.pi * f
+    >>> noise = 0.01 * rng.standard_normal((20, 2)) @ [1, 1j]
+    >>> frf = cr.MeasuredFRF(3 * np.exp(-0.125 * s) / (0.4 * s + 1) + noise, f)
+    >>> fit = cr.identification.fit_joint(record, frf).fit
+    >>> fit.structure, round(fit.dead_time, 3), fit.agreement.contradicts
+    ((1, 1), 0.125, False)
+    """
+    several = as_records(records)
+    first = fit_of(
+        fit_output_error(several, structures=structures, max_delay=max_delay), OutputErrorFit
+    )
+    held = first.dt if hold == "zoh" else None
+    other = fit_of(
+        fit_frf(
+            frf,
+            _orders(frf) if structures is None else sorted({n for n, _ in structures}),
+            relative_degree=None if structures is None else sorted({r for _, r in structures}),
+            dt=held,
+            weighting=weighting,
+            hold=hold,
+            band_hz=band_hz,
+        ),
+        FRFFit,
+    )
+    latest = None if max_delay is None else max_delay * first.dt
+    part, data, time = _part(first, latest)
+    joint = joint_fit(_with_spread(part, first), _points(other), _starts(first, other))
+    estimate, agreed = joint.estimate, joint.agreement
+    ends = [(estimate.low, estimate.high)]
+    if agreed.contradicts:
+        ends += [first.interval, other.interval]
+    growth = float(np.std(part.output - estimate.fitted))
+    growth /= max(float(np.std(first.measured - first.fitted)), SMALLEST)
+    estimate = replace(
+        estimate,
+        low=float(min(low for low, _ in ends)),
+        high=float(max(high for _, high in ends)),
+        adequate=first.at_noise_level and not agreed.contradicts,
+        residual=first.residual * growth,
+        correlation=first.correlation,
+        normalized_rms=first.normalized_rms * growth,
+        better=first.better,
+    )
+    result = JointFit(
+        estimate=estimate,
+        data=data,
+        time=time,
+        records=several,
+        repeatability=first.repeatability,
+        record_fit=first,
+        frf_fit=other,
+        agreement=agreed,
+    )
+    result = replace(result, flags=joint_flags(result, max_delay))
+    return delayed_ss(
+        fitted_core(estimate, result.poles),
+        dead_time=result.dead_time,
+        dt=result.dt,
+        fit=result,
+        name=several[0].name or None,
+        inputs=list(several[0].input_labels),
+        outputs=list(several[0].output_labels),
+    )
+
+
+def _orders(frf: ct.FrequencyResponseData) -> range | None:
+    """Orders that a short frequency response can determine; None: those of `fit_frf`."""
+    points = int(np.size(getattr(frf, "omega", ())))
+    return range(1, max((points - 1) // 2, 1) + 1) if points < 2 * _MOST_ORDER + 1 else None
+
+
+def _part(first: OutputErrorFit, latest: float | None) -> tuple[RecordPart, StepData, FloatArray]:
+    """Rows of the records, and what is shown of them: data and times."""
+    if np.isfinite(first.onset):
+        return step_part(first.data, first.estimate, latest), first.data, first.time
+    repeats = first.repeatability
+    left_out = () if repeats is None else repeats.outlying
+    names = repeats.names if repeats is not None else ("",)
+    used = [r for r, name in zip(first.records, names, strict=True) if name not in left_out]
+    outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
+    data = sampled_data(outputs, inputs, first.dt, first.dead_time)
+    times: list[FloatArray] = []
+    signals = []
+    for r, u, offset, start, y in zip(
+        used, data.inputs, data.offsets, data.starts, data.outputs, strict=True
+    ):
+        time = r.time[offset + start : offset + y.size]
+        times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
+        signals.append(u[start:])
+    part = sampled_part(data, first.estimate, latest)
+    shown = bare_data(part.output, np.concatenate(signals), data.dt, first.residual)
+    return part, shown, np.concatenate(times)
+
+
+def _with_spread(part: RecordPart, first: OutputErrorFit) -> RecordPart:
+    """Let what differs between records by more than their noise deviate from the plant's."""
+    repeats = first.repeatability
+    if repeats is None:
+        return part
+    kept = np.array([name not in repeats.outlying for name in repeats.names])
+    spread: list[tuple[EffectKey, float]] = []
+    tests: tuple[tuple[EffectKey, FloatArray, float], ...] = (
+        ("gain", repeats.gains, repeats.gain_test[1]),
+        ("dead_time", repeats.delays, repeats.p_value),
+        ("lags", np.log(repeats.lags), repeats.lag_test[1]),
+    )
+    for key, values, chance in tests:
+        if chance < BY_CHANCE:
+            spread.append((key, float(np.std(values[kept], ddof=1) / np.sqrt(kept.sum()))))
+    return with_random_effects(part, first.estimate, spread)
+
+
+def _points(fit: FRFFit) -> MeasuredPoints:
+    """Points with the noise that their own fit leaves, never less than what was measured."""
+    omega = 2 * np.pi * fit.frequency_hz
+    scale = max(fit.weighted_rms, 1.0) if fit.noise_known else fit.weighted_rms
+    # Exact points would have no noise at all.
+    scale = max(scale, _LEAST * float(np.max(np.abs(fit.measured) / fit.sigma)))
+    scale *= float(np.sqrt(points_as_one((fit.measured - fit.response(omega)) / fit.sigma)))
+    freedom = 2.0 * omega.size - (2 * fit.order + 2 - fit.relative_degree)
+    known = fit.noise_known and fit.weighted_rms <= 1.0
+    return MeasuredPoints(omega, fit.measured, fit.sigma * scale, np.inf if known else freedom)
+
+
+def _starts(
+    first: OutputErrorFit, other: FRFFit
+) -> dict[Structure, tuple[tuple[float, ComplexArray], ...]]:
+    return {
+        line.structure: ((line.dead_time, line.poles),)
+        + (((other.dead_time, other.poles),) if line.order == other.order else ())
+        for line in first.structures
+    }

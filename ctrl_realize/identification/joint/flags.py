@@ -1,0 +1,99 @@
+"""Flags of a joint fit: what contradicts what, and where."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..._wording import in_time, interval_in_time
+from ...frequency.comparison import hertz
+from ...numerics.joint.agreement import BY_CHANCE
+from ...numerics.rational.bands import running_median, widest_run
+from ...results import Flag
+from ..output_error.flags import model_flags
+from .result import JointFit
+
+_SMOOTHED_POINTS = 3  # a single bad point is not a band
+_MUCH = 0.5  # of the largest shift of a response: where it is told to be
+
+
+def joint_flags(fit: JointFit, max_delay: float | None) -> tuple[Flag, ...]:
+    """List the flags of the joint model, and that of a contradiction first."""
+    length = (fit.data.output.size - fit.data.edge) * fit.dt
+    return tuple(
+        flag
+        for flag in (_contradiction(fit), *model_flags(fit.estimate, fit.dt, length, max_delay))
+        if flag is not None
+    )
+
+
+def _contradiction(fit: JointFit) -> Flag | None:
+    agreed = fit.agreement
+    if not agreed.contradicts:
+        return None
+    limit = float(chi2.isf(BY_CHANCE, agreed.parameters))
+    largest = max(agreed.record_rise, agreed.frf_rise)
+    where = []
+    if agreed.frf_rise > min(limit, 0.999 * largest):
+        where.append(_points_outside(fit))
+    if agreed.record_rise > min(limit, 0.999 * largest):
+        where.append(_times_outside(fit))
+    return Flag(
+        "frf_contradicts_records",
+        f"records and frequency response have no common model (likelihood ratio "
+        f"{agreed.statistic:.3g} for {agreed.parameters} parameters, p = {agreed.p_value:.2g}): "
+        f"the joint model {', and '.join(where)}. {_difference(fit)}. The interval spans those "
+        "of each alone; take the model of the one that was measured as the plant will be used",
+    )
+
+
+def _points_outside(fit: JointFit) -> str:
+    agreed, other = fit.agreement, fit.frf_fit
+    hz, measured = other.frequency_hz, other.measured
+    model = fit.response(2 * np.pi * hz)
+    worst = int(np.argmax(np.abs(model - measured) / agreed.radius))
+    ratio = model[worst] / measured[worst]
+    said = (
+        f"is outside of the 95 % circles of {int(agreed.outside.sum())} of {hz.size} points of "
+        f"the frequency response, by most at {hertz(hz[worst])} "
+        f"({20 * np.log10(abs(ratio)):+.2g} dB, {np.degrees(np.angle(ratio)):+.2g} deg)"
+    )
+    off = running_median(agreed.outside.astype(np.float64), _SMOOTHED_POINTS) > 0.5
+    if not off.any():
+        return said
+    band = hz[widest_run(off, hz)]
+    return f"{said}, mainly from {hertz(band[0])} to {hertz(band[-1])}"
+
+
+def _times_outside(fit: JointFit) -> str:
+    shift = np.abs(fit.agreement.shift)
+    worst = int(np.argmax(shift))
+    small = np.flatnonzero(shift < _MUCH * shift[worst])
+    first = int(small[small < worst].max(initial=-1)) + 1
+    last = int(small[small > worst].min(initial=shift.size)) - 1
+    times = fit.time[first], fit.time[last]
+    return (
+        f"is up to {shift[worst] / fit.record_fit.residual:.2g} residuals of the records away from "
+        f"their own model, mainly at {interval_in_time(*times)}"
+    )
+
+
+def _difference(fit: JointFit) -> str:
+    """Say whether another gain or another dead time explains the contradiction."""
+    agreed = fit.agreement
+    (ratio, by_gain), (later, by_delay) = agreed.gain_ratio, agreed.later
+    if max(by_gain, by_delay) < BY_CHANCE:
+        return (
+            "Neither another gain nor another dead time explains it (best ratio of gains "
+            f"{ratio:.3g}): the dynamics differ"
+        )
+    if by_gain >= by_delay:
+        return (
+            f"A gain of the frequency response of {ratio:.3g} times that of the records explains "
+            f"it (p = {by_gain:.2g})"
+        )
+    side = "longer" if later > 0 else "shorter"
+    return (
+        f"A dead time of the frequency response that is {in_time(abs(later))} {side} than that of "
+        f"the records explains it (p = {by_delay:.2g})"
+    )

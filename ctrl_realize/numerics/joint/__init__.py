@@ -1,0 +1,1 @@
+"""One model of time records and a frequency response together."""

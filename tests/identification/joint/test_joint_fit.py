@@ -1,0 +1,265 @@
+"""Time records and a frequency response together: simulated plants with known truth."""
+
+from __future__ import annotations
+
+import pickle
+import re
+from functools import cache
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import least_squares
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.identification import fit_joint
+
+DT = 0.01
+TIME = DT * np.arange(500)
+EDGE, DEAD_TIME, LAG, GAIN = 100, 0.125, 0.4, 3.0
+ONE_LAG = [(1, 1)]
+HZ = np.geomspace(0.1, 6.0, 15)
+NOISE = 0.03  # of the record
+STD = 0.05  # of the points
+
+
+def step(seed=0, dead_time=DEAD_TIME, gain=GAIN, noise=NOISE):
+    """A step at sample 100, held between samples."""
+    since = TIME - TIME[EDGE] - dead_time
+    y = np.where(since > 0, -gain * np.expm1(-np.maximum(since, 0) / LAG), 0.0)
+    y += noise * np.random.default_rng(seed).standard_normal(TIME.size)
+    return cr.Record(TIME, np.where(np.arange(TIME.size) >= EDGE, 1.0, 0.0), y)
+
+
+def response(seed=0, dead_time=DEAD_TIME, gain=GAIN, more=1.0, std=STD):
+    """Points with independent noise of known standard deviation; `more` is a further factor."""
+    s = 2j * np.pi * HZ
+    noise = np.random.default_rng(1000 + seed).standard_normal((HZ.size, 2)) @ [1, 1j]
+    exact = gain * np.exp(-s * dead_time) / (LAG * s + 1) * more
+    return cr.MeasuredFRF(exact + std / np.sqrt(2) * noise, HZ, std=np.full(HZ.size, std))
+
+
+@cache
+def agreeing(seed=0):
+    return fit_joint(step(seed), response(seed), structures=ONE_LAG).fit
+
+
+def codes(fit):
+    return {flag.code for flag in fit.flags}
+
+
+def test_it_is_the_maximum_of_the_likelihood_by_another_optimiser():
+    fit, record, frf = agreeing(), step(), response()
+    s = 2j * np.pi * HZ
+    noise = fit.record_fit.residual * np.sqrt(fit.record_fit.correlation)
+
+    def rows(x):
+        dead_time, lag, gain, level = x
+        since = np.maximum(TIME - TIME[EDGE] - dead_time, 0)
+        left = (record.output - level + gain * np.expm1(-since / lag)) / noise
+        off = np.sqrt(2) * (frf.complex - gain * np.exp(-s * dead_time) / (lag * s + 1)) / STD
+        return np.concatenate([left, off.real, off.imag])
+
+    best = least_squares(rows, [0.12, 0.5, 2.9, 0.0], x_scale=[0.01, 0.1, 1, 0.1], xtol=1e-12)
+    error = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))
+    found = [fit.dead_time, -1 / fit.poles[0].real, fit.gain]
+    # Means over bins and the wildest residuals differ slightly: a tenth of a standard error.
+    assert np.all(np.abs(found - best.x[:3]) < 0.1 * error[:3])
+    assert_allclose(fit.std_given_structure, error[0], rtol=0.1)
+
+
+def test_the_interval_is_narrower_than_either_alone_and_contains_the_truth():
+    inside = 0
+    for seed in range(6):
+        fit = agreeing(seed)
+        low, high = fit.interval
+        alone = [b - a for a, b in (fit.record_fit.interval, fit.frf_fit.interval)]
+        assert high - low < min(alone)
+        inside += low <= DEAD_TIME <= high
+        assert not fit.agreement.contradicts
+        assert fit.interval_kind == "confidence"
+    assert inside >= 5  # 95 % intervals
+
+
+def test_the_order_is_chosen_from_both():
+    fit = fit_joint(step(), response()).fit
+    assert fit.structure == (1, 1)
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+
+
+def test_the_statistic_is_the_rise_of_both_parts():
+    agreed = agreeing().agreement
+    assert agreed.statistic == agreed.record_rise + agreed.frf_rise
+    assert agreed.parameters == 3  # dead time, lag, gain
+    fit = agreeing()
+    away = np.abs(fit.response(2 * np.pi * HZ) - fit.frf_fit.measured)
+    assert np.array_equal(agreed.outside, away > agreed.radius)
+
+
+def test_another_dead_time_of_the_frequency_response_is_found():
+    fit = fit_joint(step(), response(dead_time=DEAD_TIME + 0.02), structures=ONE_LAG).fit
+    (shift, chance), (_, by_gain) = fit.agreement.later, fit.agreement.gain_ratio
+    assert fit.agreement.contradicts
+    assert_allclose(shift, 0.02, atol=0.003)  # three standard errors of the points alone
+    assert chance > 0.01 > by_gain
+    flag = next(flag for flag in fit.flags if flag.code == "frf_contradicts_records")
+    assert "dead time of the frequency response" in flag.message
+    assert "longer" in flag.message
+    # the interval spans both
+    assert fit.interval[0] <= DEAD_TIME
+    assert fit.interval[1] >= DEAD_TIME + 0.015
+    assert fit.interval_kind == "spanned"
+
+
+def test_another_gain_of_the_frequency_response_is_found():
+    fit = fit_joint(step(), response(gain=1.1 * GAIN), structures=ONE_LAG).fit
+    ratio, chance = fit.agreement.gain_ratio
+    assert_allclose(ratio, 1.1, atol=0.02)
+    assert chance > 0.01
+    assert any("A gain of the frequency response" in flag.message for flag in fit.flags)
+
+
+def test_a_lag_that_only_the_frequency_response_has_is_where_it_is():
+    s = 2j * np.pi * HZ
+    lagging = response(more=1 / (s / 25 + 1), std=0.1)  # at 4 Hz
+    fit = fit_joint(step(noise=0.005), lagging, structures=[(1, 1), (2, 2)]).fit
+    assert fit.agreement.contradicts
+    # The record is far more accurate, so that the joint model is its own: the lag moves the
+    # response out of the circles, of 0.17, where |G| omega / 25 is larger.
+    moved = np.abs(GAIN / (LAG * s + 1) * s / 25) > 0.17
+    assert np.sum(fit.agreement.outside != moved) <= 3
+    flag = next(flag for flag in fit.flags if flag.code == "frf_contradicts_records")
+    first, last = HZ[moved][0], HZ[moved][-1]
+    low, high = map(float, re.search(r"mainly from (\S+) Hz to (\S+) Hz", flag.message).groups())
+    assert first / 1.5 < low < first * 1.5  # a point or so
+    assert last / 1.5 < high < last * 1.5
+
+
+def test_units_of_output_and_time_scale_the_result_and_nothing_else():
+    fit, record, frf = agreeing(), step(), response()
+    scaled = fit_joint(
+        cr.Record(60 * TIME, record.input, 1000 * record.output),
+        cr.MeasuredFRF(1000 * frf.complex, HZ / 60, std=1000 * frf.std),
+        structures=ONE_LAG,
+    ).fit
+    # iterations end at slightly different points
+    assert_allclose(scaled.dead_time, 60 * fit.dead_time, rtol=1e-5)
+    assert_allclose(scaled.gain, 1000 * fit.gain, rtol=1e-5)
+    assert_allclose(scaled.agreement.statistic, fit.agreement.statistic, rtol=1e-3, atol=1e-3)
+
+
+def test_noise_that_was_not_measured_is_that_of_the_fit():
+    frf = response()
+    without = fit_joint(
+        step(), cr.MeasuredFRF(frf.complex, HZ), structures=ONE_LAG, weighting="uniform"
+    ).fit
+    # the true one, within three standard errors of an estimate from 27 degrees of freedom
+    radius = without.agreement.radius / np.sqrt(-np.log(0.05))
+    assert_allclose(radius, STD, rtol=3 / np.sqrt(2 * 27))
+    assert not without.agreement.contradicts
+
+
+def test_an_input_that_is_no_step_takes_part():
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)
+    core = ct.tf([GAIN], [LAG, 1])
+    y = cr.delayed_ss(core, dead_time=DEAD_TIME, dt=DT).simulate(u)
+    record = cr.Record(DT * np.arange(u.size), u, y + 0.1 * rng.standard_normal(u.size))
+    fit = fit_joint(record, response(), structures=ONE_LAG).fit
+    assert fit.time.shape == fit.measured.shape == fit.fitted.shape
+    assert not fit.agreement.contradicts
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+    assert_allclose(np.std(fit.measured - fit.fitted), 0.1, rtol=0.1)
+
+
+def test_the_hold_of_a_sampled_frequency_response_is_no_dead_time():
+    held = cr.delayed_ss(ct.tf([GAIN], [LAG, 1]), dead_time=DEAD_TIME, dt=0.1)
+    noise = np.random.default_rng(5).standard_normal((HZ.size, 2)) @ [1, 1j]
+    low = HZ < 2  # well below the Nyquist frequency of 5 Hz
+    exact = np.asarray(held(np.exp(2j * np.pi * HZ * 0.1)))
+    frf = cr.MeasuredFRF(
+        (exact + 0.02 * noise)[low], HZ[low], std=np.full(low.sum(), 0.03), sample_time=0.1
+    )
+    right = fit_joint(step(), frf, structures=ONE_LAG).fit
+    wrong = fit_joint(step(), frf, structures=ONE_LAG, hold=None).fit
+    assert not right.agreement.contradicts
+    assert wrong.agreement.contradicts  # half a sample of 0.1 s is 0.05 s
+
+
+def test_gains_that_differ_between_records_make_the_common_one_uncertain():
+    gains = GAIN * np.array([0.8, 0.9, 1.1, 1.2])
+    records = [step(seed, gain=gain) for seed, gain in enumerate(gains)]
+    several = fit_joint(records, response(gain=1.05 * GAIN), structures=ONE_LAG).fit
+    alike = fit_joint(
+        [step(seed) for seed in range(4)], response(gain=1.05 * GAIN), structures=ONE_LAG
+    ).fit
+    assert not several.agreement.contradicts  # the mean of 4 has a standard error of 9 %
+    assert alike.agreement.contradicts
+    assert several.gain > 1.03 * GAIN  # that of the frequency response
+
+
+def test_identify_delegates_and_its_result_has_what_all_fits_have():
+    system = cr.identify(step(), frf=response(), order=1)
+    fit = system.fit
+    assert isinstance(fit, cr.identification.JointFit)
+    assert fit.dead_time == agreeing().dead_time
+    assert_allclose(system.dcgain(), fit.gain, rtol=1e-6)
+    assert "agreement" in fit.report()
+    assert repr(fit).startswith("<JointFit 0.12")
+    assert pickle.loads(pickle.dumps(fit)).dead_time == fit.dead_time
+    poles = 1 / (LAG * 2j * np.pi * HZ + 1)
+    assert_allclose(
+        fit.response(2 * np.pi * HZ), GAIN * poles * np.exp(-2j * np.pi * HZ * 0.125), atol=0.1
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "match"),
+    [
+        ({"frf": np.ones(5)}, UnsuitableSystemError, "expected a MeasuredFRF"),
+        ({"frf": response(), "known": ct.tf([1], [0.1, 1])}, OptionError, "known: not an"),
+        ({"frf": response(), "method": "scan"}, OptionError, "frf: not an argument"),
+        ({"frf": response(), "order": 1, "structures": ONE_LAG}, OptionError, "got both"),
+        ({"frf": cr.MeasuredFRF([1.0, 0.5], [1.0, 2.0])}, DataError, "at least 3"),
+    ],
+)
+def test_what_cannot_be_fitted_together_is_refused(arguments, error, match):
+    with pytest.raises(error, match=match):
+        cr.identify(step(), **arguments)
+
+
+def test_few_points_take_part():
+    frf = response()
+    fit = fit_joint(step(), cr.MeasuredFRF(frf.complex[::3], HZ[::3], std=frf.std[::3])).fit
+    assert fit.frf_fit.frequency_hz.size == 5
+    assert not fit.agreement.contradicts
+
+
+def test_the_data_of_the_caller_are_not_changed():
+    record, frf = step(), response()
+    before = record.output.copy(), frf.complex.copy()
+    fit_joint(record, frf, structures=ONE_LAG)
+    assert np.array_equal(record.output, before[0])
+    assert np.array_equal(frf.complex, before[1])
+
+
+def measured_plant(folder, name):
+    records = [cr.read_record(path) for path in sorted((folder / name).glob("[!fp]*.csv"))]
+    return cr.identify(records, frf=cr.read_frf(folder / name / "frf.csv")).fit
+
+
+def test_steps_of_a_measured_heater_agree_with_its_frequency_response(shared_data):
+    fit = measured_plant(shared_data, "sbhs_heater")
+    assert not fit.agreement.contradicts
+    assert 1.0 < fit.dead_time < 4.5  # the band of the README of the data, in s
+    before = np.diff(fit.record_fit.interval)
+    assert np.diff(fit.interval) < 0.5 * before
+
+
+def test_the_frequency_response_of_a_measured_arm_differs_at_high_frequencies(shared_data):
+    fit = measured_plant(shared_data, "hdd_arm")
+    assert fit.agreement.contradicts
+    hz = fit.frf_fit.frequency_hz
+    assert np.mean(fit.agreement.outside[hz > 15]) > 0.3 > np.mean(fit.agreement.outside[hz < 15])
