@@ -17,6 +17,7 @@ from benchmarks.worlds.simulation import (
     step,
     stepped,
 )
+from ctrl_realize.numerics.output_error.step_data import step_data
 from tests import rigs
 
 Rng = np.random.Generator
@@ -146,11 +147,13 @@ def louder_from_the_step_on(rng: Rng) -> Case:
 
 
 def rest_like_a_slope(rng: Rng) -> Case:
-    """AR(1) noise with a pole at 0.995 and 2 % of the step, 100 samples of rest."""
-    plant, u = drawn(rng), step(700, 100)
+    """AR(1) noise with a pole at 0.99 and 2 % of the step; 100 samples at rest look drifting."""
+    plant, u = drawn(rng), step(400, 100)
     y = stepped(rng, plant, u)
-    noise = coloured(rng, u.size, 0.995)
-    return plant.case(record(u, noisy(rng, y + 0.02 * np.ptp(y) * noise / np.std(noise), 0.003)))
+    while True:
+        seen = noisy(rng, y + 0.02 * np.ptp(y) * coloured(rng, u.size, 0.99), 0.002)
+        if step_data(seen, u, DT, [(100, 100)]).drift:
+            return plant.case(record(u, seen))
 
 
 def drive_with_friction(rng: Rng) -> Case:

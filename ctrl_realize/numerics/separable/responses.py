@@ -100,9 +100,9 @@ class StepSequence:
         if widths[-1] == 1:
             return static, mode, slope
         mean, turn = _geometric_mean(rates[:, None] * self.dt, widths[:, None])
-        mean = mean[:, kind]
+        mean = mean.take(kind, axis=1)
         slope *= mean
-        slope += mode * (self.dt * turn)[:, kind]
+        slope += mode * (self.dt * turn).take(kind, axis=1)
         mode *= mean
         row, column = np.nonzero(here != self._arrived(since + self._lengths))
         if row.size:
@@ -139,7 +139,10 @@ class StepSequence:
 
     def _arrived(self, since: FloatArray) -> IntArray:
         """Count the changes that have arrived at delayed times (B, m)."""
-        return np.searchsorted(self._steps[0], since, side="left")
+        arrivals = self._steps[0]
+        if arrivals.size == 1:
+            return (since > arrivals[0]).astype(np.int64)
+        return np.searchsorted(arrivals, since, side="left")
 
     def _decayed(
         self,

@@ -52,6 +52,17 @@ def test_white_noise_that_comes_with_the_motion_is_noise(seed):
     assert fit.interval[0] <= 12.6 <= fit.interval[1]
 
 
+@pytest.mark.parametrize("seed", [22, 31])
+def test_a_slope_of_slow_noise_before_the_step_does_not_change_the_gain(seed):
+    # Taken for a free response or a drift that goes on, it changes the gain by 2 %.
+    rng = np.random.default_rng([seed, 7])
+    u, y = response((40.0, 12.0), 8.3, n=400, edge=100)
+    slow = lfilter([np.sqrt(1 - 0.99**2)], [1, -0.99], rng.standard_normal(900))[500:]
+    fit = fitted(u, y + 0.02 * slow + 0.002 * rng.standard_normal(400))
+    assert fit.gain == pytest.approx(1.0, abs=0.012)
+    assert fit.interval[0] <= 8.3 <= fit.interval[1]
+
+
 @pytest.mark.parametrize(("lags", "delay", "seed"), [((20.0, 8.0), 5.0, 1), ((20.0, 8.0), 2.3, 1)])
 def test_rounding_is_not_taken_for_dispersion(lags, delay, seed):
     # Where each level begins is all that is known; the beginning is between two of them.
