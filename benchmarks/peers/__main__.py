@@ -168,7 +168,7 @@ def _fits(
     measured: list[Measured], found: dict[tuple[str, Measured], tuple[Answer, float] | str]
 ) -> list[str]:
     """Tabulate fits beside that of the best rival, and what `identify` says of its own."""
-    lines = _header(["record", "identify", *RIVALS, "best of all", "flags of identify"])
+    lines = _header(["record", "identify", *RIVALS, "best of all", "what identify reports"])
     for one in measured:
         fits = {
             name: one.fit(answer[0])
@@ -177,12 +177,12 @@ def _fits(
         }
         own = found[IDENTIFY, one]
         assert not isinstance(own, str)
-        ours, flags = fits.pop(IDENTIFY), own[0].flags
+        ours, reasons = fits.pop(IDENTIFY), own[0].reasons
         best = max((name for name in fits if PACKAGE[name] != "ctrl-realize"), key=fits.__getitem__)
         shown = [f"{fits[name]:.1f}" if name in fits else "-" for name in RIVALS.values()]
         ahead = fits[best] > ours + NEARLY
         rival = f"**{fits[best]:.1f}** {best}" if ahead else f"{fits[best]:.1f}"
-        words = ", ".join(f"`{flag}`" for flag in flags) if ahead else ""
+        words = "; ".join(reasons) if ahead else ""
         lines.append(
             f"| {one.plant}/{one.name} | {ours:.1f} | " + " | ".join([*shown, rival, words]) + " |"
         )
@@ -285,8 +285,11 @@ def main() -> None:
             "end of the band, which is also where all other searches end, `identify` and the "
             "paper's settings excepted, which are told nothing of it. Fits in the last table: a "
             f"rival is named where it is better by more than {NEARLY:g} points, with what "
-            "`identify` says of its model: a drift or free response that it estimated together "
-            "with the model is not in a simulation of the model alone. The rules of `identify` "
+            "`identify` reports (there in per cent of the whole record): a drift or free response "
+            "that it estimated together with the model is not in a simulation of the model alone; "
+            "a structure that follows more closely was not chosen, since it does so by no more "
+            "than its additional parameters follow noise, or since no structure is adequate. The "
+            "rules of `identify` "
             f"were made with the records of {', '.join(FIRST)} in view, and one of them with "
             "two_cart_drive, which flatters it. "
         )

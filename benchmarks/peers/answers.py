@@ -13,7 +13,7 @@ from scipy.signal import lfilter, oaconvolve
 class Answer:
     """A delay in samples (None where the way estimates none) and a model of the scaled record.
 
-    `flags` are the codes of what the way says against its own result.
+    `reasons` are what the way says about the fit of its own result.
     """
 
     delay: float | None
@@ -21,7 +21,7 @@ class Answer:
     """Frequencies in Hz to complex gains."""
     simulate: Callable[[np.ndarray], np.ndarray]
     """Input, from rest, to output."""
-    flags: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
 
 
 def of_polynomials(delay: float | None, b: np.ndarray, f: np.ndarray, dt: float) -> Answer:

@@ -20,6 +20,9 @@ RUNNERS: dict[str, Callable[[Task], Answer]] = {}
 GIVEN: dict[str, str] = {}
 PACKAGE: dict[str, str] = {}
 
+WORTH_A_WORD = 0.5
+"""Per cent of a response by which another fit is better, from which on it is told."""
+
 BLOCKS = 500
 """Block rows and columns of a Hankel matrix of pulses: twice as many pulses are used at most."""
 
@@ -38,8 +41,21 @@ def of_system(delay: float, system: Any, task: Task) -> Answer:
         delay,
         lambda hz: task.gain * system(np.exp(2j * np.pi * hz * task.dt)),
         lambda u: task.gain * np.asarray(system.simulate(u)),
-        tuple(flag.code for flag in system.fit.flags) if hasattr(system, "fit") else (),
+        reasons(system.fit) if isinstance(system.fit, cr.identification.OutputErrorFit) else (),
     )
+
+
+def reasons(fit: cr.identification.OutputErrorFit) -> tuple[str, ...]:
+    """List what a fit reports of how closely its model follows the record."""
+    followed = fit.estimate.followed
+    words = []
+    if followed.complete - followed.simulated > WORTH_A_WORD:
+        words.append(f"{followed.complete:.1f} % with the drift or free response before the step")
+    if followed.by_closest - followed.complete > WORTH_A_WORD:
+        order, degree = followed.closest.order, followed.closest.relative_degree
+        words.append(f"order {order}, relative degree {degree}: {followed.by_closest:.1f} %")
+    words.append("residual at noise level" if fit.at_noise_level else "no structure is adequate")
+    return tuple(words)
 
 
 @runner("ctrl_realize: identify", "ctrl-realize", "nothing")

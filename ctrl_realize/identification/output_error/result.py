@@ -20,10 +20,14 @@ from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR
+from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
 from .words import ESTIMATE_WORDS, gain_in_words, total_in_words
+
+FOLLOWED_LESS = 0.5
+"""Per cent of a response by which two fits differ, from which on the difference is stated."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -234,6 +238,14 @@ class OutputErrorFit(FractionalDelayFit):
         return self.estimate.fitted
 
     @property
+    def fit_percent(self) -> float:
+        """``100 (1 - |y - fitted| / |y - mean y|)``: 100 is perfect, 0 a mean.
+
+        A drift, hum or free response that was estimated together with the model is included.
+        """
+        return float(fit_percent(self.measured[None], self.fitted[None])[0])
+
+    @property
     def dt(self) -> float:
         """Sample time in s."""
         return self.data.dt
@@ -273,6 +285,13 @@ class OutputErrorFit(FractionalDelayFit):
             f"relative degree {self.relative_degree}, residual {level}>"
         )
 
+    def _fit_in_words(self) -> str:
+        own, alone = self.fit_percent, self.estimate.followed.simulated
+        words = f"{own:.1f} % of the response"
+        if self.data.edges and own - alone > FOLLOWED_LESS:
+            words += f"; {alone:.1f} % by the model without drift, hum and free response"
+        return words
+
     def _std(self) -> float:
         return self.std_given_structure
 
@@ -300,6 +319,7 @@ class OutputErrorFit(FractionalDelayFit):
             ("model", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", poles_in_words(self.poles)),
             ("gain", gain_in_words(self.gain, self.gain_interval)),
+            ("fit", self._fit_in_words()),
             (
                 "residual",
                 f"{self.residual:.3g}, noise {self.noise:.3g} "

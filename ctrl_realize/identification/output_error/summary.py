@@ -12,7 +12,7 @@ from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...results import Flag
 from .repeatability import Repeatability
-from .result import OutputErrorFit
+from .result import FOLLOWED_LESS, OutputErrorFit
 from .words import model_words
 
 
@@ -74,6 +74,7 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             if len(fit.structures) > 1
             else f"{kind}: the only structure that was tried"
         ]
+    reasons += _closest(fit)
     if fit.delay_estimates:
         why = (
             "no model fits down to the noise level"
@@ -101,6 +102,23 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             "independent sample"
         )
     return tuple(reasons)
+
+
+def _closest(fit: OutputErrorEstimate) -> list[str]:
+    """Name a structure that follows the record more closely, and is not the model."""
+    followed = fit.followed
+    other = followed.closest
+    if other == fit.structure or followed.by_closest - followed.complete < FOLLOWED_LESS:
+        return []
+    return [
+        f"order {other.order}, relative degree {other.relative_degree} follows the record more "
+        f"closely (fit {followed.by_closest:.1f} % instead of {followed.complete:.1f} %), but "
+        + (
+            "not more than additional parameters follow noise (information criterion)"
+            if fit.adequate
+            else "no structure reaches the noise, and the simple ones are more reliable then"
+        )
+    ]
 
 
 def _interval_of(fit: OutputErrorEstimate) -> str:

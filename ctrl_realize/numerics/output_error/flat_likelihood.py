@@ -24,7 +24,7 @@ from ..separable.profile import dead_time_error
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
 from .margins import close_to
-from .result import OutputErrorEstimate, RobustKey
+from .result import OutputErrorEstimate, RobustKey, followed_by
 from .step_data import StepData
 
 _PINNED = 0.25
@@ -81,6 +81,7 @@ def moved(
         poles=fixed.poles,
         numerator=state.numerator[0],
         fitted=whole.window.predict(whole.problem, fixed),
+        followed=followed_by(whole, fixed, state.numerator[0]),
         static=whole.static(fixed),
         delay_estimates=views,
     )

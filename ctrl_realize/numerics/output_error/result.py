@@ -21,8 +21,9 @@ from ..separable.lag_chains import LagChain, lag_sum
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import StaticGain, averaged_ends
 from ..separable.structures import Candidate, Scales, needless_parameters
-from ..separable.varpro import Structure, evaluate
+from ..separable.varpro import Structure, evaluate, respond
 from ..separable.window import WindowFit
+from ..signals.correlation import fit_percent
 from .margins import CloseDecision
 from .profiles import Profile
 
@@ -39,6 +40,20 @@ RobustKey: TypeAlias = Literal[
     "model_of_record",
 ]
 """Dead time estimates where no model is adequate: "early" is 15 % of the excursion, "rise" 63 %."""
+
+
+class Followed(NamedTuple):
+    """How much of an output, in per cent, models follow: 100 (1 - |error| / |y - mean|).
+
+    `complete` is that of the chosen model with drift, hum and free response, `simulated` without
+    them; `closest` is the structure with the smallest residual, whatever its number of parameters,
+    and `by_closest` how much it follows, with all of these.
+    """
+
+    complete: float
+    simulated: float
+    closest: Structure
+    by_closest: float
 
 
 class OtherModel(NamedTuple):
@@ -138,6 +153,7 @@ class OutputErrorEstimate:
     structures: tuple[StructureFit, ...]
     delay_estimates: tuple[tuple[RobustKey, float], ...]
     fitted: FloatArray
+    followed: Followed
     profile: Profile
     latest: float
     chain: LagChain | None = None
@@ -195,6 +211,17 @@ def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[Struct
     return tuple(sorted(lines, key=lambda line: line.delta_bic))
 
 
+def followed_by(whole: WindowFit, chosen: Candidate, numerator: FloatArray) -> Followed:
+    """Compare a model alone, and the structure with the smallest residual, with the output."""
+    window, problem = whole.window, whole.problem
+    closest = min(whole.candidates.values(), key=lambda candidate: candidate.cost)
+    alone = respond(window.drive, problem.known, numerator, chosen.parameters)
+    alone += np.mean(window.output - alone)
+    modelled = [window.predict(problem, chosen), alone, window.predict(problem, closest)]
+    complete, simulated, most = fit_percent(np.tile(window.output, (3, 1)), np.stack(modelled))
+    return Followed(float(complete), float(simulated), closest.structure, float(most))
+
+
 def assembled(
     whole: WindowFit,
     chosen: Candidate,
@@ -237,6 +264,7 @@ def assembled(
         structures=_table(whole, profiles),
         delay_estimates=delay_estimates,
         fitted=whole.window.predict(whole.problem, chosen),
+        followed=followed_by(whole, chosen, numerator),
         profile=profile,
         latest=whole.scales.latest,
         relaxing=relaxing,

@@ -141,7 +141,7 @@ class StepSequence:
         """Count the changes that have arrived at delayed times (B, m)."""
         arrivals = self._steps[0]
         if arrivals.size == 1:
-            return (since > arrivals[0]).astype(np.int64)
+            return np.asarray(since > arrivals[0], dtype=np.int64)
         return np.searchsorted(arrivals, since, side="left")
 
     def _decayed(
