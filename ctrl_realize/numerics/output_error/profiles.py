@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..separable.compared_fits import settled
 from ..separable.profile import Points, dead_time_profile, profile_curve, profile_points, with_ends
-from ..separable.profile_ends import profile_limits
+from ..separable.profile_ends import bracket_ends, profile_limits
 from ..separable.structures import Candidate
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
@@ -29,6 +29,11 @@ _LOWER = 0.01
 
 Ablation: profiles followed below a minimum."""
 _ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
+_NO_POINT_NEAR = 50.0
+"""Variances of a point beyond an end above which none was laid near it: those near an end of the
+interval that the curvature at the minimum tells reach three half intervals, 35 variances. Beside a
+zero that takes the place of dead time there is no such curvature, and the profile is no parabola:
+ends between its points were off by a factor of 5."""
 
 Profile: TypeAlias = tuple[FloatArray, FloatArray]
 """Dead times, and the misfit at each; see `dead_time_profile`."""
@@ -51,20 +56,33 @@ def solved_profiles(
     """Profile points, with the ends of the intervals that may be ends of all of them.
 
     Between the points of a profile its ends are known to a few parts in a hundred; those of the
-    chosen structure, and those that lie as far out as any, are solved for.
+    chosen structure, those that lie as far out as any, and those without a point near them are
+    solved for.
     """
     setting = whole.variance, whole.scales
-    limits = {s: profile_limits(*profile) for s, profile in curves(whole, points).items()}
+    profiles = curves(whole, points)
+    limits = {s: profile_limits(*profile) for s, profile in profiles.items()}
     # None are left where a dispersed flow rules out every structure.
     low = min((first for first, _ in limits.values()), default=np.inf)
     high = max((last for _, last in limits.values()), default=-np.inf)
     found = dict(points)
     for s, (first, last) in limits.items():
         margin = _ROUGHLY * (last - first)
-        ends = s == chosen or first - margin <= low, s == chosen or last + margin >= high
+        lower, upper = _without_points(profiles[s])
+        ends = (
+            s == chosen or lower or first - margin <= low,
+            s == chosen or upper or last + margin >= high,
+        )
         if any(ends):
             found[s] = with_ends(whole.problem, points[s], *setting, ends)
     return found
+
+
+def _without_points(profile: Profile) -> tuple[bool, bool]:
+    """Whether no point of a profile lies near its lower, and its upper end."""
+    excess = dict(zip(*profile, strict=True))
+    far = {at > near: excess[at] > _NO_POINT_NEAR for near, at in bracket_ends(excess)}
+    return far.get(False, False), far.get(True, False)
 
 
 def curves(whole: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Profile]:
