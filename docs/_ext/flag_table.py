@@ -36,8 +36,8 @@ COMPOSED = {
     "frf_contradicts_records": "records and frequency response have no common model (likelihood "
     "ratio …): the joint model is outside of the 95 % circles of … points of the frequency "
     "response, by most at …, mainly from … to …, and is up to … residuals of the records away from "
-    "their own model, mainly at …. Neither another gain nor another dead time explains it: the dynamics "
-    "differ. The interval spans those of each alone",
+    "their own model, mainly at …. Neither another gain nor another dead time explains it: the "
+    "dynamics differ. The interval spans those of each alone",
     "structured_misfit": "no model fits down to the noise level: the plant is nonlinear or has "
     "unmodelled dynamics; the dead time is the median of five delay estimates and the interval is "
     "their range",

@@ -133,17 +133,17 @@ def fit_joint(
     )
     latest = None if max_delay is None else max_delay * first.dt
     part, data, time = _part(first, latest)
-    joint = joint_fit(_with_spread(part, first), _points(other), _starts(first, other))
+    lows, highs = zip(first.interval, other.interval, strict=True)
+    span = float(min(lows)), float(max(highs))
+    joint = joint_fit(_with_spread(part, first), _points(other), _starts(first, other), span)
     estimate, agreed = joint.estimate, joint.agreement
-    ends = [(estimate.low, estimate.high)]
     if agreed.contradicts:
-        ends += [first.interval, other.interval]
+        low, high = min(span[0], estimate.dead_time), max(span[1], estimate.dead_time)
+        estimate = replace(estimate, low=low, high=high)
     growth = float(np.std(part.output - estimate.fitted))
     growth /= max(float(np.std(first.measured - first.fitted)), SMALLEST)
     estimate = replace(
         estimate,
-        low=float(min(low for low, _ in ends)),
-        high=float(max(high for _, high in ends)),
         adequate=first.at_noise_level and not agreed.contradicts,
         residual=first.residual * growth,
         correlation=first.correlation,

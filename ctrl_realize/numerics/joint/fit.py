@@ -46,6 +46,7 @@ def joint_fit(
     record: RecordPart,
     points: MeasuredPoints,
     starts: Mapping[Structure, Sequence[StartPoint]],
+    within: tuple[float, float],
 ) -> JointEstimate:
     """Fit all structures to both, and compare with what each would have alone.
 
@@ -55,16 +56,21 @@ def joint_fit(
     points : MeasuredPoints
     starts : mapping of Structure to sequences
         The structures to try, each with models of one of the two.
+    within : tuple of float
+        Range of the dead time in s that contains the intervals of both: where they contradict each
+        other, a compromise in all other parameters may lie far from either.
     """
+    low = min(within[0], 0.99 * record.scales.latest)
+    scales = replace(record.scales, earliest=low, latest=min(within[1], record.scales.latest))
     alone = points.problem()
     problem = both_together(record.problem, alone)
     samples = record.independent + 2 * points.omega.size
-    from_points = search(alone, starts, record.scales)
-    first = _starting_fits(problem, starts, from_points, record.scales)
-    candidates = converged(problem, first, record.scales, 1.0, samples)
+    from_points = search(alone, starts, scales)
+    first = _starting_fits(problem, starts, from_points, scales)
+    candidates = converged(problem, first, scales, 1.0, samples)
     window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
     window = replace(window, samples=int(np.ceil(samples)))
-    whole = WindowFit(window, problem, candidates, {}, record.scales, 1.0, 1.0, 1.0, colour=1.0)
+    whole = WindowFit(window, problem, candidates, {}, scales, 1.0, 1.0, 1.0, colour=1.0)
     whole = replace(whole, criterion=whole.criteria(candidates))
     found = likelihood_fit(whole, adequate=True)
     own = np.concatenate([[found.dead_time], parameters_from_poles(found.poles)])
