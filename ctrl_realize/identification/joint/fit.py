@@ -9,6 +9,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
+from ..._wording import in_time
 from ...data import Record
 from ...data.given import as_records
 from ...delayed import DelayedStateSpace, delayed_ss, fit_of
@@ -21,6 +22,7 @@ from ...numerics.joint.fit import joint_fit
 from ...numerics.joint.frf_rows import MeasuredPoints
 from ...numerics.joint.own_effects import EffectKey, with_random_effects
 from ...numerics.joint.record_part import RecordPart, sampled_data, sampled_part, step_part
+from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
 from ...numerics.rational.search import points_as_one
 from ...numerics.separable.varpro import Structure
@@ -135,7 +137,9 @@ def fit_joint(
     part, data, time = _part(first, latest)
     lows, highs = zip(first.interval, other.interval, strict=True)
     span = float(min(lows)), float(max(highs))
-    joint = joint_fit(_with_spread(part, first), _points(other), _starts(first, other), span)
+    spread = _spread(first)
+    part = with_random_effects(part, first.estimate, spread)
+    joint = joint_fit(part, _points(other), _starts(first, other), span)
     estimate, agreed = joint.estimate, joint.agreement
     if agreed.contradicts:
         low, high = min(span[0], estimate.dead_time), max(span[1], estimate.dead_time)
@@ -159,6 +163,7 @@ def fit_joint(
         record_fit=first,
         frf_fit=other,
         agreement=agreed,
+        choices=_choices(estimate, first, other, spread),
     )
     result = replace(result, flags=joint_flags(result, max_delay))
     return delayed_ss(
@@ -201,22 +206,52 @@ def _part(first: OutputErrorFit, latest: float | None) -> tuple[RecordPart, Step
     return part, shown, np.concatenate(times)
 
 
-def _with_spread(part: RecordPart, first: OutputErrorFit) -> RecordPart:
-    """Let what differs between records by more than their noise deviate from the plant's."""
+def _spread(first: OutputErrorFit) -> list[tuple[EffectKey, float]]:
+    """Standard errors of what differs between records by more than their noise."""
     repeats = first.repeatability
     if repeats is None:
-        return part
+        return []
     kept = np.array([name not in repeats.outlying for name in repeats.names])
-    spread: list[tuple[EffectKey, float]] = []
     tests: tuple[tuple[EffectKey, FloatArray, float], ...] = (
         ("gain", repeats.gains, repeats.gain_test[1]),
         ("dead_time", repeats.delays, repeats.p_value),
         ("lags", np.log(repeats.lags), repeats.lag_test[1]),
     )
-    for key, values, chance in tests:
-        if chance < BY_CHANCE:
-            spread.append((key, float(np.std(values[kept], ddof=1) / np.sqrt(kept.sum()))))
-    return with_random_effects(part, first.estimate, spread)
+    return [
+        (key, float(np.std(values[kept], ddof=1) / np.sqrt(kept.sum())))
+        for key, values, chance in tests
+        if chance < BY_CHANCE
+    ]
+
+
+def _choices(
+    estimate: OutputErrorEstimate,
+    first: OutputErrorFit,
+    other: FRFFit,
+    spread: Sequence[tuple[EffectKey, float]],
+) -> tuple[str, ...]:
+    s, count = estimate.structure, len(estimate.structures)
+    kind = f"order {s.order}, relative degree {s.relative_degree}"
+    reasons = [
+        f"{kind}: lowest information criterion of {count} structures on both together"
+        if count > 1
+        else f"{kind}: the only structure that was tried",
+        f"noise of the records: {first.residual:.3g}, {first.correlation:.3g} samples count as one",
+        "noise of the frequency response: its standard deviation"
+        if other.noise_known
+        else "noise of the frequency response: the scatter about its own fit",
+    ]
+    said = {
+        "gain": lambda std: f"gains ({100 * std:.2g} %)",
+        "dead_time": lambda std: f"dead times ({in_time(std)})",
+        "lags": lambda std: f"time constants ({100 * std:.2g} %)",
+    }
+    if spread:
+        reasons.append(
+            "differences between the records enter with the standard error of their mean: "
+            + ", ".join(said[key](std) for key, std in spread)
+        )
+    return tuple(reasons)
 
 
 def _points(fit: FRFFit) -> MeasuredPoints:

@@ -71,6 +71,10 @@ class JointFit(OutputErrorFit):
     def __repr__(self) -> str:
         return f"<Joint{super().__repr__()[len('<OutputError') :]}"
 
+    def _fit_in_words(self) -> str:
+        differs = "free response, and with the common gain, dead time and lags"
+        return super()._fit_in_words().replace("free response", differs)
+
     def _method(self) -> str:
         return "output-error fit of raw records and a frequency response"
 

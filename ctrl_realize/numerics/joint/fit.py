@@ -19,13 +19,14 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..output_error.interval import likelihood_fit
-from ..output_error.result import OutputErrorEstimate
+from ..output_error.result import Followed, OutputErrorEstimate
 from ..separable.batch_search import fit_batch
 from ..separable.compared_fits import converged
 from ..separable.poles import parameters_from_poles
 from ..separable.structures import Candidate, Scales, neighbour_starts, parameter_bounds, search
-from ..separable.varpro import Problem, Structure
+from ..separable.varpro import KnownFactor, Problem, Structure, respond
 from ..separable.window import Window, WindowFit
+from ..signals.correlation import fit_percent
 from .agreement import Agreement, agreement
 from .frf_rows import MeasuredPoints, both_together
 from .record_part import RecordPart
@@ -85,7 +86,18 @@ def joint_fit(
             at = np.concatenate([[line.dead_time], parameters_from_poles(line.poles)])
             other = agreement(*setting, Candidate(line.structure, at, 0.0), near)[1]
             agreed = agreed if other.contradicts else other
-    return JointEstimate(replace(found, fitted=fitted), agreed)
+    return JointEstimate(
+        replace(found, fitted=fitted, followed=_followed(record, found, fitted)), agreed
+    )
+
+
+def _followed(record: RecordPart, found: OutputErrorEstimate, fitted: FloatArray) -> Followed:
+    """How much of the records the joint model follows, which are only a part of the rows."""
+    own = np.concatenate([[found.dead_time], parameters_from_poles(found.poles)])
+    alone = respond(record.drive, KnownFactor(), found.numerator, own)
+    alone = alone + np.mean(record.output - alone)
+    both = fit_percent(np.stack([record.output, record.output]), np.stack([fitted, alone]))
+    return Followed(float(both[0]), float(both[1]), found.structure, float(both[0]))
 
 
 def _parameters(starts: Sequence[StartPoint]) -> list[FloatArray]:

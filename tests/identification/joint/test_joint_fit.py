@@ -208,6 +208,7 @@ def test_gains_that_differ_between_records_make_the_common_one_uncertain():
     assert not several.agreement.contradicts  # the mean of 4 has a standard error of 9 %
     assert alike.agreement.contradicts
     assert several.gain > 1.03 * GAIN  # that of the frequency response
+    assert any("gains (9." in reason for reason in several.choices)  # 0.183 / sqrt(4)
 
 
 def test_identify_delegates_and_its_result_has_what_all_fits_have():
@@ -216,6 +217,10 @@ def test_identify_delegates_and_its_result_has_what_all_fits_have():
     assert isinstance(fit, cr.identification.JointFit)
     assert fit.dead_time == agreeing().dead_time
     assert_allclose(system.dcgain(), fit.gain, rtol=1e-6)
+    left = np.linalg.norm(fit.measured - fit.fitted)
+    spread = np.linalg.norm(fit.measured - fit.measured.mean())
+    assert_allclose(fit.estimate.followed.complete, 100 * (1 - left / spread), rtol=1e-9)
+    assert_allclose(fit.estimate.followed.simulated, fit.fit_percent, atol=0.01)  # a level alone
     assert "agreement" in fit.report()
     assert repr(fit).startswith("<JointFit 0.12")
     assert pickle.loads(pickle.dumps(fit)).dead_time == fit.dead_time
