@@ -82,6 +82,7 @@ TABLES = {
     "fuzz": ("docs/fuzz_table.md", "python3 tools/fuzz_table.py"),
     "peers": ("docs/peers_table.md", "python -m benchmarks.peers simulated"),
     "crossed": ("docs/crossed_table.md", "python -m benchmarks.peers crossed"),
+    "joint": ("docs/joint_table.md", "python -m benchmarks.peers joint"),
     "peers_measured": ("docs/peers_measured_table.md", "python -m benchmarks.peers measured"),
 }
 (GENERATED / "tables").mkdir(exist_ok=True)

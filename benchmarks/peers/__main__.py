@@ -19,6 +19,7 @@ import numpy as np
 
 from .answers import Answer
 from .crossed import crossed_table
+from .joint import joint_table
 from .measured import FIRST, SETS, Measured, records
 from .runners import GIVEN, PACKAGE, RUNNERS
 from .starts import STARTS
@@ -243,7 +244,7 @@ def made(command: str) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("table", choices=("simulated", "measured", "crossed"))
+    parser.add_argument("table", choices=("simulated", "measured", "crossed", "joint"))
     parser.add_argument("--seeds", type=int, default=10, help="simulated records for each cell")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the measured records")
     parser.add_argument("--output", type=Path, help="Markdown file to write")
@@ -269,6 +270,17 @@ def main() -> None:
             "Each cell: median over all pairs of different records of a plant of the fit in "
             "percent (NRMSE after the step, offset taken off) of one record by the model of the "
             "other, as it is / with the best gain for that record. Way told the order: 3. "
+        )
+    elif arguments.table == "joint":
+        lines = joint_table(records(arguments.data))
+        note = (
+            "Each cell: median over the records of a plant, each left out once, of the fit in "
+            "percent (NRMSE after the step, offset taken off) of that record by models of the "
+            "others, as it is / with the best gain for that record. Single fits: median of the "
+            "predictions of their models. Own gains, as it is: with the gain that the schedule has "
+            "at the operating point of the record left out, which is beyond the others for two "
+            "records of three. Records whose sample times differ by less than 0.1 % were "
+            "resampled to the median. "
         )
     else:
         every = records(arguments.data)

@@ -8,6 +8,7 @@ from .joint.fit import fit_joint as fit_joint
 from .joint.result import JointFit as JointFit
 from .methods import identify as identify
 from .output_error.fit import fit_output_error as fit_output_error
+from .output_error.record_gains import RecordGains as RecordGains
 from .output_error.result import OutputErrorFit as OutputErrorFit
 from .realization.delay_scan import estimate_delay as estimate_delay
 from .realization.delay_scan_result import DelayScan as DelayScan

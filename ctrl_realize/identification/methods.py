@@ -43,6 +43,7 @@ class IdentifyOptions(TypedDict, total=False):
     noise: Literal["auto", "white"]
     structures: Sequence[tuple[int, int]] | None
     include_known: bool
+    gains: Literal["common", "own"]
     cutoff_hz: float | Literal["auto"] | None
     samples: int | None
     feedthrough: bool | None
@@ -64,6 +65,7 @@ def identify(
     noise: Literal["auto", "white"] = "auto",
     structures: Sequence[tuple[int, int]] | None = None,
     include_known: bool = False,
+    gains: Literal["common", "own"] = "common",
     cutoff_hz: float | Literal["auto"] | None = "auto",
     samples: int | None = None,
     feedthrough: bool | None = None,
@@ -88,7 +90,7 @@ def identify(
         Largest delay in samples. Default: for ``"scan"`` the time at which the step response has
         reached half of its final value, for ``"paper"`` 100, for ``"output_error"`` see
         `fit_output_error`.
-    known, loss, noise, structures, include_known : optional
+    known, loss, noise, structures, include_known, gains : optional
         For ``"output_error"``, see `fit_output_error`.
     cutoff_hz, samples, feedthrough : optional
         For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
@@ -149,7 +151,7 @@ def identify(
     scan_only["feedthrough"] = feedthrough is not None
     fit_only = {"known": known is not None, "structures": structures is not None}
     fit_only |= {"loss": loss != "huber", "noise": noise != "auto"}
-    fit_only["include_known"] = include_known
+    fit_only |= {"include_known": include_known, "gains": gains != "common"}
     if frf is not None and method == "output_error":
         given = [name for name, used in (scan_only | fit_only).items() if used]
         if strange := [name for name in given if name != "structures"]:
@@ -188,6 +190,7 @@ def identify(
             noise=noise,
             structures=structures,
             include_known=include_known,
+            gains=gains,
         )
         stepped = np.isfinite(fit_of(system, OutputErrorFit).onset)
         if stepped or known is not None:

@@ -24,6 +24,7 @@ from ..numerics.signals.noise_model import coloured_criterion
 from ..results import Flag
 from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
+from .output_error.own_gains import at_model_gain
 from .output_error.result import OutputErrorFit
 from .state_space_fit.result import Timing
 from .state_space_fit.starts import Outcome, from_starts
@@ -61,10 +62,11 @@ def with_modes_judged(
 ) -> DelayedStateSpace:
     """Try a state-space model if the residual is correlated with the input; return the better one.
 
-    With `asked`, the structure was requested: its residual is tested, but nothing else is tried.
+    With `asked`, the structure was requested: its residual is tested, but nothing else is tried;
+    neither for records with gains of their own.
     """
     fit = fit_of(system, OutputErrorFit)
-    records, cut = lively_parts(fit.records)
+    records, cut = lively_parts(at_model_gain(fit))
     try:
         follows, left = _left(system, records)
     except UnsuitableSystemError:  # an unstable model is not simulated
@@ -78,6 +80,8 @@ def with_modes_judged(
             "identify without order and structures, or fit_state_space, also tries "
             "state-space models"
         )
+    elif fit.gains is not None:
+        why = "no other model was tried with a gain for each record"
     elif outlying:
         why = "the records do not agree on one plant, so no other model was tried"
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .campaigns import campaign_plot
+from .campaigns import campaign_plot, gain_plot
 from .delays import bootstrap_plot, delay_comparison_plot, track_plot
 from .dispatch import draw
 from .fits import dead_time_plot, fit_plot
@@ -29,6 +29,7 @@ __all__ = [
     "fit_plot",
     "frf_fit_plot",
     "frf_plot",
+    "gain_plot",
     "hankel_plot",
     "impulse_estimate_plot",
     "impulse_plot",

@@ -14,6 +14,7 @@ from .._wording import in_time
 from ..errors import DataError
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.rows import CampaignRow
+from ..identification.output_error.record_gains import RecordGains
 from . import style
 from .names import plain
 from .shared_docs import documented
@@ -90,6 +91,62 @@ def campaign_plot(
             known = f"truth {truth:.4g} (simulated)"
             along(truth, color=style.TRUTH, linestyle=":", label=known, **reach)
         return style.finished([axes], [lines], loc="upper left")
+
+
+@documented()
+def gain_plot(
+    gains: RecordGains, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the gain of every record with its interval over the operating point, and the schedule.
+
+    Horizontal lines reach from the input before the step to that after it; records that are not in
+    the fit are drawn as crosses.
+
+    Parameters
+    ----------
+    gains : RecordGains
+        ``sys.fit.gains`` of ``identify(records, gains="own")``.
+    **kwargs
+        Line properties of the points.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.bench.valve()
+    >>> records = [valve.step_record(amplitude, rng=1) for amplitude in (8.0, 12.0, 16.0)]
+    >>> sys = cr.fit_output_error(records, structures=[(3, 3)], gains="own")
+    >>> cplt = cr.plots.gain_plot(sys.fit.gains)
+    >>> cplt.figure.axes[0].get_xlabel()
+    'input level [unit of the input]'
+    """
+    looks = {"color": style.MEASURED, "marker": "o", "linestyle": "none", **kwargs}
+    name = f"{len(gains.names)} records, common dynamics"
+    with style.canvas(ax, title=title, default_title=name) as (axes,):
+        ends = zip(gains.low, gains.high, strict=True)
+        for x, g, span, (low, high) in zip(
+            gains.operating_points, gains.gains, gains.input_levels, ends, strict=True
+        ):
+            thin = {"color": looks["color"], "alpha": 0.45}
+            if np.isfinite([low, high]).all():
+                axes.plot([x, x], [low, high], linewidth=1.6, **thin)
+            if gains.scheduled_over == "input level":
+                axes.plot(span, [g, g], linewidth=0.8, **thin)
+        used = np.array([name not in gains.outlying for name in gains.names])
+        lines = axes.plot(gains.operating_points[used], gains.gains[used], label="records", **looks)
+        if not used.all():
+            crosses = {**looks, "marker": "x", "label": "outlying"}
+            lines += axes.plot(gains.operating_points[~used], gains.gains[~used], **crosses)
+        line: dict[str, Any] = {"color": style.MODEL, "linestyle": style.DASHES[0]}
+        points, values = gains.breakpoints
+        if points.size > 1:
+            shown = np.sort(np.r_[axes.get_xlim(), points])
+            lines += axes.plot(shown, np.interp(shown, points, values), label="schedule", **line)
+        else:
+            lines.append(axes.axhline(gains.reference, label="model", **line))
+        axes.set(
+            xlabel=f"{gains.scheduled_over} [unit of the input]", ylabel="gain [output / input]"
+        )
+        return style.finished([axes], [lines], loc="best")
 
 
 def _groups(campaign: Campaign) -> dict[float, list[CampaignRow]] | None:

@@ -15,7 +15,7 @@ from ..identification.output_error.result import OutputErrorFit
 from ..identification.realization.delay_scan_result import DelayScan
 from ..identification.realization.result import Realization
 from ..io.stored_fit import FitSummary
-from .campaigns import campaign_plot
+from .campaigns import campaign_plot, gain_plot
 from .delays import bootstrap_plot, delay_comparison_plot, track_plot
 from .fits import fit_plot
 from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
@@ -79,6 +79,7 @@ for _plot in (
     delay_comparison_plot,
     delay_robustness_plot,
     frf_fit_plot,
+    gain_plot,
     hankel_plot,
     impulse_estimate_plot,
     impulse_plot,

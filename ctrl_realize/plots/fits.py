@@ -155,10 +155,11 @@ def _each_record(axes: Axes, result: OutputErrorFit, factor: float) -> list[Line
     """Draw every record behind their mean, scaled to a unit step."""
     lines: list[Line2D] = []
     every = max(1, -(-len(result.records) // _MOST_RECORDS))
-    for record in result.records[::every]:
+    ratios = np.ones(len(result.records)) if result.gains is None else result.gains.ratios
+    for record, ratio in zip(result.records[::every], ratios[::every], strict=True):
         step = unit_step(record, remove_drift=False)
         time = factor * step.dt * np.arange(-step.pre_step.size, step.n_samples)
-        values = np.concatenate([step.pre_step, step.output])
+        values = np.concatenate([step.pre_step, step.output]) / ratio
         lines += axes.plot(
             time, values, color=style.MEASURED, linewidth=0.6, alpha=0.35, zorder=1,
             label=None if lines else f"{len(result.records)} records",

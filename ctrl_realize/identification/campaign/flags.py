@@ -61,7 +61,8 @@ def _different_gains(rows: Rows) -> list[Flag]:
             Flag(
                 "no_common_gain",
                 f"no single gain fits all records: the gains are {gains.min():.3g} to "
-                f"{gains.max():.3g}; identify the records of each operating point separately",
+                f"{gains.max():.3g}; identify(records, gains='own') fits one for each, with "
+                "common dynamics",
             ),
         )
     return flags

@@ -21,8 +21,9 @@ from ...numerics.validation.own_response import OwnResponse
 from ...results import Flag
 from .averaging import common_sample_time, compared, delay_outliers, widened
 from .flags import sampled_flags
+from .own_gains import unlike_records
 from .repeat_flags import repeat_flags
-from .repeatability import Repeatability
+from .repeatability import Repeatability, distinct
 from .result import OutputErrorFit
 from .summary import summarise
 
@@ -33,24 +34,35 @@ _APART = 5.0  # in standard deviations: largest distance of a record's gain from
 
 
 def fit_any_input(
-    records: tuple[Record, ...], limit: float | None, settings: Mapping[str, Any]
+    records: tuple[Record, ...],
+    limit: float | None,
+    settings: Mapping[str, Any],
+    ratios: FloatArray | None = None,
 ) -> tuple[OutputErrorFit, OutputErrorEstimate]:
     """Fit one model to all records; level, drift and initial state are estimated for each record.
 
     A record whose delay or gain is an outlier is left out, as among step records, until there are
-    no more outliers.
+    no more outliers. With `ratios`, the relative gains of the records, their inputs are multiplied
+    by them.
     """
     dt = common_sample_time(records)
     latest = None if limit is None else limit * dt
     used = tuple(range(len(records)))
+    scales = np.ones(len(records)) if ratios is None else ratios
+    signals = [(y, scale * u) for (y, u), scale in zip(map(_signals, records), scales, strict=True)]
     if len(records) == 1:
-        found = _fit(records, dt, latest, settings)
+        found = _fit(records, signals, dt, latest, settings)
         return _summary(found, found.fit, records, used, limit, ()), found.fit
     while True:
-        found = _fit(tuple(records[i] for i in used), dt, latest, settings)
-        own = [found.own_delay(*_signals(record)) for record in records]
+        found = _fit(
+            tuple(records[i] for i in used), [signals[i] for i in used], dt, latest, settings
+        )
+        own = [found.own_delay(*pair) for pair in signals]
         repeats = _repeatability(own, records, used, found.fit.dead_time)
-        apart = {*delay_outliers(repeats, used), *_gain_outliers(own, used)}
+        if ratios is None:
+            apart = {*delay_outliers(repeats, used), *_gain_outliers(own, used)}
+        else:
+            apart = set(unlike_records(repeats, used, dt))
         if not apart:
             break
         used = tuple(i for i in used if i not in apart)
@@ -63,11 +75,15 @@ def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
 
 
 def _fit(
-    records: tuple[Record, ...], dt: float, latest: float | None, settings: Mapping[str, Any]
+    records: tuple[Record, ...],
+    signals: list[tuple[FloatArray, FloatArray]],
+    dt: float,
+    latest: float | None,
+    settings: Mapping[str, Any],
 ) -> SampledFit:
     for record in records:
         _check_moves(record)
-    outputs, inputs = zip(*map(_signals, records), strict=True)
+    outputs, inputs = zip(*signals, strict=True)
     ways = {name: value for name, value in settings.items() if name != "whiten"}
     found = fit_sampled(outputs, inputs, dt, latest=latest, **ways)
     if found.explained < FOLLOWS:
@@ -99,7 +115,7 @@ def _repeatability(
     own: list[OwnResponse], records: tuple[Record, ...], used: tuple[int, ...], delay: float
 ) -> Repeatability:
     return compared(
-        tuple(record.name or f"record {i}" for i, record in enumerate(records)),
+        distinct(record.name for record in records),
         np.array([float(np.ptp(record.input)) for record in records]),
         own,
         used,

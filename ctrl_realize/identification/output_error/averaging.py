@@ -16,7 +16,7 @@ from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse, homogeneity, own_step_response
 from ..step.steps import unit_step
-from .repeatability import Repeatability
+from .repeatability import Repeatability, distinct
 
 _TRIM = 0.1  # at each end: 97 % efficient in Gaussian noise; one record of ten may be an outlier
 _SAME_AMPLITUDE = 0.03  # relative, below which steps count as equally high
@@ -67,7 +67,8 @@ def common_sample_time(records: tuple[Record, ...]) -> float:
         if abs(record.dt - first) > 1e-6 * first:
             raise DataError(
                 f"{named('record', record.name)} has dt={record.dt:g} s, the first has "
-                f"{first:g} s; records fitted together need the same sample time"
+                f"{first:g} s; records fitted together need the same sample time: "
+                f"Record.resampled(time, input, output, dt={first:g}) interpolates"
             )
     return first
 
@@ -83,9 +84,7 @@ def mean_step(steps: tuple[StepResponse, ...], skip: tuple[int, ...] = ()) -> Me
     """
     before = min(step.pre_step.size for step in steps)
     after = min(step.n_samples for step in steps)
-    outputs = np.array(
-        [np.concatenate([s.pre_step[s.pre_step.size - before :], s.output[:after]]) for s in steps]
-    )
+    outputs = _stacked(steps)
     inputs = np.array([np.concatenate([np.zeros(before), s.input[:after]]) for s in steps])
     far = sorted({*skip, *_far_from_the_rest(outputs)})
     used = [i for i in range(len(steps)) if i not in far] or list(range(len(steps)))
@@ -102,6 +101,42 @@ def mean_step(steps: tuple[StepResponse, ...], skip: tuple[int, ...] = ()) -> Me
         steps[0].dt,
         tuple(used),
         tuple(i for i in far if i not in used),
+    )
+
+
+def _stacked(steps: tuple[StepResponse, ...]) -> FloatArray:
+    """Unit-step responses at the samples that all of them have, shape (R, N)."""
+    before = min(step.pre_step.size for step in steps)
+    after = min(step.n_samples for step in steps)
+    return np.array(
+        [np.concatenate([s.pre_step[s.pre_step.size - before :], s.output[:after]]) for s in steps]
+    )
+
+
+def relative_gains(steps: tuple[StepResponse, ...]) -> FloatArray:
+    """Gains (R,) for which one response of any shape times each is nearest to all; median 1.
+
+    Least squares in the unit of the outputs, in which the noise is the same: the first singular
+    vector (Golub and Van Loan, Matrix Computations, 4th ed., section 2.4). Levels are free.
+    """
+    heights = np.array([step.amplitude for step in steps])
+    outputs = heights[:, None] * _stacked(steps)
+    centred = outputs - outputs.mean(axis=1, keepdims=True)
+    first = np.linalg.svd(centred, full_matrices=False)[0][:, 0] / heights
+    ratios = first / (float(np.median(first)) or 1.0)
+    return np.where(ratios > 0, ratios, 1.0)
+
+
+def scaled(steps: tuple[StepResponse, ...], ratios: FloatArray) -> tuple[StepResponse, ...]:
+    """Divide responses by relative gains, as if the steps had been higher by them."""
+    return tuple(
+        replace(
+            step,
+            output=step.output / ratio,
+            pre_step=step.pre_step / ratio,
+            amplitude=step.amplitude * ratio,
+        )
+        for step, ratio in zip(steps, ratios.tolist(), strict=True)
     )
 
 
@@ -131,8 +166,8 @@ def repeatability(
         output = np.concatenate([step.pre_step[step.pre_step.size - mean.edge :], step.output[:n]])
         found.append(own_step_response(output, model, mean.edge + delay / mean.dt, own, mean.dt))
     return compared(
-        tuple(step.name or f"record {i}" for i, step in enumerate(steps)),
-        np.array([step.amplitude for step in steps]),
+        distinct(step.name for step in steps),
+        np.array([step.edge.amplitude for step in steps]),
         found,
         mean.used,
         delay,
@@ -185,6 +220,8 @@ def compared(
         trend=trend,
         trend_error=trend_error,
         outlying=tuple(name for i, name in enumerate(names) if i not in used),
+        gains_alone=np.array([one.gain_alone for one in own]),
+        gain_alone_errors=np.array([one.gain_alone_error for one in own]),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal, TypedDict
 
 import control as ct
@@ -24,16 +25,26 @@ from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.separable.varpro import KnownFactor, Structure
 from ..step.steps import found_step
 from .any_input import fit_any_input
-from .averaging import aligned_steps, delay_outliers, mean_step, repeatability, widened
+from .averaging import (
+    aligned_steps,
+    delay_outliers,
+    mean_step,
+    relative_gains,
+    repeatability,
+    scaled,
+    widened,
+)
 from .checks import checked
 from .flags import fit_flags
 from .known import known_factor
+from .own_gains import fit_own_gains, unlike_records
 from .repeat_flags import repeat_flags, same_record_flags
 from .result import OutputErrorFit
 from .summary import fitted_core, summarise
 
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
+Gains = Literal["common", "own"]
 
 _LAST = 5  # a first step in the last samples of a record has no response to fit
 
@@ -54,6 +65,7 @@ def fit_output_error(
     loss: Loss = "huber",
     noise: Noise = "auto",
     include_known: bool = False,
+    gains: Gains = "common",
 ) -> DelayedStateSpace:
     """Fit a transfer function with dead time to raw records.
 
@@ -81,6 +93,10 @@ def fit_output_error(
         ``"white"``: all samples have equal weight, and correlation only widens the interval.
     include_known : bool, optional
         Include the known dynamics in the returned model.
+    gains : {"common", "own"}, optional
+        For several records. ``"own"``: each has its own gain, with common dynamics and dead time;
+        records that do not agree with the others are named and left out. The model has the median
+        gain, and ``fit.gains`` has all of them as a schedule over the operating point.
 
     Returns
     -------
@@ -154,6 +170,7 @@ def fit_output_error(
     """
     loss = one_of(loss, "loss", ("huber", "least_squares"))
     noise = one_of(noise, "noise", ("auto", "white"))
+    gains = one_of(gains, "gains", ("common", "own"))
     tried = _structures(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)
@@ -166,8 +183,13 @@ def fit_output_error(
     }
     if len(several) > 1:
         # If all records are step experiments they can be averaged.
-        way = _fit_mean if all(map(_edges, several)) else fit_any_input
-        result, fit = way(several, limit, settings)
+        stepped = all(map(_edges, several))
+        way = _fit_mean if stepped else fit_any_input
+        if gains == "own":
+            start = relative_gains(aligned_steps(several)) if stepped else None
+            result, fit = fit_own_gains(several, partial(way, several, limit, settings), start)
+        else:
+            result, fit = way(several, limit, settings)
         result = replace(result, flags=result.flags + same_record_flags(several))
     else:
         result, fit = _fit_one(several[0], limit, settings)
@@ -206,9 +228,14 @@ def _fit_one(
 
 
 def _fit_mean(
-    records: tuple[Record, ...], limit: float | None, settings: _Settings
+    records: tuple[Record, ...],
+    limit: float | None,
+    settings: _Settings,
+    ratios: FloatArray | None = None,
 ) -> tuple[OutputErrorFit, OutputErrorEstimate]:
     steps = aligned_steps(records)
+    if ratios is not None:
+        steps = scaled(steps, ratios)
     latest = None if limit is None else limit * steps[0].dt
     skip: tuple[int, ...] = ()
     for _ in range(2):
@@ -221,7 +248,11 @@ def _fit_mean(
         fit = fit_step_record(data, latest=latest, **settings)
         own = own_regressors(data, fit.poles if fit.relaxing else None)
         repeats = repeatability(steps, mean, fit.fitted, fit.dead_time, own)
-        apart = delay_outliers(repeats, mean.used)
+        apart = (
+            delay_outliers(repeats, mean.used)
+            if ratios is None
+            else unlike_records(repeats, mean.used, mean.dt)
+        )
         if not apart:
             break
         skip = apart

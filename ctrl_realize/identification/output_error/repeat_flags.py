@@ -64,8 +64,8 @@ def _response_flags(result: Repeatability) -> list[Flag]:
                 "no_common_gain",
                 f"no single gain fits all records: their gains are {_range(result.gains)} "
                 f"times that of the model, with fits of {followed.min(initial=100):.3g} to "
-                f"{followed.max(initial=0):.3g} %; fit the records of each operating point "
-                "separately",
+                f"{followed.max(initial=0):.3g} %; gains='own' fits one for each record, with "
+                "common dynamics",
             )
         )
     if chance < BY_CHANCE and result.gain_spread > SAME:
@@ -74,7 +74,8 @@ def _response_flags(result: Repeatability) -> list[Flag]:
                 "gains_differ",
                 "the gains of the records differ by more than their noise explains, "
                 f"{_range(result.gains)} times the common gain (chi-square {statistic:.3g}, p "
-                f"= {chance:.2g}): the plant is nonlinear, or has changed between the records",
+                f"= {chance:.2g}): the plant is nonlinear, or has changed between the records; "
+                "gains='own' fits one for each",
             )
         )
     statistic, chance = result.lag_test

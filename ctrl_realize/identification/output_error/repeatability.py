@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,14 @@ if TYPE_CHECKING:
 
 _MOST_NAMED = 8
 """Largest number of records listed in a card; the table lists all."""
+
+
+def distinct(names: Iterable[str]) -> tuple[str, ...]:
+    """Names of records, with numbers where they are missing or the same."""
+    given = [name or f"record {i}" for i, name in enumerate(names)]
+    return tuple(
+        name if given.count(name) == 1 else f"{name} ({i})" for i, name in enumerate(given)
+    )
 
 
 def _nothing() -> FloatArray:
@@ -50,6 +59,8 @@ class Repeatability:
         Slope of the delays over the amplitudes, in s per unit of input.
     outlying : tuple of str
         Outlying records, which are not in the mean.
+    gains_alone, gain_alone_errors : ndarray, shape (R,)
+        As `gains`, with the dead time common as well.
     """
 
     names: tuple[str, ...]
@@ -68,6 +79,8 @@ class Repeatability:
     fit_percent: FloatArray = field(default_factory=_nothing)
     gain_test: tuple[float, float] = (0.0, 1.0)
     lag_test: tuple[float, float] = (0.0, 1.0)
+    gains_alone: FloatArray = field(default_factory=_nothing)
+    gain_alone_errors: FloatArray = field(default_factory=_nothing)
 
     @property
     def gain_spread(self) -> float:

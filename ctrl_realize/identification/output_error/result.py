@@ -22,6 +22,7 @@ from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
+from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
 from .words import ESTIMATE_WORDS, gain_in_words, total_in_words
@@ -53,6 +54,8 @@ class OutputErrorFit(FractionalDelayFit):
         Records that were given.
     repeatability : Repeatability or None
         Delay of each record separately, if there are several.
+    gains : RecordGains or None
+        Gain of each record at its operating point, if they were not taken for the same.
     choices : tuple of str
         Automatic choices, with reasons.
     flags : tuple of Flag
@@ -76,6 +79,7 @@ class OutputErrorFit(FractionalDelayFit):
     time: FloatArray
     records: tuple[Record, ...]
     repeatability: Repeatability | None = None
+    gains: RecordGains | None = None
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
 
@@ -178,12 +182,13 @@ class OutputErrorFit(FractionalDelayFit):
     def gain_interval(self) -> tuple[float, float]:
         """95 % interval of the gain, for all structures that the data do not rule out.
 
-        Also for all records, if their gains differ. Infinite if the record is shorter than the
+        Also for all records, if their gains differ and were taken for the same. Infinite if the
+        record is shorter than the
         slowest time constant and does not determine the gain.
         """
         low, high = self.estimate.gain_ends
         repeats = self.repeatability
-        if repeats is None or repeats.gain_test[1] >= BY_CHANCE:
+        if repeats is None or self.gains is not None or repeats.gain_test[1] >= BY_CHANCE:
             return low, high
         kept = [name not in repeats.outlying for name in repeats.names]
         own = self.gain * repeats.gains[kept]
@@ -332,4 +337,6 @@ class OutputErrorFit(FractionalDelayFit):
         ]
         if self.repeatability is not None:
             rows += self.repeatability.rows()
+        if self.gains is not None:
+            rows.append(("schedule", self.gains.in_words()))
         return rows

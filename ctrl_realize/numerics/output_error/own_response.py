@@ -69,6 +69,7 @@ def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor
     # Small stretches: the derivative of the response with respect to the log of the time constants.
     turn = (response(at, 1 + _STRETCH) - response(at, 1 - _STRETCH)) / (2 * _STRETCH)
     solution, errors = regression([response(at), slope, turn])
+    alone, alone_errors = regression([response(fit.dead_time)])
     size = float(solution[0]) or 1.0
     lag = float(np.exp(np.clip(solution[2] / size, -_FARTHEST, _FARTHEST)))
     forced = own.without(response(fit.dead_time)[None, :, None])[0, :, 0]
@@ -81,4 +82,6 @@ def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor
         lag,
         max(float(errors[2]) / abs(size), 1e-12),
         float(followed[0]),
+        float(alone[0]),
+        max(float(alone_errors[0]), 1e-12),
     )

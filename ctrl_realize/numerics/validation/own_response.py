@@ -9,6 +9,8 @@ References
    101-129, doi:10.2307/3001666.
 .. [2] S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall
    1993, chapter 4 (Linear models).
+.. [3] R. D. Cook and S. Weisberg, Residuals and Influence in Regression, Chapman and Hall 1982,
+   section 2.2 (Outliers).
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtri, stdtrit
 
 from ..arrays import FloatArray
 from ..signals.correlation import fit_percent
@@ -25,6 +27,7 @@ from ..signals.noise import correlation_time
 _TURNS = 6  # of Gauss and Newton at most
 _LARGEST_STRETCH = 0.5  # of the logarithm, in one turn
 _SETTLED = 1e-3  # samples, and part of the lags
+_FALSE_NAMES = 0.01  # chance that an outlier is named in a set without one
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +36,8 @@ class OwnResponse:
 
     `shift` in s and `gain` (a ratio) are estimated together, with common lags; `lag` is the ratio
     of all time constants with delay and gain free too, and its error is relative. `followed` is the
-    fit percentage of the unchanged common model.
+    fit percentage of the unchanged common model. `gain_alone` is the gain with everything else
+    common, the dead time too.
     """
 
     shift: float
@@ -43,6 +47,8 @@ class OwnResponse:
     lag: float = 1.0
     lag_error: float = float("inf")
     followed: float = float("nan")
+    gain_alone: float = 1.0
+    gain_alone_error: float = float("inf")
 
 
 def homogeneity(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
@@ -64,6 +70,53 @@ def homogeneity(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
     centre = float(np.sum(weight * values) / np.sum(weight))
     statistic = float(np.sum(weight * (values - centre) ** 2))
     return statistic, float(chdtrc(values.size - 1, statistic))
+
+
+def disagreeing(values: FloatArray, errors: FloatArray, least: float) -> list[int]:
+    """Positions of estimates that do not agree with the others, the farthest first.
+
+    Each is compared with the mean of the others (deleted residual [3]_). If those
+    agree within their errors, these are the yardstick, otherwise their scatter with its few degrees
+    of freedom. Bonferroni's correction allows one false name in a hundred sets. At least half of
+    the estimates, and two, remain; differences up to `least` are ignored.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> disagreeing(np.array([1.0, 1.02, 1.5]), np.full(3, 0.02), 0.1)
+    [2]
+    >>> disagreeing(np.array([1.0, 1.25, 1.5]), np.full(3, 0.02), 0.1)  # none agree
+    []
+    """
+    kept = np.flatnonzero(np.isfinite(errors) & np.isfinite(values)).tolist()
+    fewest = max(len(values) // 2 + 1, 2)
+    apart: list[int] = []
+    while len(kept) > fewest:
+        scores = [
+            _against_others(i, [k for k in kept if k != i], values, errors, least) for i in kept
+        ]
+        worst = int(np.argmax(scores))
+        if scores[worst] <= 1:
+            break
+        apart.append(kept.pop(worst))
+    return apart
+
+
+def _against_others(
+    one: int, others: list[int], values: FloatArray, errors: FloatArray, least: float
+) -> float:
+    """Distance of an estimate from the mean of the others, over its critical value."""
+    tail = _FALSE_NAMES / (2 * (len(others) + 1))
+    rest = values[others]
+    if homogeneity(rest, errors[others])[1] >= _FALSE_NAMES:
+        weight = errors[others] ** -2.0
+        centre = float(np.sum(weight * rest) / np.sum(weight))
+        critical = -ndtri(tail) * np.hypot(errors[one], np.sum(weight) ** -0.5)
+    else:
+        centre = float(rest.mean())
+        scale = max(float(rest.std(ddof=1)), errors[one]) * np.sqrt(1 + 1 / len(others))
+        critical = -stdtrit(len(others) - 1, tail) * scale
+    return float(abs(values[one] - centre) / max(critical, least))
 
 
 def own_step_response(
@@ -99,10 +152,19 @@ def own_step_response(
         if abs(move) < _SETTLED:
             break
     lag, lag_error = _own_lags(output, model, start, beside, shift)
+    alone, errors = _regression(np.column_stack([model[:n], own[:n]]), output)
     level = np.linalg.lstsq(beside, output - model[:n], rcond=None)[0]
     followed = float(fit_percent(output[None], (model[:n] + beside @ level)[None])[0])
     return OwnResponse(
-        shift * dt, max(error, 1e-12) * dt, gain, max(gain_error, 1e-12), lag, lag_error, followed
+        shift * dt,
+        max(error, 1e-12) * dt,
+        gain,
+        max(gain_error, 1e-12),
+        lag,
+        lag_error,
+        followed,
+        float(alone[0]),
+        max(float(errors[0]), 1e-12),
     )
 
 
