@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from tests import rigs
+from tests import measured, rigs
 
 CLOSE = 1e-6  # of the dead time, or of a sample where that is longer
 
@@ -36,22 +36,15 @@ def two_lags_of_random_levels():
     return cr.Record(0.01 * np.arange(u.size), u, y)
 
 
-def measured(folder, name):
-    table = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
-    time = np.linspace(table[0, 0], table[-1, 0], len(table))
-    return cr.Record(time, table[:, 1], table[:, 2])
-
-
-def answer(record):
-    fit = cr.fit_output_error(record).fit
+def answer(fit):
     shape = fit.order, fit.relative_degree, sorted(flag.code for flag in fit.flags)
     return shape, np.array([fit.dead_time, *fit.interval]) / fit.dt
 
 
-def alike(record, changes=CHANGES):
-    shape, times = answer(record)
+def alike(record, changes=CHANGES, fit=None):
+    shape, times = answer(fit or cr.fit_output_error(record).fit)
     for change in changes:
-        again, others = answer(change(record))
+        again, others = answer(cr.fit_output_error(change(record)).fit)
         assert again == shape
         np.testing.assert_allclose(others, times, rtol=0, atol=CLOSE * max(times[0], 1.0))
 
@@ -71,7 +64,8 @@ def test_a_record_of_random_levels_is_answered_alike():
 
 @pytest.mark.parametrize("name", ["gas_furnace/record", "heating_system/edge2"])
 def test_a_measured_record_is_answered_alike(shared_data, name):
-    alike(measured(shared_data, name), (last_digit,))
+    record = measured.record(shared_data, name)
+    alike(record, (last_digit,), measured.fitted(shared_data, name))
 
 
 def two_modes_that_do_not_begin_at_rest(seed):
