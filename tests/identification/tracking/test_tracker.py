@@ -8,6 +8,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError, UnsuitableSystemError
+from tests import measured
 from tests.rigs import R3, TS, lag, pair
 
 
@@ -50,8 +51,8 @@ def test_a_dead_time_that_wears_from_37_to_60_samples_is_followed(dynamics, erro
 
 def test_a_delay_at_rest_is_known_as_well_as_weighted_samples_can_tell_it():
     errors, limits = [], []
-    for seed in range(6):
-        record, _ = worn_valve(seconds=12, last=37.0, seed=seed)
+    for seed in range(4):
+        record, _ = worn_valve(seconds=10, last=37.0, seed=seed)
         bank = tracker(dynamics=False)
         bank.track(record)
         last = bank.estimate()
@@ -67,16 +68,16 @@ def test_a_delay_at_rest_is_known_as_well_as_weighted_samples_can_tell_it():
         inverse = np.linalg.inv(slopes.T @ (weight[:, None] * slopes))
         spread = slopes.T @ (weight[:, None] ** 2 * slopes)
         limits.append(0.08 * np.sqrt((inverse @ spread @ inverse)[0, 0]))
-    # chi-square of six: 22.5 is exceeded once in 1000
-    assert np.sum((np.array(errors) / limits) ** 2) < 22.5
+    # chi-square of four: 18.5 is exceeded once in 1000
+    assert np.sum((np.array(errors) / limits) ** 2) < 18.5
     assert np.mean(limits) < 0.05  # samples
 
 
 def test_gain_is_followed_with_the_delay():
-    record, _ = worn_valve(gain=0.8)
+    record, _ = worn_valve(seconds=25, gain=0.8)
     bank = tracker()
     track = bank.track(record)
-    assert abs(track.gain_ratio[20] - 1.0) < 0.02
+    assert abs(track.gain_ratio[10] - 1.0) < 0.02
     last = bank.estimate()
     assert abs(last.gain_ratio - 0.8) < max(4 * last.gain_std, 0.005)
     assert abs(ct.dcgain(bank.model) - 0.8 * ct.dcgain(R3)) < 0.01
@@ -85,7 +86,7 @@ def test_gain_is_followed_with_the_delay():
 
 
 def test_a_model_that_is_off_is_renewed_until_poles_and_delay_are_right():
-    record, truth = worn_valve(seconds=45, last=50.0)
+    record, truth = worn_valve(seconds=30, last=50.0)
     bank = tracker(lag(2.5) * pair(7.0, 0.6))
     track = bank.track(record)
     last = bank.estimate()
@@ -103,13 +104,13 @@ def test_a_model_that_is_off_is_renewed_until_poles_and_delay_are_right():
 
 
 def test_an_input_that_rests_does_not_tell():
-    record, _ = worn_valve(seconds=12, last=37.0)
+    record, _ = worn_valve(seconds=5, last=37.0)
     bank = tracker(forgetting_time=1.0)
     bank.track(record)
     assert bank.estimate().resolved
     rest_y = float(record.output[-400:].mean())
     rng = np.random.default_rng(1)
-    for noise in 0.08 * rng.standard_normal(20 * 1280):
+    for noise in 0.08 * rng.standard_normal(8 * 1280):
         bank.update(record.input[-1], rest_y + noise)
     last = bank.estimate()
     assert not last.resolved
@@ -118,7 +119,7 @@ def test_an_input_that_rests_does_not_tell():
 
 
 def test_an_output_that_is_stuck_does_not_tell():
-    record, _ = worn_valve(seconds=12)
+    record, _ = worn_valve(seconds=8)
     rng = np.random.default_rng(1)
     stuck = cr.Record(record.time, record.input, 0.3 + 0.08 * rng.standard_normal(record.n_samples))
     bank = tracker()
@@ -128,7 +129,7 @@ def test_an_output_that_is_stuck_does_not_tell():
 
 
 def test_a_delay_beyond_the_candidates_is_not_claimed():
-    record, _ = worn_valve(seconds=12, last=37.0)
+    record, _ = worn_valve(seconds=6, last=37.0)
     bank = tracker(max_delay=20, forgetting_time=1.5)
     bank.track(record)
     assert not bank.estimate().resolved
@@ -167,20 +168,19 @@ def wrong(track, delay):
     return int(np.sum(track.resolved & ~held))
 
 
-@pytest.mark.parametrize(("delay", "seed"), [(100, 0), (120, 1)])
-def test_slower_poles_do_not_stand_in_for_a_delay_beyond_the_candidates(delay, seed):
-    record = operated(cr.delayed_ss(R3, delay=delay, dt=TS), seconds=20, seed=seed)
+def test_slower_poles_do_not_stand_in_for_a_delay_beyond_the_candidates():
+    record = operated(cr.delayed_ss(R3, delay=100, dt=TS), seconds=15, seed=0)
     bank = tracker()
     track = bank.track(record)
-    assert wrong(track, delay) == 0
+    assert wrong(track, 100) == 0
     assert not bank.estimate().resolved
 
 
 def test_a_track_that_is_lost_is_said_and_found_again_after_a_reset():
     """All poles of the plant become half as fast at once."""
     slow = cr.delayed_ss(lag(1.1) * pair(4.0, 0.7), delay=37, dt=TS)
-    before = operated(cr.delayed_ss(R3, delay=37, dt=TS), seconds=8, seed=0)
-    after = operated(slow, seconds=20, seed=1)
+    before = operated(cr.delayed_ss(R3, delay=37, dt=TS), seconds=6, seed=0)
+    after = operated(slow, seconds=12, seed=1)
     bank = tracker()
     assert not bank.track(before).lost[-1]
     assert bank.estimate().resolved
@@ -192,7 +192,7 @@ def test_a_track_that_is_lost_is_said_and_found_again_after_a_reset():
     # A second look at the plant gives a new model, here with poles 10 % off.
     bank.reset(cr.delayed_ss(lag(1.0) * pair(4.4, 0.7), delay=0, dt=TS))
     assert bank.estimate().reason == "no samples yet"
-    found = bank.track(operated(slow, seconds=15, seed=2))
+    found = bank.track(operated(slow, seconds=10, seed=2))
     assert wrong(found, 37) == 0
     assert bank.estimate().resolved
     assert abs(bank.estimate().delay - 37) <= 2
@@ -211,10 +211,10 @@ def test_the_noise_of_a_fitted_model_is_known():
     assert "4" in known.estimate().reason
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_a_dead_time_under_a_random_walk_is_followed_behind_a_high_pass(seed):
     plant = cr.delayed_ss(R3, delay=45, dt=TS)
-    record = operated(plant, seconds=15, seed=seed, walk=0.0005)
+    record = operated(plant, seconds=12, seed=seed, walk=0.0005)
     passed = tracker(dynamics=False, drift_time=0.1)
     track = passed.track(record)
     late = track.time > 5
@@ -252,12 +252,10 @@ def test_intervals_are_in_seconds_and_in_samples():
     assert cr.design.pid(bank.model).check.stable_within_interval is not None
 
 
-@pytest.mark.parametrize("order", [2, 3])
-def test_the_exchanger_keeps_its_delay_of_zero(shared_data, order):
-    table = np.loadtxt(shared_data / "exchanger" / "record.csv", delimiter=",", skiprows=1)
-    record = cr.Record(*table.T)
+def test_the_exchanger_keeps_its_delay_of_zero(shared_data):
+    record = measured.record(shared_data, "exchanger/record")
     first = cr.impulse_from_io(record.between(0, 1500), 200)
-    model = cr.realize(first, order, feedthrough=True)
+    model = cr.realize(first, 3, feedthrough=True)
     track = cr.DelayTracker(model, max_delay=20, forgetting_time=300.0).track(record)
     # the plant is not linear, and at times a pole of the third order moves too far
     assert np.mean(track.resolved) > 0.6
