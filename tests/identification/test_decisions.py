@@ -199,7 +199,7 @@ def test_a_noisy_record_of_any_input_weighs_little_beside_a_quiet_one():
 
 
 def test_a_record_of_any_input_with_another_delay_is_left_out():
-    records = [driven(random_levels(k), k, name=f"r{k}") for k in range(5)]
+    records = [driven(random_levels(k), k, name=f"r{k}") for k in range(4)]
     fit = cr.fit_output_error(
         [*records, driven(random_levels(7), 7, delay=9, name="late")], **ONE
     ).fit
@@ -227,8 +227,6 @@ def test_a_plant_with_a_resonance_and_zeros_gets_states_instead_of_lags():
     assert np.abs(poles - (-0.5 + 1j * np.sqrt(15.75))).min() < 0.1
     found = (row.error, row.dead_time, row.interval)
     assert found == (None, modes.fit.dead_time, modes.fit.interval)
-    near = cr.identify(record, max_delay=2)
-    assert near.fit.dead_time <= 2 * DT * (1 + 1e-9)
 
 
 # --- the impulse response from any input

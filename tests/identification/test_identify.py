@@ -97,8 +97,6 @@ def test_the_interval_of_modes_holds_a_dead_time(delay, colour):
 
 
 def test_lags_that_leave_only_noise_stay_as_they_are():
-    white = cr.identify(record(LAG, 12.4, seed=3))
-    assert isinstance(white.fit, cr.identification.OutputErrorFit)
     data = record(LAG, 12.4, seed=3, colour=0.9)
     found, plain = cr.identify(data), cr.fit_output_error(data)
     assert isinstance(found.fit, cr.identification.OutputErrorFit)

@@ -68,7 +68,7 @@ def bound(plant, u, noise):
 def test_all_samples_of_a_long_record_count():
     colour = 0.9
     rng = np.random.default_rng(2)
-    u = np.repeat(rng.choice([-1.0, 1.0], 1500), 10)
+    u = np.repeat(rng.choice([-1.0, 1.0], 800), 10)
     clean = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     noise = 0.05 * float(np.std(clean))
     y = clean + lfilter([1.0], [1.0, -colour], noise * rng.standard_normal(u.size))
@@ -88,7 +88,7 @@ def test_all_samples_of_a_long_record_count():
 def test_more_lags_than_a_long_record_shows_are_fitted():
     # Two of the three lags are nearly nothing: the misfit is steep beside its minimum.
     rng = np.random.default_rng(1)
-    k = np.arange(30_000)
+    k = np.arange(15_000)
     waves = zip((1, 2, 5, 10, 20, 40, 80), rng.uniform(0, 2 * np.pi, 7), strict=True)
     u = np.sum([np.sin(2e-4 * np.pi * f * k + phase) for f, phase in waves], axis=0)
     y = cr.delayed_ss(lag(5.0), dead_time=DELAY * DT, dt=DT).simulate(u)

@@ -65,7 +65,7 @@ def test_a_delay_that_grows_with_the_amplitude_is_an_alarm():
         for k in range(4)
         for a in (4, 8, 16)
     ]
-    fit = cr.fit_output_error(records).fit
+    fit = cr.fit_output_error(records, structures=[(3, 3)]).fit
     assert "amplitude_trend" in codes(fit)
     assert fit.repeatability.trend / TS == pytest.approx(1 / 8, rel=0.3)
 
@@ -290,7 +290,7 @@ def test_the_gains_of_a_canal_differ_with_the_opening_of_its_gate(shared_data):
         cr.read_record(folder / f"20210202_step_gate1_2_s{opening}.csv")
         for opening in (25, 100, 255)
     ]
-    system = cr.identify(records)
+    system = cr.identify(records, structures=[(2, 1), (3, 1)])
     assert "gains_differ" in {flag.code for flag in system.fit.flags}
     assert report.verdict_of(system).level == "poor"
 

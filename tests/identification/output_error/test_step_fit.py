@@ -179,7 +179,7 @@ def test_few_or_no_samples_before_the_step_suffice(before):
     assert ("no_rest" in codes(fit)) == (before < 8)
 
 
-def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_matters():
+def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_matters(quiet_valve):
     k = np.arange(1600)
     flags, widths = [], []
     for seed in range(2):
@@ -195,7 +195,8 @@ def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_mat
     # 84 independent samples; where a parameter is charged no more than their log: 48 and both
     assert np.median(widths) < 40
     assert not any("no_delay_resolved" in found for found in flags)
-    white = [cr.fit_output_error(rigs.step_record(noise=n, seed=1)).fit for n in (0.005, 0.03)]
+    loud = cr.fit_output_error(rigs.step_record(noise=0.03, seed=1)).fit
+    white = [quiet_valve.fit, loud]
     assert ["structures_disagree" in codes(fit) for fit in white] == [False, True]
 
 
@@ -204,12 +205,11 @@ def test_slow_noise_that_a_short_rest_hides_is_noise_all_the_same():
     plant = cr.delayed_ss(ct.tf([1.5], [1.6, 2.8, 1]), dead_time=1.3, dt=0.05)
     t = 0.05 * np.arange(-100, 1100)
     u = np.where(t < 0, 0.0, 2.0)
-    for seed in range(2):
-        e = 0.02 * np.random.default_rng(seed).standard_normal(t.size + 500)
-        slow = lfilter([1.0], [1.0, -0.95], e)[500:]
-        fit = cr.fit_output_error(cr.Record(t, u, plant.simulate(u) + slow)).fit
-        assert fit.at_noise_level
-        assert fit.interval[0] <= 1.3 <= fit.interval[1]
+    e = 0.02 * np.random.default_rng(0).standard_normal(t.size + 500)
+    slow = lfilter([1.0], [1.0, -0.95], e)[500:]
+    fit = cr.fit_output_error(cr.Record(t, u, plant.simulate(u) + slow)).fit
+    assert fit.at_noise_level
+    assert fit.interval[0] <= 1.3 <= fit.interval[1]
 
 
 def test_a_code_for_missing_samples_is_told_by_its_value():
@@ -274,8 +274,6 @@ def test_the_result_says_what_the_better_structure_would(forced):
     ("record", "asked"),
     [
         (two_lags(1), {"order": 2}),
-        (one_lag(1), {"order": 1}),
-        (one_lag(2), {"order": 3}),
         (one_lag(3), {"structures": [(2, 2)]}),
     ],
 )
