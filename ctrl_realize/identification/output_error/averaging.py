@@ -114,7 +114,7 @@ def _stacked(steps: tuple[StepResponse, ...]) -> FloatArray:
 
 
 def relative_gains(steps: tuple[StepResponse, ...]) -> FloatArray:
-    """Gains (R,) for which one response of any shape times each is nearest to all; median 1.
+    """Gains (R,) for which one response of any shape times each is nearest to all; the middle is 1.
 
     Least squares in the unit of the outputs, in which the noise is the same: the first singular
     vector (Golub and Van Loan, Matrix Computations, 4th ed., section 2.4). Levels are free.
@@ -123,8 +123,12 @@ def relative_gains(steps: tuple[StepResponse, ...]) -> FloatArray:
     outputs = heights[:, None] * _stacked(steps)
     centred = outputs - outputs.mean(axis=1, keepdims=True)
     first = np.linalg.svd(centred, full_matrices=False)[0][:, 0] / heights
-    ratios = first / (float(np.median(first)) or 1.0)
-    return np.where(ratios > 0, ratios, 1.0)
+    return np.asarray(first / middle_gain(first))
+
+
+def middle_gain(gains: FloatArray) -> float:
+    """Median, of an even number one of the two in the middle: their mean may be zero."""
+    return float(np.sort(gains)[gains.size // 2]) or 1.0
 
 
 def scaled(steps: tuple[StepResponse, ...], ratios: FloatArray) -> tuple[StepResponse, ...]:

@@ -30,6 +30,7 @@ from ...numerics.constants import Z_95
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.validation.own_response import disagreeing, homogeneity
 from ...results import Flag
+from .averaging import middle_gain
 from .record_gains import (
     ONE_POINT,
     RecordGains,
@@ -44,8 +45,8 @@ _TURNS = 8  # at most; two or three are usual
 _SETTLED = 0.25  # standard errors by which a ratio may still move: 3 % of the error in quadrature
 _ROUNDING = 1e-4  # the same of the ratio itself, for records without noise
 _RESPONDS = 5.0
-"""Standard errors that a gain must be above zero to be one, as for an output that leaves its rest.
-A record below that does not respond, or in the opposite direction."""
+"""Standard errors that a gain must be away from zero to be one, as for an output that leaves its
+rest. A record below that does not respond."""
 _LATER = 1.0
 """Samples by which dead times may differ in any case: the trigger falls between two samples."""
 _SLOWER = 0.1
@@ -63,9 +64,10 @@ def unlike_records(found: Repeatability, used: tuple[int, ...], dt: float) -> tu
 
     They do not respond, or their dead time or time constants disagree with those of the others.
     """
-    silent = [i for i in used if found.gains_alone[i] < _RESPONDS * found.gain_alone_errors[i]]
-    rest = np.array([i for i in used if i not in silent], dtype=np.int64)
-    if rest.size < 2:
+    answers = np.abs(found.gains_alone) > _RESPONDS * found.gain_alone_errors
+    silent = [i for i in used if not answers[i]]
+    rest = np.array([i for i in used if answers[i]], dtype=np.int64)
+    if rest.size == 0:
         return ()
     late = disagreeing(found.delays[rest], found.errors[rest], _LATER * dt)
     slow = disagreeing(np.log(found.lags[rest]), found.lag_errors[rest], np.log1p(_SLOWER))
@@ -92,10 +94,13 @@ def fit_own_gains(
         result, estimate = fit(ratios)
         found = _compared(result)
         used = np.array([name not in found.outlying for name in found.names])
-        moved, errors = found.gains_alone, found.gain_alone_errors
-        moved = ratios * np.where(moved > _RESPONDS * errors, moved, 1.0)
-        moved = moved / float(np.median(moved[used]))
-        turned = moved if start is None else ratios / float(np.median(ratios[used]))
+        errors = found.gain_alone_errors
+        moved = ratios * found.gains_alone
+        moved = moved / middle_gain(moved[used])
+        answers = np.abs(found.gains_alone) > _RESPONDS * errors
+        turned = ratios / middle_gain(ratios[used])
+        if start is None:
+            turned = np.where(answers, moved, turned)
         if np.all(np.abs(turned / ratios - 1) <= np.maximum(_SETTLED * errors, _ROUNDING)):
             break
         ratios = turned

@@ -55,7 +55,8 @@ class RecordGains(Result):
     low, high : ndarray, shape (R,)
         95 % intervals of the gains, for all structures that the data do not rule out.
     reference : float
-        Gain of the returned model: the median of the gains that are not outlying.
+        Gain of the returned model: the median of the gains that are not outlying, of an even number
+        one of the two in the middle.
     chi_square, p_value : float
         Test whether the gains are the same: sum of ((gain - weighted mean) / standard error)^2, and
         the probability of a larger value if they differ by noise alone.

@@ -178,6 +178,15 @@ def test_a_record_that_does_not_respond_is_named():
     assert_allclose(gains.gains[:3], GAINS, atol=0.005)
 
 
+def test_a_gain_may_change_its_sign_between_records():
+    gains = own(at_three_levels(gains=(0.5, -0.2, -1.0))).fit.gains
+    assert_allclose(gains.gains, [0.5, -0.2, -1.0], atol=0.005)
+    assert gains.reference == pytest.approx(-0.2, abs=0.005)
+    assert np.all(gains.low < gains.gains)
+    two = own([step(1, 1.0), step(2, -0.5, level=2.0)]).fit.gains
+    assert_allclose(two.gains, [1.0, -0.5], atol=0.005)
+
+
 def test_records_of_one_name_are_told_apart():
     records = at_three_levels()
     alike = [cr.Record(r.time, r.input, r.output, name="bench") for r in records]
