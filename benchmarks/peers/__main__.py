@@ -235,6 +235,8 @@ def version(package: str) -> str:
 
 def made(command: str) -> str:
     packages = [*dict.fromkeys(PACKAGE.values()), "numpy"]
+    if command == "joint":  # of ours alone
+        packages = ["ctrl-realize", "control", "scipy", "numpy"]
     versions = ", ".join(f"{package} {version(package)}" for package in packages)
     return (
         f"Made on {date.today()} by `python -m benchmarks.peers {command}` with Python "
