@@ -82,14 +82,18 @@ def step_part(data: StepData, fit: OutputErrorEstimate, latest: float | None) ->
     rounding = data.quantum / np.sqrt(12) if is_coarse(data.sigma, data.quantum) else 0.0
     variance = fit.residual**2 + rounding**2
     variance *= weighted_correlation(fit.correlation, part.counted)
-    problem = part.problem
+    problem, own = part.problem, part.own
+    if own is not None and problem.segments is not None:
+        # Before the middle of the first bin a free response was not seen: that of a fast pole,
+        # which is over by then, would have any size there.
+        own = replace(own, clock=np.maximum(own.clock, problem.segments.clock[0]))
     return RecordPart(
         replace(problem, root_weight=problem.root_weight / np.sqrt(variance)),
         step_scales(data, calm.size, latest),
         (calm.size - part.start) / fit.correlation,
         part.drive,
         part.columns,
-        part.own,
+        own,
         data.output,
     )
 

@@ -211,6 +211,17 @@ def test_gains_that_differ_between_records_make_the_common_one_uncertain():
     assert any("gains (9." in reason for reason in several.choices)  # 0.183 / sqrt(4)
 
 
+@pytest.mark.parametrize("structure", [(1, 1), (2, 1)])
+def test_a_plant_that_still_moves_before_the_step_is_followed_from_the_first_sample(structure):
+    record = step()
+    moving = cr.Record(TIME, record.input, record.output + 2.0 * np.exp(-TIME / LAG))
+    fit = fit_joint(moving, response(), structures=[structure]).fit
+    assert fit.estimate.relaxing or fit.record_fit.estimate.relaxing
+    # six standard deviations, and what a bin of some samples does not show of the decay
+    assert np.abs(fit.measured - fit.fitted).max() < 6 * NOISE + 0.1
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+
+
 def test_identify_delegates_and_its_result_has_what_all_fits_have():
     system = cr.identify(step(), frf=response(), order=1)
     fit = system.fit
