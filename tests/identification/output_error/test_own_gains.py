@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import pickle
 from pathlib import Path
 
 import control as ct
@@ -47,6 +49,12 @@ def own(records, **kwargs):
     return cr.fit_output_error(records, structures=ONE_LAG, gains="own", **kwargs)
 
 
+@functools.cache
+def fitted(seed=0):
+    """Model of three records at three levels, which several tests look at."""
+    return own(at_three_levels(seed))
+
+
 def codes(fit):
     return {flag.code for flag in fit.flags}
 
@@ -54,7 +62,7 @@ def codes(fit):
 def test_gains_of_steps_are_within_their_intervals_and_the_dead_time_in_its():
     inside = []
     for seed in range(12):
-        fit = own(at_three_levels(seed)).fit
+        fit = fitted(seed).fit
         gains = fit.gains
         inside += [*((gains.low <= GAINS) & (gains.high >= GAINS))]
         inside.append(fit.interval[0] <= DEAD_TIME <= fit.interval[1])
@@ -65,7 +73,7 @@ def test_gains_of_steps_are_within_their_intervals_and_the_dead_time_in_its():
 
 
 def test_the_error_of_a_gain_is_its_scatter():
-    found = [own(at_three_levels(seed)).fit.gains for seed in range(12)]
+    found = [fitted(seed).fit.gains for seed in range(12)]
     scatter = np.std([one.gains for one in found], axis=0, ddof=1)
     told = np.mean([one.errors for one in found], axis=0)
     # twelve values: the standard deviation is known to 21 %
@@ -136,7 +144,7 @@ def test_gains_of_fits_with_one_gain_agree_with_those_of_own_gains():
 
 
 def test_the_schedule_is_linear_between_records_and_constant_beyond():
-    sys = own(at_three_levels())
+    sys = fitted()
     gains = sys.fit.gains
     assert_allclose(gains.operating_points, [1.0, 3.0, 5.0])
     assert gains.at(2.0) == pytest.approx((gains.gains[0] + gains.gains[1]) / 2)
@@ -212,16 +220,14 @@ def test_the_flag_of_different_gains_names_the_option_and_the_fit_with_it_the_sc
     told = [str(flag) for flag in common.flags if "gain" in flag.code]
     assert told
     assert all("gains='own'" in text for text in told)
-    fit = own(records).fit
+    fit = fitted().fit
     assert [flag.code for flag in fit.flags if "gain" in flag.code] == ["gains_differ"]
     assert "schedule" in fit.report()
     assert "outlying" not in fit.gains.report()
 
 
 def test_table_plot_and_pickle_of_the_gains():
-    import pickle
-
-    gains = own(at_three_levels()).fit.gains
+    gains = fitted().fit.gains
     table = gains.table()
     assert list(table.index) == ["at 0", "at 2", "at 4"]
     assert_allclose(table[["input_before", "input_after"]], gains.input_levels)
@@ -251,7 +257,7 @@ def test_other_options_are_refused():
     with pytest.raises(OptionError, match="gains"):
         cr.identify(at_three_levels()[0], method="scan", gains="own")
     with pytest.raises(OptionError, match="point"):
-        own(at_three_levels()).fit.gains.at("high")
+        fitted().fit.gains.at("high")
 
 
 def test_identify_and_campaigns_take_own_gains():
