@@ -132,7 +132,7 @@ def test_what_stays_for_as_long_as_the_fit_looks_is_not_fitted(still):
     y = np.convolve(u, 0.1 * 0.9 ** np.arange(50))[: u.size]
     {"input": u, "output": y}[still][:4200] = 0.0
     with pytest.raises(DataError, match="does not respond to the input"):
-        cr.identify(cr.Record(np.arange(4500.0), u, y, name="r"), order=1)
+        cr.fit_output_error(cr.Record(np.arange(4500.0), u, y), structures=[(1, 1)])
 
 
 def test_an_output_that_moves_at_its_last_sample_alone_is_fitted_or_refused():
