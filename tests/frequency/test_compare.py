@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize import report
+from tests.measured import model
 
 DT = 1 / 1280
 F = np.geomspace(0.1, 50, 60)
@@ -135,9 +136,8 @@ def test_noise_of_the_response_is_no_disagreement():
 
 
 def test_the_response_of_the_motor_contradicts_the_model_of_its_step(shared_data):
-    folder = shared_data / "dc_motor_tacho"
-    system = cr.identify(cr.read_record(folder / "up.csv"))
-    comparison = cr.compare_frf(system, cr.read_frf(folder / "frf.csv"))
+    system = model(shared_data, "dc_motor_tacho/up")
+    comparison = cr.compare_frf(system, cr.read_frf(shared_data / "dc_motor_tacho" / "frf.csv"))
     verdict = report.verdict_of(system, comparison.flags)
     assert verdict.level == "poor"
     assert "measured frequency response contradicts" in verdict.reasons[0]

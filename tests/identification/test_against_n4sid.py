@@ -8,18 +8,9 @@ import pandas as pd
 import pytest
 
 import ctrl_realize as cr
+from tests import measured
 
 nfoursid = pytest.importorskip("nfoursid.nfoursid")
-
-
-def halves(folder, plant):
-    table = np.loadtxt(folder / plant / "record.csv", delimiter=",", skiprows=1)
-    signals = table[:, 1:].T
-    m = signals.shape[0] // 2
-    u, y = (signals[:1], signals[1:]) if m == 1 else (signals[:m], signals[m:])
-    whole = cr.Record(table[:, 0], u.squeeze(), y.squeeze(), name=plant)
-    middle = whole.time[whole.n_samples // 2]
-    return whole.between(whole.time[0], middle), whole.between(middle, np.inf)
 
 
 def by_n4sid(record, order, block_rows):
@@ -51,7 +42,7 @@ def by_n4sid(record, order, block_rows):
 def test_realization_predicts_as_well_as_a_subspace_method(
     shared_data, plant, length, order, options
 ):
-    first, second = halves(shared_data, plant)
+    first, second = measured.halves(shared_data, f"{plant}/record")
     hankel = "square" if plant == "robot_arm" else "padded"
     ours = cr.realize(cr.impulse_from_io(first, length, **options), order, hankel=hankel)
     fit = cr.validation.analyse_residuals(ours, second).fit_percent.mean()
@@ -78,7 +69,7 @@ def test_realization_predicts_as_well_as_a_subspace_method(
 def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(
     shared_data, plant, orders, gain, ours
 ):
-    first, second = halves(shared_data, plant)
+    first, second = measured.halves(shared_data, f"{plant}/record")
     found = cr.fit_state_space(first, ours)
     fit = cr.validation.analyse_residuals(found, second).fit_percent.mean()
     theirs = []
@@ -95,7 +86,7 @@ def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(
 
 def test_the_robot_arm_needs_no_choice_of_method_or_length(shared_data):
     # 36 % with the regularized estimate, 97 % with what the default takes
-    first, second = halves(shared_data, "robot_arm")
+    first, second = measured.halves(shared_data, "robot_arm/record")
     impulse = cr.impulse_from_io(first)
     assert impulse.method.startswith("OKID")
     model = cr.realize(impulse, 6)

@@ -16,6 +16,7 @@ from ctrl_realize.identification.impulse.regression import (
     through_arx,
     without_prior,
 )
+from tests import measured
 from tests.rigs import DT, TWO_STATES
 
 METHODS = [
@@ -125,8 +126,7 @@ def test_the_errors_of_a_regularized_response_hold_the_truth_also_where_it_dies_
 def test_measured_plants_have_the_delay_that_their_authors_state(
     shared_data, options, plant, length, delay
 ):
-    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
-    g = cr.impulse_from_io(cr.Record(*table.T), length, **options)
+    g = cr.impulse_from_io(measured.record(shared_data, f"{plant}/record"), length, **options)
     assert cr.estimate_delay(g, 2, max_delay=15).delay == delay
 
 

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.delayed.simulation import simulate_record
+from tests.measured import halves
 from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
 MIMO = cr.DelayedStateSpace(TWO_INPUTS.delay_free, (2, 4), output_delay=(0, 3, 1))
@@ -143,10 +144,7 @@ def test_predictions_fall_from_the_noise_model_to_the_simulation():
 def test_measured_plants_are_predicted_on_the_half_that_was_not_used(
     shared_data, plant, length, order, least
 ):
-    table = np.loadtxt(shared_data / plant / "record.csv", delimiter=",", skiprows=1)
-    whole = cr.Record(*table.T, name=plant)
-    middle = whole.time[whole.n_samples // 2]
-    first, second = whole.between(0, middle), whole.between(middle, np.inf)
+    first, second = halves(shared_data, f"{plant}/record")
     model = cr.estimate_delay(cr.impulse_from_io(first, length), order, max_delay=10)
     assert cr.validation.analyse_residuals(model, second).fit_percent[0] > least
     assert cr.validation.predict(model, second, 1).fit_percent[0] > least + 3
