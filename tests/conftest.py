@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+import ctrl_realize as cr
+
 # Same examples on every run: a failure seen once is seen again. CI machines are slow at times,
 # so no deadline on a single example.
 settings.register_profile(
@@ -21,6 +23,12 @@ settings.register_profile("long", parent=settings.get_profile("suite"), max_exam
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def valve() -> cr.bench.Valve:
+    """The simulated valve, its records short."""
+    return cr.bench.valve(pre_step_time=0.5, hold=1.0)
 
 
 @pytest.fixture

@@ -24,11 +24,6 @@ def save(record, path):
 
 
 @pytest.fixture(scope="module")
-def valve():
-    return cr.bench.valve(pre_step_time=0.5, hold=1.0)
-
-
-@pytest.fixture(scope="module")
 def folder(valve, tmp_path_factory):
     folder = tmp_path_factory.mktemp("records")
     for k in range(3):

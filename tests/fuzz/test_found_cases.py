@@ -135,21 +135,28 @@ def test_what_stays_for_as_long_as_the_fit_looks_is_not_fitted(still):
         cr.fit_output_error(cr.Record(np.arange(4500.0), u, y), structures=[(1, 1)])
 
 
-def test_an_output_that_moves_at_its_last_sample_alone_is_fitted_or_refused():
-    # the line back to the rest level was drawn through a sample behind the end
-    u = (np.arange(60) >= 44).astype(float)
-    y = np.where(np.arange(60) == 59, 1.0, 0.0)
-    with good_end() as models:
-        models.append(cr.identify(cr.Record(np.arange(60.0), u, y)))
+NOISE = np.random.default_rng(0).standard_normal(23)
+WILD_AT_REST = np.r_[-4.94e-324, 0, 0, -653.0, np.zeros(11), -3.2 * np.arange(1, 11)]
+WILD_AND_LATE = np.r_[np.zeros(6), -8.58913364, np.zeros(22), -3.2]
 
 
-@pytest.mark.parametrize("edge", [18, 19, 20, 21])
-def test_a_step_near_the_end_of_a_short_record_is_fitted_or_refused(edge):
-    # the noise of the settled half was asked of a half without a sample
-    u = (np.arange(23) >= edge).astype(float)
-    y = np.random.default_rng(0).standard_normal(23)
-    with good_end() as models:
-        models.append(cr.identify(cr.Record(np.arange(23.0), u, y)))
+@pytest.mark.parametrize(
+    ("edge", "height", "dt", "y"),
+    [
+        # the line back to the rest level was drawn through a sample behind the end
+        pytest.param(44, 1.0, 1.0, np.r_[np.zeros(59), 1.0], id="moves at the last sample"),
+        # the noise of the settled half was asked of a half without a sample
+        *(pytest.param(edge, 1.0, 1.0, NOISE, id=f"edge {edge} of 23") for edge in range(18, 22)),
+        # a chain of lags whose gain has no influence on the fit: 0/0 in the error of its delay
+        pytest.param(12, -16.0, 1e-6, WILD_AT_REST, id="wild before an integrator"),
+        # the delay of a chain was known without any error: 0/0 in its profile
+        pytest.param(26, -16.0, 1e-6, WILD_AND_LATE, id="moves last, behind a wild sample"),
+    ],
+)
+def test_a_short_odd_record_of_a_step_is_fitted_or_refused(edge, height, dt, y):
+    k = np.arange(y.size)
+    with good_end(seconds=60):
+        cr.identify(cr.Record(dt * k, np.where(k < edge, 0.0, height), y))
 
 
 def test_a_file_name_that_is_no_utf8_does_not_lose_a_campaign(tmp_path):
@@ -360,26 +367,6 @@ def test_an_output_1e200_times_as_large_as_the_input_is_followed_without_overflo
             tracker.update(2e-144 if k == 5 else 0.0, 1e58 * np.sin(k))
         told.append(tracker.estimate())
     assert not np.isnan(told[0].gain_std)
-
-
-def test_one_wild_sample_at_rest_before_an_integrator_is_fitted_or_refused():
-    # a chain of lags whose gain has no influence on the fit: 0/0 in the error of its delay
-    n = 25
-    u = np.where(np.arange(n) < 12, 0.0, -16.0)
-    y = np.concatenate([np.zeros(15), -3.2 * np.arange(1, 11)])
-    y[0], y[3] = -4.94e-324, -653.0
-    with good_end(seconds=60):
-        cr.identify(cr.Record(1e-6 * np.arange(n), u, y))
-
-
-def test_a_first_move_at_the_last_sample_behind_a_wild_one_is_fitted_or_refused():
-    # the delay of a chain was known without any error: 0/0 in its profile
-    n = 30
-    u = np.where(np.arange(n) < 26, 0.0, -16.0)
-    y = np.zeros(n)
-    y[6], y[-1] = -8.58913364, -3.2
-    with good_end(seconds=60):
-        cr.identify(cr.Record(1e-6 * np.arange(n), u, y))
 
 
 @pytest.mark.parametrize("moved", [1e-155, 1e-158, 1e-100])

@@ -17,11 +17,6 @@ from ctrl_realize.plots import style
 
 
 @pytest.fixture(scope="module")
-def valve():
-    return cr.bench.valve(pre_step_time=0.5, hold=1.0)
-
-
-@pytest.fixture(scope="module")
 def record(valve):
     return valve.step_record(16.0, rng=5)
 

@@ -54,11 +54,6 @@ def parsed(path):
 
 
 @pytest.fixture(scope="module")
-def valve():
-    return cr.bench.valve(pre_step_time=0.5, hold=1.0)
-
-
-@pytest.fixture(scope="module")
 def record(valve):
     return valve.step_record(16.0, rng=5)
 

@@ -75,19 +75,6 @@ def test_a_delay_that_grows_with_the_step_raises_the_alarm():
     assert "longer for larger steps" in str(flags[0])
 
 
-def test_table_1_gives_the_papers_37_and_2():
-    # Through the statistics that a campaign uses: 36.676 and 2.042 / 2.104.
-    from ctrl_realize import paper
-    from ctrl_realize.numerics.statistics import trimmed_statistics
-
-    table = np.asarray(paper.TABLE_1, dtype=float)
-    summary = trimmed_statistics(table, 3)
-    assert_allclose(summary.mean, 36.676, atol=5e-4)
-    assert_allclose(summary.variance, 2.104, atol=5e-4)
-    assert_allclose(trimmed_statistics(table, 3, ddof=0).variance, 2.042, atol=5e-4)
-    assert (round(summary.mean), round(summary.variance)) == (paper.DELAY, 2)
-
-
 def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
     system = campaign.system
     assert isinstance(system, ct.StateSpace)
