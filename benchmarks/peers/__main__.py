@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import driven
 from .answers import Answer
 from .crossed import crossed_table
 from .joint import joint_table
@@ -123,7 +124,7 @@ def simulated_table(seeds: int) -> list[str]:
     lines = _header(head)
     bound = [f"{100 * noise * CRAMER_RAO:.2g}" for noise in NOISES]
     lines.append("| *Cramér-Rao bound* | order, relative degree | " + " | ".join(bound) + " | |")
-    for name in RUNNERS:
+    for name in step_ways():
         cells, seconds = [], []
         for noise in NOISES:
             cell = simulated_cell(name, noise, seeds)
@@ -162,14 +163,28 @@ def measured_tables(found: dict[tuple[str, Measured], tuple[Answer, float] | str
         cells = [_delay_cell(one, found[name, one]) for name in SHOWN.values()]
         band = f"{one.band[0]:.3g} to {one.band[1]:.3g}"
         lines.append(f"| {one.plant}/{one.name} | {band} | " + " | ".join(cells) + " |")
-    return [*lines, "", "Fits of the single records:", "", *_fits(measured, found)]
+    return [*lines, "", "Fits of the single records:", "", *_fits(measured, found, RIVALS)]
+
+
+def driven_table(folder: Path) -> list[str]:
+    """Tabulate the fits of records of moving inputs."""
+    every = driven.driven(folder)
+    found = {
+        (name, one): answer_of(name, one.task)
+        for name in (IDENTIFY, *driven.RIVALS.values())
+        for one in every
+    }
+    lines = _fits(list(every), found, driven.RIVALS)
+    return ["", "Fits of records of moving inputs:", "", *lines]
 
 
 def _fits(
-    measured: list[Measured], found: dict[tuple[str, Measured], tuple[Answer, float] | str]
+    measured: list[Measured],
+    found: dict[tuple[str, Measured], tuple[Answer, float] | str],
+    rivals: dict[str, str],
 ) -> list[str]:
     """Tabulate fits beside that of the best rival, and what `identify` says of its own."""
-    lines = _header(["record", "identify", *RIVALS, "best of all", "what identify reports"])
+    lines = _header(["record", "identify", *rivals, "best of all", "what identify reports"])
     for one in measured:
         fits = {
             name: one.fit(answer[0])
@@ -180,30 +195,40 @@ def _fits(
         assert not isinstance(own, str)
         ours, reasons = fits.pop(IDENTIFY), own[0].reasons
         best = max((name for name in fits if PACKAGE[name] != "ctrl-realize"), key=fits.__getitem__)
-        shown = [f"{fits[name]:.1f}" if name in fits else "-" for name in RIVALS.values()]
+        shown = [_percent(fits[name]) if name in fits else "-" for name in rivals.values()]
         ahead = fits[best] > ours + NEARLY
         rival = f"**{fits[best]:.1f}** {best}" if ahead else f"{fits[best]:.1f}"
         words = "; ".join(reasons) if ahead else ""
         lines.append(
-            f"| {one.plant}/{one.name} | {ours:.1f} | " + " | ".join([*shown, rival, words]) + " |"
+            f"| {one.plant}/{one.name} | {_percent(ours)} | "
+            + " | ".join([*shown, rival, words])
+            + " |"
         )
     return lines
 
 
+def step_ways() -> list[str]:
+    """List the ways that take step records."""
+    return [name for name in RUNNERS if name not in (driven.FIRST, driven.SECOND)]
+
+
 def measured_ways() -> list[str]:
-    """List the ways that are asked for measured records."""
+    """List the ways that are asked for measured step records."""
     # llsi takes minutes for one of these records, and is told the delay.
-    return [name for name in RUNNERS if PACKAGE[name] != "llsi"]
+    return [name for name in step_ways() if PACKAGE[name] != "llsi"]
 
 
 def _plant_cell(good: list[tuple[Measured, Answer]], count: int) -> str:
-    middle = float(np.median([one.fit(answer) for one, answer in good]))
-    fit = f"{round(middle, 1) + 0.0:.1f} %" if middle > -100 else "below -100 %"
+    fit = f"{_percent(float(np.median([one.fit(answer) for one, answer in good])))} %"
     delays = [(one, answer.delay) for one, answer in good if answer.delay is not None]
     if not delays:
         return f"- / {fit}"
     inside = sum(one.outside(delay) == 0 for one, delay in delays)
     return f"{inside} of {count} / {fit}"
+
+
+def _percent(fit: float) -> str:
+    return f"{round(fit, 1) + 0.0:.1f}" if fit > -100 else "below -100"
 
 
 def _delay_cell(one: Measured, found: tuple[Answer, float] | str) -> str:
@@ -289,6 +314,7 @@ def main() -> None:
         lines = measured_tables(
             {(name, one): answer_of(name, one.task) for name in measured_ways() for one in every}
         )
+        lines += driven_table(arguments.data)
         note = (
             "Upper table, each cell: delays within the band (- where the way estimates none) / "
             "median of the percentage of the response that a simulation explains, offset taken "
@@ -302,7 +328,9 @@ def main() -> None:
             "`identify` reports (there in per cent of the whole record): a drift or free response "
             "that it estimated together with the model is not in a simulation of the model alone; "
             "a structure that follows more closely was not chosen, since it does so by no more "
-            "than its additional parameters follow noise, or since no structure is adequate. The "
+            "than its additional parameters follow noise, or since no structure is adequate. "
+            "Inputs that move: means taken off, simulated from rest, the last nine tenths of the "
+            "record, dead times up to 15 samples. The "
             "rules of `identify` "
             f"were made with the records of {', '.join(FIRST)} in view, and one of them with "
             "two_cart_drive, which flatters it. "

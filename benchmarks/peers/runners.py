@@ -41,16 +41,20 @@ def of_system(delay: float, system: Any, task: Task) -> Answer:
         delay,
         lambda hz: task.gain * system(np.exp(2j * np.pi * hz * task.dt)),
         lambda u: task.gain * np.asarray(system.simulate(u)),
-        reasons(system.fit) if isinstance(system.fit, cr.identification.OutputErrorFit) else (),
+        reasons(system.fit),
     )
 
 
-def reasons(fit: cr.identification.OutputErrorFit) -> tuple[str, ...]:
+def reasons(fit: Any) -> tuple[str, ...]:
     """List what a fit reports of how closely its model follows the record."""
+    if isinstance(fit, cr.identification.StateSpaceFit):
+        return (f"{fit.fit_percent[0]:.1f} % with the initial state that was estimated along",)
+    if not isinstance(fit, cr.identification.OutputErrorFit):
+        return ()
     followed = fit.estimate.followed
     words = []
     if followed.complete - followed.simulated > WORTH_A_WORD:
-        words.append(f"{followed.complete:.1f} % with the drift or free response before the step")
+        words.append(f"{followed.complete:.1f} % with the drift or free response at the start")
     if followed.by_closest - followed.complete > WORTH_A_WORD:
         order, degree = followed.closest.order, followed.closest.relative_degree
         words.append(f"order {order}, relative degree {degree}: {followed.by_closest:.1f} %")
@@ -165,8 +169,7 @@ def scipy_second_order(task: Task) -> Answer:
 
 @runner(f"SciPy: least_squares from {STARTS} starts", "scipy", "order of `identify`, any zeros")
 def scipy_many_starts(task: Task) -> Answer:
-    order = cr.identify(task.record).fit.structure[0]
-    return from_many_starts(task, order)
+    return from_many_starts(task, cr.identify(task.record).fit.order)
 
 
 def best_delay(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.signal import lfilter
 
-from .answers import Answer, of_step
+from .answers import Answer
 from .tasks import Task
 
 STARTS = 50
@@ -22,20 +23,26 @@ def _exponents(shape: np.ndarray, pairs: int) -> np.ndarray:
     return np.array([*found, *-np.exp(shape[2 * pairs :])], dtype=complex)
 
 
-def _responses(time: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    """Step responses that poles span, from zero on, shape (N, n): any zeros but no jump."""
-    return np.column_stack([np.expm1(pole * time) for pole in poles])
+def _responses(u: np.ndarray, delay: float, poles: np.ndarray) -> np.ndarray:
+    """Responses to a held input that poles span, from rest, (N, n): any zeros but no jump."""
+    whole = int(np.ceil(delay - 1e-9))
+    moves = np.concatenate([np.zeros(whole), np.diff(u, prepend=0.0)])[: u.size]
+    # exp(p t) of every change that has arrived, and where all of them are over.
+    parts = [
+        np.exp(pole * (whole - delay)) * lfilter([1.0], [1.0, -np.exp(pole)], moves)
+        for pole in poles
+    ]
+    return np.column_stack(parts) - np.cumsum(moves)[:, None]
 
 
 def from_many_starts(task: Task, order: int) -> Answer:
-    """Fit dead time and poles of a step response by least squares, the rest is linear."""
+    """Fit dead time and poles by least squares; the rest is linear."""
     rng = np.random.default_rng(0)
-    after = np.arange(task.y.size) - task.edge
     length = float(task.y.size - task.edge)
 
     def solved(theta: np.ndarray, pairs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         poles = _exponents(theta[1:], pairs)
-        basis = _responses(np.clip(after - theta[0], 0, None), poles)
+        basis = _responses(task.u, theta[0], poles)
         parts = np.column_stack([basis.real, basis.imag, np.ones(task.y.size)])
         weights = np.linalg.lstsq(parts, task.y, rcond=1e-10)[0]
         return poles, weights, task.y - parts @ weights
@@ -63,12 +70,11 @@ def from_many_starts(task: Task, order: int) -> Answer:
     residues = weights[:order] - 1j * weights[order : 2 * order]
     rates = poles / task.dt
 
-    def step(time: np.ndarray) -> np.ndarray:
-        late = np.clip(time / task.dt - theta[0], 0, None)
-        return np.real(_responses(late, poles) @ residues)
+    def simulate(u: np.ndarray) -> np.ndarray:
+        return np.real(_responses(u, theta[0], poles) @ residues)
 
     def response(s: np.ndarray) -> np.ndarray:
         core = (residues * rates / (s[:, None] - rates)).sum(axis=1)
         return core * np.exp(-s * theta[0] * task.dt)
 
-    return of_step(float(theta[0]), step, response, task.dt)
+    return Answer(float(theta[0]), lambda hz: response(2j * np.pi * hz), simulate)
