@@ -75,6 +75,11 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             else f"{kind}: the only structure that was tried"
         ]
     reasons += _closest(fit)
+    if fit.rounded is not None and not fit.delay_estimates:
+        reasons.append(
+            "dead time and model: maximum likelihood of the rounded samples, with noise of "
+            f"{fit.rounded:.3g} before rounding"
+        )
     if fit.delay_estimates:
         why = (
             "no model fits down to the noise level"

@@ -136,7 +136,8 @@ class OutputErrorEstimate:
     `whitened`: coloured noise was made white, by what it is at rest. `static` is the gain of the
     model, `alike` those of the other structures that are not ruled out and resolve one, each with
     its evidence over the model's. `better` is a structure that rules out those that were asked for;
-    `close` are decisions that rounding may turn.
+    `close` are decisions that rounding may turn. `rounded` is the noise before rounding, if the
+    model is that of the likelihood of rounded data.
     """
 
     dead_time: float
@@ -168,6 +169,7 @@ class OutputErrorEstimate:
     alike: tuple[tuple[StaticGain, float], ...] = ()
     better: StructureFit | None = None
     close: tuple[CloseDecision, ...] = ()
+    rounded: float | None = None
 
     @property
     def robust(self) -> bool:

@@ -73,6 +73,7 @@ from .interval import likelihood_fit
 from .margins import close_to
 from .profiles import profile_of
 from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
+from .rounded import in_rounded_data
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
 
@@ -168,6 +169,8 @@ def fit_step_record(
             relaxing=data.relaxing,
             near=near,
         )
+        if data.coarse:
+            likely = in_rounded_data(likely, whole, data.quantum)
         at_the_end = pinned(likely, data, plain)
         likely = told(likely, at_the_end)
         if at_the_end > 1:
