@@ -204,6 +204,7 @@ MADE_FOR = {
     "records weighted by their noise": unequal_sensors,
     "noise of a rest that is constant": padded_rest,
     "louder noise after the step": louder_from_the_step_on,
+    "likelihood of rounded data": steps_of_a_converter,
     "strong evidence of a motion": rest_like_a_slope,
     "slope that was nothing": rest_like_a_slope,
     "no dispersion where rounding is coarse": sensors.coarse,

@@ -259,6 +259,7 @@ SWITCHES = (
         "no dispersion where rounding is coarse",
         {f"{STEP}:_flows": lambda _: lambda _data, whole, chains: flows_of(whole, chains)},
     ),
+    Switch("likelihood of rounded data", {f"{STEP}:in_rounded_data": first}),
     Switch(
         "estimates against a pinned likelihood",
         {f"{STEP}:pinned": giving(2.0)},

@@ -6,9 +6,8 @@ least-squares fit of the same structure, for which rounding is noise.
 
 References
 ----------
-.. [1] A. N. Pettitt, Censored observations, repeated measures and mixed effects models: an approach
-   using the EM algorithm and normal errors, Biometrika 73 (1986) 635-643,
-   doi:10.1093/biomet/73.3.635.
+.. [1] F. Gustafsson and R. Karlsson, Statistical results for system identification based on
+   quantized observations, Automatica 45 (2009) 2794-2801, doi:10.1016/j.automatica.2009.09.014.
 .. [2] C. R. Rao, Linear Statistical Inference and its Applications, 2nd ed., Wiley 1973, section 5g
    (the method of scoring), doi:10.1002/9780470316436.
 """
@@ -22,6 +21,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import log_ndtr
 
 from ..arrays import FloatArray
+from ..constants import Z_95
 from ..separable.structures import Candidate, parameter_bounds
 from ..separable.varpro import Structure, evaluate, respond
 from ..separable.window import WindowFit
@@ -46,22 +46,24 @@ def in_rounded_data(
 ) -> OutputErrorEstimate:
     """Take the model of the likelihood of rounded data, if the data are such.
 
-    That is: the noise is much less than a step of the converter, what is left is white, and the
-    dead time is inside of the interval.
+    That is: the noise is much less than a step of the converter, and what is left is white. The
+    interval is extended to that of the new dead time for its structure.
     """
-    window = whole.window
+    window, scales = whole.window, whole.scales
     special = found.chain is not None or found.follows_flow or found.whitened
     if special or window.own is not None or window.output.size > _LONGEST:
         return found
     start = whole.candidates[found.structure]
     best = fit_rounded(whole, start, step)
-    credible = found.low <= best.candidate.dead_time <= found.high
-    if best.noise > _ROUGH * step or best.correlation > _WHITE or not credible:
+    if best.noise > _ROUGH * step or best.correlation > _WHITE:
         return found
+    dead_time, reach = best.candidate.dead_time, Z_95 * best.std
     numerator = best.linear[: start.structure.zeros + 1]
     return replace(
         found,
-        dead_time=best.candidate.dead_time,
+        dead_time=dead_time,
+        low=max(min(found.low, dead_time - reach), scales.earliest),
+        high=min(max(found.high, dead_time + reach), scales.latest),
         poles=best.candidate.poles,
         numerator=numerator,
         fitted=best.model,
@@ -76,14 +78,15 @@ class Rounded:
     """Maximum of the likelihood.
 
     `linear` (q,) are the coefficients of the numerator and of the regressors, `model` (N,) the
-    output without noise and rounding, `noise` its standard deviation. `correlation` is the
-    correlation time of the scores, 1 if the noise is white.
+    output without noise and rounding, `noise` its standard deviation, `std` the standard error of
+    the dead time in s. `correlation` is the correlation time of the scores, 1 for white noise.
     """
 
     candidate: Candidate
     linear: FloatArray
     model: FloatArray
     noise: float
+    std: float
     correlation: float
 
 
@@ -119,12 +122,20 @@ class _Likelihood:
         )
         return float(np.exp(found.x))
 
-    def slopes(self, x: FloatArray, linear: FloatArray, model: FloatArray) -> FloatArray:
-        """Derivatives (N, 1 + n) of the model by the dead time and the pole parameters."""
-        unit = _DIFFERENCE * np.diag(self.units(x.size))
-        return np.column_stack(
-            [(self.terms(x + move) @ linear - model) / _DIFFERENCE for move in unit]
-        )
+    def information(
+        self, x: FloatArray, linear: FloatArray, terms: FloatArray, weight: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives (N, p) of the model, sizes (p,) of all, and the information scaled by them.
+
+        Derivatives by dead time in samples, pole parameters, and linear terms.
+        """
+        moves, model = _DIFFERENCE * np.diag(self.units(x.size)), terms @ linear
+        slopes = [(self.terms(x + move) @ linear - model) / _DIFFERENCE for move in moves]
+        jacobian = np.column_stack([*slopes, terms])
+        size = np.sqrt(weight @ jacobian**2)
+        size[size == 0] = 1.0
+        scaled = jacobian / size
+        return jacobian, size, scaled.T @ (weight[:, None] * scaled)
 
     def units(self, count: int) -> FloatArray:
         """Units of the parameters: one sample, and one for the logarithms."""
@@ -145,10 +156,7 @@ def fit_rounded(whole: WindowFit, start: Candidate, step: float) -> Rounded:
     best, damping = likelihood.value(model, noise), _DAMPING
     for _ in range(_TURNS):
         score, weight = scores(likelihood.error(model), step, noise)
-        jacobian = np.concatenate([likelihood.slopes(x, linear, model), terms], axis=1)
-        size = np.sqrt(weight @ jacobian**2)
-        size[size == 0] = 1.0
-        normal = (jacobian / size).T @ (weight[:, None] * (jacobian / size))
+        jacobian, size, normal = likelihood.information(x, linear, terms, weight)
         slope = score @ (jacobian / size)
         while damping < _GIVEN_UP:
             change = np.linalg.solve(normal + damping * np.eye(size.size), slope) / size
@@ -169,8 +177,10 @@ def fit_rounded(whole: WindowFit, start: Candidate, step: float) -> Rounded:
             break
     score, weight = scores(likelihood.error(model), step, noise)
     left = (score / np.sqrt(weight))[whole.window.start :]
+    _, size, normal = likelihood.information(x, linear, terms, weight)
+    std = np.sqrt(np.linalg.pinv(normal)[0, 0]) / size[0] * whole.scales.dt
     candidate = Candidate(start.structure, x, start.cost, searched=False)
-    return Rounded(candidate, linear, model, noise, correlation_time(left))
+    return Rounded(candidate, linear, model, noise, float(std), correlation_time(left))
 
 
 def log_probability(error: FloatArray, step: float, noise: float) -> FloatArray:

@@ -15,6 +15,8 @@ The rule:
    clearly better than any lags, and rounding is not coarse, its dead time is used. A zero can
    imitate a smooth onset: if the best structure has one, the interval extends to a sample after the
    visible onset, and to three times the distance between dead time and onset before the dead time.
+   Where the noise is much less than a step of the converter, dead time and model are those of the
+   likelihood of rounded data.
    Where the residual is correlated or coarsely rounded, the likelihood may be flat down to the
    earliest dead time and have its maximum there, although the first 15 % of the response alone tell
    the dead time more closely: the dead time is then the median of the estimates of point 3, if most
@@ -153,9 +155,11 @@ def fit_step_record(
             plain.best,
             lambda: _fit_until(data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber),
         )
-        return likelihood_fit(
+        given = likelihood_fit(
             whole, adequate=adequate, relaxing=data.relaxing, better=better, near=near
         )
+        rounded = adequate and data.coarse
+        return in_rounded_data(given, whole, data.quantum) if rounded else given
     likely: OutputErrorEstimate | None = None
     if adequate:
         assert data.motion is not None
