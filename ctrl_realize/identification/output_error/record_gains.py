@@ -74,7 +74,6 @@ class RecordGains(Result):
     A simulated plant whose gain falls with the level of its input:
 
     >>> import numpy as np
-    from numpy.typing import NDArray
     >>> import ctrl_realize as cr
     >>> t, rng = 0.01 * np.arange(700), np.random.default_rng(1)
     >>> lag = np.where(t < 1.12, 0.0, -np.expm1(-(t - 1.12) / 0.4))
@@ -110,9 +109,9 @@ class RecordGains(Result):
             self.output_levels,
             self.gains,
             self.errors,
+            self.low,
+            self.high,
         ):
-            values.flags.writeable = False
-        for values in (self.low, self.high):
             values.flags.writeable = False
 
     @property
