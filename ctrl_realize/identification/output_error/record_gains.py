@@ -38,7 +38,7 @@ class RecordGains(Result):
     input levels before and after the step: where the static characteristic is quadratic, its slope
     there is exactly the gain of the step. For any other input it is the mean of the input. If all
     records have the same operating point, the schedule is over the height of the step: friction or
-    a limit makes the gain depend on it.
+    a limit makes the gain depend on it. The schedule is linear between operating points [1]_.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class RecordGains(Result):
         return np.array(at), np.array([float(np.median(gains[group])) for group in groups])
 
     def at(self, point: float | Record) -> float:
-        """Gain at an operating point: interpolated between records, constant beyond them [1]_.
+        """Gain at an operating point: interpolated between records, constant beyond them.
 
         Parameters
         ----------
