@@ -46,11 +46,14 @@ def in_rounded_data(
 ) -> OutputErrorEstimate:
     """Take the model of the likelihood of rounded data, if the data are such.
 
-    That is: the noise is much less than a step of the converter, and what is left is white. The
-    interval is extended to that of the new dead time for its structure.
+    That is: the noise is much less than a step of the converter, and what is left is white. Not
+    where the model has zeros: how much of the time before the onset is dead time is then not
+    identifiable, from rounded samples neither. The interval is extended to that of the new dead
+    time for its structure.
     """
     window, scales = whole.window, whole.scales
     special = found.chain is not None or found.follows_flow or found.whitened
+    special |= found.structure.zeros > 0
     if special or window.own is not None or window.output.size > _LONGEST:
         return found
     start = whole.candidates[found.structure]
