@@ -32,18 +32,7 @@ def plant_of(one: Measured) -> str:
 def predicted(model: Answer, fitted: Measured, other: Measured) -> tuple[float, float]:
     """Fit in percent of a record that was not seen: as it is, and with the best gain."""
     gain = other.task.gain / fitted.task.gain
-    after = slice(other.task.edge, None)
-    measured = other.task.y[after] - np.mean(other.task.y[after])
-    simulated = gain * model.simulate(other.task.u)[after]
-    simulated = simulated - np.mean(simulated)
-    power = float(simulated @ simulated)
-    best = float(simulated @ measured) / power if power > 0 else 0.0
-    scale = float(np.linalg.norm(measured))
-    as_it_is, free = (
-        100 * (1 - float(np.linalg.norm(measured - part * simulated)) / scale)
-        for part in (1.0, best)
-    )
-    return as_it_is, free
+    return other.predicted(gain * model.simulate(other.task.u))
 
 
 def crossed_table(records: tuple[Measured, ...], ask: Ask) -> list[str]:

@@ -16,18 +16,8 @@ WAYS = ("median of single fits", "joint, one gain", "joint, own gains")
 
 def predicted(system: Any, other: Measured, ratio: float = 1.0) -> tuple[float, float]:
     """Fit in percent of a record that was not seen: as it is, and with the best gain."""
-    after = slice(other.task.edge, None)
-    measured = other.task.y[after] - np.mean(other.task.y[after])
-    simulated = ratio * other.task.gain * np.asarray(system.simulate(other.task.u))[after]
-    simulated = simulated - np.mean(simulated)
-    power = float(simulated @ simulated)
-    best = float(simulated @ measured) / power if power > 0 else 0.0
-    scale = float(np.linalg.norm(measured))
-    as_it_is, free = (
-        100 * (1 - float(np.linalg.norm(measured - part * simulated)) / scale)
-        for part in (1.0, best)
-    )
-    return as_it_is, free
+    gain = ratio * other.task.gain
+    return other.predicted(gain * np.asarray(system.simulate(other.task.u)))
 
 
 def at_one_rate(some: list[Measured]) -> list[cr.Record]:

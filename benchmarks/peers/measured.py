@@ -56,6 +56,19 @@ class Measured:
         left = (self.task.y - answer.simulate(self.task.u))[after]
         return float(100 * (1 - np.std(left) / np.std(self.task.y[after])))
 
+    def predicted(self, simulated: np.ndarray) -> tuple[float, float]:
+        """Percent explained by a prediction, offset taken off: as it is, and with the best gain."""
+        measured, simulated = (x[self.task.edge :] for x in (self.task.y, simulated))
+        measured, simulated = measured - np.mean(measured), simulated - np.mean(simulated)
+        power = float(simulated @ simulated)
+        best = float(simulated @ measured) / power if power > 0 else 0.0
+        scale = float(np.linalg.norm(measured))
+        as_it_is, free = (
+            100 * (1 - float(np.linalg.norm(measured - part * simulated)) / scale)
+            for part in (1.0, best)
+        )
+        return as_it_is, free
+
 
 @functools.cache
 def records(folder: Path) -> tuple[Measured, ...]:

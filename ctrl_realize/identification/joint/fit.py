@@ -12,7 +12,7 @@ import numpy as np
 from ..._wording import in_time
 from ...data import Record
 from ...data.given import as_records
-from ...delayed import DelayedStateSpace, delayed_ss, fit_of
+from ...delayed import DelayedStateSpace, fit_of
 from ...frequency.fit_frf import fit_frf
 from ...frequency.frf_fit import FRFFit
 from ...numerics.arrays import ComplexArray, FloatArray
@@ -29,7 +29,7 @@ from ...numerics.separable.varpro import Structure
 from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
-from ..output_error.summary import fitted_core
+from ..output_error.summary import fitted_core, fitted_model
 from .flags import joint_flags
 from .result import JointFit
 
@@ -166,15 +166,7 @@ def fit_joint(
         choices=_choices(estimate, first, other, spread),
     )
     result = replace(result, flags=joint_flags(result, max_delay))
-    return delayed_ss(
-        fitted_core(estimate, result.poles),
-        dead_time=result.dead_time,
-        dt=result.dt,
-        fit=result,
-        name=several[0].name or None,
-        inputs=list(several[0].input_labels),
-        outputs=list(several[0].output_labels),
-    )
+    return fitted_model(fitted_core(estimate, result.poles), result)
 
 
 def _orders(frf: ct.FrequencyResponseData) -> range | None:

@@ -14,7 +14,7 @@ from ..._checks import one_of, positive
 from ..._wording import named
 from ...data import Record, StepEdge
 from ...data.given import as_records, check_complete
-from ...delayed import DelayedStateSpace, delayed_ss
+from ...delayed import DelayedStateSpace
 from ...errors import DataError, NoStepError, OptionError, OrderError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -40,7 +40,7 @@ from .known import known_factor
 from .own_gains import fit_own_gains, unlike_records
 from .repeat_flags import repeat_flags, same_record_flags
 from .result import OutputErrorFit
-from .summary import fitted_core, summarise
+from .summary import fitted_core, fitted_model, summarise
 
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
@@ -197,15 +197,7 @@ def fit_output_error(
     core = fitted_core(fit, result.poles)
     if include_known and known is not None:
         core = ct.ss(known) * core
-    return delayed_ss(
-        core,
-        dead_time=result.dead_time,
-        dt=result.dt,
-        fit=result,
-        name=several[0].name or None,
-        inputs=list(several[0].input_labels),
-        outputs=list(several[0].output_labels),
-    )
+    return fitted_model(core, result)
 
 
 class _Settings(TypedDict):

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..._wording import interval_in_time
 from ...data import Record
+from ...delayed import DelayedStateSpace, delayed_ss
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
@@ -35,6 +36,20 @@ def summarise(
         repeatability=repeatability,
         choices=choices + _choices(fit),
         flags=flags,
+    )
+
+
+def fitted_model(core: ct.StateSpace, result: OutputErrorFit) -> DelayedStateSpace:
+    """Make the model of a fit from its continuous core, with the names of the first record."""
+    first = result.records[0]
+    return delayed_ss(
+        core,
+        dead_time=result.dead_time,
+        dt=result.dt,
+        fit=result,
+        name=first.name or None,
+        inputs=list(first.input_labels),
+        outputs=list(first.output_labels),
     )
 
 
