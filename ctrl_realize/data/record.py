@@ -14,6 +14,7 @@ from ..errors import DataError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.signals.time_axis import axis_fault, sample_time
 from ..results import Drawable
+from .irregular import on_one_axis
 from .record_checks import axis_words, check_finite, check_shape, check_size, labelled
 from .resampling import MIN_SAMPLES, resampled
 
@@ -109,8 +110,9 @@ class Record(Drawable):
         fault = axis_fault(stamps)
         if fault is not None:
             raise TimeAxisError(
-                f"{axis_words(fault)}; Record.resampled(...) or read_record(..., "
-                "resample=True) interpolates small jitter; Record needs a uniform time axis"
+                f"{axis_words(fault)}; Record needs a uniform time axis: Record.from_samples(...) "
+                "takes gaps and irregular samples as they are, Record.resampled(...) or "
+                "read_record(..., resample=True) interpolates small jitter"
             )
         fix = object.__setattr__
         fix(self, "time", read_only(stamps))
@@ -229,6 +231,57 @@ class Record(Drawable):
             Time that repeats or decreases, or a gap.
         """
         return cls(*resampled(time, input, output, dt, max_jitter), **labels)
+
+    @classmethod
+    def from_samples(
+        cls,
+        time: ArrayLike,
+        input: ArrayLike,
+        output: ArrayLike,
+        *,
+        input_time: ArrayLike | None = None,
+        dt: float | None = None,
+        **labels: Any,
+    ) -> Record:
+        """Make a record from samples with gaps or irregular time stamps, without interpolation.
+
+        The time axis is a uniform grid on which each sample has its own row. The output is NaN
+        (missing) in rows without a sample, the input holds its last value.
+
+        Parameters
+        ----------
+        time, input, output : array_like
+            As for `Record`, but the time stamps only need to increase. NaN in the output is
+            missing; where the input is NaN it holds its last value.
+        input_time : array_like, optional
+            Time stamps of the input in s, if they are others than those of the output: a fast
+            input with a slow output, or an input that is stored when it changes.
+        dt : float, optional
+            Step of the grid in s; each sample goes to the nearest row. Default: regular samples
+            keep their step; otherwise the greatest common divisor of the distances between the
+            stamps, or a fiftieth of the usual distance if that would be too fine.
+        **labels
+            Further arguments of `Record`.
+
+        Returns
+        -------
+        Record
+            With ``missing="keep"``. It starts with the first sample of the input.
+
+        Raises
+        ------
+        TimeAxisError
+            Time that repeats or decreases, or two samples in one step.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> record = cr.Record.from_samples([0, 10, 30, 40], [0, 0, 1, 1], [5, 5, 5, 6])
+        >>> record.dt, record.input.tolist(), record.output.tolist()
+        (10.0, [0.0, 0.0, 0.0, 1.0, 1.0], [5.0, 5.0, nan, 5.0, 6.0])
+        """
+        labels = {"missing": "keep", **labels}
+        return cls(*on_one_axis(time, input, output, input_time, dt), **labels)
 
     @classmethod
     def from_response(cls, response: ct.TimeResponseData, *, name: str | None = None) -> Record:

@@ -31,9 +31,13 @@ def sample_time(time: FloatArray) -> float:
     >>> sample_time(0.01 * np.arange(1, 18062))
     0.01
     """
-    mean = float((time[-1] - time[0]) / (time.size - 1))
-    short = float(f"{mean:.12g}")
-    return short if abs(short - mean) <= 1e-13 * mean else mean
+    return without_rounding(float((time[-1] - time[0]) / (time.size - 1)))
+
+
+def without_rounding(step: float) -> float:
+    """Return a step with twelve digits if it differs from them by rounding only."""
+    short = float(f"{step:.12g}")
+    return short if abs(short - step) <= 1e-13 * step else step
 
 
 AxisFaultKind: TypeAlias = Literal[

@@ -1,0 +1,91 @@
+"""Samples with gaps, irregular time stamps or two sample times, on one uniform time axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._checks import numbers, positive
+from ..errors import DataError, OptionError, TimeAxisError
+from ..numerics.arrays import FloatArray
+from ..numerics.signals.sample_grid import grid_rows, grid_step
+from ..numerics.signals.time_axis import axis_fault
+from .record_checks import axis_words, check_finite, check_shape, check_size
+from .resampling import MAX_DENSER, MIN_SAMPLES
+
+
+def on_one_axis(
+    time: ArrayLike,
+    input: ArrayLike,
+    output: ArrayLike,
+    input_time: ArrayLike | None,
+    dt: float | None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Time axis, held input, and output with NaN where there is no sample.
+
+    See `Record.from_samples`.
+    """
+    stamps = _stamps(time, "time")
+    moves = stamps if input_time is None else _stamps(input_time, "input_time")
+    u, y = numbers(input, "input"), numbers(output, "output")
+    for what, values, count in (("input", u, moves.size), ("output", y, stamps.size)):
+        check_shape(values, what, count)
+        check_finite(values, what, allow_nan=True)
+        check_size(values, what)
+    known = ~np.isnan(np.atleast_2d(u))
+    if not known.any(axis=1).all():
+        raise DataError("the input has no samples: all of its values are NaN")
+    # An input is unknown before its first sample: what came before cannot be used.
+    start = float(max(moves[row][0] for row in known))
+    seen = stamps >= start
+    if np.count_nonzero(seen & ~np.isnan(np.atleast_2d(y)).all(axis=0)) < MIN_SAMPLES:
+        raise DataError(
+            f"the output has less than {MIN_SAMPLES} samples from {start:g} s on, the first "
+            "sample of the input; before it the input is unknown"
+        )
+    every = np.union1d(stamps[seen], moves[moves >= start])
+    every = np.union1d(every, [start])
+    most = MAX_DENSER * every.size
+    step = grid_step(every, most) if dt is None else positive(dt, "dt", "sample time in s")
+    if (every[-1] - every[0]) / step > most:
+        raise OptionError(
+            f"dt={step:g} s would give {(every[-1] - every[0]) / step:.4g} rows for {every.size} "
+            f"samples; the limit is {MAX_DENSER} times as many"
+        )
+    rows = grid_rows(stamps[seen], float(every[0]), step)
+    shared = np.flatnonzero(np.diff(rows) == 0)
+    if shared.size:
+        first = int(shared[0])
+        raise TimeAxisError(
+            f"two samples, at {stamps[seen][first]:.9g} s and {stamps[seen][first + 1]:.9g} s, "
+            f"lie within dt={step:g} s; expected one sample in each step: give a smaller dt, or "
+            "average samples that are closer together"
+        )
+    axis = every[0] + step * np.arange(max(int(rows[-1]) + 1, MIN_SAMPLES), dtype=np.float64)
+    spread = np.full((*y.shape[:-1], axis.size), np.nan)
+    spread[..., rows] = y[..., seen]
+    held = np.stack([
+        _held(moves[row], values[row], axis, step)
+        for row, values in zip(known, np.atleast_2d(u), strict=True)
+    ])  # fmt: skip
+    return axis, held[0] if u.ndim == 1 else held, spread
+
+
+def _stamps(time: ArrayLike, what: str) -> FloatArray:
+    stamps = numbers(time, what)
+    if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
+        raise DataError(f"{what} has shape {stamps.shape}; expected (N,), N >= {MIN_SAMPLES}")
+    check_finite(stamps, what)
+    check_size(stamps, what)
+    fault = axis_fault(stamps) if np.any(np.diff(stamps) <= 0) else None
+    if fault is not None:
+        raise TimeAxisError(f"{axis_words(fault)}; {what} must increase from row to row")
+    return stamps
+
+
+def _held(stamps: FloatArray, values: FloatArray, axis: FloatArray, step: float) -> FloatArray:
+    """Last value of an input at every row of the time axis."""
+    # Of several values within a row the last one holds on.
+    rows = grid_rows(stamps, float(axis[0]), step)
+    last = np.searchsorted(rows, np.arange(axis.size), side="right") - 1
+    return np.asarray(values[np.maximum(last, 0)])
