@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
 
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import numbers, one_of, spelled_out
-from ..errors import DataError, TimeAxisError
+from .._checks import numbers, one_of, real, spelled_out
+from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray, read_only
 from ..numerics.signals.time_axis import axis_fault, sample_time
 from ..results import Drawable
+from .frames import frame_of_signals, signals_of_frame
 from .irregular import on_one_axis
-from .record_checks import axis_words, check_finite, check_shape, check_size, labelled
+from .record_checks import (
+    axis_words,
+    check_finite,
+    check_shape,
+    check_size,
+    checked_units,
+    labelled,
+)
 from .resampling import MIN_SAMPLES, resampled
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MISSING = ("refuse", "keep")
 
@@ -34,6 +46,9 @@ class Record(Drawable):
         Name in tables and plots.
     input_labels, output_labels : sequence of str, optional
         Names of the signals; default ``u`` and ``y`` (``u[0]``, ``u[1]``, ... for several).
+    units : mapping of str to str, optional
+        Unit of each signal by its label, such as ``{"u": "%", "y": "degC"}``; under ``"time"`` the
+        unit in which times are to be shown (`time` itself is in s).
     missing : {"refuse", "keep"}, optional
         How NaN in `input` and `output` is treated. With ``"keep"`` they are missing samples, which
         `impulse_from_io` can handle; the step functions need complete records.
@@ -55,12 +70,17 @@ class Record(Drawable):
 
     Examples
     --------
+    ``len(record)`` is the number of samples, ``record[t0:t1]`` the part between two times in s.
+
     >>> import numpy as np
     >>> import ctrl_realize as cr
     >>> t = 0.01 * np.arange(500)
     >>> u = (t >= 1.0).astype(float)
-    >>> cr.Record(t, u, 2 * u, name="bench")
+    >>> record = cr.Record(t, u, 2 * u, name="bench", units={"u": "V", "y": "mm"})
+    >>> record
     <Record 'bench': 500 samples of 0.01 s, 1 input, 1 output>
+    >>> record.input_units, record.output_units, len(record[0.5:2])
+    (('V',), ('mm',), 151)
     """
 
     __slots__ = (
@@ -72,6 +92,7 @@ class Record(Drawable):
         "output",
         "output_labels",
         "time",
+        "units",
     )
 
     time: FloatArray
@@ -82,6 +103,7 @@ class Record(Drawable):
     input_labels: tuple[str, ...]
     output_labels: tuple[str, ...]
     missing: str
+    units: Mapping[str, str]
 
     def __init__(
         self,
@@ -92,6 +114,7 @@ class Record(Drawable):
         name: str = "",
         input_labels: Sequence[str] | None = None,
         output_labels: Sequence[str] | None = None,
+        units: Mapping[str, str] | None = None,
         missing: Literal["refuse", "keep"] = "refuse",
     ) -> None:
         stamps = numbers(time, "time")
@@ -123,6 +146,8 @@ class Record(Drawable):
         fix(self, "missing", str(missing))
         fix(self, "input_labels", labelled(input_labels, self.ninputs, "u", "input_labels"))
         fix(self, "output_labels", labelled(output_labels, self.noutputs, "y", "output_labels"))
+        known = checked_units(units, (*self.input_labels, *self.output_labels))
+        fix(self, "units", MappingProxyType(known))
 
     def __setattr__(self, attribute: str, value: Any) -> None:
         raise AttributeError(
@@ -130,18 +155,17 @@ class Record(Drawable):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (
-            _rebuild,
-            (
-                self.time,
-                self.input,
-                self.output,
-                self.name,
-                self.input_labels,
-                self.output_labels,
-                self.missing,
-            ),
-        )
+        return _rebuild, (self.time, self.input, self.output, self._labels())
+
+    def _labels(self) -> dict[str, Any]:
+        """Arguments of a record besides its samples."""
+        return {
+            "name": self.name,
+            "input_labels": self.input_labels,
+            "output_labels": self.output_labels,
+            "units": dict(self.units),
+            "missing": self.missing,
+        }
 
     def __repr__(self) -> str:
         name = f" {self.name!r}" if self.name else ""
@@ -149,6 +173,19 @@ class Record(Drawable):
             f"<Record{name}: {self.n_samples} samples of {self.dt:g} s, "
             f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}>"
         )
+
+    def __len__(self) -> int:
+        return self.n_samples
+
+    def __getitem__(self, part: slice) -> Record:
+        if not isinstance(part, slice) or part.step is not None:
+            raise OptionError(
+                f"record[{part!r}]; expected two times in s, such as record[10:60]; the samples "
+                "are in record.time, record.input and record.output"
+            )
+        low = self.time[0] if part.start is None else real(part.start, "start", "time in s")
+        high = self.time[-1] if part.stop is None else real(part.stop, "stop", "time in s")
+        return self.between(low, high)
 
     @property
     def n_samples(self) -> int:
@@ -169,6 +206,16 @@ class Record(Drawable):
     def n_missing(self) -> int:
         """Number of values of input and output that are NaN."""
         return int(np.isnan(self.input).sum() + np.isnan(self.output).sum())
+
+    @property
+    def input_units(self) -> tuple[str, ...]:
+        """Units of the input signals; empty where they are not known."""
+        return tuple(self.units.get(label, "") for label in self.input_labels)
+
+    @property
+    def output_units(self) -> tuple[str, ...]:
+        """Units of the output signals; empty where they are not known."""
+        return tuple(self.units.get(label, "") for label in self.output_labels)
 
     def issiso(self) -> bool:
         """Whether there is one input and one output."""
@@ -194,11 +241,112 @@ class Record(Drawable):
             self.time[inside],
             self.input[..., inside],
             self.output[..., inside],
-            name=self.name,
-            input_labels=self.input_labels,
-            output_labels=self.output_labels,
-            missing="keep" if self.missing == "keep" else "refuse",
+            **self._labels(),
         )
+
+    def with_baseline(self, input: ArrayLike, output: ArrayLike) -> Record:
+        """Return the record with one sample of the steady state in front of it.
+
+        For a record that begins with its step: the input had the value `input` before, and the
+        output had settled at `output`.
+
+        Parameters
+        ----------
+        input, output : float or array_like, shape (signals,)
+            Levels before the record.
+
+        Raises
+        ------
+        DataError
+            Not one number for each signal.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> record = cr.Record([0, 1, 2, 3], [5, 5, 5, 5], [20, 20, 21, 22]).with_baseline(0, 20)
+        >>> print(record.time, record.input, record.output)
+        [-1.  0.  1.  2.  3.] [0. 5. 5. 5. 5.] [20. 20. 20. 21. 22.]
+        """
+        levels = []
+        for what, given, signal in (("input", input, self.input), ("output", output, self.output)):
+            level = numbers(given, f"the baseline of the {what}")
+            check_finite(np.atleast_1d(level), f"the baseline of the {what}")
+            if level.size != np.atleast_2d(signal).shape[0]:
+                raise DataError(
+                    f"the baseline of the {what} has {level.size} values; expected one for each "
+                    f"of the {np.atleast_2d(signal).shape[0]} signals"
+                )
+            levels.append(level.reshape(signal[..., :1].shape))
+        return Record(
+            np.r_[self.time[0] - self.dt, self.time],
+            np.concatenate([levels[0], self.input], axis=-1),
+            np.concatenate([levels[1], self.output], axis=-1),
+            **self._labels(),
+        )
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: pd.DataFrame,
+        *,
+        input: str | Sequence[str],
+        output: str | Sequence[str],
+        time: str | None = None,
+        **options: Any,
+    ) -> Record:
+        """Make a record from a pandas table.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+        input, output : str or sequence of str
+            Columns of the signals; their names become the labels.
+        time : str, optional
+            Column of time; default: the index. Dates (a `DatetimeIndex`) and durations are
+            counted in s from the first row, numbers are s.
+        **options
+            Further arguments of `Record`. With ``missing="keep"``, missing values are kept.
+
+        Raises
+        ------
+        OptionError
+            The table has no such column.
+        DataError, TimeAxisError
+            As for `Record`.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> import ctrl_realize as cr
+        >>> when = pd.date_range("2025-02-01 08:15", periods=5, freq="10s")
+        >>> frame = pd.DataFrame({"OP": [0, 0, 1, 1, 1], "PV": [5.0, 5, 5, 6, 7]}, index=when)
+        >>> cr.Record.from_frame(frame, input="OP", output="PV").dt
+        10.0
+        """
+        *signals, inputs, outputs = signals_of_frame(frame, input, output, time)
+        labels = {"input_labels": inputs, "output_labels": outputs}
+        return cls(*signals, **labels | options)
+
+    def to_frame(self, start: Any = None) -> pd.DataFrame:
+        """Convert the record to a pandas table with a column for each signal.
+
+        Parameters
+        ----------
+        start : str, datetime or pandas.Timestamp, optional
+            Date and time of time 0. The index is then a `DatetimeIndex`; default: time in s.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> print(cr.Record([0, 1, 2], [0, 1, 1], [5, 5, 6]).to_frame())
+                u    y
+        time
+        0.0   0.0  5.0
+        1.0   1.0  5.0
+        2.0   1.0  6.0
+        """
+        rows = np.concatenate([np.atleast_2d(self.input), np.atleast_2d(self.output)])
+        return frame_of_signals(self.time, rows, (*self.input_labels, *self.output_labels), start)
 
     @classmethod
     def resampled(
@@ -326,23 +474,9 @@ class Record(Drawable):
 
 
 def _rebuild(
-    time: FloatArray,
-    input: FloatArray,
-    output: FloatArray,
-    name: str,
-    input_labels: tuple[str, ...],
-    output_labels: tuple[str, ...],
-    missing: Literal["refuse", "keep"],
+    time: FloatArray, input: FloatArray, output: FloatArray, labels: dict[str, Any]
 ) -> Record:
-    return Record(
-        time,
-        input,
-        output,
-        name=name,
-        input_labels=input_labels,
-        output_labels=output_labels,
-        missing=missing,
-    )
+    return Record(time, input, output, **labels)
 
 
 def _count(number: int, noun: str) -> str:

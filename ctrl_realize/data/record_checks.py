@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -63,6 +64,23 @@ def labelled(
     if len(labels) != count or len(set(labels)) != count:
         raise OptionError(f"{argument}={labels!r}; expected {count} different names")
     return labels
+
+
+def checked_units(given: Any, labels: Sequence[str]) -> dict[str, str]:
+    """Return the units of signals by label, and that of time."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise OptionError(
+            f"units={given!r}; expected units by label, such as {{{labels[0]!r}: '%'}}"
+        )
+    strange = [name for name in given if name not in (*labels, "time")]
+    if strange:
+        raise OptionError(
+            f"units has the names {', '.join(map(repr, strange[:5]))}; expected "
+            f"{', '.join(map(repr, labels[:20]))} or 'time'"
+        )
+    return {str(name): spelled_out(str(unit)) for name, unit in given.items() if str(unit)}
 
 
 def axis_words(fault: AxisFault) -> str:

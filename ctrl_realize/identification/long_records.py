@@ -44,6 +44,7 @@ def _part(record: Record, start: int, count: int) -> Record:
         record.output[..., part],
         name=record.name,
         input_labels=record.input_labels,
+        units=record.units,
         output_labels=record.output_labels,
         missing="keep" if record.n_missing else "refuse",
     )

@@ -15,10 +15,34 @@ NUMBER = {
     ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
-_TIME = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([ T].*|[.,]\d+)?|\d{1,2}:\d{2}([.,]\d+)?")
+_CLOCK = r"\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?( ?[AaPp]\.?[Mm]\.?)?( ?(Z|UTC|[+-]\d{2}:?\d{2}))?"
+_MONTH = r"[^\W\d_]{3,9}\.?"
+_DATE = rf"(\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}\.?|\d{{1,2}}[-/. ]{_MONTH}[-/. ]\d{{2,4}})"
+_TIME = re.compile(rf"{_CLOCK}|{_DATE}([ T]+{_CLOCK})?")
+_PERCENT = re.compile(r"(?P<number>[+-]?[\d.,]+([eE][+-]?\d+)?) ?%")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 MISSING = frozenset({"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "?"})
 _NOT_NAMES = MISSING | {"inf", "+inf", "-inf", "infinity", "-infinity"}
+BAD_VALUES = frozenset(
+    {"bad", "bad data", "bad input", "bad quality", "bad value", "i/o timeout", "i/o-timeout",
+     "io timeout", "no data", "no sample", "no result", "not available", "not connect",
+     "not connected", "comm fail", "comm error", "calc failed", "pt created", "configure",
+     "intf shut", "interface shut", "shutdown", "scan off", "scan timeout", "over range",
+     "under range", "out of serv", "out of service", "arc off-line", "failed", "error", "invalid",
+     "timeout", "fault", "ungültig", "#value!", "#ref!", "#div/0!", "#num!", "#name?", "#null!",
+     "#n/a n/a", "[-11059] no good data for calculation"}
+)  # fmt: skip
+"""States that historians (the system digital states of AVEVA PI, OPC qualities) and spreadsheets
+write in place of a value."""
+
+STATES = {
+    "on": 1.0, "true": 1.0, "open": 1.0, "yes": 1.0, "ein": 1.0, "an": 1.0, "auf": 1.0,
+    "wahr": 1.0, "ja": 1.0, "running": 1.0, "opened": 1.0,
+    "off": 0.0, "false": 0.0, "closed": 0.0, "no": 0.0, "aus": 0.0, "zu": 0.0, "falsch": 0.0,
+    "nein": 0.0, "stopped": 0.0, "close": 0.0,
+}  # fmt: skip
+"""Positions of a switch, as numbers."""
+
 FILLED = ("number", "time")
 """Kinds of cells that hold data, see `kind_of`."""
 
@@ -62,10 +86,16 @@ def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str) -> None:
         )
 
 
+def without_percent(cell: str) -> str:
+    """Return the number of a cell such as ``12.5 %``; other cells as they are."""
+    found = _PERCENT.fullmatch(cell)
+    return found["number"] if found else cell
+
+
 def kind_of(cell: str, decimal: str) -> Literal["number", "time", "missing", "text"]:
     """Return the kind of a cell."""
-    if NUMBER[decimal].fullmatch(cell):
+    if NUMBER[decimal].fullmatch(without_percent(cell)):
         return "number"
-    if cell.lower() in _NOT_NAMES:
+    if cell.lower() in _NOT_NAMES or cell.lower() in BAD_VALUES:
         return "missing"
     return "time" if _TIME.fullmatch(cell) else "text"

@@ -201,7 +201,7 @@ def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
     column = table.columns[index]
     if unit is None:
         named_omega = plain_name(column.name) in ("omega", "ω", "w")
-        unit = column.unit or ("rad/s" if named_omega else "hz")
+        unit = plain_unit(column.unit) or ("rad/s" if named_omega else "hz")
     if unit not in _IN_HZ:
         raise OptionError(
             f"{table.path}: {table.title(index)} is in {unit!r}; give frequency_unit='Hz', "
@@ -222,7 +222,7 @@ def _response(table: Table, columns: dict[str, int], units: _Units) -> ComplexAr
 
 def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
     values = table.numbers(index)
-    unit = table.columns[index].unit if unit is None else unit
+    unit = plain_unit(table.columns[index].unit) if unit is None else unit
     if unit == "db":
         if values.max() > 400:
             raise DataError(f"{table.path}: {table.title(index)} goes up to {values.max():g} dB")
@@ -238,7 +238,7 @@ def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
 def _phase(table: Table, index: int, unit: str | None) -> FloatArray:
     """Phase in rad."""
     values = table.numbers(index)
-    unit = table.columns[index].unit if unit is None else unit
+    unit = plain_unit(table.columns[index].unit) if unit is None else unit
     if unit not in ("", "deg", "rad"):
         raise OptionError(
             f"{table.path}: {table.title(index)} is in {unit!r}; give phase_unit='deg' or 'rad'"

@@ -43,12 +43,12 @@ _CLOSING = "])}>"
 def plain_unit(text: str) -> str:
     """Normalise a unit: ``"Sec" -> "s"``, ``"µs" -> "us"``, ``"Degrees" -> "deg"``."""
     # MHz is the only unit here that depends on its capital letter, and mHz is not in use
-    lower = text.strip().strip("[](){}<>").strip().lower()
+    lower = bare_unit(text).lower()
     return _SPELLINGS.get(lower, lower)
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Split a column's name into name and unit.
+    """Split a column's name into name and unit in plain spelling.
 
     Examples
     --------
@@ -56,19 +56,40 @@ def split_unit(name: str) -> tuple[str, str]:
     >>> split_unit("time_ms"), split_unit("Zeit [s]"), split_unit("output_1")
     (('time', 'ms'), ('Zeit', 's'), ('output_1', ''))
     """
-    name = name.strip()
+    base, unit = _parted(name.strip())
+    return base, plain_unit(unit)
+
+
+def unit_of(name: str) -> str:
+    """Return the unit in a column's name as it is written, without brackets.
+
+    Examples
+    --------
+    >>> from ctrl_realize.io.units import unit_of
+    >>> unit_of("Temp [°C]"), unit_of("time_ms"), unit_of("output")
+    ('°C', 'ms', '')
+    """
+    return bare_unit(_parted(name.strip())[1])
+
+
+def bare_unit(text: str) -> str:
+    """Return a unit without brackets and blanks."""
+    return text.strip().strip("[](){}<>").strip()
+
+
+def _parted(name: str) -> tuple[str, str]:
     if name.endswith(tuple(_CLOSING)):
         opening = max(name.rfind(bracket) for bracket in _OPENING)
         if opening >= 0:
             base = name[:opening].rstrip(_SEPARATORS)
-            return base or name, plain_unit(name[opening:])
+            return base or name, name[opening:]
     tails = [tail for tail in _PER_SECOND if name.lower().endswith(tail)]
     start = max(name.rfind(separator) for separator in _SEPARATORS) + 1
     if tails:
         start = len(name) - len(tails[0])
     base = name[:start].rstrip(_SEPARATORS)
     if base and start and name[start - 1] in _SEPARATORS and plain_unit(name[start:]) in _KNOWN:
-        return base, plain_unit(name[start:])
+        return base, name[start:]
     return name, ""
 
 

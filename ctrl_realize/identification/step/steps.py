@@ -90,8 +90,9 @@ def found_step(
     if not found and np.ptp(signal) == 0:
         raise NoStepError(
             f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the "
-            "record begins with its step, prepend samples of the steady state before it; "
-            "otherwise check which column is the input"
+            "record begins with its step, give the steady state before it with "
+            "record.with_baseline(u0, y0) or read_record(..., rest=(u0, y0)); otherwise check "
+            "which column is the input"
         )
     if not found:
         raise NoStepError(

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import FileFormatError
 from ..checks import MAX_COLUMNS, MAX_NAME
 from ..tables import Column, Table
-from ..units import split_unit
+from ..units import unit_of
 
 AnyArray = np.ndarray[Any, np.dtype[Any]]
 
@@ -66,7 +66,7 @@ def table_of_arrays(path: Path, arrays: Mapping[str, AnyArray], variable: str | 
 
 def _columns(name: str, array: AnyArray, *, nameless: bool) -> list[Column]:
     name = name[:MAX_NAME]
-    unit = split_unit(name)[1]
+    unit = unit_of(name)
     if array.ndim == 1:
         return [Column(name, unit, array)]
     channels = array if array.shape[0] <= array.shape[1] else array.T

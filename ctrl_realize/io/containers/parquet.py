@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import FileFormatError
 from ..checks import MAX_COLUMNS, MAX_NAME, check_size
 from ..tables import Column, Table
-from ..units import split_unit
+from ..units import unit_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -34,7 +34,7 @@ class LateColumn(Column):
 
     def __init__(self, name: str, load: Callable[[int | None], AnyArray]) -> None:
         object.__setattr__(self, "name", name)
-        object.__setattr__(self, "unit", split_unit(name)[1])
+        object.__setattr__(self, "unit", unit_of(name))
         object.__setattr__(self, "_load", load)
 
     @cached_property

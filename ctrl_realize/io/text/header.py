@@ -9,7 +9,7 @@ from pathlib import Path
 from ...errors import FileFormatError
 from ..cells import DELIMITERS, FILLED, kind_of, split_line
 from ..checks import MAX_NAME
-from ..units import is_units_line, plain_unit, split_unit
+from ..units import bare_unit, is_units_line, unit_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
     if names is not None:
         above = texts[-2] if len(texts) > 1 else None
         if above is not None and is_units_line(names):
-            return above, [plain_unit(cell) for cell in names]
+            return above, [bare_unit(cell) for cell in names]
     elif texts and len(head.cells[first - 1]) > 1:
         raise FileFormatError(
             f"line {head.rows[first - 1] + 1} of {head.path} has {len(head.cells[first - 1])} "
@@ -74,7 +74,7 @@ def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
         )
     else:
         names = _names_in_comments(head, head.rows[first])
-    return names, [split_unit(name[:MAX_NAME])[1] for name in names]
+    return names, [unit_of(name[:MAX_NAME]) for name in names]
 
 
 def _header_cells(head: Head, row: int, first: int) -> list[str] | None:

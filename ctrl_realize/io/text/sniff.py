@@ -4,8 +4,8 @@ The rules, in this order; each can be overruled by the caller:
 
 1. The encoding is determined by the byte order mark, by zero bytes in every second place (UTF-16),
    or by valid UTF-8; otherwise it is Latin-1.
-2. The delimiter and the decimal sign are the pair for which the largest fraction of the cells in
-   the lower half of the first lines are numbers or times.
+2. The delimiter and the decimal sign are the pair that gives the most cells with numbers or times
+   in the lower half of the first lines; of those, the pair with the largest fraction of them.
 3. The data begin with the line from which on all numeric columns contain numbers.
 4. The header is the line above, if it has as many cells and no numbers; a line of units may be
    between. Without one, the last comment line above the data is used (as written by NumPy's
@@ -29,6 +29,9 @@ from .header import Head, column_names, first_data_row
 
 _SAMPLE_LINES = 60
 """Number of lines on which every pair of delimiter and decimal sign is tried."""
+
+_FEWEST_NUMBERS = 0.3
+"""Smallest fraction of the cells of a table that are numbers or times."""
 
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -135,7 +138,7 @@ def _comment(lines: list[str]) -> str | None:
 def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) -> tuple[str, str]:
     delimiters = DELIMITERS if options.delimiter == "auto" else (options.delimiter,)
     decimals = (".", ",") if options.decimal == "auto" else (options.decimal,)
-    best, best_score = ("", ""), (0.0, False)
+    best, best_score = ("", ""), (0.0, 0.0, False)
     for delimiter in delimiters:
         rows = [split_line(line, delimiter) for line in sample]
         width = Counter(map(len, rows)).most_common(1)[0][0]
@@ -144,10 +147,11 @@ def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) 
             good = sum(kind in FILLED for kind in kinds)
             filled = sum(map(len, rows)) - kinds.count("missing")
             # a single column counts only if no delimiter splits the lines into numbers
-            score = (round(good / max(filled, 1), 3), width > 1)
-            if good and score > best_score:
+            share = round(good / max(filled, 1), 3)
+            score = (round(good / len(rows), 1), share, width > 1)
+            if good and share >= _FEWEST_NUMBERS and score > best_score:
                 best, best_score = (delimiter, decimal), score
-    if best_score[0] < 0.3:
+    if not best_score[0]:
         raise FileFormatError(
             f"{path} has no recognisable numeric columns; one of its first lines is "
             f"{sample[0][:60]!r}; try delimiter=, decimal= and skip_rows="
