@@ -21,8 +21,11 @@ from .predictors.estimator import KalmanPredictor, kalman_predictor
 from .predictors.lqg import LQGController, lqg
 from .predictors.regulator import PredictorLQR, predictor_lqr
 from .predictors.smith import SmithPredictor, smith_predictor
+from .tuning.algorithm import PIDAlgorithm
 from .tuning.controller import PIDController
+from .tuning.forms import PIDForm, pid_forms
 from .tuning.pid import pid
+from .tuning.simulated import LoopSimulation, simulate_loop
 from .tuning.table import PIDComparison, compare_pid
 
 __all__ = [
@@ -33,9 +36,12 @@ __all__ = [
     "KalmanPredictor",
     "LQGController",
     "LoopCheck",
+    "LoopSimulation",
     "Margins",
+    "PIDAlgorithm",
     "PIDComparison",
     "PIDController",
+    "PIDForm",
     "Performance",
     "PredictorLQR",
     "ProcessModel",
@@ -51,11 +57,13 @@ __all__ = [
     "pade_ss",
     "performance",
     "pid",
+    "pid_forms",
     "predictor_lqr",
     "reduce",
     "reduce_fopdt",
     "reduce_sopdt",
     "robust_stability",
+    "simulate_loop",
     "smith_predictor",
     "thiran",
     "to_continuous",

@@ -15,11 +15,11 @@ from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ..loops.loop_check import LoopCheck
 from ..models.process_model import ProcessModel
+from .algorithm import DISCRETIZATIONS as DISCRETIZATIONS
+from .delivery import Delivered
 
-DISCRETIZATIONS = ("tustin", "forward", "backward")
 
-
-class PIDController(BesideDelays):
+class PIDController(Delivered, BesideDelays):
     """PID controller in ideal form, continuous or discrete; a `control.StateSpace`.
 
     Continuous: ``kp (1 + 1/(ti s) + td s / (tf s + 1))`` from error to plant input. Discrete: the
@@ -55,6 +55,15 @@ class PIDController(BesideDelays):
     <PIDController 'PI': kp = 0.5, ti = 0.2 s, dt = 0.001 s>
     >>> pi.kind, pi.nstates
     ('PI', 1)
+    >>> print(pi)
+    PID controller PI
+      kind          PI
+      rule          given
+      gain kp       0.5
+      integral ti   200 ms
+      gains         kp = 0.5, ki = kp / ti = 2.5 1/s
+      sample time   1 ms, tustin rule
+      to enter it   .as_form(name), .forms(); .algorithm() has limits and code
     """
 
     def __init__(
@@ -192,7 +201,7 @@ class PIDController(BesideDelays):
 
     def __str__(self) -> str:
         # python-control shows only matrices, in which the parameters are not visible.
-        return f"{self._line()}\n{self._gains()}\n\n{super().__str__()}"
+        return self.report()
 
     def _gains(self) -> str:
         """The gains of the parallel form, ``kp + ki / s + kd s / (tf s + 1)``."""
@@ -201,21 +210,25 @@ class PIDController(BesideDelays):
             gains.append(f"ki = kp / ti = {self.kp / self.ti:.4g} 1/s")
         if "D" in self.kind:
             gains.append(f"kd = kp td = {self.kp * self.td:.4g} s")
-        return "gains: " + ", ".join(gains)
+        return ", ".join(gains)
 
     def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]
         if "I" in self.kind:
-            rows.append(("integral time ti", in_time(self.ti, 4)))
+            rows.append(("integral ti", in_time(self.ti, 4)))
         if "D" in self.kind:
-            rows.append(("derivative time td", in_time(self.td, 4)))
+            rows.append(("derivative td", in_time(self.td, 4)))
             rows.append(("its filter tf", in_time(self.tf, 4)))
+        if self.kind != "P":
+            rows.append(("gains", self._gains()))
         step = f"{in_time(self.dt, 6)}, {self.method} rule" if self.dt else "none: continuous"
         rows.append(("sample time", step))
-        if self.check is None:
-            return f"PID controller {self.name}", rows, []
-        rows += self.check.rows()
-        return f"PID controller {self.name}", rows, [str(flag) for flag in self.check.flags]
+        flags = []
+        if self.check is not None:
+            rows += self.check.rows()
+            flags = [str(flag) for flag in self.check.flags]
+        rows.append(("to enter it", ".as_form(name), .forms(); .algorithm() has limits and code"))
+        return f"PID controller {self.name}", rows, flags
 
     def _repr_html_(self) -> str:
         title, rows, flags = self._card()
