@@ -6,6 +6,7 @@ from . import bench as bench
 from . import data as data
 from . import design as design
 from . import errors as errors
+from . import export as export
 from . import frequency as frequency
 from . import identification as identification
 from . import io as io

@@ -53,6 +53,10 @@ class MissingFileError(CtrlRealizeError, FileNotFoundError):
     """The file does not exist."""
 
 
+class MissingPackageError(CtrlRealizeError, ImportError):
+    """An optional package is needed that is not installed."""
+
+
 class CtrlRealizeWarning(UserWarning):
     """Base class of all warnings of this toolbox."""
 

@@ -16,6 +16,7 @@ SUBMODULES = {
     "data",
     "design",
     "errors",
+    "export",
     "frequency",
     "identification",
     "io",

@@ -22,7 +22,7 @@ FLOORS = [
     {"identification"},
     {"design", "validation"},
     {"io"},
-    {"plots"},
+    {"plots", "export"},
     {"report"},
     {"cli"},
     {"__main__", "__init__"},

@@ -61,6 +61,7 @@ DEFINING = ("errors", "results")
 
 SUBMODULES = {
     "design": "Controllers for plants with dead time.",
+    "export": "Controllers and models for other programs: PLC, C, Python, MATLAB, FMI.",
     "plots": "What each of them draws is on [Pictures](../../pictures.md).",
     "bench": "Simulated set-ups with known truth.",
     "report": "HTML reports: one self-contained file, the verdict first.",

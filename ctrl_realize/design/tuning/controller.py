@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import one_of, positive, real
+from ..._checks import one_of, positive, real, system_name
 from ..._shown import as_asked, html_card, text_card
 from ..._wording import in_time
 from ...delayed.operators import BesideDelays
@@ -100,7 +100,7 @@ class PIDController(Delivered, BesideDelays):
         super().__init__(
             *self._matrices(step),
             step,
-            name=name or (self.kind if rule == "given" else f"{self.kind}_{rule}"),
+            name=system_name(name or (self.kind if rule == "given" else f"{self.kind}_{rule}")),
             inputs=["e"],
             outputs=["u"],
             remove_useless_states=False,

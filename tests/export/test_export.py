@@ -1,0 +1,254 @@
+"""Exported code is compiled or parsed, run, and compared with the simulation."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+import sys
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+
+export = cr.export
+RNG = np.random.default_rng(8)
+COUNT = 240
+SETPOINT = np.repeat(RNG.uniform(30, 70, 8), COUNT // 8)
+MEASURED = 50 + np.cumsum(RNG.standard_normal(COUNT))
+MANUAL = np.where((np.arange(COUNT) // 60) % 3 == 1, 42.0, np.nan)
+PID = cr.design.PIDController(2.3, 7.0, 1.5, 0.2, dt=0.25, name="TIC 101.OP")
+ALGORITHMS = {
+    "full": PID.algorithm(
+        setpoint_weight=0.7, derivative_weight=0.1, output_limits=(0, 100), bias=35.0
+    ),
+    "forward": cr.design.PIDController(-0.8, 12.0, dt=0.25, method="forward").algorithm(
+        output_limits=(-np.inf, 20), tracking_time=3.0
+    ),
+    "P": cr.design.PIDController(1.4, dt=0.25).algorithm(),
+}
+CORE = ct.tf([1.8, 0.3], [1.0, 0.9, 0.2])
+SISO = cr.delayed_ss(CORE, dead_time=1.83, dt=0.25, name="column")
+MIMO = cr.DelayedStateSpace(
+    ct.ss(
+        [[0.9, 0.1, 0], [0, 0.7, -0.2], [0, 0.2, 0.7]],
+        [[1.0, 0], [0.5, -1], [0, 2]],
+        [[1.0, 0, 0.3], [0, 1, 0]],
+        [[0.2, 0], [0, 0]],
+        0.25,
+    ),
+    [4, 0],
+    output_delay=[0, 2],
+    name="two by two",
+)
+PLANTS = {"siso": SISO, "mimo": MIMO, "lag": cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.25), 0)}
+gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc compiles the exported C")
+
+
+def simulated(plant):
+    """Outputs at the call after each input, as exported code gives them."""
+    u = RNG.standard_normal((plant.ninputs, COUNT))
+    longer = np.c_[u, np.zeros(plant.ninputs)]
+    y = plant.simulate(longer if plant.ninputs > 1 else longer[0])
+    return u, np.atleast_2d(y)[:, 1:]
+
+
+def compiled(system, folder):
+    source = export.to_c(system, folder / "unit.c", name="unit")
+    library = folder / "unit.so"
+    # C89 without warnings, as the compilers of controllers want it
+    strict = ["-std=c89", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC"]
+    subprocess.run(["gcc", *strict, "-o", str(library), str(source)], check=True)
+    made = ctypes.CDLL(str(library))
+    made.unit_step.restype = ctypes.c_double
+    return made, ctypes.create_string_buffer(1 << 14)
+
+
+def python_unit(system, folder):
+    path = export.to_python(system, folder / "unit.py", name="unit")
+    scope = {}
+    exec(compile(path.read_text(), str(path), "exec"), scope)
+    return scope["unit"]()
+
+
+def structured_text(system, folder, **options):
+    pytest.importorskip("blark", reason="blark parses Structured Text")
+    from tests.oracles.structured_text import FunctionBlock
+
+    return FunctionBlock(export.to_structured_text(system, folder / "u.st", **options).read_text())
+
+
+def signals():
+    hand = ~np.isnan(MANUAL)
+    columns = SETPOINT, MEASURED, hand, np.nan_to_num(MANUAL)
+    return zip(*(column.tolist() for column in columns), strict=True)
+
+
+@pytest.mark.parametrize("kind", ALGORITHMS)
+@pytest.mark.parametrize("language", [pytest.param("c", marks=gcc), "python", "st"])
+def test_an_exported_controller_is_the_simulated_one(kind, language, tmp_path):
+    algorithm = ALGORITHMS[kind]
+    expected = algorithm.simulate(SETPOINT, MEASURED, MANUAL)
+    if language == "c":
+        made, state = compiled(algorithm, tmp_path)
+        made.unit_init(state)
+        got = [
+            made.unit_step(state, *map(ctypes.c_double, (r, y)), int(m), ctypes.c_double(v))
+            for r, y, m, v in signals()
+        ]
+    elif language == "python":
+        unit = python_unit(algorithm, tmp_path)
+        got = [unit.step(r, y, m, v) for r, y, m, v in signals()]
+    else:
+        block, got = structured_text(algorithm, tmp_path), []
+        for r, y, m, v in signals():
+            block(setpoint=r, measured=y, manual=m, manual_output=v)
+            got.append(block.values["u"])
+    np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12)
+    assert np.ptp(expected) > 5
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+@pytest.mark.parametrize("language", [pytest.param("c", marks=gcc), "python", "st"])
+def test_an_exported_plant_is_the_simulated_one(kind, language, tmp_path):
+    plant = PLANTS[kind]
+    u, expected = simulated(plant)
+    if language == "c":
+        made, state = compiled(plant, tmp_path)
+        made.unit_init(state)
+        got = []
+        for sample in u.T.tolist():
+            given = list(map(ctypes.c_double, sample))
+            if plant.noutputs == 1:
+                got.append([made.unit_step(state, *given)])
+            else:
+                out = [ctypes.c_double() for _ in range(plant.noutputs)]
+                made.unit_step(state, *given, *map(ctypes.byref, out))
+                got.append([each.value for each in out])
+    elif language == "python":
+        unit = python_unit(plant, tmp_path)
+        got = [np.atleast_1d(unit.step(*sample)) for sample in u.T]
+    else:
+        block, got = structured_text(plant, tmp_path), []
+        for sample in u.T.tolist():
+            block(**dict(zip(("u",) if len(sample) == 1 else ("u1", "u2"), sample, strict=True)))
+            got.append([v for n, v in block.values.items() if re.fullmatch(r"y\d?", n)])
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(np.transpose(got), expected, rtol=0, atol=1e-12 * scale)
+
+
+def test_exported_loop_is_the_simulated_loop(tmp_path):
+    algorithm = cr.design.pid(SISO, "amigo").algorithm(output_limits=(-1, 2))
+    plant, control = python_unit(SISO, tmp_path), python_unit(algorithm, tmp_path)
+    expected = cr.design.simulate_loop(SISO, algorithm, 200)
+    y, measured = 0.0, []
+    for reference in expected.setpoint:
+        measured.append(y)
+        y = plant.step(control.step(float(reference), y))
+    np.testing.assert_allclose(measured, expected.measured, rtol=0, atol=1e-12)
+
+
+def test_names_become_identifiers_and_short_numbers_are_a_choice(tmp_path):
+    block = structured_text(ALGORITHMS["full"], tmp_path, real="REAL")
+    assert str(block.block.name) == "TIC_101_OP"
+    text = (tmp_path / "u.st").read_text()
+    assert "LREAL" not in text
+    assert text.isascii()
+    path = export.to_python(PID, tmp_path / "a.py", name="while")
+    assert "class while_1:" in path.read_text()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pythonfmu brings libraries for this machine")
+def test_an_fmu_is_valid_and_simulates_the_model(tmp_path):
+    pytest.importorskip("pythonfmu", reason="pythonfmu makes FMUs")
+    fmpy = pytest.importorskip("fmpy", reason="fmpy runs FMUs")
+    from fmpy.validation import validate_fmu
+
+    places = list(sys.path)
+    path = export.to_fmu(SISO, tmp_path / "column.fmu")
+    assert sys.path == places
+    assert validate_fmu(str(path)) == []
+    u, expected = simulated(SISO)
+    time = 0.25 * np.arange(COUNT)
+    held = np.array(list(zip(time, u[0], strict=True)), dtype=[("time", float), ("u", float)])
+    result = fmpy.simulate_fmu(
+        str(path),
+        stop_time=0.25 * 100,
+        step_size=0.25,
+        output_interval=0.25,
+        input=held,
+        output=["y"],
+    )
+    np.testing.assert_allclose(result["y"][1:100], expected[0, :99], rtol=0, atol=1e-12)
+
+
+def read_script(path):
+    """Variables of a script of MATLAB: matrices as arrays, calls as (name, arguments)."""
+    found = {}
+    for name, value in re.findall(r"^(\w+) = (.*);$", path.read_text(), re.M):
+        call = re.fullmatch(r"(\w+)\((.*)\)", value)
+        if call and call[1] != "zeros":
+            parts = re.findall(r"\[[^]]*\]|[^,]+", call[2])
+            found[name] = (call[1], [part.strip().strip("'") for part in parts])
+        elif value.startswith(("[", "-")) or value[0].isdigit():
+            rows = value.strip("[]").split(";")
+            found[name] = np.array([row.split() for row in rows], dtype=float)
+    return found
+
+
+@pytest.mark.parametrize("kind", ["siso", "mimo"])
+def test_a_script_of_matlab_has_all_digits_and_the_delays(kind, tmp_path):
+    plant = PLANTS[kind]
+    script = read_script(export.to_matlab(plant, tmp_path / "plant.m", name="G"))
+    for letter in "ABCD":
+        np.testing.assert_array_equal(script[letter], getattr(plant.delay_free, letter))
+    name, (a, b, c, d, dt, *delays) = script["G"]
+    assert (name, a, b, c, d, float(dt)) == ("ss", "A", "B", "C", "D", 0.25)
+    expected = {
+        "siso": ["InputDelay", "8"],
+        "mimo": ["InputDelay", "[4; 0]", "OutputDelay", "[0; 2]"],
+    }
+    assert delays == expected[kind]
+
+
+def test_scripts_of_continuous_models_and_controllers(tmp_path):
+    path = tmp_path / "x.m"
+    continuous = read_script(export.to_matlab(SISO, path, name="G", continuous=True))
+    assert continuous["G"][1][4:6] == ["0", "InputDelay"]
+    assert float(continuous["G"][1][6]) == pytest.approx(1.83, rel=1e-9)
+    poles = np.linalg.eigvals(continuous["A"])
+    np.testing.assert_allclose(np.sort(poles), [-0.5, -0.4], rtol=1e-9)
+    name, gains = read_script(export.to_matlab(PID, path, name="C"))["C"]
+    assert name == "pid"
+    assert list(map(float, gains[:5])) == pytest.approx([2.3, 2.3 / 7, 2.3 * 1.5, 0.2, 0.25])
+    assert gains[5:] == ["IFormula", "Trapezoidal", "DFormula", "BackwardEuler"]
+    script = read_script(export.to_matlab(ALGORITHMS["full"], path, name="C"))
+    assert script["C"][0] == "pid2"
+    assert script["C"][1][4:6] == ["0.7", "0.1"]
+    np.testing.assert_array_equal(script["C_limits"], [[0, 100]])
+    assert script["C_tracking_time"][0, 0] == pytest.approx(np.sqrt(7.0 * 1.5))
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "match"),
+    [
+        (lambda p: export.to_c(PID, p / "a.txt"), "OptionError", "ends in .c"),
+        (lambda p: export.to_python(CORE, p / "a.py"), "UnsuitableSystemError", "TransferFunction"),
+        (lambda p: export.to_matlab(CORE, p / "a.m"), "UnsuitableSystemError", "DelayedStateSpace"),
+        (
+            lambda p: export.to_structured_text(
+                cr.delayed_ss(ct.ss(0.9, 1, 1, 1, 0.1), 0), p / "a.st"
+            ),
+            "UnsuitableSystemError",
+            "within the same sample",
+        ),
+        (lambda p: export.to_c(PID.continuous, p / "a.c"), "OptionError", "discretised"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused_and_writes_nothing(call, error, match, tmp_path):
+    with pytest.raises(getattr(cr.errors, error), match=match):
+        call(tmp_path)
+    assert list(tmp_path.iterdir()) == []
