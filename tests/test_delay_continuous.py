@@ -366,6 +366,21 @@ BAD = {
         r"feedback of python-control.*cr\.interconnect",
     ),
     "margin of a plant": (lambda: ct.margin(P1), UnsuitableSystemError, r"ct\.margin\(1 \* P\)"),
+    "gang of four of python-control": (
+        lambda: ct.gangof4_response(P1, C),
+        UnsuitableSystemError,
+        r"gangof4_response.*cr\.design\.gang_of_four",
+    ),
+    "root locus of python-control": (
+        lambda: ct.sisotool(C * P1),
+        UnsuitableSystemError,
+        r"sisotool.*cr\.design\.root_locus",
+    ),
+    "transfer function first": (
+        lambda: C * ct.feedback(P1),
+        UnsuitableSystemError,
+        r"P \* C.*cr\.DelaySystem\(ct\.ss\(C\)\)",
+    ),
     "improper": (lambda: ct.tf([1, 0], [1]) * cr.delay(1.0), UnsuitableSystemError, "proper"),
     "inverse": (lambda: P1**-1, UnsuitableSystemError, "not proper"),
     "times": (lambda: P1.forced_response(T + 1, T), DataError, "increase from 0"),

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import (
+    DataError,
     DelayRangeError,
     ModelWarning,
     OptionError,
@@ -96,8 +97,39 @@ def test_time_responses_equal_those_of_the_augmented_matrices(seed):
         assert (ours.ntraces, ours.trace_types) == (theirs.ntraces, theirs.trace_types)
     assert_allclose(loop.step(T.size), ct.step_response(host, T).outputs, **limit)
     assert_allclose(DT * loop.impulse_response(T).outputs, loop.markov(T.size), **limit)
+    start = np.random.default_rng(seed + 1).standard_normal(loop.nstates)
+    for name, given in (
+        ("forced_response", (u, start)),
+        ("step_response", (start,)),
+        ("initial_response", (start,)),
+    ):
+        ours, theirs = getattr(loop, name)(T, *given), getattr(ct, name)(host, T, *given)
+        assert_allclose(ours.y, theirs.y, **limit)
+        early = T[:20]  # shorter than some of the delays
+        assert_allclose(
+            getattr(loop, name)(early, *(x[..., :20] if x is u else x for x in given)).y,
+            theirs.y[..., :20],
+            **limit,
+        )
     # what asks for states is left to python-control
     assert loop.step_response(T, return_states=True).states.shape[0] == loop.nstates
+
+
+@pytest.mark.parametrize("kind", ["plant", "loop"])
+def test_long_simulations_without_matrices_are_named_by_python_control_s(kind):
+    plant = cr.delayed_ss(LAG, 600, dt=0.002) * 0.5
+    system = plant if kind == "plant" else ct.feedback(plant)
+    for ask, count in ((ct.step_response, 30), (ct.impulse_response, 30), (ct.step_info, 1700)):
+        t = 0.002 * np.arange(count)
+        with pytest.warns(ModelWarning, match=r"601 states.*sys\.step_response") as caught:
+            ask(system, t)
+        assert {one.filename for one in caught} == {__file__}
+    # the length of a response is that of its slowest pole
+    response = system.step_response()
+    settled = response.outputs[-1]
+    assert settled == pytest.approx(system.dcgain(), rel=2e-3)
+    with pytest.raises(DataError, match="3 values; expected 601"):
+        system.step_response(t, [1.0, 2.0, 3.0])
 
 
 @pytest.mark.parametrize("delays", [(0, 3), (1, 40), (17, 200)])
@@ -139,6 +171,44 @@ def test_dominant_poles_of_random_long_loops_are_the_largest_of_all(seed, delays
     found = np.abs(loop.dominant_poles(8))
     assert_allclose(found, sizes[: found.size], rtol=1e-9)
     assert loop.is_stable() == (sizes[0] < 1)
+
+
+GAINS = np.geomspace(0.05, 2.5, 30)  # of the gain margin
+ROOT_LOCI = {
+    "discrete": (cr.delayed_ss(LAG, 12, dt=DT), lambda p: p**-12 * (LAG.sample(DT))(p)),
+    "loop": (ct.feedback(cr.delayed_ss(LAG, 12, dt=DT), 0.5), None),
+    "continuous": (LAG * cr.delay(1.0), lambda p: np.exp(-p) * LAG(p)),
+}
+
+
+@pytest.mark.parametrize("case", ROOT_LOCI)
+def test_a_root_locus_solves_its_equation_on_continuous_branches(case):
+    system, response = ROOT_LOCI[case]
+    gains = None if case == "continuous" else cr.design.margins(system).gain_margin * GAINS
+    locus = cr.design.root_locus(system, gains, count=6)
+    assert locus.loci.shape == (locus.gains.size, 6)
+    values = (response or system)(locus.loci.ravel())
+    values = values.reshape(locus.loci.shape)
+    # rounding of exp(-p) far to the left, and of p^-12 near 0
+    assert_allclose(locus.gains[:, None] * values, -1, rtol=1e-6)
+    # the boundary of stability is passed at the gain margin
+    inside = (np.abs(locus.loci) < 1 if system.dt else locus.loci.real < 0).all(axis=1)
+    assert_array_equal(inside, locus.gains < cr.design.margins(system).gain_margin)
+    # the dominant pair moves in small steps
+    steps = np.abs(np.diff(locus.loci[:, :2], axis=0)).max()
+    assert steps < 0.1 * np.ptp(np.abs(locus.loci[:, :2] - locus.loci[0, :2])) + 0.05
+
+
+def test_a_root_locus_of_a_long_chain_is_that_of_its_closed_loops():
+    locus = cr.design.root_locus(cr.delayed_ss(LAG, 1000, dt=0.001), [0.5, 1.2], count=4)
+    for gain, branch in zip(locus.gains, locus.loci, strict=True):
+        loop = ct.feedback(gain * cr.delayed_ss(LAG, 1000, dt=0.001))
+        largest = np.sort(np.abs(loop.dominant_poles(4)))
+        assert_allclose(np.sort(np.abs(branch)), largest, rtol=1e-12)
+    with pytest.raises(DataError, match="gains must increase"):
+        cr.design.root_locus(LAG, [1.0, 0.5])
+    with pytest.raises(UnsuitableSystemError, match="2 inputs"):
+        cr.design.root_locus(drawn(0, 2, 2))
 
 
 def test_zeros_of_a_loop_are_those_of_its_parts():
@@ -192,7 +262,8 @@ def test_names_go_through_interconnections():
     C = ct.ss(PI, name="C", inputs="e", outputs="u")
     error = ct.summing_junction(["r", "-y"], "e")
     ours = cr.interconnect([P, C, error], inputs="r", outputs=["y", "u"], name="loop")
-    theirs = ct.interconnect([P, C, error], inputs="r", outputs=["y", "u"], name="loop")
+    with pytest.warns(ModelWarning, match="cr.interconnect instead"):
+        theirs = ct.interconnect([P, C, error], inputs="r", outputs=["y", "u"], name="loop")
     assert isinstance(ours, cr.DelaySystem)
     assert ours.internal_delays == (30,)
     assert (ours.name, ours.input_labels, ours.output_labels) == ("loop", ["r"], ["y", "u"])
@@ -277,17 +348,51 @@ def test_encirclements_count_the_unstable_poles(d, gain):
     assert loop.is_stable() == (unstable == 0) == (gain < 1)
 
 
-def test_polynomials_of_a_loop_are_warned_of():
+FILTER = ct.tf([0.5], [1, -0.5], DT)
+LOST = {
+    "tf * sys": lambda L: FILTER * L,
+    "tf + sys": lambda L: FILTER + L,
+    "tf in front": lambda L: ct.feedback(FILTER, L),
+    "polynomial": ct.tf,
+    "system in front": lambda L: ct.feedback(PI, L),
+    "number in front": lambda L: ct.feedback(1, L),
+    "append": lambda L: ct.append(PI, L),
+    "lft": lambda L: ct.append(PI, PI).lft(L),
+}
+KEPT = {
+    "series": (lambda L: ct.series(PI, L), lambda g, c: g * c),
+    "series behind": (lambda L: ct.series(L, PI), lambda g, c: c * g),
+    "parallel": (lambda L: ct.parallel(PI, L), lambda g, c: c + g),
+    "difference": (lambda L: PI - L, lambda g, c: c - g),
+    "quotient": (lambda L: PI / (1 + L), lambda g, c: c / (1 + g)),
+    "number over": (lambda L: 1 / (1 + L), lambda g, c: 1 / (1 + g)),
+    "tf behind": (lambda L: L * FILTER + 1, lambda g, c: g * FILTER(Z) + 1),
+    "feedback": (lambda L: ct.feedback(cr.DelaySystem(PI), L), lambda g, c: c / (1 + c * g)),
+    "append": (
+        lambda L: ct.append(cr.DelaySystem(PI), L),
+        lambda g, c: np.stack([np.stack([c, 0 * c]), np.stack([0 * g, g])]),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", LOST)
+def test_where_python_control_loses_the_delay_the_warning_says_what_keeps_it(case):
     loop = ct.feedback(cr.delayed_ss(LAG, 60, dt=DT))
-    filter_ = ct.tf([0.5], [1, -0.5], DT)
-    for ask in (lambda: filter_ * loop, lambda: ct.feedback(filter_, loop), lambda: ct.tf(loop)):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            ask()
-        said = [str(one.message) for one in caught if one.category is ModelWarning]
-        assert any("sys * tf" in words and "dominant_poles" in words for words in said)
-    for right in (loop * filter_, ct.ss(filter_) * loop):
-        assert_allclose(right(Z), loop(Z) * filter_(Z), rtol=1e-9)
+    with pytest.warns(ModelWarning, match=r"dominant_poles|root_locus|cr\.DelaySystem") as caught:
+        LOST[case](loop)
+    said = [one for one in caught if one.category is ModelWarning]
+    assert len(said) == 1
+    assert said[0].filename == __file__
+
+
+@pytest.mark.parametrize("case", KEPT)
+def test_these_orders_keep_the_delay(case):
+    loop = ct.feedback(cr.delayed_ss(LAG, 60, dt=DT))
+    make, expected = KEPT[case]
+    made = make(loop)
+    assert isinstance(made, cr.DelaySystem)
+    assert made.internal_delays == (60,)
+    assert_allclose(made(Z), expected(loop(Z), PI(Z)), rtol=1e-9, atol=1e-12)
 
 
 def test_bandwidth_is_where_the_gain_has_dropped():
@@ -346,6 +451,7 @@ BAD = {
     "shapes": (lambda: drawn(0, 2, 2) * drawn(0, 3, 2), r"\(2, 2\) and \(3, 2\)"),
     "improper": (lambda: cr.delayed_ss(PI, 3) + ct.tf([1, 0], [1], DT), "more zeros than poles"),
     "not finite": (lambda: cr.delayed_ss(PI, 3) + np.nan, "non-finite"),
+    "complex": (lambda: cr.delayed_ss(PI, 3) + np.complex128(1j), "complex"),
     "no system": (lambda: cr.interconnect([PI, "plant"]), "str"),
     "zeros": (
         lambda: ct.feedback(
@@ -360,7 +466,7 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_what_cannot_be_connected_is_told(case):
     make, message = BAD[case]
-    with pytest.raises((UnsuitableSystemError, OptionError), match=message):
+    with pytest.raises((UnsuitableSystemError, OptionError, TypeError), match=message):
         make()
 
 

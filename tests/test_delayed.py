@@ -14,7 +14,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
+from ctrl_realize.errors import (
+    DataError,
+    DelayRangeError,
+    ModelWarning,
+    OptionError,
+    UnsuitableSystemError,
+)
 from ctrl_realize.io import FitSummary
 from tests.rigs import R3, TS, exact_step
 
@@ -280,9 +286,10 @@ def test_products_of_channels_with_different_delays_stay_right():
 def test_interconnect_and_feedback_with_names_work():
     S = valve(37, name="valve", inputs="i", outputs="x")
     K = ct.ss(CONTROLLER, name="pi", inputs="e", outputs="i")
-    loop = ct.interconnect(
-        [S, K, ct.summing_junction(["r", "-x"], "e")], inplist="r", outlist="x", name="loop"
-    )
+    with pytest.warns(ModelWarning, match="40 states"):
+        loop = ct.interconnect(
+            [S, K, ct.summing_junction(["r", "-x"], "e")], inplist="r", outlist="x", name="loop"
+        )
     direct = ct.feedback(S * CONTROLLER, 1)
     t = TS * np.arange(200)
     assert_allclose(

@@ -90,7 +90,10 @@ def test_the_calls_that_the_warning_names_are_right():
         "sys * tf": (G * FILTER, g * f),
         "sys + tf": (G + FILTER, g + f),
         "ct.ss(tf) * sys": (ct.ss(FILTER) * G, g * f),
-        "ct.feedback(ct.ss(tf), sys)": (ct.feedback(ct.ss(FILTER), G), f / (1 + f * g)),
+        "ct.feedback(cr.DelaySystem(ct.ss(tf)), sys)": (
+            ct.feedback(cr.DelaySystem(ct.ss(FILTER)), G),
+            f / (1 + f * g),
+        ),
         "sys.to_tf()": (G.to_tf(), g),
     }
     for call, (made, expected) in calls.items():

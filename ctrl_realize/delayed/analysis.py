@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from scipy.optimize import brentq
 
-from .._checks import real
+from .._checks import real, whole
 from ..numerics.arrays import ComplexArray
 from .parts import CoreAndDelays
 
@@ -20,6 +20,29 @@ class DelayedAnalysis(CoreAndDelays):
         """Poles: those of the core, and exact zeros for the delay."""
         chain = np.zeros(sum(self.input_delays) + sum(self.output_delays), dtype=np.complex128)
         return np.concatenate([self._core.poles(), chain])
+
+    def dominant_poles(self, count: int = 10) -> ComplexArray:
+        """Poles of the core that decay most slowly, or grow fastest, the slowest first.
+
+        Parameters
+        ----------
+        count : int, optional
+            Largest number of poles; one more if a pair would be split.
+
+        Returns
+        -------
+        ndarray
+            Descending in magnitude.
+        """
+        wanted = whole(count, "count", 1)
+        poles = np.asarray(self._core.poles(), dtype=np.complex128)
+        poles = poles[np.lexsort((-poles.imag, -np.abs(poles)))]
+        split = wanted < poles.size and poles[wanted - 1].imag > 0
+        return poles[: wanted + split]
+
+    def is_stable(self) -> bool:
+        """Whether all poles are inside the unit circle; a delay has its poles at 0."""
+        return bool(np.all(np.abs(self._core.poles()) < 1))
 
     def zeros(self) -> ComplexArray:
         """Finite zeros; for one input and output, those of the core."""

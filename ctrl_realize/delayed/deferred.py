@@ -12,6 +12,7 @@ from ..errors import DelayRangeError
 from ..numerics.arrays import FloatArray
 from ..numerics.internal_delays.form import DelayForm
 from .chains import Matrices
+from .readers import warn_of_an_interconnection, warn_of_the_reader
 
 MAX_STATES = 20_000
 """A is dense, as python-control needs it: 20 000 states take 3 GB."""
@@ -24,8 +25,12 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
     below.
     """
 
+    # NumPy leaves its operators to ours, and does not unpack a system as a sequence.
+    __array_ufunc__ = None
+
     _augmented: Matrices | None
     _state_names: dict[str, int] | None
+    _registers: int
 
     def _begin(self, states: list[str] | int, nstates: int, dt: float, **names: Any) -> None:
         """Set up the system without matrices; `states` are those without the delay line."""
@@ -36,6 +41,7 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
         )
         # The names of the delay line's states are made on demand.
         self.nstates = nstates
+        self._registers = nstates - (states if isinstance(states, int) else len(states))
         self._state_names = None
         self._augmented = None
 
@@ -91,6 +97,7 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
     @property
     def A(self) -> FloatArray:
         """Dynamics matrix, the delay line's states last; read-only."""
+        warn_of_the_reader(self._registers, self.nstates)
         return self._matrices()[0]
 
     @property
@@ -107,6 +114,10 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
     def D(self) -> FloatArray:
         """Direct term, read-only."""
         return self._matrices()[3]
+
+    def _update_params(self, params: Any) -> None:
+        warn_of_an_interconnection(self._registers, self.nstates)
+        super()._update_params(params)
 
     def __setattr__(self, attribute: str, value: Any) -> None:
         # Core and matrices would become inconsistent; python-control's `append` does such an

@@ -8,7 +8,6 @@ simulate with delay lines.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
 from typing import Any
 
 import control as ct
@@ -18,28 +17,28 @@ from numpy.typing import ArrayLike
 from .._checks import finite
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray
-from ..numerics.loops.crossings import follow, frequency_grid
-from .deferred import DeferredMatrices
+from .host_margins import HostMargins
 
-FINE = 0.1
-"""Phase in rad between the points of a response from which margins are interpolated: the cubic
-spline of python-control is then accurate to 1e-6."""
+PLAIN = frozenset({"squeeze", "transpose"})
+"""Arguments of python-control's responses that need no states."""
 
-DECIDES = 0.2
-"""Least relative gain that matters for a margin; beyond the last frequency with such a gain the
-response is left out."""
+FEWEST, MOST = 20, 5000
+"""Samples of a response whose length is not given, as in python-control."""
+
+ON_CIRCLE = 1e-8
+"""Distance of a pole to the unit circle below which it counts as on it, as in python-control."""
 
 
-class HostResponses(DeferredMatrices):
-    """Time responses, and the frequency response for margins."""
-
-    @abstractmethod
-    def _simulated(self, inputs: FloatArray) -> FloatArray:
-        """Compute the outputs (p, N) from zero initial state."""
+class HostResponses(HostMargins):
+    """Time responses without matrices."""
 
     @abstractmethod
-    def features(self) -> tuple[ComplexArray, float]:
-        """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
+    def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
+        """Compute the outputs (p, N) from zero initial state, or from a given one."""
+
+    @abstractmethod
+    def dominant_poles(self, count: int = 10) -> ComplexArray:
+        """Compute the poles that decay most slowly, or grow fastest."""
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
         """Compute the response to any input from zero initial state, sample by sample.
@@ -77,15 +76,18 @@ class HostResponses(DeferredMatrices):
             )
 
     def forced_response(
-        self, timepts: ArrayLike | None = None, inputs: ArrayLike = 0.0, *args: Any, **settings: Any
+        self,
+        timepts: ArrayLike | None = None,
+        inputs: ArrayLike = 0.0,
+        initial_state: ArrayLike = 0.0,
+        **settings: Any,
     ) -> ct.TimeResponseData:
-        """Compute the response to any input from zero initial state, see `control.forced_response`.
+        """Compute the response to any input, see `control.forced_response`.
 
-        With an initial state, or if the states are requested, python-control simulates with the
-        matrices.
+        If the states are requested, python-control simulates with the matrices.
         """
-        if args or set(settings) - {"squeeze", "transpose"} or not self.dt:
-            return super().forced_response(timepts, inputs, *args, **settings)
+        if set(settings) - PLAIN or not self.dt:
+            return super().forced_response(timepts, inputs, initial_state, **settings)
         given = np.atleast_2d(finite(inputs, "inputs"))
         times = self._times(timepts, given.shape[-1])
         rows = np.broadcast_to(given, (self.ninputs, times.size)) if given.size == 1 else given
@@ -93,60 +95,78 @@ class HostResponses(DeferredMatrices):
             raise DataError(
                 f"inputs has shape {np.shape(inputs)}; expected ({self.ninputs}, {times.size})"
             )
-        return ct.TimeResponseData(
-            times,
-            self._simulated(np.ascontiguousarray(rows)),
-            inputs=rows,
-            issiso=self.issiso(),
-            input_labels=self.input_labels,
-            output_labels=self.output_labels,
-            sysname=self.name,
-            plot_inputs=True,
-            **settings,
-        )
+        outputs = self._simulated(np.ascontiguousarray(rows), self._state(initial_state))
+        return self._data(times, outputs, inputs=rows, plot_inputs=True, **settings)
+
+    def initial_response(
+        self,
+        timepts: ArrayLike | float | None = None,
+        initial_state: ArrayLike = 0.0,
+        **settings: Any,
+    ) -> ct.TimeResponseData:
+        """Compute the response to an initial state, see `control.initial_response`.
+
+        The states are those of the core, then the past samples in the order of ``state_labels``.
+        """
+        if set(settings) - PLAIN or not self.dt:
+            return super().initial_response(timepts, initial_state, **settings)
+        times = self._all_times(timepts)
+        rest = np.zeros((self.ninputs, times.size))
+        return self._data(times, self._simulated(rest, self._state(initial_state)), **settings)
 
     def step_response(
-        self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
+        self,
+        timepts: ArrayLike | float | None = None,
+        initial_state: ArrayLike = 0.0,
+        **settings: Any,
     ) -> ct.TimeResponseData:
-        """Compute the step responses from zero initial state, see `control.step_response`."""
-        if args or timepts is None or set(settings) - {"squeeze", "transpose"} or not self.dt:
-            return super().step_response(timepts, *args, **settings)
-        return self._traces(timepts, "step", 1.0, settings)
+        """Compute the step responses, see `control.step_response`.
+
+        Without `timepts` until the slowest pole has decayed to a thousandth, for 5000 samples at
+        most.
+        """
+        if set(settings) - PLAIN or not self.dt:
+            return super().step_response(timepts, initial_state, **settings)
+        return self._traces(timepts, "step", 1.0, initial_state, settings)
 
     def impulse_response(
-        self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
+        self, timepts: ArrayLike | float | None = None, **settings: Any
     ) -> ct.TimeResponseData:
-        """Compute the responses to pulses of height 1/dt, see `control.impulse_response`."""
-        if args or timepts is None or set(settings) - {"squeeze", "transpose"} or not self.dt:
-            return super().impulse_response(timepts, *args, **settings)
-        return self._traces(timepts, "impulse", 1 / self.dt, settings)
+        """Compute the responses to pulses of height 1/dt, see `control.impulse_response`.
+
+        `timepts` as for `step_response`.
+        """
+        if set(settings) - PLAIN or not self.dt:
+            return super().impulse_response(timepts, **settings)
+        return self._traces(timepts, "impulse", 1 / self.dt, 0.0, settings)
 
     def _traces(
-        self, timepts: ArrayLike | float, kind: str, height: float, settings: dict[str, Any]
+        self,
+        timepts: ArrayLike | float | None,
+        kind: str,
+        height: float,
+        state: ArrayLike,
+        settings: dict[str, Any],
     ) -> ct.TimeResponseData:
-        if np.size(timepts) == 1:
-            timepts = np.arange(int(float(np.ravel(timepts)[0]) / self.dt) + 1) * self.dt
-        times = self._times(timepts, 0)
+        times = self._all_times(timepts)
         signal = np.zeros(times.size)
         signal[: 1 if kind == "impulse" else None] = height
         m = self.ninputs
         drive = np.zeros((m, m, times.size))
         drive[np.arange(m), np.arange(m)] = signal
-        outputs = np.stack([self._simulated(drive[:, j]) for j in range(m)], axis=1)
+        start = self._state(state)
+        outputs = np.stack([self._simulated(drive[:, j], start) for j in range(m)], axis=1)
         return self._unit_responses(times, outputs, drive, kind, **settings)
 
     def _unit_responses(
         self, times: FloatArray, outputs: FloatArray, drive: FloatArray, kind: str, **settings: Any
     ) -> ct.TimeResponseData:
         """Response data, one trace for each input, as python-control makes them."""
-        return ct.TimeResponseData(
+        given = kind == "step"
+        return self._data(
             times,
             outputs,
-            inputs=drive if kind == "step" else None,
-            issiso=self.issiso(),
-            input_labels=self.input_labels if kind == "step" else None,
-            output_labels=self.output_labels,
-            sysname=self.name,
+            inputs=drive if given else None,
             trace_labels=[f"From {label}" for label in self.input_labels],
             trace_types=[kind] * self.ninputs,
             plot_inputs=False,
@@ -166,69 +186,48 @@ class HostResponses(DeferredMatrices):
             )
         return times
 
-    def __len__(self) -> int:
-        return 3
-
-    def __iter__(self) -> Iterator[FloatArray]:
-        """Unpack as magnitude, phase in degrees, and omega: what `control.margin` accepts.
-
-        `control.margin` and `control.stability_margins` accept three such arrays, or anything that
-        unpacks into them, instead of a system. So they use the exact response instead of a
-        polynomial.
-
-        Raises
-        ------
-        UnsuitableSystemError
-            More than one input or output.
-        """
-        if not self.issiso():
-            raise UnsuitableSystemError(
-                f"{self.name!r} has {self.ninputs} inputs and {self.noutputs} outputs; margins are "
-                "those of one of each"
-            )
-        omega, values = self._followed()
-        phase = np.degrees(np.unwrap(np.angle(values)))
-        return iter((np.abs(values), phase, omega))
-
-    def _followed(self) -> tuple[FloatArray, ComplexArray]:
-        """Frequencies so close that the response between them can be interpolated."""
-        features, wait = self.features()
-        sizes = np.abs(features)
-        sizes = sizes[sizes > 0]
+    def _all_times(self, timepts: ArrayLike | float | None) -> FloatArray:
+        """Check the given times, or make those up to an end or until the response has settled."""
         dt = float(self.dt)
-        fastest = float(sizes.max(initial=1 / wait if wait else 1.0))
-        top = np.pi / dt if dt else self._gain_is_gone(fastest)
-        low = 1e-3 * min(float(sizes.min(initial=top)), 1 / wait if wait else top)
+        if timepts is None:
+            count = self._settling_samples()
+        elif np.size(timepts) == 1:
+            count = int(float(np.ravel(timepts)[0]) / dt) + 1
+        else:
+            return self._times(timepts, 0)
+        return self._times(None, count)
 
-        def curve(omega: FloatArray) -> ComplexArray:
-            x = np.exp(1j * omega * dt) if dt else 1j * omega
-            return np.asarray(self.horner(x, warn_infinite=False)[0, 0])
+    def _settling_samples(self) -> int:
+        poles = self.dominant_poles(10)
+        poles = poles[np.abs(poles) > ON_CIRCLE]
+        rates = np.abs(np.log(np.abs(poles)))
+        # an integrator, or an oscillation, is seen for five times as long as the rest
+        lasting = rates < ON_CIRCLE
+        slow = float(np.max(np.log(1000) / rates[~lasting], initial=0.0))
+        wait = self.features()[1] / float(self.dt)
+        count = (slow + wait) * (5 if lasting.any() else 1)
+        return int(np.clip(np.ceil(count) + 1, FEWEST, MOST))
 
-        omega, values = follow(curve, frequency_grid(low, top, features, wait))
-        omega, values = follow(curve, omega[: _last(values)], FINE)
-        known = np.isfinite(values)
-        return omega[known], values[known]
+    def _state(self, given: ArrayLike) -> FloatArray | None:
+        """Check an initial state; None if it is zero."""
+        state = np.ravel(finite(given, "initial_state"))
+        if not np.any(state):
+            return None
+        if state.size not in (1, self.nstates):
+            raise DataError(f"initial_state has {state.size} values; expected {self.nstates}")
+        return np.broadcast_to(state, self.nstates).astype(np.float64)
 
-    def _gain_is_gone(self, fastest: float) -> float:
-        """Find a frequency above which the gain of a system is too low for any margin."""
-        omega = fastest * np.geomspace(1e-3, 1e5, 4000)
-        size = np.abs(self.horner(1j * omega, warn_infinite=False)[0, 0])
-        (large,) = np.nonzero(
-            ~(size < 0.1 * DECIDES * min(1.0, float(np.median(size[:100])) or 1.0))
-        )  # a gain that does not roll off is evaluated up to ten times the fastest pole
-        last = int(large[-1]) if large.size else 0
-        return float(omega[last + 1]) if last + 1 < omega.size else 10 * fastest
-
-
-def _last(values: ComplexArray) -> int:
-    """Count the points up to the last one that matters for the margins.
-
-    The gain is a fifth of 1 there, or of the largest gain at a phase of -180 degrees:
-    python-control takes a minute for the turns of the phase beyond.
-    """
-    size = np.abs(values)
-    across = (values.imag[1:] < 0) != (values.imag[:-1] < 0)
-    across &= values.real[1:] + values.real[:-1] < 0
-    level = DECIDES * min(1.0, float(size[1:][across].max(initial=0.0)) or 1.0)
-    (above,) = np.nonzero(~(size < level))
-    return int(above[-1]) + 3 if above.size else values.size
+    def _data(
+        self, times: FloatArray, outputs: FloatArray, inputs: FloatArray | None = None, **more: Any
+    ) -> ct.TimeResponseData:
+        """Response data with the names of this system."""
+        return ct.TimeResponseData(
+            times,
+            outputs,
+            inputs=inputs,
+            issiso=self.issiso(),
+            input_labels=None if inputs is None else self.input_labels,
+            output_labels=self.output_labels,
+            sysname=self.name,
+            **more,
+        )

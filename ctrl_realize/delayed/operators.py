@@ -72,6 +72,8 @@ class DelayOperators(DeferredMatrices):
 
     def _other(self, other: Any) -> DelayForm | None:
         """Form of the other operand; None if it has its own operator, or is not a system."""
+        if isinstance(other, (complex, np.complexfloating)):
+            raise UnsuitableSystemError(f"got the complex number {other}; expected a real gain")
         if isinstance(other, ct.FrequencyResponseData) or not is_linear(other):
             return None
         return form_of(other)

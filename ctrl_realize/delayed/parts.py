@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -11,26 +10,13 @@ import control as ct
 import numpy as np
 
 from .._checks import system_names
-from ..errors import ModelWarning, OptionError, UnsuitableSystemError, warn_caller
-from ..numerics.arrays import ComplexArray, FloatArray, IntArray, read_only
+from ..errors import OptionError, UnsuitableSystemError
+from ..numerics.arrays import ComplexArray, IntArray, read_only
 from .chains import Matrices, augment, chain_labels
 from .deferred import DeferredMatrices
 
 MAX_DELAY = 10_000_000
 """Samples in all delays together; more are a sample time given in another unit."""
-
-HARMLESS = 20
-"""Delay up to which the characteristic polynomial is accurate to 1e-6 of the response.
-
-The error grows a hundredfold for ten more samples. On five plants, alone and with a PI controller,
-the largest error was 1e-6 at 20, 2e-5 at 30, 7e-3 at 37 and 40 at 50.
-"""
-
-ASKS = "_convert_to_transfer_function"
-"""The function of python-control 0.10.2 that converts systems to polynomials.
-
-It reads ``A, B, C, D`` directly, so a system can only detect which function reads them.
-"""
 
 
 class CoreAndDelays(DeferredMatrices):
@@ -63,12 +49,6 @@ class CoreAndDelays(DeferredMatrices):
             "cr.design.to_discrete(*cr.design.to_continuous(sys), dt) gives a system with a "
             "longer sample time"
         )
-
-    @property
-    def A(self) -> FloatArray:
-        """Dynamics matrix of ``[core; chains]``, read-only."""
-        warn_of_a_transfer_function(self.nstates - self._core.nstates)
-        return self._matrices()[0]
 
     @property
     def delay_free(self) -> ct.StateSpace:
@@ -188,21 +168,3 @@ def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter:
         return system_names(names)
     generic = [f"{letter}[{i}]" for i in range(len(core))]
     return [letter] if list(core) == generic and len(generic) == 1 else list(core)
-
-
-def warn_of_a_transfer_function(registers: int) -> None:
-    """Warn if python-control computes a polynomial of a long delay line; called when A is read."""
-    if registers <= HARMLESS:
-        return
-    # The frame that reads the property that calls this function.
-    if sys._getframe(2).f_code.co_name != ASKS:
-        return
-    warn_caller(
-        f"python-control forms polynomials with {registers} delay registers here; from about "
-        "50 on these are numerically meaningless, and so are the results. Instead of a root locus "
-        "use ct.feedback(k * sys).dominant_poles() or cr.design.margins(sys), instead of "
-        "ct.tf(sys) "
-        "use sys.to_tf() where the delay is not in a loop, and with a transfer function sys * tf, "
-        "sys + tf, ct.ss(tf) * sys and ct.feedback(ct.ss(tf), sys)",
-        ModelWarning,
-    )

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .._checks import whole
 from ..numerics.arrays import ComplexArray, FloatArray, later
+from ..numerics.internal_delays.recurrence import recurrence
 from ..numerics.state_space import responses
 from .chains import powers
 from .host_responses import HostResponses
@@ -60,7 +61,9 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         """
         return self._with_delay(responses.step_response, whole(count, "count", 1))
 
-    def _simulated(self, inputs: FloatArray) -> FloatArray:
+    def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
+        if state is not None:
+            return recurrence(self._form(), inputs, state)
         held = np.stack([later(u, d) for u, d in zip(inputs, self.input_delays, strict=True)])
         core = self._core
         out = responses.simulate(core.A, core.B, core.C, core.D, held)

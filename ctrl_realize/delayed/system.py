@@ -31,7 +31,7 @@ AnyFit = TypeVar("AnyFit", bound=ModelFit)
 
 
 class DelayedStateSpace(
-    DelayedResponses, DelayedAnalysis, DelayedAlgebra, DelayedCards, Drawable, kind=ENDS
+    DelayedAnalysis, DelayedResponses, DelayedAlgebra, DelayedCards, Drawable, kind=ENDS
 ):
     """Discrete state-space system with dead time: core(z) z^-d.
 
@@ -90,7 +90,11 @@ class DelayedStateSpace(
     ``tf * sys``, ``tf + sys``, ``ct.feedback(tf, sys)`` and ``ct.tf(sys)`` are evaluated by
     python-control alone: it converts the augmented matrices to a transfer function, which has no
     correct digits from about d = 50 on. Beyond 20 samples a `ModelWarning` is given. Use
-    ``sys * tf``, ``sys + tf``, ``ct.feedback(ct.ss(tf), sys)`` and ``sys.to_tf()`` instead.
+    ``sys * tf``, ``sys + tf``, ``ct.feedback(cr.DelaySystem(ct.ss(tf)), sys)`` and ``sys.to_tf()``
+    instead. With a plain system or a number first, ``ct.feedback``, ``ct.append`` and
+    ``ct.interconnect`` give a plain system with all states: use `DelaySystem` around it, too, and
+    `interconnect`. ``ct.step_response(sys)`` multiplies by the matrices at every sample;
+    ``sys.step_response()`` does not. A `ModelWarning` is given in both cases.
     ``ct.margin(sys)`` uses the exact response: a system of one input and one output unpacks as
     magnitude, phase and omega.
 

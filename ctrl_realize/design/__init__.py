@@ -6,12 +6,14 @@ All functions use core and delay separately, so that they are exact at any delay
 
 from .delay_line import DelayLineController
 from .loops.delay_robustness import DelayRobustness, delay_robustness
+from .loops.gang_of_four import gang_of_four
 from .loops.loop_check import LoopCheck
 from .loops.margin_result import Margins
 from .loops.margins import margins
 from .loops.performance import Performance, performance
 from .loops.phase import unwrapped_phase
 from .loops.robustness import RobustnessCheck, UncertaintyBound, robust_stability, uncertainty_bound
+from .loops.root_locus import root_locus
 from .models.approximations import pade_ss, thiran
 from .models.balanced import BalancedReduction, hankel_singular_values, reduce
 from .models.conversions import ContinuousModel, to_continuous, to_discrete, to_tf
@@ -50,6 +52,7 @@ __all__ = [
     "UncertaintyBound",
     "compare_pid",
     "delay_robustness",
+    "gang_of_four",
     "hankel_singular_values",
     "kalman_predictor",
     "lqg",
@@ -63,6 +66,7 @@ __all__ = [
     "reduce_fopdt",
     "reduce_sopdt",
     "robust_stability",
+    "root_locus",
     "simulate_loop",
     "smith_predictor",
     "thiran",

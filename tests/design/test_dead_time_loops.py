@@ -96,6 +96,24 @@ def test_margins_are_those_of_plant_and_dead_time_given_apart():
         assert design.margins(later).stable is stable
 
 
+@pytest.mark.parametrize(
+    ("plant", "controller", "points"),
+    [
+        (P, C, 1j * OMEGA),
+        (P, ct.feedback(C * P), 1j * OMEGA),
+        (CORE, 0.7, 1j * OMEGA),
+        (PLANT, PI, np.exp(1j * np.geomspace(0.1, 3000, 25) * DT)),
+        (2.0, PLANT, np.exp(1j * np.geomspace(0.1, 3000, 25) * DT)),
+    ],
+)
+def test_the_gang_of_four_are_the_four_quotients(plant, controller, points):
+    four = design.gang_of_four(plant, controller)
+    g, k = (x if np.isscalar(x) else x(points) for x in (plant, controller))
+    expected = np.array([[g * k, g + 0 * points], [k + 0 * points, 1 + 0 * points]]) / (1 + g * k)
+    assert_allclose(four(points), expected, rtol=1e-9, atol=1e-12)
+    assert (four.input_labels, four.output_labels) == (["r", "d"], ["y", "v"])
+
+
 def test_margins_of_an_outer_loop_count_the_poles_of_the_inner_one():
     # the inner loop alone is unstable: K = 20 with a critical gain of 6.2 / 2
     inner = ct.feedback(10 * P)

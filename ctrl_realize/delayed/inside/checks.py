@@ -13,14 +13,48 @@ from ..operands import whole_samples
 from ..parts import MAX_DELAY, check_entries
 
 
-def who_asks() -> str:
-    """Name the function of python-control that was called and needs the matrices."""
+TIMES = "sys.step_response(t), sys.impulse_response(t) and sys.forced_response(t, u)"
+LOCUS = "Use cr.design.root_locus(sys), cr.design.margins(sys) and sys.step_response(t)"
+FOUR = "Use cr.design.gang_of_four(P, C), and ct.bode_plot(..., plot_phase=False) of it"
+MARGIN = "Use ct.margin(1 * P) or cr.design.margins(P)"
+ADVICE = {
+    "step_response": f"Use {TIMES}",
+    "impulse_response": f"Use {TIMES}",
+    "initial_response": f"Use {TIMES}",
+    "forced_response": f"Use {TIMES}",
+    "step_info": "Use ct.step_info(r.outputs, r.time) of r = sys.step_response(t)",
+    "root_locus_map": LOCUS,
+    "root_locus_plot": LOCUS,
+    "sisotool": LOCUS,
+    "gangof4_response": FOUR,
+    "gangof4_plot": FOUR,
+    "margin": MARGIN,
+    "stability_margins": MARGIN,
+    "disk_margins": "Use cr.design.margins(sys), whose modulus margin is the disk margin of S",
+    "interconnect": "Use cr.interconnect, with the same arguments",
+}
+"""What to call instead, by the function of python-control that was called."""
+
+ORDER = (
+    "If a transfer function or plain system comes first, write P * C, P + C, ct.ss(C) * P, "
+    "cr.DelaySystem(ct.ss(C)) instead of C, cr.interconnect, or (1 + L) ** -1 for "
+    f"ct.feedback(1, L). For time responses use {TIMES}, for a rational approximation "
+    "sys.pade(order), for a sampled model sys.to_discrete(dt)"
+)
+
+
+def not_rational(what: str) -> UnsuitableSystemError:
+    """Make the error for a function of python-control that needs what a dead time does not have."""
     frame, name = sys._getframe(1), ""
     while frame is not None:
         if frame.f_globals.get("__name__", "").startswith("control."):
             name = frame.f_code.co_name
         frame = frame.f_back  # type: ignore[assignment]
-    return f"{name} of python-control" if name else "this"
+    asks = f"{name} of python-control" if name else "this"
+    return UnsuitableSystemError(
+        f"{asks} needs {what}, which do not exist for a dead time in continuous time. "
+        f"{ADVICE.get(name, ORDER)}"
+    )
 
 
 def check_core(core: Any) -> float:

@@ -79,10 +79,7 @@ class Motion(InsidePoles):
         transpose: bool = False,
     ) -> ct.TimeResponseData:
         """Compute the responses to a unit step, or a unit impulse, on each input."""
-        if timepts is None or np.size(timepts) == 1:
-            end = self._settling() if timepts is None else float(np.ravel(timepts)[0])
-            timepts = np.linspace(0, positive(end, "timepts", "time in s"), POINTS)
-        times = _checked_times(timepts, self.name)
+        times = self._motion_times(timepts)
         m = self.ninputs
         outputs = np.empty((self.noutputs, m, times.size))
         drive = np.zeros((m, m, times.size))
@@ -140,6 +137,13 @@ class Motion(InsidePoles):
                 ModelWarning,
             )
         return found
+
+    def _motion_times(self, timepts: ArrayLike | float | None) -> FloatArray:
+        """Check the given times, or make those up to an end or until the response has settled."""
+        if timepts is None or np.size(timepts) == 1:
+            end = self._settling() if timepts is None else float(np.ravel(timepts)[0])
+            return np.linspace(0, positive(end, "timepts", "time in s"), POINTS)
+        return _checked_times(timepts, self.name)
 
     def _settling(self) -> float:
         """Estimate a time in s at which a response has settled, or is seen not to settle."""

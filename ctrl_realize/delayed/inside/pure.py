@@ -8,9 +8,10 @@ import control as ct
 import numpy as np
 
 from ..._checks import positive, real
-from ...errors import DelayRangeError, UnsuitableSystemError
+from ...errors import DelayRangeError
 from ...numerics.state_space.sampling import split_dead_time
 from ..operators import ENDS
+from .checks import not_rational
 from .system import DelaySystem
 
 
@@ -23,10 +24,7 @@ class _InName(ct.TransferFunction):  # type: ignore[misc]  # control is untyped
     @property
     def num_array(self) -> Any:
         """Refused: a dead time has no polynomials."""
-        raise UnsuitableSystemError(
-            "python-control needs polynomials here, and a dead time has none. Write "
-            "ct.margin(1 * P), cr.design.margins(P), ct.feedback(P * C) and (1 + L) ** -1"
-        )
+        raise not_rational("polynomials")
 
     den_array = num = den = num_list = den_list = num_array
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import whole
+from ...errors import OptionError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays.recurrence import recurrence
 from ...numerics.internal_delays.response import Response
@@ -37,7 +38,11 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         return settled_values(self._response(points), points, warn_infinite=warn_infinite)
 
     def forced_response(
-        self, timepts: ArrayLike | None = None, inputs: Any = 0.0, *args: Any, **settings: Any
+        self,
+        timepts: ArrayLike | None = None,
+        inputs: Any = 0.0,
+        initial_state: ArrayLike = 0.0,
+        **settings: Any,
     ) -> ct.TimeResponseData:
         """Compute the response to any input, see `control.forced_response`.
 
@@ -48,11 +53,13 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         inputs : array_like or callable
             Values at these times, linear between them in continuous time; or a function of an
             array of K times that returns values of shape (inputs, K).
-        *args, **settings
+        initial_state : array_like, optional
+            In discrete time of all states, in the order of ``state_labels``; in continuous time of
+            the core.
+        **settings
             ``squeeze`` and ``transpose``; in discrete time those of `control.forced_response`. In
-            continuous time also ``initial_state`` of the core; ``history``, the constant input of
-            each delay before time 0 (default 0); and ``tolerance``, the largest error relative to
-            the largest output (1e-8).
+            continuous time also ``history``, the constant input of each delay before time 0
+            (default 0); and ``tolerance``, the largest error relative to the largest output (1e-8).
 
         Returns
         -------
@@ -69,30 +76,52 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
            University Press 2003, chapters 2 and 3, doi:10.1093/acprof:oso/9780198506546.001.0001.
         """
         if self.dt:
-            return super().forced_response(timepts, inputs, *args, **settings)
-        return self._forced_motion(timepts, inputs, *args, **settings)
+            return super().forced_response(timepts, inputs, initial_state, **settings)
+        return self._forced_motion(timepts, inputs, initial_state, **settings)
 
-    def step_response(
-        self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
+    def initial_response(
+        self,
+        timepts: ArrayLike | float | None = None,
+        initial_state: ArrayLike = 0.0,
+        **settings: Any,
     ) -> ct.TimeResponseData:
-        """Compute the step responses from zero initial state, see `control.step_response`.
+        """Compute the response to an initial state, see `control.initial_response`.
 
-        In continuous time ``tolerance`` is accepted as in `forced_response`.
+        In continuous time of the core, with ``history`` and ``tolerance`` as in `forced_response`.
         """
         if self.dt:
-            return super().step_response(timepts, *args, **settings)
-        return self._unit_motion(timepts, "step", *args, **settings)
+            return super().initial_response(timepts, initial_state, **settings)
+        times = self._motion_times(timepts)
+        return self._forced_motion(times, 0.0, initial_state, **settings)
+
+    def step_response(
+        self,
+        timepts: ArrayLike | float | None = None,
+        initial_state: ArrayLike = 0.0,
+        **settings: Any,
+    ) -> ct.TimeResponseData:
+        """Compute the step responses, see `control.step_response`.
+
+        Without `timepts` until the slowest pole has decayed; in discrete time for 5000 samples at
+        most. In continuous time from zero initial state, and ``tolerance`` is accepted as in
+        `forced_response`.
+        """
+        if self.dt:
+            return super().step_response(timepts, initial_state, **settings)
+        if np.any(initial_state):
+            raise OptionError("a step response starts from rest; use sys.forced_response")
+        return self._unit_motion(timepts, "step", **settings)
 
     def impulse_response(
-        self, timepts: ArrayLike | float | None = None, *args: Any, **settings: Any
+        self, timepts: ArrayLike | float | None = None, **settings: Any
     ) -> ct.TimeResponseData:
         """Compute the impulse responses from zero initial state, see `control.impulse_response`.
 
         In continuous time the slope of the step response; impulses in the output are omitted.
         """
         if self.dt:
-            return super().impulse_response(timepts, *args, **settings)
-        return self._unit_motion(timepts, "impulse", *args, **settings)
+            return super().impulse_response(timepts, **settings)
+        return self._unit_motion(timepts, "impulse", **settings)
 
     def markov(self, count: int) -> FloatArray:
         """Compute the unit-pulse response.
@@ -124,5 +153,5 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
             out[:, j] = recurrence(form, inputs)
         return out[0, 0] if self.issiso() else out
 
-    def _simulated(self, inputs: FloatArray) -> Any:
-        return recurrence(self._form(), inputs)
+    def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
+        return recurrence(self._form(), inputs, state)

@@ -14,8 +14,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import real, system_name
-from ...errors import UnsuitableSystemError
-from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.arrays import IntArray
 from ...numerics.internal_delays.form import DelayForm
 from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.recurrence import absorbed
@@ -23,9 +22,9 @@ from ...numerics.internal_delays.response import Response
 from ..chains import Matrices
 from ..operands import plain
 from ..operators import INSIDE, DelayOperators
-from ..parts import named, signal_names, warn_of_a_transfer_function
+from ..parts import named, signal_names
 from .cards import InsideCards
-from .checks import check_core, check_delays, who_asks
+from .checks import check_core, check_delays, not_rational
 from .conversions import InsideConversions
 from .responses import InsideResponses
 
@@ -73,9 +72,11 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
 
     In continuous time there are no such matrices, and access to them raises an error.
 
-    In ``K * sys`` and ``ct.feedback(K, sys)`` with a transfer function or plain system K,
-    python-control uses the matrices: use ``sys * K``, ``ct.ss(K) * sys`` and ``ct.feedback(sys *
-    K)`` or ``cr.interconnect`` instead.
+    In ``K * sys`` with a transfer function K, and in ``ct.feedback(K, sys)`` and ``ct.append(K,
+    sys)`` also with a plain system or a number, python-control uses the matrices: use ``sys * K``,
+    ``cr.DelaySystem(ct.ss(K))`` instead of K, or `interconnect`. So do ``ct.step_response(sys)``
+    and ``ct.step_info(sys)``; the methods of the same names do not. Warnings, in continuous time
+    errors, name the alternative.
 
     References
     ----------
@@ -136,12 +137,6 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         """The delay-free core, with the delays' inputs and outputs after the others."""
         return self._core
 
-    @property
-    def A(self) -> FloatArray:
-        """Dynamics matrix of ``[core; delays]``, read-only; discrete systems only."""
-        warn_of_a_transfer_function(self.nstates - self._core.nstates)
-        return self._matrices()[0]
-
     def _form(self) -> DelayForm:
         core = self._core
         return DelayForm(core.A, core.B, core.C, core.D, self.internal_delays)
@@ -163,13 +158,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
 
     def _make_matrices(self) -> Matrices:
         if not self.dt and self.internal_delays:
-            raise UnsuitableSystemError(
-                f"{who_asks()} needs A, B, C, D, which do not exist for a dead time in continuous "
-                "time. If a transfer function or plain system comes first, write P * C, P + C, "
-                "ct.ss(C) * P, cr.interconnect, or (1 + L) ** -1 for ct.feedback(1, L). For time "
-                "responses use sys.step_response and sys.forced_response, for a rational "
-                "approximation sys.pade(order), for a sampled model sys.to_discrete(dt)"
-            )
+            raise not_rational("A, B, C, D")
         full = absorbed(self._form(), list(range(len(self.internal_delays))))
         return full.A, full.B, full.C, full.D
 

@@ -45,26 +45,38 @@ def absorbed(form: DelayForm, at: list[int]) -> DelayForm:
     )
 
 
-def recurrence(form: DelayForm, inputs: FloatArray) -> FloatArray:
-    """Compute the response of a discrete system from rest.
+def recurrence(form: DelayForm, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
+    """Compute the response of a discrete system.
 
     Parameters
     ----------
     form : DelayForm
         Delays in samples, at least 1 each.
     inputs : ndarray, shape (m, N)
+    state : ndarray, shape (n + sum of the delays,), optional
+        Initial state: of the core, then the past of each delay, newest sample first. Default: zero.
 
     Returns
     -------
     ndarray, shape (p, N)
     """
     N = inputs.shape[1]
-    # Longer than the record they hold nothing back that could come out.
-    form = form.channels([i for i, delay in enumerate(form.delays) if delay < N])
-    form = absorbed(form, [i for i, delay in enumerate(form.delays) if delay < SHORT])
+    begin, lines_before = np.zeros(form.states), [np.zeros(int(d)) for d in form.delays]
+    if state is not None:
+        begin, *lines_before = np.split(
+            state, form.states + np.cumsum([0, *map(len, lines_before)])[:-1]
+        )
+    else:
+        # Longer than the record they hold nothing back that could come out.
+        keep = [i for i, delay in enumerate(form.delays) if delay < N]
+        form, lines_before = form.channels(keep), [lines_before[i] for i in keep]
+    short = [i for i, delay in enumerate(form.delays) if delay < SHORT]
+    form = absorbed(form, short)
+    begin = np.concatenate([begin, *(lines_before[i] for i in short)])
+    lines_before = [line for i, line in enumerate(lines_before) if i not in short]
     m, p = form.inputs, form.outputs
     if not form.delays:
-        return simulate(form.A, form.B, form.C, form.D, inputs)
+        return simulate(form.A, form.B, form.C, form.D, inputs, begin)
     delays = np.array(form.delays, dtype=np.int64)
     # a power of two, as the block operators need, and no longer than the shortest delay
     L = min(BLOCK, 1 << (int(delays.min()).bit_length() - 1))
@@ -75,12 +87,15 @@ def recurrence(form: DelayForm, inputs: FloatArray) -> FloatArray:
     out = np.empty((blocks * L, p))
     longest = int(delays.max())
     past = np.zeros((longest + blocks * L, delays.size))  # z, from `longest` samples before 0
+    for i, line in enumerate(lines_before):
+        past[longest - line.size : longest, i] = line[::-1]
     lines = np.arange(delays.size)
     offsets = np.arange(L)[:, None] + longest - delays
     # outputs and next state of a block from its state and its inputs, in one product
     step = np.block([[rows, inside], [jump, into]])
     n, width = form.states, m + delays.size
     known = np.zeros(n + L * width)
+    known[:n] = begin
     drive = known[n:].reshape(L, width)
     for start in range(0, blocks * L, L):
         drive[:, :m] = given[start : start + L]
