@@ -48,5 +48,6 @@ from .io import load_model as load_model
 from .io import read_frf as read_frf
 from .io import read_record as read_record
 from .io import save_model as save_model
+from .validation import compare as compare
 
 __version__: str

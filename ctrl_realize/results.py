@@ -11,7 +11,12 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
+from ._parameters import Parameter as Parameter
+from ._parameters import checked_time_unit, formula, parameter_table
 from ._shown import html_card, text_card
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 IntervalKind = Literal["confidence", "conditional", "spanned", "flatness", "plausible", "tracked"]
 """Kinds of intervals of a dead time; see `ModelFit`."""
@@ -168,6 +173,14 @@ class ModelFit(Result):
         Standard error for the chosen structure.
     residual_std : float or None
         Standard deviation of the residual; None for several outputs.
+    parameters : tuple of Parameter
+        Gain, dead time, lags, ... of the model as a process model, times in s; empty if the method
+        does not estimate them. `parameter_table` has them as a table.
+    formula : str
+        The transfer function in one line, in `time_unit`, the gain with its standard error; empty
+        without `parameters`.
+    time_unit : str
+        Unit of time of the records (``"s"``, ``"min"``, ...), in which results are written.
     sampling : str or None
         Sampling of the impulse response that the model was realized from.
     records : tuple of Record
@@ -265,6 +278,59 @@ class ModelFit(Result):
     def residual_std(self) -> float | None:
         """Standard deviation of the residual; None for several outputs."""
         return None
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the model as a process model, with standard errors; times in s."""
+        return ()
+
+    @property
+    def integrators(self) -> int:
+        """Number of poles at zero."""
+        return 0
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of time in which results are written: that of the records."""
+        return "s"
+
+    @property
+    def formula(self) -> str:
+        """The transfer function in one line, in `time_unit`; empty without `parameters`."""
+        if not self.parameters:
+            return ""
+        shown = [one.in_time_unit(self.time_unit) for one in self.parameters]
+        return formula(shown, self.integrators, self.time_unit)
+
+    def parameter_table(self, *, time_unit: str | None = None) -> pd.DataFrame:
+        """List the parameters with standard errors and 95 % intervals.
+
+        Parameters
+        ----------
+        time_unit : {"ms", "s", "min", "h", "day"}, optional
+            Default: `time_unit` of the fit.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row for each of `parameters`, see `Parameter`.
+
+        Raises
+        ------
+        OptionError
+            Another unit of time.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> record = cr.bench.valve().step_record(16, rng=5)
+        >>> fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
+        >>> table = fit.parameter_table(time_unit="ms")
+        >>> print(f"{table.loc['lag_1', 'value']:.1f} {table.loc['lag_1', 'unit']}")
+        89.8 ms
+        """
+        unit = self.time_unit if time_unit is None else checked_time_unit(time_unit)
+        return parameter_table([one.in_time_unit(unit) for one in self.parameters])
 
     @property
     def sampling(self) -> str | None:

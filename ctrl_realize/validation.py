@@ -2,6 +2,8 @@
 
 from .identification.validation.bootstrap import Bootstrap as Bootstrap
 from .identification.validation.bootstrap import bootstrap as bootstrap
+from .identification.validation.comparison import ModelComparison as ModelComparison
+from .identification.validation.comparison import compare as compare
 from .identification.validation.cross_validation import cross_validate as cross_validate
 from .identification.validation.delay_estimates import (
     compare_delay_estimates as compare_delay_estimates,
@@ -17,10 +19,12 @@ __all__ = [
     "Bootstrap",
     "DelayComparison",
     "DelayEstimate",
+    "ModelComparison",
     "Prediction",
     "ResidualAnalysis",
     "analyse_residuals",
     "bootstrap",
+    "compare",
     "compare_delay_estimates",
     "cross_validate",
     "predict",

@@ -15,7 +15,9 @@ MOST_MODULES = 16
 FLOORS = [
     {"errors"},
     {"_checks", "_shown", "numerics"},
-    {"_wording", "results", "paper"},
+    {"_wording", "paper"},
+    {"_parameters"},
+    {"results"},
     {"data"},
     {"delayed"},
     {"frequency", "bench"},

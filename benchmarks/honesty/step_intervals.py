@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
+import control as ct
 import numpy as np
 
 import ctrl_realize as cr
@@ -28,10 +29,28 @@ def given(kind: str, plant: str, noise: float, seed: int) -> Seen:
         "fit_output_error, structure given: interval": inside(fit.interval, truth),
         "fit_output_error, structure given: -+ 1.96 std": inside(near, truth),
     }
+    if plant in PLANTS:
+        true = parameters_of(PLANTS[plant]) | {"gain": case.gain}
+        for one in fit.parameters:
+            if one.name in true:
+                reach = 1.96 * one.std_given_structure
+                key = f"fit_output_error, structure given: {one.name} of {plant} -+ 1.96 std"
+                covered[key] = inside((one.value - reach, one.value + reach), true[one.name])
     if plant == "R4":
         fit = cr.fit_output_error(case.record, known=SENSOR).fit
         covered["fit_output_error, sensor known: interval"] = inside(fit.interval, truth)
     return Seen("given", kind, plant, noise, seed, covered)
+
+
+def parameters_of(plant: ct.TransferFunction) -> dict[str, float]:
+    """Lags, and time constant and damping of a pair, by their names in a fit."""
+    poles = sorted(plant.poles(), key=abs)
+    lags = [-1 / p.real for p in poles if abs(p.imag) < 1e-6 * abs(p)]
+    found = {f"lag_{i}": float(lag) for i, lag in enumerate(lags, 1)}
+    for p in poles:
+        if p.imag > 1e-6 * abs(p):
+            found |= {"pair_time_1": 1 / abs(p), "pair_damping_1": -p.real / abs(p)}
+    return found
 
 
 def scans(kind: str, plant: str, noise: float, seed: int) -> Seen:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 
+from .._parameters import SECONDS, Parameter
 from ..errors import FileFormatError
 from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
 from .json_content import MAX_TEXT, field
@@ -25,7 +26,7 @@ _METHODS = {
 _KEPT = (
     "delay", "order", "dead_time", "dead_time_interval", "interval", "delay_interval",
     "total_delay", "total_delay_interval", "gain", "gain_interval", "gain_std_given_structure",
-    "onset", "interval_kind", "residual_std", "sampling",
+    "onset", "interval_kind", "residual_std", "sampling", "time_unit", "integrators",
 )  # fmt: skip
 """Attributes that are stored if the fit has them."""
 _MAX_ROWS = 200
@@ -72,6 +73,19 @@ def _times(value: Plain) -> tuple[float, float] | None:
     if ends is None or any(-math.inf < end < 0 for end in ends) or not ends[0] <= ends[1]:
         return None
     return ends
+
+
+def _parameter(row: Plain) -> Parameter | None:
+    """Accept the fields of a parameter in their order."""
+    match row:
+        case (str(name), *numbers, bool(all_structures), str(unit), int(times)) if len(
+            numbers
+        ) == 4 and times in (-1, 0, 1):
+            value, *others = (_number(number) for number in numbers)
+            std, low, high = (np.nan if number is None else number for number in others)
+            if value is not None:
+                return Parameter(name, value, std, low, high, all_structures, unit, times)
+    return None
 
 
 def _closed(value: Plain) -> tuple[float, float] | None:
@@ -157,6 +171,24 @@ class FitSummary(ModelFit):
     )
 
     @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the process model; empty if the file does not contain them."""
+        rows = self._value("parameters")
+        found = [_parameter(row) for row in rows] if isinstance(rows, tuple) else []
+        return tuple(one for one in found if one is not None)
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of time in which results are written."""
+        unit = _text(self._value("time_unit"))
+        return unit if unit in SECONDS else "s"
+
+    @property
+    def integrators(self) -> int:
+        """Number of poles at zero."""
+        return _count(self._value("integrators")) or 0
+
+    @property
     def interval_kind(self) -> IntervalKind | None:
         """Kind of `interval`; None if the file does not contain it."""
         value = self._value("interval_kind")
@@ -195,6 +227,10 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     # all are attributes of a ModelFit; the list is also that of the keys in the file
     values = {key: _plain(getattr(fit, key)) for key in _KEPT}
     values["std_given_structure"] = _plain(fit._std())
+    values["fit_percent"] = _plain(getattr(fit, "fit_percent", None))
+    if fit.parameters:
+        values["formula"] = fit.formula
+        values["parameters"] = _plain([tuple(vars(one).values()) for one in fit.parameters])
     return FitSummary(
         kind=type(fit).__name__,
         title=fit._title(),

@@ -10,7 +10,12 @@ from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
 from .loops import closed_loop_plot, margins_plot
 from .records import onset_plot, record_plot, step_plot
-from .residuals import prediction_plot, residual_plot, state_space_fit_plot
+from .residuals import (
+    model_comparison_plot,
+    prediction_plot,
+    residual_plot,
+    state_space_fit_plot,
+)
 from .responses import impulse_estimate_plot, impulse_plot, mimo_realization_plot, system_plot
 from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
@@ -36,6 +41,7 @@ __all__ = [
     "joint_fit_plot",
     "margins_plot",
     "mimo_realization_plot",
+    "model_comparison_plot",
     "onset_plot",
     "order_plot",
     "pid_comparison_plot",

@@ -22,7 +22,7 @@ from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
 from .loops import margins_plot
 from .records import record_plot, step_plot
-from .residuals import prediction_plot, residual_plot, state_space_fit_plot
+from .residuals import model_comparison_plot, prediction_plot, residual_plot, state_space_fit_plot
 from .responses import impulse_estimate_plot, impulse_plot, mimo_realization_plot, system_plot
 from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
@@ -85,6 +85,7 @@ for _plot in (
     impulse_plot,
     margins_plot,
     mimo_realization_plot,
+    model_comparison_plot,
     order_plot,
     pid_comparison_plot,
     prediction_plot,

@@ -13,11 +13,12 @@ from .._checks import whole
 from ..data import Record
 from ..errors import OptionError
 from ..identification.state_space_fit.result import StateSpaceFit
+from ..identification.validation.comparison import ModelComparison
 from ..identification.validation.prediction import Prediction
 from ..identification.validation.residuals_result import ResidualAnalysis
 from ..numerics.arrays import FloatArray
 from . import style
-from .names import wrapped
+from .names import plain, wrapped
 from .shared_docs import documented
 from .style import axis_time_unit
 
@@ -66,6 +67,86 @@ def residual_plot(
         axes[2].set_ylabel("residual with\ninput before")
         axes[2].set_xlabel("lag [samples]")
         return style.finished(axes, [above, own, cross], loc="above")
+
+
+@documented("sequence of four Axes")
+def model_comparison_plot(
+    comparison: ModelComparison,
+    *,
+    output: int = 0,
+    input: int = 0,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the outputs of several models on one record, their residuals, and correlations.
+
+    The bands are those of the correlations of white noise that does not depend on the input.
+
+    Parameters
+    ----------
+    comparison : ModelComparison
+    output, input : int, optional
+        Channels to show.
+    **kwargs
+        Line properties of the models.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> model = cr.fit_output_error(record, structures=[(2, 2)])
+    >>> cplt = cr.plots.model_comparison_plot(cr.compare({"two lags": model}, record))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['measured', 'two lags, 99.6 %']
+    """
+    first, record = comparison.checks[0], comparison.record
+    row = whole(output, "output", 0, first.fit_percent.size - 1)
+    column = whole(input, "input", 0, first.cross.shape[1] - 1)
+    with style.canvas(
+        ax, 4, title=title,
+        size=(8.0, 8.4), heights=(2.2, 1.0, 1.0, 1.0), sharex=False,
+    ) as axes:  # fmt: skip
+        factor, unit = axis_time_unit(float(np.ptp(record.time)), axes[1])
+        time = factor * record.time
+        measured = np.atleast_2d(record.output)[row]
+        lines = [
+            list(axes[0].plot(time, measured, color=style.MEASURED, label="measured")),
+            [],
+            [],
+            [],
+        ]
+        bound = max(float(check.cross_bound[row, column]) for check in comparison.checks)
+        for axis, size in ((axes[2], first.bound), (axes[3], bound)):
+            axis.axhspan(-size, size, color=style.BAND, alpha=0.3, linewidth=0)
+        for number, (name, check) in enumerate(
+            zip(comparison.names, comparison.checks, strict=True)
+        ):
+            looks = {
+                "color": style.model_colour(number),
+                "linestyle": style.DASHES[number % len(style.DASHES)],
+                **kwargs,
+            }
+            label = f"{plain(name, 24)}, {check.fit_percent[row]:.1f} %"
+            simulated, left = (
+                np.atleast_2d(values)[row] for values in (check.simulated, check.residual)
+            )
+            lines[0] += axes[0].plot(time, simulated, **{"label": label, **looks})
+            lines[1] += axes[1].plot(time, left, **{**looks, "linestyle": "-", "linewidth": 0.9})
+            dots = {**looks, "marker": "o", "markersize": 3.0, "linewidth": 1.0}
+            lines[2] += axes[2].plot(
+                check.lags[check.lags >= 0], check.autocorrelation[row], **dots
+            )
+            lines[3] += axes[3].plot(check.lags, check.cross[row, column], **dots)
+        axes[1].sharex(axes[0])
+        axes[0].tick_params(labelbottom=False)
+        axes[1].set_xlabel(f"time [{unit}]")
+        axes[0].set_ylabel(wrapped(record.output_labels[row], 16))
+        axes[1].set_ylabel("residual")
+        axes[2].set_ylabel("residual with\nitself")
+        axes[3].set_ylabel("residual with\ninput before")
+        axes[3].set_xlabel("lag [samples]")
+        return style.finished(axes, lines, loc="above")
 
 
 @documented()

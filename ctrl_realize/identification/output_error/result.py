@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..._parameters import Parameter
 from ..._wording import (
     in_time,
     interval_in_time,
@@ -22,6 +23,7 @@ from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
+from ..process_parameters import time_unit_of, with_intervals
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
@@ -195,6 +197,32 @@ class OutputErrorFit(FractionalDelayFit):
         return float(min(low, *own)), float(max(high, *own))
 
     @property
+    def integrators(self) -> int:
+        """Number of poles at zero."""
+        return int(np.sum(self._plain_poles == 0))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Gain, dead time, lags, ... with standard errors and 95 % intervals; times in s.
+
+        The intervals of gain and dead time cover the choice of the structure, the others are those
+        of the chosen one. Standard errors are NaN where no likelihood describes the error of the
+        fit, and for lags that follow a law (many equal lags, axial dispersion).
+        """
+        return with_intervals(
+            self.estimate.parameters,
+            self.records,
+            gain=(self.gain, self.gain_std_given_structure, self.gain_interval),
+            dead_time=(self.std_given_structure, self.interval),
+            integrating=self.integrators > 0,
+        )
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of time of the records, in which results are written."""
+        return time_unit_of(self.records)
+
+    @property
     def at_noise_level(self) -> bool:
         """Whether the residual is as small as the noise before the step."""
         return self.estimate.adequate
@@ -314,6 +342,7 @@ class OutputErrorFit(FractionalDelayFit):
         wait = time_within(self.dead_time, low, high)
         samples = number_within(self.delay, *self.delay_interval)
         rows = [
+            ("transfer function", self.formula),
             (self._kind(), f"{wait} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
             *([("visible onset", in_time(self.onset, 4))] if self.onset == self.onset else []),

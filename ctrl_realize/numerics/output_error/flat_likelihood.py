@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..constants import SMALLEST, Z_95
+from ..parameters.physical import process_parameters
 from ..separable.compared_fits import at_dead_time
 from ..separable.profile import dead_time_error
 from ..separable.varpro import Structure, evaluate
@@ -84,4 +85,7 @@ def moved(
         followed=followed_by(whole, fixed, state.numerator[0]),
         static=whole.static(fixed),
         delay_estimates=views,
+        parameters=process_parameters(
+            fixed.poles, state.numerator[0], dead_time, whole.scales.length
+        ),
     )

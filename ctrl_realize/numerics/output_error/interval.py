@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..constants import Z_95
+from ..parameters.physical import without_errors
 from ..separable.dispersion import DispersedFlow, flow_profile
 from ..separable.lag_chains import (
     FREE_IN_A_CHAIN,
@@ -100,8 +101,12 @@ def likelihood_fit(
         own_structure = chosen.structure
         close += close_choices(whole, choice.level, own_structure)
         close += close_exclusions(whole, _charged_level(whole, choice), own_structure)
+    parameters = found.parameters
+    if choice.chain is not None or choice.flow is not None:
+        parameters = without_errors(parameters)
     return replace(
         found,
+        parameters=parameters,
         chain=choice.chain,
         other_models=tuple(others),
         endless=endless,

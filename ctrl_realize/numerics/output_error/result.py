@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..parameters.physical import ProcessParameter, fitted_parameters
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain, lag_sum
 from ..separable.profile_ends import profile_limits
@@ -136,8 +137,9 @@ class OutputErrorEstimate:
     `whitened`: coloured noise was made white, by what it is at rest. `static` is the gain of the
     model, `alike` those of the other structures that are not ruled out and resolve one, each with
     its evidence over the model's. `better` is a structure that rules out those that were asked for;
-    `close` are decisions that rounding may turn. `rounded` is the noise before rounding, if the
-    model is that of the likelihood of rounded data.
+    `close` are decisions that rounding may turn. `parameters` are those of the model as a process
+    model, with standard errors where they are those of a likelihood. `rounded` is the noise before
+    rounding, if the model is that of the likelihood of rounded data.
     """
 
     dead_time: float
@@ -170,6 +172,7 @@ class OutputErrorEstimate:
     better: StructureFit | None = None
     close: tuple[CloseDecision, ...] = ()
     rounded: float | None = None
+    parameters: tuple[ProcessParameter, ...] = ()
 
     @property
     def robust(self) -> bool:
@@ -274,4 +277,7 @@ def assembled(
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
         better=better,
+        parameters=fitted_parameters(
+            whole.problem, chosen, numerator, whole.variance, whole.scales.length
+        ),
     )

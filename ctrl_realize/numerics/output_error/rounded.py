@@ -22,6 +22,7 @@ from scipy.special import log_ndtr
 
 from ..arrays import FloatArray
 from ..constants import Z_95
+from ..parameters.physical import fitted_parameters
 from ..separable.structures import Candidate, parameter_bounds
 from ..separable.varpro import Structure, evaluate, respond
 from ..separable.window import WindowFit
@@ -73,6 +74,9 @@ def in_rounded_data(
         static=whole.static(best.candidate),
         followed=followed_by(whole, best.candidate, numerator),
         rounded=best.noise,
+        parameters=fitted_parameters(
+            whole.problem, best.candidate, numerator, whole.variance, scales.length
+        ),
     )
 
 

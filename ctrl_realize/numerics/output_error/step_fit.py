@@ -56,6 +56,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..constants import Z_95
+from ..parameters.physical import without_errors
 from ..separable.compared_fits import at_dead_time
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain
@@ -267,7 +268,8 @@ def _robust_fit(
     fixed = at_dead_time(whole.problem, chosen, whole.scales, dead_time)
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
-    return assembled(whole, fixed, False, views, profiles, interval, own, relaxing=relaxing)
+    found = assembled(whole, fixed, False, views, profiles, interval, own, relaxing=relaxing)
+    return replace(found, parameters=without_errors(found.parameters))
 
 
 def _fit_until(

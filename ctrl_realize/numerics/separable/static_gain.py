@@ -99,37 +99,16 @@ def static_gain(
     state = evaluate(problem, candidate.structure, candidate.parameters[None])
     theta, numerator = candidate.parameters, state.numerator[0]
     point = np.concatenate([theta, numerator])
-    steps = np.concatenate(
-        [
-            [_STEP * min(1 / float(np.abs(candidate.poles).max()), length)],
-            np.full(theta.size - 1, _STEP),
-            _STEP * np.maximum(np.abs(numerator), _STEP * np.abs(numerator).max()),
-        ]
-    )
-
-    def response(at: FloatArray) -> FloatArray:
-        return respond(problem.drive, problem.known, at[theta.size :], at[: theta.size])
+    moves = _moves(candidate, numerator, length)
 
     def told(at: FloatArray) -> FloatArray:
         return np.array(_told(at[: theta.size], at[theta.size :], length))
 
-    moves = steps * np.eye(point.size)
-    # A dead time is not negative: the derivatives at zero are those slightly later.
-    inside = np.concatenate([[max(point[0], steps[0])], point[1:]])
-    slopes = np.stack([(response(inside + m) - response(inside - m)) / 2 for m in moves], axis=1)
-    gradient = np.stack([(told(point + m) - told(point - m)) / 2 for m in moves], axis=1)
-    # For an integrator the slowness of the pole is only rounding.
-    seen = np.any(gradient != 0, axis=0)
-    slopes, gradient = slopes[:, seen], gradient[:, seen]
-    columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
-    if problem.segments is not None:
-        columns = problem.local_terms(candidate.poles[None]).without(columns[None])[0]
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
-    _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
-    along = turned[:, : seen.sum()] @ (gradient / size[: seen.sum()]).T
-    along /= np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))[:, None]
-    gain_std, total_std, rate_std = np.sqrt(variance * np.sum(along**2, axis=0))
+    gradient = np.stack(
+        [(told(point + m) - told(point - m)) / (2 * m.sum()) for m in moves], axis=1
+    )
+    errors = local_errors(problem, candidate, numerator, length)
+    gain_std, total_std, rate_std = errors.std(gradient, variance)
     gain, total, rate = (float(value) for value in told(point))
     slow = np.abs(candidate.poles)
     # An integrator has no slowest time constant, but a constant slope.
@@ -144,6 +123,67 @@ def static_gain(
         reached=_reached(candidate.poles, numerator, length),
         sign_known=bool(abs(rate) > SIGNIFICANT * rate_std),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class LocalErrors:
+    """Curvature of the sum of squares about a model: errors of its parameters.
+
+    `slopes` (m, p) are the weighted derivatives of the model with respect to dead time, pole
+    parameters and numerator, `own` (m, q) the columns of the terms that are estimated with it.
+    """
+
+    slopes: FloatArray
+    own: FloatArray
+
+    def std(self, gradient: FloatArray, variance: float) -> FloatArray:
+        """Standard errors (k,) of functions with these gradients (k, p), by the delta method.
+
+        Parameters that none of them depends on, like the slowness of a pole that is taken for an
+        integrator, are no unknowns.
+        """
+        seen = np.any(gradient != 0, axis=0)
+        columns = np.concatenate([self.slopes[:, seen], self.own], axis=1)
+        size = np.linalg.norm(columns, axis=0)
+        size[size == 0] = 1.0
+        _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
+        along = turned[:, : seen.sum()] @ (gradient[:, seen] / size[: seen.sum()]).T
+        along /= np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))[:, None]
+        return np.asarray(np.sqrt(variance * np.sum(along**2, axis=0)))
+
+
+def local_errors(
+    problem: Problem, candidate: Candidate, numerator: FloatArray, length: float
+) -> LocalErrors:
+    """Derivatives of a model with respect to its parameters, by differences."""
+    theta = candidate.parameters
+    moves = _moves(candidate, numerator, length)
+
+    def response(at: FloatArray) -> FloatArray:
+        return respond(problem.drive, problem.known, at[theta.size :], at[: theta.size])
+
+    # A dead time is not negative: the derivatives at zero are those slightly later.
+    inside = np.concatenate([[max(theta[0], moves[0, 0])], theta[1:], numerator])
+    slopes = np.stack(
+        [(response(inside + m) - response(inside - m)) / (2 * m.sum()) for m in moves], axis=1
+    )
+    columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
+    if problem.segments is not None:
+        columns = problem.local_terms(candidate.poles[None]).without(columns[None])[0]
+    count = moves.shape[0]
+    return LocalErrors(columns[:, :count], columns[:, count:])
+
+
+def _moves(candidate: Candidate, numerator: FloatArray, length: float) -> FloatArray:
+    """Steps of the parameters for derivatives by differences, on the diagonal of a matrix."""
+    steps = np.concatenate(
+        [
+            [_STEP * min(1 / float(np.abs(candidate.poles).max()), length)],
+            np.full(candidate.parameters.size - 1, _STEP),
+            _STEP * np.maximum(np.abs(numerator), _STEP * np.abs(numerator).max()),
+        ]
+    )
+    return np.diag(steps)
 
 
 def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, float]:

@@ -1,0 +1,74 @@
+"""Parameters of a fitted process model, with units and intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .._parameters import SECONDS, Parameter, gain_unit, slope_unit
+from ..data import Record
+from ..numerics.constants import Z_95
+from ..numerics.parameters.physical import ProcessParameter
+
+Interval = tuple[float, float]
+
+
+def with_intervals(
+    found: Sequence[ProcessParameter],
+    records: Sequence[Record],
+    *,
+    gain: tuple[float, float, Interval],
+    dead_time: tuple[float, Interval],
+    integrating: bool,
+) -> tuple[Parameter, ...]:
+    """Add units and 95 % intervals to the parameters of a fit.
+
+    Parameters
+    ----------
+    found : sequence of ProcessParameter
+    records : sequence of Record
+        Those that were fitted; the first has the units.
+    gain : tuple
+        Value, standard error for the structure, and interval for all structures.
+    dead_time : tuple
+        Standard error for the structure, and interval for all structures.
+    integrating : bool
+        Whether the gain is a slope.
+    """
+    ratio = ratio_unit(records)
+    parameters = []
+    for name, value, std in found:
+        if name == "gain":
+            value, std, ends = gain
+            unit = slope_unit(ratio, "s") if integrating and ratio else ratio
+            times = -1 if integrating else 0
+            finite = bool(np.isfinite(ends).all())
+            low, high = ends if finite else (np.nan, np.nan)
+            parameters.append(Parameter(name, value, std, low, high, finite, unit, times))
+        elif name == "dead_time":
+            std, (low, high) = dead_time
+            parameters.append(Parameter(name, value, std, low, high, True, "s", 1))
+        else:
+            ratio_of_times = name.rpartition("_")[0].endswith("damping")
+            unit, times = ("", 0) if ratio_of_times else ("s", 1)
+            reach = Z_95 * std
+            parameters.append(
+                Parameter(name, value, std, value - reach, value + reach, False, unit, times)
+            )
+    return tuple(parameters)
+
+
+def ratio_unit(records: Sequence[Record]) -> str:
+    """Unit of the gain: that of the output over that of the input; empty if not known."""
+    if not records:
+        return ""
+    first = records[0]
+    output, input = getattr(first, "output_units", ("",)), getattr(first, "input_units", ("",))
+    return gain_unit(output[0], input[0])
+
+
+def time_unit_of(records: Sequence[Record]) -> str:
+    """Unit of time in which results of these records are written."""
+    unit = getattr(records[0], "units", {}).get("time", "s") if records else "s"
+    return unit if unit in SECONDS else "s"

@@ -1,0 +1,1 @@
+"""Process parameters (gain, dead time, lags, leads) of fitted models, and their errors."""
