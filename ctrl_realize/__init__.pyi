@@ -18,7 +18,6 @@ from . import validation as validation
 from .data import ImpulseResponse as ImpulseResponse
 from .data import MeasuredFRF as MeasuredFRF
 from .data import Record as Record
-from .data import StepResponse as StepResponse
 from .delayed import DelayedStateSpace as DelayedStateSpace
 from .delayed import DelaySystem as DelaySystem
 from .delayed import delay as delay

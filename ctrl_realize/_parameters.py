@@ -228,7 +228,10 @@ def _short(one: Parameter) -> str:
     reach = Z_95 * one.std
     if not np.isfinite(reach) or not reach > 1e-4 * abs(one.value):
         return f"{one.value:.4g}"
-    return number_within(one.value, one.value - reach, one.value + reach)
+    said = number_within(one.value, one.value - reach, one.value + reach)
+    if float(said):
+        return said
+    return f"{one.value:.2g}" if abs(one.value) > 0.01 * reach else "0"
 
 
 def parameter_table(parameters: Sequence[Parameter]) -> pd.DataFrame:

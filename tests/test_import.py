@@ -29,7 +29,7 @@ SUBMODULES = {
 MOST = 33  # names that a user learns
 
 PROMISED = """
-Record ImpulseResponse MeasuredFRF StepResponse read_record read_frf detect_step
+Record ImpulseResponse MeasuredFRF compare read_record read_frf detect_step
 unit_step impulse_from_step impulse_from_io impulse_from_frf fit_frf realize estimate_delay
 fit_output_error fit_state_space scan_orders identify Campaign identify_campaign DelayTracker
 DelayedStateSpace DelaySystem delay delayed_ss interconnect save_model load_model

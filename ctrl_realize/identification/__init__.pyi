@@ -10,6 +10,7 @@ from .methods import identify as identify
 from .output_error.fit import fit_output_error as fit_output_error
 from .output_error.record_gains import RecordGains as RecordGains
 from .output_error.result import OutputErrorFit as OutputErrorFit
+from .process_structures import ProcessStructure as ProcessStructure
 from .realization.delay_scan import estimate_delay as estimate_delay
 from .realization.delay_scan_result import DelayScan as DelayScan
 from .realization.mimo import MimoRealization as MimoRealization

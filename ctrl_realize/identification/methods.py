@@ -19,8 +19,9 @@ from ..numerics.blas_threads import single_threaded
 from ..paper import SETTINGS
 from .joint.fit import fit_joint
 from .model_class import with_modes_judged
-from .output_error.fit import MOST_ORDER, fit_output_error
+from .output_error.fit import fit_output_error
 from .output_error.result import OutputErrorFit
+from .process_structures import MOST_ORDER, Structures
 from .realization.delay_scan import estimate_delay
 from .realization.delay_scan_result import DelayScan
 from .realization.order_scan import scan_orders
@@ -41,7 +42,7 @@ class IdentifyOptions(TypedDict, total=False):
     known: ct.LTI | None
     loss: Literal["huber", "least_squares"]
     noise: Literal["auto", "white"]
-    structures: Sequence[tuple[int, int]] | None
+    structures: Structures | None
     include_known: bool
     gains: Literal["common", "own"]
     cutoff_hz: float | Literal["auto"] | None
@@ -63,7 +64,7 @@ def identify(
     known: ct.LTI | None = None,
     loss: Literal["huber", "least_squares"] = "huber",
     noise: Literal["auto", "white"] = "auto",
-    structures: Sequence[tuple[int, int]] | None = None,
+    structures: Structures | None = None,
     include_known: bool = False,
     gains: Literal["common", "own"] = "common",
     cutoff_hz: float | Literal["auto"] | None = "auto",
@@ -216,16 +217,14 @@ def fit_records(
     records: Record | Sequence[Record],
     *,
     order: int | None = None,
-    structures: Sequence[tuple[int, int]] | None = None,
+    structures: Structures | None = None,
     **options: Any,
 ) -> DelayedStateSpace:
     """Output-error fit with the arguments of `identify`; several records are fitted together."""
     return fit_output_error(records, structures=_requested(order, structures), **options)
 
 
-def _requested(
-    order: int | None, structures: Sequence[tuple[int, int]] | None
-) -> Sequence[tuple[int, int]] | None:
+def _requested(order: int | None, structures: Structures | None) -> Structures | None:
     """Structures that are asked for, by themselves or by an order."""
     if order is None:
         return structures

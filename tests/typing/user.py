@@ -12,7 +12,7 @@ import ctrl_realize as cr
 def model_of(path: Path) -> cr.DelayedStateSpace:
     record = cr.read_record(path)
     edge: cr.data.StepEdge = cr.detect_step(record)
-    step: cr.StepResponse = cr.unit_step(record, edge)
+    step: cr.data.StepResponse = cr.unit_step(record, edge)
     impulse: cr.ImpulseResponse = cr.impulse_from_step(step, cutoff_hz=50.0)
     scanned: cr.DelayedStateSpace = cr.estimate_delay(impulse, 3, max_delay=100)
     orders: cr.identification.OrderScan = cr.scan_orders(impulse, range(1, 6), max_delay=100)

@@ -30,6 +30,7 @@ from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
 from ..output_error.summary import fitted_core, fitted_model
+from ..process_structures import Structures, plain_pairs
 from .flags import joint_flags
 from .result import JointFit
 
@@ -42,7 +43,7 @@ def fit_joint(
     records: Record | Sequence[Record],
     frf: ct.FrequencyResponseData,
     *,
-    structures: Sequence[tuple[int, int]] | None = None,
+    structures: Structures | None = None,
     max_delay: int | None = None,
     weighting: Literal["auto", "std", "relative", "uniform"] = "auto",
     hold: Literal["auto", "zoh"] | None = "auto",
@@ -60,8 +61,9 @@ def fit_joint(
         One input, one output; see `fit_output_error`.
     frf : MeasuredFRF
         One input, one output, at least 3 points. Any `control.FrequencyResponseData`.
-    structures : sequence of (order, relative degree), optional
-        Structures to try; default: those of `fit_output_error`.
+    structures : optional
+        Structures to try, (order, relative degree) or names of process models as for
+        `fit_output_error`, without prescribed parameters; default: those of `fit_output_error`.
     max_delay : int, optional
         Largest delay in samples of the records.
     weighting, hold, band_hz : optional
@@ -117,15 +119,14 @@ def fit_joint(
     ((1, 1), 0.125, False)
     """
     several = as_records(records)
-    first = fit_of(
-        fit_output_error(several, structures=structures, max_delay=max_delay), OutputErrorFit
-    )
+    pairs = plain_pairs(structures, "fit_joint")
+    first = fit_of(fit_output_error(several, structures=pairs, max_delay=max_delay), OutputErrorFit)
     held = first.dt if hold == "zoh" else None
     other = fit_of(
         fit_frf(
             frf,
-            _orders(frf) if structures is None else sorted({n for n, _ in structures}),
-            relative_degree=None if structures is None else sorted({r for _, r in structures}),
+            _orders(frf) if pairs is None else sorted({n for n, _ in pairs}),
+            relative_degree=None if pairs is None else sorted({r for _, r in pairs}),
             dt=held,
             weighting=weighting,
             hold=hold,

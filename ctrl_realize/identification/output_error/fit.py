@@ -15,14 +15,16 @@ from ..._wording import named
 from ...data import Record, StepEdge
 from ...data.given import as_records, check_complete
 from ...delayed import DelayedStateSpace
-from ...errors import DataError, NoStepError, OptionError, OrderError
+from ...errors import DataError, NoStepError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, own_regressors, step_data
 from ...numerics.output_error.step_fit import fit_step_record
+from ...numerics.parameters.process_form import ProcessForm
 from ...numerics.separable.varpro import KnownFactor, Structure
+from ..process_structures import Structures, requested
 from ..step.steps import found_step
 from .any_input import fit_any_input
 from .averaging import (
@@ -48,7 +50,6 @@ Gains = Literal["common", "own"]
 
 _LAST = 5  # a first step in the last samples of a record has no response to fit
 
-MOST_ORDER = 8  # higher orders suffer from rounding in the partial fractions
 FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
@@ -59,7 +60,7 @@ _DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 def fit_output_error(
     records: Record | Sequence[Record],
     *,
-    structures: Sequence[tuple[int, int]] | None = None,
+    structures: Structures | None = None,
     max_delay: float | None = None,
     known: ct.LTI | None = None,
     loss: Loss = "huber",
@@ -75,10 +76,12 @@ def fit_output_error(
         One input, one output, any input that moves. Several records of one plant are fitted
         together: step records are aligned and averaged; for other inputs poles, gain and dead time
         are common, and level, drift and initial state are estimated for each record.
-    structures : sequence of (order, relative_degree), optional
-        (order, relative degree) of the models to try. Default: orders 1 to 5 with relative degrees
-        1 to the order. If structures are given, the delay is that of the best of them, adequate or
-        not.
+    structures : optional
+        Models to try: (order, relative degree), a process model by name (``"P1D"``, ``"P2DZ"``,
+        ``"P2DU"``, ``"P1DI"``, ``"FOPDT"``, ``"SOPDT"``, ...), a `ProcessStructure` with fixed or
+        bounded parameters, or a sequence of them. Default: orders 1 to 5 with relative degrees 1 to
+        the order. If structures are given, the delay is that of the best of them, adequate or not;
+        where another one fits clearly better, it is reported as an apparent dead time.
     max_delay : float, optional
         Largest dead time in samples. Default: the visible onset of the output, which the dead time
         cannot exceed.
@@ -171,12 +174,13 @@ def fit_output_error(
     loss = one_of(loss, "loss", ("huber", "least_squares"))
     noise = one_of(noise, "noise", ("auto", "white"))
     gains = one_of(gains, "gains", ("common", "own"))
-    tried = _structures(structures)
+    asked = requested(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)
     several = _records(records)
     settings: _Settings = {
-        "structures": tried,
+        "structures": None if asked is None else asked.structures,
+        "forms": () if asked is None else asked.forms,
         "known": factor,
         "huber": loss == "huber",
         "whiten": noise == "auto",
@@ -202,6 +206,7 @@ def fit_output_error(
 
 class _Settings(TypedDict):
     structures: tuple[Structure, ...] | None
+    forms: tuple[ProcessForm, ...]
     known: KnownFactor
     huber: bool
     whiten: bool
@@ -275,25 +280,6 @@ def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
                 f"{record.noutputs} outputs; select one of each when the record is made"
             )
     return several
-
-
-def _structures(structures: Sequence[tuple[int, int]] | None) -> tuple[Structure, ...] | None:
-    if structures is None:
-        return None
-    chosen = []
-    for pair in structures:
-        try:
-            n, r = (int(number) for number in pair)
-        except (TypeError, ValueError):
-            raise OptionError(f"structure {pair!r}; expected (order, relative_degree)") from None
-        if not (1 <= r <= n <= MOST_ORDER):
-            raise OrderError(
-                f"structure ({n}, {r}); expected 1 <= relative degree <= order <= {MOST_ORDER}"
-            )
-        chosen.append(Structure(n, r))
-    if not chosen:
-        raise OptionError("structures is empty; give None for all of them")
-    return tuple(dict.fromkeys(chosen))
 
 
 def _step_data(record: Record) -> StepData | None:

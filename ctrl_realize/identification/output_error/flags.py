@@ -12,7 +12,7 @@ from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
 from .model_flags import cancelled_pair, slow_modes, unresolved_gain
-from .words import ESTIMATE_WORDS, is_firm
+from .words import ESTIMATE_WORDS, is_firm, structure_words
 
 # Thresholds for flags alone are a matter of presentation.
 _SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it counts as zero
@@ -103,11 +103,10 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
     assert other.interval is not None
     return Flag(
         "apparent_dead_time",
-        f"order {fit.structure.order}, relative degree {fit.structure.relative_degree} was "
-        f"requested and is ruled out by the data: {time_within(fit.dead_time, fit.low, fit.high)} "
-        "is an apparent dead time, which compensates for missing or superfluous lags, and its "
-        "interval is valid only if the structure is right; order "
-        f"{other.order}, relative degree {other.relative_degree} gives "
+        f"{structure_words(fit)} was requested and is ruled out by the data: "
+        f"{time_within(fit.dead_time, fit.low, fit.high)} is an apparent dead time, which "
+        "compensates for missing or superfluous lags, and its interval is valid only if the "
+        f"structure is right; order {other.order}, relative degree {other.relative_degree} gives "
         f"{time_within(other.dead_time, *other.interval)} "
         f"({interval_in_time(*other.interval)})",
     )
@@ -170,6 +169,8 @@ def _near(fit: OutputErrorEstimate, delay: float) -> bool:
 
 def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
     if fit.low > _SAMPLES_BESIDE_NOTHING * dt:
+        return None
+    if fit.form is not None and (not fit.form.dead_time or "dead_time" in fit.form.fixed):
         return None
     return Flag(
         "no_delay_resolved", f"a model without dead time fits as well (up to {in_time(fit.high)})"

@@ -27,7 +27,7 @@ from ..process_parameters import time_unit_of, with_intervals
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
-from .words import ESTIMATE_WORDS, gain_in_words, total_in_words
+from .words import ESTIMATE_WORDS, gain_in_words, structure_words, total_in_words
 
 FOLLOWED_LESS = 0.5
 """Per cent of a response by which two fits differ, from which on the difference is stated."""
@@ -350,7 +350,7 @@ class OutputErrorFit(FractionalDelayFit):
                 "total delay",
                 total_in_words(self.total_delay, self.total_delay_interval, self.flags),
             ),
-            ("model", f"order {self.order}, relative degree {self.relative_degree}"),
+            ("model", structure_words(self.estimate)),
             ("poles", poles_in_words(self.poles)),
             ("gain", gain_in_words(self.gain, self.gain_interval)),
             ("fit", self._fit_in_words()),

@@ -14,7 +14,7 @@ from ...numerics.output_error.step_data import StepData
 from ...results import Flag
 from .repeatability import Repeatability
 from .result import FOLLOWED_LESS, OutputErrorFit
-from .words import model_words
+from .words import form_words, model_words
 
 
 def summarise(
@@ -89,6 +89,12 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             if len(fit.structures) > 1
             else f"{kind}: the only structure that was tried"
         ]
+    if fit.form is not None:
+        reasons = [f"{form_words(fit.form)}: as requested"]
+        if fit.at_bound:
+            reasons.append(
+                f"{', '.join(fit.at_bound)} ended at a bound: the data suggest a value beyond it"
+            )
     reasons += _closest(fit)
     if fit.rounded is not None and not fit.delay_estimates:
         reasons.append(
@@ -144,6 +150,8 @@ def _closest(fit: OutputErrorEstimate) -> list[str]:
 def _interval_of(fit: OutputErrorEstimate) -> str:
     """Describe the interval: structures, and other models that extend it."""
     ends = [line.interval for line in fit.structures if line.interval is not None]
+    if fit.form is not None:
+        return "interval: profile likelihood of the process models that the data cannot rule out"
     parts = [f"{len(ends)} structure(s)"] if ends else []
     low = min((end[0] for end in ends), default=np.inf)
     high = max((end[1] for end in ends), default=-np.inf)

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..._wording import in_time, interval_in_time, numbers_alike, time_within
-from ...numerics.output_error.result import RobustKey
+from ...numerics.output_error.result import OutputErrorEstimate, RobustKey
+from ...numerics.parameters.process_form import ProcessForm
 from ...numerics.separable.dispersion import DispersedFlow
 from ...numerics.separable.lag_chains import LagChain
 from ...results import Flag
@@ -49,6 +50,19 @@ def model_words(model: LagChain | DispersedFlow) -> str:
     if model.hidden:
         return "diffusion model"
     return f"model of {model.candidate.structure.order} nearly equal lags"
+
+
+def form_words(form: ProcessForm) -> str:
+    """Name a process model with what was prescribed."""
+    said = [f"{name} fixed at {value:.4g}" for name, value in form.fixed.items()]
+    said += [f"{name} in {low:.4g}...{high:.4g}" for name, (low, high) in form.bounds.items()]
+    return form.name + (f" with {', '.join(said)}" if said else "")
+
+
+def structure_words(fit: OutputErrorEstimate) -> str:
+    """Name the structure of a model, or the process model that was prescribed."""
+    plain = f"order {fit.structure.order}, relative degree {fit.structure.relative_degree}"
+    return plain if fit.form is None else f"{form_words(fit.form)} ({plain})"
 
 
 def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[Flag]) -> str:

@@ -37,7 +37,7 @@ class ModelComparison(Result):
     ----------
     names : tuple of str
     checks : tuple of ResidualAnalysis
-    fitted : tuple of bool
+    estimation_data : tuple of bool
         Whether the record is one that the model was fitted to: its fit is no test of it then.
     record : Record
 
@@ -51,13 +51,13 @@ class ModelComparison(Result):
     ...     for name, pair in {"one lag": (1, 1), "two lags": (2, 2)}.items()
     ... }
     >>> found = cr.compare(models, unseen)
-    >>> found.best, found.fitted
+    >>> found.best, found.estimation_data
     ('two lags', (False, False))
     """
 
     names: tuple[str, ...]
     checks: tuple[ResidualAnalysis, ...]
-    fitted: tuple[bool, ...]
+    estimation_data: tuple[bool, ...]
     record: Record
 
     @property
@@ -78,7 +78,7 @@ class ModelComparison(Result):
         -------
         pandas.DataFrame
             Index ``model``; columns ``fit_percent``, ``residual_rms`` (for several outputs their
-            root mean square), ``white`` and ``independent`` (see `ResidualAnalysis`), ``fitted``.
+            root mean square), ``white`` and ``independent`` (see `ResidualAnalysis`), ``estimation_data``.
         """
         import pandas as pd
 
@@ -87,7 +87,7 @@ class ModelComparison(Result):
             "residual_rms": [float(np.sqrt(np.mean(one.residual**2))) for one in self.checks],
             "white": [one.white for one in self.checks],
             "independent": [one.independent for one in self.checks],
-            "fitted": list(self.fitted),
+            "estimation_data": list(self.estimation_data),
         }
         table = pd.DataFrame(rows, index=pd.Index(self.names, name="model"))
         return table.sort_values("fit_percent", ascending=False, kind="stable")
@@ -98,7 +98,7 @@ class ModelComparison(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         rows = []
-        for name, check, fitted in zip(self.names, self.checks, self.fitted, strict=True):
+        for name, check, fitted in zip(self.names, self.checks, self.estimation_data, strict=True):
             said = [f"fit {in_percent(check.fit_percent)}"]
             said.append("residual white" if check.white else "residual not white")
             if not check.independent:
@@ -185,7 +185,7 @@ def compare(
             analyse_residuals(model, given, lags=lags, confidence=confidence, start=start)
             for _, model in named
         ),
-        fitted=tuple(_was_fitted(model, given) for _, model in named),
+        estimation_data=tuple(_was_fitted(model, given) for _, model in named),
         record=given,
     )
 

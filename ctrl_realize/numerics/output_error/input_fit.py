@@ -25,6 +25,7 @@ from functools import partial
 import numpy as np
 
 from ..arrays import FloatArray
+from ..parameters.process_form import ProcessForm
 from ..separable.batch_search import fit_batch
 from ..separable.compared_fits import converged, settled
 from ..separable.poles import parameters_from_poles, poles_from_parameters
@@ -40,6 +41,7 @@ from .input_data import SampledData, cut
 from .interval import likelihood_fit
 from .margins import close_to
 from .own_response import own_response
+from .process_models import process_fit
 from .result import OutputErrorEstimate
 from .selection import chains_of
 
@@ -95,6 +97,7 @@ def fit_sampled(
     dt: float,
     *,
     structures: Sequence[Structure] | None = None,
+    forms: Sequence[ProcessForm] = (),
     latest: float | None = None,
     known: KnownFactor | None = None,
     huber: bool = True,
@@ -107,7 +110,7 @@ def fit_sampled(
         One of each for every record.
     dt : float
         Sample time in s.
-    structures, latest, known, huber
+    structures, forms, latest, known, huber
         See `fit_step_record`; orders up to 3 by default, `latest` a quarter of the longest record.
 
     Notes
@@ -157,7 +160,12 @@ def fit_sampled(
         every = partial(_fit, data, factor, ORDERS, scales, huber)
         better = better_structure(stretch, stretch.best, every)
     white = whole.correlation <= WHITE
-    fit = likelihood_fit(whole, adequate=white, chains=chains, better=better)
+    if forms:
+        fit = process_fit(
+            whole, forms, is_noise=lambda _, correlation: correlation <= WHITE, better=better
+        )
+    else:
+        fit = likelihood_fit(whole, adequate=white, chains=chains, better=better)
     if sums is not None:
         fit = replace(fit, fitted=_on_stretch(data, fit, factor))
     elif fit.chain:

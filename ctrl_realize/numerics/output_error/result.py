@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..parameters.physical import ProcessParameter, fitted_parameters
+from ..parameters.process_form import ProcessForm
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain, lag_sum
 from ..separable.profile_ends import profile_limits
@@ -139,7 +140,8 @@ class OutputErrorEstimate:
     its evidence over the model's. `better` is a structure that rules out those that were asked for;
     `close` are decisions that rounding may turn. `parameters` are those of the model as a process
     model, with standard errors where they are those of a likelihood. `rounded` is the noise before
-    rounding, if the model is that of the likelihood of rounded data.
+    rounding, if the model is that of the likelihood of rounded data. `form` is the form that was
+    prescribed, if it is no plain structure, and `at_bound` its parameters that are at a bound.
     """
 
     dead_time: float
@@ -173,6 +175,8 @@ class OutputErrorEstimate:
     close: tuple[CloseDecision, ...] = ()
     rounded: float | None = None
     parameters: tuple[ProcessParameter, ...] = ()
+    form: ProcessForm | None = None
+    at_bound: tuple[str, ...] = ()
 
     @property
     def robust(self) -> bool:

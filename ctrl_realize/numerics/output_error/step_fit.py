@@ -57,6 +57,7 @@ import numpy as np
 
 from ..constants import Z_95
 from ..parameters.physical import without_errors
+from ..parameters.process_form import ProcessForm
 from ..separable.compared_fits import at_dead_time
 from ..separable.dispersion import DispersedFlow
 from ..separable.lag_chains import LagChain
@@ -74,6 +75,7 @@ from .coloured import in_coloured_noise
 from .flat_likelihood import closer, later, moved, pinned, told
 from .interval import likelihood_fit
 from .margins import close_to
+from .process_models import process_fit
 from .profiles import profile_of
 from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
 from .rounded import in_rounded_data
@@ -110,6 +112,7 @@ def fit_step_record(
     data: StepData,
     *,
     structures: Sequence[Structure] | None = None,
+    forms: Sequence[ProcessForm] = (),
     latest: float | None = None,
     known: KnownFactor | None = None,
     huber: bool = True,
@@ -124,6 +127,8 @@ def fit_step_record(
     structures : sequence of Structure, optional
         Default: orders 1 to 5, relative degrees 1 to the order. If structures are given, the dead
         time is that of the best of them, adequate or not.
+    forms : sequence of ProcessForm, optional
+        Process models to which the choice is limited; `structures` are theirs.
     latest : float, optional
         Largest dead time, in s.
     known : KnownFactor, optional
@@ -156,6 +161,16 @@ def fit_step_record(
             plain.best,
             lambda: _fit_until(data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber),
         )
+        if forms:
+            level = max(ADEQUATE * data.colour, whole.normalized_rms if adequate else 0.0)
+            return process_fit(
+                whole,
+                forms,
+                is_noise=lambda rms, _: rms <= level,
+                better=better,
+                relaxing=data.relaxing,
+                near=near,
+            )
         given = likelihood_fit(
             whole, adequate=adequate, relaxing=data.relaxing, better=better, near=near
         )

@@ -120,7 +120,7 @@ def static_gain(
         total_std=float(total_std),
         slowest=float(slow.min(initial=np.inf)) * length,
         integrates=slow.size < candidate.poles.size,
-        reached=_reached(candidate.poles, numerator, length),
+        reached=reached_after(candidate.poles, numerator, length),
         sign_known=bool(abs(rate) > SIGNIFICANT * rate_std),
     )
 
@@ -215,7 +215,7 @@ def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, f
     return ends(0.025), ends(0.975)
 
 
-def _reached(poles: ComplexArray, numerator: FloatArray, length: float) -> float:
+def reached_after(poles: ComplexArray, numerator: FloatArray, length: float) -> float:
     """Value of the step response of b(s)/a(s) after a time."""
     residues, level, _ = partial_fractions(poles[None], np.ones(1), numerator.size)
     modes = np.exp(poles * length) @ residues[0]

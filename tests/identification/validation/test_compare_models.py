@@ -43,9 +43,9 @@ def test_a_record_of_the_fit_is_told_and_equal_names_are_numbered():
     fitted = [cr.fit_output_error(seen, structures=[(1, 1)]) for _ in range(2)]
     found = cr.compare([*fitted, PLANT], seen)
     assert found.names == ("day 1 (0)", "day 1 (1)", "plant")
-    assert found.fitted == (True, True, False)
+    assert found.estimation_data == (True, True, False)
     assert found.report().count("fitted to this record") == 2
-    assert cr.compare(PLANT, record(2)).fitted == (False,)
+    assert cr.compare(PLANT, record(2)).estimation_data == (False,)
 
 
 @pytest.mark.parametrize(("models", "match"), [([], "no models"), ({}, "no models")])

@@ -1,0 +1,213 @@
+"""Estimate of process models of a prescribed form: the best of them, and whether others fit better.
+
+The counterpart of `interval.likelihood_fit` for forms, fixed and bounded parameters: profile
+likelihoods [1]_ of all forms that the data do not rule out.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..constants import Z_95
+from ..parameters.process_form import FormFit, ProcessForm, fit_form
+from ..separable.lag_chains import lag_sum
+from ..separable.profile_ends import profile_limits
+from ..separable.static_gain import INTEGRATOR, StaticGain, reached_after
+from ..separable.structures import PLAUSIBLE
+from ..separable.varpro import evaluate, respond
+from ..separable.window import WindowFit
+from ..signals.correlation import fit_percent
+from ..signals.noise import correlation_time
+from .interval import likelihood_fit
+from .margins import CloseDecision
+from .result import DelayInterval, Followed, OutputErrorEstimate, StructureFit, assembled
+
+IsNoise = Callable[[float, float], bool]
+"""Whether a residual counts as noise: of its normalised rms and its correlation time."""
+
+
+def process_fit(
+    whole: WindowFit,
+    forms: Sequence[ProcessForm],
+    *,
+    is_noise: IsNoise,
+    better: StructureFit | None,
+    relaxing: bool = False,
+    near: tuple[CloseDecision, ...] = (),
+) -> OutputErrorEstimate:
+    """Determine model, dead time and interval among process models of prescribed forms.
+
+    Parameters
+    ----------
+    whole : WindowFit
+        Fit of the structures of the forms, without their prescriptions.
+    forms : sequence of ProcessForm
+    is_noise : callable
+    better : StructureFit or None
+        A structure that rules out those of `whole`.
+    relaxing, near
+        As for `likelihood_fit`.
+    """
+    adequate = is_noise(whole.normalized_rms, whole.correlation)
+    if all(form.admits(whole.candidates[form.structure], whole.scales.length) for form in forms):
+        return likelihood_fit(whole, adequate=adequate, relaxing=relaxing, better=better, near=near)
+    fits = [_fitted(whole, form) for form in forms]
+    values = [_criterion(whole, fit) for fit in fits]
+    best = int(np.argmin(values))
+    chosen = fits[best]
+    host = whole.candidates[chosen.form.structure]
+    # What the prescriptions cost is part of the noise, if the data contradict them.
+    variance = whole.variance * max(chosen.candidate.cost / max(host.cost, 1e-300), 1.0)
+    if variance > 1.01 * whole.variance:
+        chosen = _fitted(whole, chosen.form, variance)
+    kept = [
+        chosen if i == best else fit
+        for i, fit in enumerate(fits)
+        if values[i] <= values[best] + PLAUSIBLE
+    ]
+    ends = [profile_limits(*fit.profile) for fit in kept]
+    first, last = profile_limits(*chosen.profile)
+    interval = DelayInterval(
+        min(low for low, _ in ends), max(high for _, high in ends), (last - first) / (2 * Z_95)
+    )
+    fitted = _predicted(whole, chosen)
+    rms = whole.normalized_rms * float(np.sqrt(chosen.candidate.cost / max(host.cost, 1e-300)))
+    error = (whole.window.output - fitted)[whole.window.start :]
+    correlation = correlation_time(error)
+    found = assembled(
+        whole,
+        chosen.candidate,
+        is_noise(rms, correlation),
+        (),
+        {},
+        interval,
+        chosen.profile,
+        relaxing=relaxing,
+        better=_better(whole, chosen, better),
+    )
+    return replace(
+        found,
+        numerator=chosen.numerator,
+        fitted=fitted,
+        followed=_followed(whole, chosen, fitted),
+        normalized_rms=rms,
+        residual=float(np.sqrt(np.mean(error**2))),
+        correlation=correlation,
+        static=_static(whole, chosen),
+        alike=(),
+        structures=_table(fits, values, ends=dict(zip(map(id, kept), ends, strict=True))),
+        parameters=chosen.parameters,
+        form=chosen.form,
+        at_bound=chosen.at_bound,
+        close=near,
+    )
+
+
+def _fitted(whole: WindowFit, form: ProcessForm, variance: float | None = None) -> FormFit:
+    like = list(whole.candidates.values())
+    like.sort(key=lambda one: one.structure != form.structure)
+    numerators = [
+        evaluate(whole.problem, one.structure, one.parameters[None]).numerator[0] for one in like
+    ]
+    noise = whole.variance if variance is None else variance
+    return fit_form(whole.problem, form, whole.scales, like, numerators, noise)
+
+
+def _criterion(whole: WindowFit, fit: FormFit) -> float:
+    return fit.candidate.cost / whole.variance + fit.free * whole.penalty
+
+
+def _better(whole: WindowFit, chosen: FormFit, better: StructureFit | None) -> StructureFit | None:
+    """The structure without the prescriptions, if it rules them out; or what rules out both."""
+    host = whole.candidates[chosen.form.structure]
+    more = 2 + host.structure.order + host.structure.zeros - chosen.free
+    excess = (chosen.candidate.cost - host.cost) / whole.variance - more * whole.penalty
+    if better is not None:
+        # relative to the structure without prescriptions, which may be worse: it has no integrator
+        both = excess - better.delta_bic
+        return replace(better, delta_bic=-both) if both > PLAUSIBLE else None
+    if excess <= PLAUSIBLE:
+        return None
+    found = likelihood_fit(whole, adequate=True)
+    static = whole.static(whole.candidates[found.structure])
+    return StructureFit(
+        found.structure,
+        found.dead_time,
+        static.total,
+        -float(excess),
+        (found.low, found.high),
+        found.poles,
+        static.gain,
+    )
+
+
+def _predicted(whole: WindowFit, fit: FormFit) -> FloatArray:
+    """Model at every sample, with the terms that enter linearly."""
+    window, problem = whole.window, whole.problem
+    setting = problem.known, fit.numerator, fit.candidate.parameters
+    rest = problem.data - respond(problem.drive, *setting)
+    regressors = problem.weighted(problem.regressors)
+    if problem.segments is not None:
+        terms = problem.local_terms(fit.candidate.poles[None])
+        left = problem.weighted(rest[:, None])
+        if window.bins is None or window.own is None:
+            remainder = terms.without(left[None])[0, :, 0]
+            return np.asarray(problem.data - remainder / problem.root_weight)
+        local = terms.fitted((problem.root_weight * rest)[None], window.own)[0]
+        return np.asarray(respond(window.drive, *setting) + local)
+    linear = np.linalg.lstsq(regressors, problem.weighted(rest[:, None])[:, 0])[0]
+    return np.asarray(respond(window.drive, *setting) + window.columns @ linear)
+
+
+def _followed(whole: WindowFit, fit: FormFit, fitted: FloatArray) -> Followed:
+    window = whole.window
+    alone = respond(window.drive, whole.problem.known, fit.numerator, fit.candidate.parameters)
+    alone = alone + np.mean(window.output - alone)
+    both = fit_percent(np.tile(window.output, (2, 1)), np.stack([fitted, alone]))
+    return Followed(float(both[0]), float(both[1]), fit.form.structure, float(both[0]))
+
+
+def _static(whole: WindowFit, fit: FormFit) -> StaticGain:
+    length, poles = whole.scales.length, fit.candidate.poles
+    moving = poles[np.abs(poles) * length >= INTEGRATOR]
+    gain = next(one for one in fit.parameters if one.name == "gain")
+    slow = np.abs(moving)
+    return StaticGain(
+        gain=gain.value,
+        gain_std=gain.std if np.isfinite(gain.std) else 0.0,
+        total=fit.candidate.dead_time + lag_sum(moving, fit.numerator),
+        total_std=fit.total_std,
+        slowest=float(slow.min(initial=np.inf)) * length,
+        integrates=fit.form.integrator,
+        reached=reached_after(poles, fit.numerator, length),
+        sign_known=abs(gain.value) > Z_95 * gain.std,
+    )
+
+
+def _table(
+    fits: Sequence[FormFit],
+    values: Sequence[float],
+    ends: dict[int, tuple[float, float]],
+) -> tuple[StructureFit, ...]:
+    lines = [
+        StructureFit(
+            fit.form.structure,
+            fit.candidate.dead_time,
+            fit.candidate.dead_time + lag_sum(fit.candidate.poles, fit.numerator),
+            value - min(values),
+            ends.get(id(fit)),
+            fit.candidate.poles,
+            float(fit.numerator[0] / np.prod(-fit.candidate.poles).real),
+        )
+        for fit, value in zip(fits, values, strict=True)
+    ]
+    return tuple(sorted(lines, key=lambda line: line.delta_bic))

@@ -1,0 +1,151 @@
+"""Process models by name, with fixed and bounded parameters."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+
+import ctrl_realize as cr
+from ctrl_realize.identification import ProcessStructure
+
+DT, EDGE, NOISE = 0.1, 100, 0.01
+TWO_LAGS = ([2.0], [10.0, 7.0, 1.0])  # 5 s and 2 s
+PAIR = ([2.0], [4.0, 0.8, 1.0])  # 2 s, damping 0.2
+INTEGRATOR = ([0.3], [3.0, 1.0, 0.0])
+LEAD = ([2.0 * 0.8, 2.0], [10.0, 7.0, 1.0])
+DEAD_TIME = 1.5
+
+
+def record(plant, count=600, seed=0, dead_time=DEAD_TIME, noise=NOISE):
+    system = cr.delayed_ss(ct.tf(*plant), dead_time=dead_time, dt=DT)
+    u = (np.arange(count) >= EDGE).astype(float)
+    y = system.simulate(u) + noise * np.random.default_rng(seed).standard_normal(count)
+    return cr.Record(DT * np.arange(count), u, y)
+
+
+@pytest.mark.parametrize(
+    ("name", "plant", "truth"),
+    [
+        ("P2D", TWO_LAGS, {"gain": 2, "lag_1": 5, "lag_2": 2}),
+        ("sopdt", TWO_LAGS, {"gain": 2, "lag_1": 5, "lag_2": 2}),
+        ("P2DU", PAIR, {"gain": 2, "pair_time_1": 2, "pair_damping_1": 0.2}),
+        ("P1DI", INTEGRATOR, {"gain": 0.3, "lag_1": 3}),
+        ("P2DZ", LEAD, {"gain": 2, "lag_1": 5, "lag_2": 2, "lead_1": 0.8}),
+        ("p2zd", LEAD, {"gain": 2, "lag_1": 5, "lag_2": 2, "lead_1": 0.8}),
+    ],
+)
+def test_a_process_model_by_name_has_the_parameters_of_the_plant(name, plant, truth):
+    fit = cr.fit_output_error(record(plant), structures=name).fit
+    table = fit.parameter_table()
+    assert list(table.index) == ["gain", "dead_time", *(key for key in truth if key != "gain")]
+    for key, value in {**truth, "dead_time": DEAD_TIME}.items():
+        error = table.loc[key, "std_given_structure"]
+        assert abs(table.loc[key, "value"] - value) < 4 * error
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+    assert fit.better is None
+    assert fit.interval_kind == "confidence"
+
+
+def test_an_integrator_is_exact_in_the_model_and_in_words():
+    system = cr.fit_output_error(record(INTEGRATOR), structures="P1DI")
+    assert np.isclose(system.delay_free.poles(), 1.0, rtol=0, atol=1e-12).sum() == 1
+    assert system.fit.integrators == 1
+    assert system.fit.formula.startswith("0.30007 (+-0.00005) e^(-1.504 s) / (s (3.00")
+
+
+def test_fixed_parameters_stay_and_the_others_have_the_errors_of_least_squares():
+    data = record(TWO_LAGS)
+    known = ProcessStructure("P2D", fixed={"Td": DEAD_TIME, "gain": 2.0}, start={"lag_1": 8.0})
+    fit = cr.fit_output_error(data, structures=known, loss="least_squares").fit
+    table = fit.parameter_table()
+    assert fit.interval == (DEAD_TIME, DEAD_TIME)
+    assert fit.gain == 2.0
+    assert table.loc[["gain", "dead_time"], "std_given_structure"].tolist() == [0.0, 0.0]
+
+    def model(t, level, slow, fast):
+        after = np.clip(t - DT * EDGE - DEAD_TIME, 0, None)
+        lags = slow * np.exp(-after / slow) - fast * np.exp(-after / fast)
+        return level + 2 * (1 - lags / (slow - fast))
+
+    best, covariance = curve_fit(model, data.time, data.output, (0, 6, 1.5))
+    lags = table.loc[["lag_1", "lag_2"]]
+    np.testing.assert_allclose(lags["value"], best[1:], atol=0.2 * np.sqrt(covariance[1, 1]))
+    # means over bins lose a few per cent
+    expected = np.sqrt(np.diag(covariance))[1:]
+    np.testing.assert_allclose(lags["std_given_structure"], expected, rtol=0.12)
+
+
+def test_a_form_that_the_data_rule_out_is_told_as_an_apparent_dead_time():
+    bounded = ProcessStructure("P2D", bounds={"Tp2": (None, 1.0)})
+    for asked in ("FOPDT", bounded):
+        fit = cr.fit_output_error(record(TWO_LAGS), structures=asked).fit
+        assert fit.better is not None
+        assert fit.interval_kind == "conditional"
+        flag = next(flag for flag in fit.flags if flag.code == "apparent_dead_time")
+        assert "order 2, relative degree 2 gives 1.50" in flag.message
+        low, high = fit.better.interval
+        assert fit.dead_time > high
+        assert low <= DEAD_TIME <= high
+    assert fit.parameter_table().loc["lag_2", "value"] == pytest.approx(1.0, abs=1e-3)
+    assert any("lag_2 ended at a bound" in choice for choice in fit.choices)
+
+
+def test_the_best_of_several_forms_is_chosen():
+    fit = cr.identify(record(PAIR, count=700), structures=["P1D", "P2D", "P2DU"]).fit
+    model = next(line for line in fit.report().splitlines() if line.startswith("  model"))
+    assert model.split(maxsplit=1)[1] == "P2DU (order 2, relative degree 2)"
+    assert [line.delta_bic for line in fit.structures] == sorted(
+        line.delta_bic for line in fit.structures
+    )
+    assert len(fit.structures) == 3
+
+
+def test_names_serve_moving_inputs_too():
+    system = cr.delayed_ss(ct.tf(*TWO_LAGS), dead_time=DEAD_TIME, dt=DT)
+    rng = np.random.default_rng(9)
+    u = np.repeat(rng.choice([-1.0, 1.0], 40), 20)
+    y = system.simulate(u) + 0.02 * rng.standard_normal(u.size)
+    known = ProcessStructure("P2D", fixed={"dead_time": DEAD_TIME})
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=known).fit
+    table = fit.parameter_table()
+    for key, value in {"gain": 2.0, "lag_1": 5.0, "lag_2": 2.0}.items():
+        assert abs(table.loc[key, "value"] - value) < 4 * table.loc[key, "std_given_structure"]
+    assert fit.better is None
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "match"),
+    [
+        (lambda: ProcessStructure("P2DX"), cr.errors.OptionError, "'P2DX'; expected a pair"),
+        (lambda: ProcessStructure("P4D"), cr.errors.OrderError, "0 to 3 lags"),
+        (lambda: ProcessStructure("P1DU"), cr.errors.OrderError, "at least 2 with U"),
+        (lambda: ProcessStructure("P1DZ"), cr.errors.OrderError, "fewer zeros than poles"),
+        (lambda: ProcessStructure("P1D", fixed={"Tz": 1}), cr.errors.OptionError, "parameters of"),
+        (
+            lambda: ProcessStructure("P1", fixed={"Td": 1}),
+            cr.errors.OptionError,
+            "parameters of P1",
+        ),
+        (lambda: ProcessStructure("P1D", fixed={"lag_1": -1}), cr.errors.OptionError, "0...inf"),
+        (
+            lambda: ProcessStructure("P1D", bounds={"lag_1": (3, 2)}),
+            cr.errors.OptionError,
+            "expected low < high",
+        ),
+        (
+            lambda: ProcessStructure("P1D", fixed={"Kp": 1}, bounds={"gain": (0, 2)}),
+            cr.errors.OptionError,
+            "fixed and bounded",
+        ),
+        (
+            lambda: cr.fit_output_error(record(TWO_LAGS), structures=["P1D", (2, 2)]),
+            cr.errors.OptionError,
+            "pairs and names",
+        ),
+    ],
+)
+def test_what_is_no_process_model_is_refused(make, error, match):
+    with pytest.raises(error, match=match):
+        make()
