@@ -64,11 +64,10 @@ def ratio_unit(records: Sequence[Record]) -> str:
     if not records:
         return ""
     first = records[0]
-    output, input = getattr(first, "output_units", ("",)), getattr(first, "input_units", ("",))
-    return gain_unit(output[0], input[0])
+    return gain_unit(first.output_units[0], first.input_units[0])
 
 
 def time_unit_of(records: Sequence[Record]) -> str:
     """Unit of time in which results of these records are written."""
-    unit = getattr(records[0], "units", {}).get("time", "s") if records else "s"
+    unit = records[0].units.get("time", "s") if records else "s"
     return unit if unit in SECONDS else "s"

@@ -78,9 +78,9 @@ class ProcessStructure:
     start: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.form()
+        self._checked()
 
-    def form(self) -> ProcessForm:
+    def _checked(self) -> ProcessForm:
         """Form for the fit, with checked values."""
         plain = _form(self.name)
         fixed = {key: _value(key, value) for key, value in _named(self.fixed, "fixed", plain)}
@@ -124,14 +124,14 @@ def requested(given: Structures | None) -> Requested | None:
     if given is None:
         return None
     alone = isinstance(given, str | ProcessStructure)
-    several: Iterable[Any] = [given] if alone else given  # type: ignore[list-item, assignment]
+    several: Iterable[Any] = [given] if alone else given  # type: ignore[assignment]
     pairs: list[Structure] = []
     forms: list[ProcessForm] = []
     for one in several:
         if isinstance(one, str):
-            forms.append(ProcessStructure(one).form())
+            forms.append(ProcessStructure(one)._checked())
         elif isinstance(one, ProcessStructure):
-            forms.append(one.form())
+            forms.append(one._checked())
         else:
             pairs.append(_pair(one))
     if not pairs and not forms:

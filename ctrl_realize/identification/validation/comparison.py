@@ -78,7 +78,8 @@ class ModelComparison(Result):
         -------
         pandas.DataFrame
             Index ``model``; columns ``fit_percent``, ``residual_rms`` (for several outputs their
-            root mean square), ``white`` and ``independent`` (see `ResidualAnalysis`), ``estimation_data``.
+            root mean square), ``white`` and ``independent`` (see `ResidualAnalysis`),
+            ``estimation_data``.
         """
         import pandas as pd
 

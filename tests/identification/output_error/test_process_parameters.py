@@ -79,6 +79,21 @@ def test_the_transfer_function_is_one_line_in_the_unit_of_time_asked_for():
         fit.parameter_table(time_unit="weeks")
 
 
+def test_units_go_from_the_record_to_the_parameters():
+    units = {"u": "%", "y": "degC", "time": "min"}
+    fit = cr.fit_output_error(furnace(noise=0.02, units=units), structures=[(2, 2)]).fit
+    assert fit.formula.startswith("0.7996 (+-0.0003) degC/% e^(-0.74")
+    assert fit.formula.endswith(" s + 1)), time in min")
+    units_of = fit.parameter_table()["unit"].to_dict()
+    assert units_of == {"gain": "degC/%", "dead_time": "min", "lag_1": "min", "lag_2": "min"}
+    slope = cr.fit_output_error(furnace(noise=0.02, units=units), structures="IPDT").fit
+    per_minute, per_second = (
+        slope.parameter_table(time_unit=unit).loc["gain"] for unit in ("min", "s")
+    )
+    assert (per_minute["unit"], per_second["unit"]) == ("degC/(% min)", "degC/(% s)")
+    assert per_minute["value"] == pytest.approx(60 * per_second["value"])
+
+
 def test_a_model_file_keeps_the_parameters(tmp_path):
     system = cr.fit_output_error(furnace(noise=0.02), structures=[(2, 2)])
     cr.save_model(tmp_path / "furnace.json", system)
