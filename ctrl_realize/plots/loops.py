@@ -15,8 +15,18 @@ from .._checks import positive
 from .._wording import in_time
 from ..delayed import DelayedStateSpace
 from ..design.loops.margin_result import Margins
-from ..design.loops.performance import lasting, loop_time, settled_responses, step_responses
+from ..design.loops.performance import (
+    controller_responses,
+    lasting,
+    loop_time,
+    settled_responses,
+    step_responses,
+)
+from ..design.tuning.algorithm import PIDAlgorithm
+from ..design.tuning.controller import PIDController
+from ..design.tuning.simulated import simulate_loop
 from ..errors import DataError
+from ..numerics.arrays import FloatArray
 from . import style
 from .names import plain
 from .shared_docs import documented
@@ -144,25 +154,40 @@ def _nyquist(axes: Any, result: Margins, values: Any) -> Any:
     return lines
 
 
-@documented("sequence of two Axes")
+@documented("sequence of four Axes")
 def closed_loop_plot(
     plant: DelayedStateSpace,
     controllers: Mapping[str, Any],
     *,
     span: float | None = None,
+    setpoint: float = 1.0,
+    load: float = 1.0,
+    output_limits: tuple[float, float] | None = None,
+    noise_std: float = 0.0,
     ax: style.AxesLike = None,
     title: str | None = None,
 ) -> ct.ControlPlot:
-    """Draw the output after a step of set-point and of load for several controllers.
+    """Draw the response to a step of set-point and of load, above the output of the controller.
+
+    With limits or noise, the loops are simulated by `design.simulate_loop`; otherwise the responses
+    are those of the linear loops.
 
     Parameters
     ----------
     plant : DelayedStateSpace
     controllers : mapping of str to system
-        Name -> controller with the plant's sample time; each must give a stable loop.
+        Name -> controller with the plant's sample time; each must give a stable loop. A
+        `PIDAlgorithm` is simulated with its set-point weights and limits.
     span : float, optional
         Time to show in s. Default: 1.25 times the time until all responses stay within 2 % of their
         final values.
+    setpoint, load : float, optional
+        Heights of the steps.
+    output_limits : tuple of float, optional
+        Lower and upper limit of the controller's output, as changes from its value before the step.
+    noise_std : float, optional
+        Standard deviation of the noise of the measured value, to see what of it arrives at the
+        actuator.
 
     Raises
     ------
@@ -174,34 +199,92 @@ def closed_loop_plot(
     >>> import ctrl_realize as cr
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
     >>> loops = {rule: cr.design.pid(plant, rule) for rule in ("simc", "amigo")}
-    >>> cplt = cr.plots.closed_loop_plot(plant, loops)
+    >>> cplt = cr.plots.closed_loop_plot(plant, loops, output_limits=(-0.5, 1.5))
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
-    ['output, set-point step', 'output, load step']
+    ['measured value', '', 'controller output', '']
     """
+    linear = {name: _linear(controller) for name, controller in controllers.items()}
     if span is None:
-        span = _span(plant, controllers)
+        span = _span(plant, linear)
     count = int(np.ceil(positive(span, "span", "time in s") / plant.dt)) + 1
-    # Twice the span is computed: circular wrap-around shows at the end.
-    length = 2 ** int(np.ceil(np.log2(2 * count)))
-    drawn: list[list[Any]] = [[], []]
-    with style.canvas(ax, 2, title=title, default_title="Closed loop", size=(8.0, 6.5)) as axes:
-        factor, unit = axis_time_unit(span, axes[1])
+    drawn: list[list[Any]] = [[], [], [], []]
+    with style.canvas(
+        ax, 2, columns=2, title=title, default_title="Set-point step", size=(10.5, 6.5)
+    ) as axes:
+        factor, unit = axis_time_unit(span, axes[2])
         time = np.arange(count) * plant.dt * factor
         for number, (name, controller) in enumerate(controllers.items()):
-            for where, response in enumerate(step_responses(plant, controller, length)):
+            if noise_std or output_limits or isinstance(controller, PIDAlgorithm):
+                settings = {"noise_std": noise_std, "output_limits": output_limits}
+                signals = _simulated(plant, controller, count, (setpoint, load), settings)
+            else:
+                signals = _linear_signals(plant, controller, count, (setpoint, load))
+            for where, signal in enumerate(signals):
                 drawn[where] += axes[where].plot(
                     time,
-                    response[:count],
+                    signal,
                     color=style.model_colour(number),
                     linestyle="-" if number == 0 else style.DASHES[number % len(style.DASHES)],
+                    drawstyle="steps-post" if where > 1 else "default",
                     label=plain(name),
                 )
-        axes[0].axhline(1, color=style.INPUT, linewidth=1)
+        axes[0].axhline(setpoint, color=style.INPUT, linewidth=1)
         axes[1].axhline(0, color=style.INPUT, linewidth=1)
-        axes[0].set_ylabel("output, set-point step")
-        axes[1].set(ylabel="output, load step", xlabel=f"time [{unit}]")
-        # The set-point response ends at 1: the corner below it is free.
-        return style.finished(axes, drawn, loc="lower right")
+        for limit in _drawn_limits(controllers, output_limits):
+            for each in axes[2:]:
+                each.axhline(limit, color=style.TRUTH, linestyle=style.DASHES[1], linewidth=1)
+        if ax is None:
+            axes[1].set_title("Load step", loc="left")
+        axes[0].set_ylabel("measured value")
+        axes[2].set(ylabel="controller output", xlabel=f"time [{unit}]")
+        axes[3].set_xlabel(f"time [{unit}]")
+        # The set-point response ends at the set-point: the corner below it is free.
+        return style.finished(axes, drawn, columns=2, loc="lower right")
+
+
+def _linear(controller: Any) -> Any:
+    """Controller without limits and weights, which do not move the poles of the loop."""
+    if not isinstance(controller, PIDAlgorithm):
+        return controller
+    c = controller
+    return PIDController(c.kp, c.ti, c.td, c.tf, dt=c.dt, method=c.method, name=c.name)
+
+
+def _linear_signals(
+    plant: DelayedStateSpace, controller: Any, count: int, steps: tuple[float, float]
+) -> list[FloatArray]:
+    """Measured value after both steps, then the controller's output after both."""
+    # Twice the span is computed: circular wrap-around shows at the end.
+    length = 2 ** int(np.ceil(np.log2(2 * count)))
+    responses = (
+        *step_responses(plant, controller, length),
+        *controller_responses(plant, controller, length),
+    )
+    return [height * y[:count] for height, y in zip(steps * 2, responses, strict=True)]
+
+
+def _simulated(
+    plant: DelayedStateSpace,
+    controller: Any,
+    count: int,
+    steps: tuple[float, float],
+    settings: dict[str, Any],
+) -> list[FloatArray]:
+    # The steps are at the second sample, which is time 0 here.
+    loops = [
+        simulate_loop(plant, controller, count + 1, setpoint=r, load=d, **settings)
+        for r, d in ((steps[0], 0.0), (0.0, steps[1]))
+    ]
+    return [loop.measured[1:] for loop in loops] + [loop.output[1:] for loop in loops]
+
+
+def _drawn_limits(controllers: Mapping[str, Any], given: tuple[float, float] | None) -> list[float]:
+    """Limits to mark: the given ones, and those of the algorithms."""
+    limits = set(given or ())
+    for each in controllers.values():
+        if isinstance(each, PIDAlgorithm):
+            limits |= set(each.output_limits)
+    return sorted(limit for limit in limits if np.isfinite(limit))
 
 
 def _span(plant: DelayedStateSpace, controllers: Mapping[str, Any]) -> float:

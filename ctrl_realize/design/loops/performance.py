@@ -103,6 +103,20 @@ def step_responses(
     return setpoint, load
 
 
+def controller_responses(
+    plant: DelayedStateSpace, controller: Any, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Output of the controller after unit steps of set-point and of load; see `step_responses`."""
+    z = damped_circle(count)
+    loop = open_loop(plant, controller)
+    values = np.ones(z.size, dtype=np.complex128)
+    for factor in loop.factors:
+        values = values * factor.response(z - 1) * z ** (-factor.delay)
+    closed = values / (1 + values)
+    process = np.asarray(plant.horner(z)[0, 0])
+    return step_on_circle(closed / process, z, count), -step_on_circle(closed, z, count)
+
+
 @single_threaded
 def performance(
     plant: DelayedStateSpace | DelaySystem, controller: Any, total_time: float | None = None
