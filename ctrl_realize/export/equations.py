@@ -44,6 +44,8 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
         Variable("bias", "output at zero error", value=c.bias),
     ]
     states: list[Variable] = []
+    before: list[Statement] = []
+    first: list[Statement] = []
     body: list[Statement] = []
     base, wanted = "bias + (p_setpoint * setpoint - p_measured * measured)", "base"
     if c.slope:
@@ -56,12 +58,10 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
         states += [
             Variable("d_part", "derivative part"),
             Variable("rate_before", "input of the derivative at the last call"),
-            Variable("started", "after the first call", "boolean"),
         ]
-        first = (Assign("rate_before", "rate"), Assign("started", "true"))
+        first.append(Assign("rate_before", "rate"))
+        before.append(Assign("rate", "d_setpoint * setpoint - measured"))
         body += [
-            Assign("rate", "d_setpoint * setpoint - measured"),
-            If("started", first, negated=True),
             Assign("d_part", "d_pole * d_part + d_gain * (rate - rate_before)"),
             Assign("rate_before", "rate"),
         ]
@@ -73,8 +73,14 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
             Variable("tracking", "dt / tracking time of the anti-windup", value=c.tracking),
         ]
         states.append(Variable("i_part", "integral part"))
+        first.append(Assign("i_part", "(p_measured - p_setpoint) * setpoint"))
         body.append(Assign("deviation", "setpoint - measured"))
-    body += [
+    if first:
+        states.append(Variable("started", "after the first call", "boolean"))
+        before.append(If("started", (*first, Assign("started", "true")), negated=True))
+    body = [
+        *before,
+        *body,
         Assign("base", base),
         Assign("wanted", wanted),
         If("manual", (Assign("u", "manual_output"),), (Assign("u", "wanted"),)),

@@ -158,7 +158,7 @@ def test_the_algorithm_without_limits_is_the_linear_controller(kind, method):
     linear = ct.forced_response(pid, pid.dt * np.arange(ERROR.size), ERROR).outputs
     np.testing.assert_allclose(algorithm.simulate(ERROR, 0 * ERROR), linear, rtol=0, atol=1e-12)
     # and of the measured value, whatever the weights
-    weighted = pid.algorithm(setpoint_weight=0.3)
+    weighted = pid.algorithm(setpoint_weight=0.3 if "I" in kind else 1.0)
     np.testing.assert_allclose(weighted.simulate(0 * ERROR, -ERROR), linear, rtol=0, atol=1e-12)
 
 
@@ -172,6 +172,14 @@ def test_set_point_weights_act_on_the_set_point_alone():
     ]
     now = 2.0 * 0.5 / 10 / 2
     assert jump == pytest.approx([now, 2 * 0.6 + now, now + 0.5 * 2 * 3 / (0.5 + 0.5)])
+
+
+def test_a_set_point_weight_starts_at_the_bias():
+    algorithm = PID(2.0, 10.0, 3.0, 0.5, dt=0.5).algorithm(setpoint_weight=0.4, bias=40.0)
+    at_180 = np.full(30, 180.0)
+    np.testing.assert_allclose(algorithm.simulate(at_180, at_180), 40.0)
+    with pytest.raises(cr.errors.OptionError, match="without integral action"):
+        PID(2.0, dt=0.5).algorithm(setpoint_weight=0.4)
 
 
 def test_anti_windup_leaves_the_limit_early_and_limits_hold():

@@ -66,7 +66,8 @@ class PIDAlgorithm(Result):
 
     where pole = tf/(tf + dt), slope = kp td/(tf + dt), integral = kp dt/ti and newest is its share
     by the discretization (0, 1/2 or all of it). In manual operation I is such that the output
-    continues without a bump. Before the first sample all signals are taken to have been constant.
+    continues without a bump. The first sample is taken to have lasted for long, without an error:
+    D is 0, and I such that the output is `bias` at zero error whatever the set-point.
 
     The code of `ctrl_realize.export` does the same to rounding.
 
@@ -133,6 +134,11 @@ class PIDAlgorithm(Result):
             raise OptionError(
                 f"output_limits=({low:g}, {high:g}); expected the lower limit first, such as "
                 "(0, 100)"
+            )
+        if self.ti == INF and self.setpoint_weight != 1:
+            raise OptionError(
+                f"setpoint_weight={self.setpoint_weight:g} without integral action; expected 1, "
+                "since nothing removes the offset that a weight leaves"
             )
         if self.tracking_time is not None and not (
             positive(self.tracking_time, "tracking_time", "time in s") >= self.dt
@@ -248,6 +254,8 @@ class PIDRun:
         slope = c.weight * setpoint - measured
         if self._previous is None:
             self._previous = slope
+            if c.integral != 0:
+                self._integral = (c.p_measured - c.p_setpoint) * setpoint
         self._derivative = c.pole * self._derivative + c.slope * (slope - self._previous)
         self._previous = slope
         action = c.bias + (c.p_setpoint * setpoint - c.p_measured * measured) + self._derivative
