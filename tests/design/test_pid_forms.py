@@ -113,6 +113,22 @@ def test_every_kind_and_sign_comes_back_from_every_form(form, kind):
     np.testing.assert_allclose(back.ideal[:3], pid.ideal[:3], rtol=1e-12)
 
 
+def test_units_of_the_record_come_with_the_controller():
+    model = cr.design.ProcessModel(gain=2.0, lag=600.0, dead_time=120.0).system(20.0)
+    time = 20.0 * np.arange(300)
+    u = np.where(time < 1000, 0.0, 10.0)
+    units = {"u": "%", "y": "degC", "time": "min"}
+    record = cr.Record(time, u, model.simulate(u), units=units)
+    sys = cr.identify(record, structures=[(1, 1)])
+    pid = cr.design.pid(sys, "simc", "PI")
+    assert "1.154 %/degC" in str(pid)
+    assert "10 min" in str(pid.discretised(60.0))
+    parallel = pid.as_form("parallel")
+    assert [each.unit for each in parallel.values] == ["%/degC", "%/(degC min)"]
+    assert parallel["ki"] == pytest.approx(60 * pid.kp / pid.ti)
+    assert pid.as_form("rockwell_pide_dependent").values[0].unit == ""
+
+
 def test_minutes_and_hours_are_chosen_for_forms_without_a_unit():
     pid = PID(*FULL)
     minutes = pid.as_form("proportional_band", time_unit="min")
@@ -126,7 +142,7 @@ def test_minutes_and_hours_are_chosen_for_forms_without_a_unit():
     [
         ("simatic", {}, "siemens_pid_compact"),
         ("labview_pid", {"time_unit": "s"}, "times in min"),
-        ("ideal", {"time_unit": "day"}, "time_unit"),
+        ("ideal", {"time_unit": "week"}, "time_unit"),
         ("series", {"measured_range": (3, 1)}, "lower end first"),
     ],
 )

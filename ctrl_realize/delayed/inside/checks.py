@@ -12,7 +12,6 @@ from ..deferred import DeferredMatrices
 from ..operands import whole_samples
 from ..parts import MAX_DELAY, check_entries
 
-
 TIMES = "sys.step_response(t), sys.impulse_response(t) and sys.forced_response(t, u)"
 LOCUS = "Use cr.design.root_locus(sys), cr.design.margins(sys) and sys.step_response(t)"
 FOUR = "Use cr.design.gang_of_four(P, C), and ct.bode_plot(..., plot_phase=False) of it"

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..._checks import one_of, positive, real, system_name
+from ..._parameters import SECONDS, checked_time_unit, slope_unit
 from ..._shown import as_asked, html_card, text_card
 from ..._wording import in_time
 from ...delayed.operators import BesideDelays
@@ -46,6 +47,10 @@ class PIDController(Delivered, BesideDelays):
     name : str, optional
     check : LoopCheck, optional
         Check of the closed loop with the model that the controller was tuned for.
+    gain_unit : str, optional
+        Unit of `kp`, such as ``"%/degC"``; `pid` takes it from the record of the model.
+    time_unit : {"s", "ms", "min", "h", "day"}, optional
+        Unit in which times are shown; the attributes are in s.
 
     Examples
     --------
@@ -79,6 +84,8 @@ class PIDController(Delivered, BesideDelays):
         model: ProcessModel | None = None,
         name: str | None = None,
         check: LoopCheck | None = None,
+        gain_unit: str = "",
+        time_unit: str = "s",
     ) -> None:
         self.kp = real(kp, "kp", "gain")
         self.ti = float("inf") if ti == float("inf") else positive(ti, "ti", "integral time in s")
@@ -88,6 +95,8 @@ class PIDController(Delivered, BesideDelays):
         self.rule = rule
         self.model = model
         self.check = check
+        self.gain_unit = gain_unit
+        self.time_unit = checked_time_unit(time_unit)
         if self.td < 0 or self.tf < 0 or (self.td > 0 and self.tf == 0):
             raise OptionError(
                 f"td={self.td:g} s, tf={self.tf:g} s; expected td >= 0 and, with a "
@@ -165,6 +174,8 @@ class PIDController(Delivered, BesideDelays):
             "model": self.model,
             "name": self.name,
             "check": self.check,
+            "gain_unit": self.gain_unit,
+            "time_unit": self.time_unit,
         }
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -205,20 +216,30 @@ class PIDController(Delivered, BesideDelays):
 
     def _gains(self) -> str:
         """The gains of the parallel form, ``kp + ki / s + kd s / (tf s + 1)``."""
-        gains = [f"kp = {self.kp:.4g}"]
+        unit, seconds = self.time_unit, SECONDS[self.time_unit]
+        gains = [f"kp = {self.kp:.4g} {self.gain_unit}".rstrip()]
         if "I" in self.kind:
-            gains.append(f"ki = kp / ti = {self.kp / self.ti:.4g} 1/s")
+            ki = self.kp / self.ti * seconds
+            gains.append(f"ki = kp / ti = {ki:.4g} {slope_unit(self.gain_unit, unit)}")
         if "D" in self.kind:
-            gains.append(f"kd = kp td = {self.kp * self.td:.4g} s")
+            kd = self.kp * self.td / seconds
+            gains.append(f"kd = kp td = {kd:.4g} {unit} {self.gain_unit}".rstrip())
         return ", ".join(gains)
 
+    def _in_time(self, value: float) -> str:
+        """A time in the unit of the record."""
+        if self.time_unit == "s":
+            return in_time(value, 4)
+        return f"{value / SECONDS[self.time_unit]:.4g} {self.time_unit}"
+
     def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
-        rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", f"{self.kp:.4g}")]
+        gain = f"{self.kp:.4g} {self.gain_unit}".rstrip()
+        rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", gain)]
         if "I" in self.kind:
-            rows.append(("integral ti", in_time(self.ti, 4)))
+            rows.append(("integral ti", self._in_time(self.ti)))
         if "D" in self.kind:
-            rows.append(("derivative td", in_time(self.td, 4)))
-            rows.append(("its filter tf", in_time(self.tf, 4)))
+            rows.append(("derivative td", self._in_time(self.td)))
+            rows.append(("its filter tf", self._in_time(self.tf)))
         if self.kind != "P":
             rows.append(("gains", self._gains()))
         step = f"{in_time(self.dt, 6)}, {self.method} rule" if self.dt else "none: continuous"

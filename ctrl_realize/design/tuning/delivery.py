@@ -27,6 +27,8 @@ class Delivered:
         ti: float
         td: float
         tf: float
+        gain_unit: str
+        time_unit: str
 
         def __init__(self, *parameters: Any, **settings: Any) -> None: ...
 
@@ -53,8 +55,8 @@ class Delivered:
         measured_range, output_range : tuple of float, optional
             Lower and upper end of the range of measured value and output, for forms whose gain
             refers to percent of these. Default: (0, 100).
-        time_unit : {"s", "min", "h"}, optional
-            For forms without a unit of their own. Default: s.
+        time_unit : {"s", "ms", "min", "h", "day"}, optional
+            For forms without a unit of their own. Default: that of the controller.
 
         Returns
         -------
@@ -75,12 +77,16 @@ class Delivered:
           Reset      0.5 repeats/min
           ! gain in percent of range: measured value 0...400, output 0...100
         """
+        layout = LAYOUTS.get(form)
+        if time_unit is None and layout is not None and layout.unit is None:
+            time_unit = self.time_unit
         return to_form(
             self.ideal,
             form,
             measured_range=measured_range,
             output_range=output_range,
             time_unit=time_unit,
+            gain_unit=self.gain_unit,
         )
 
     def forms(self, **ranges: Any) -> pd.DataFrame:

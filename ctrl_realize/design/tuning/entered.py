@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..._checks import band, one_of, real
+from ..._parameters import SECONDS, checked_time_unit
 from ...errors import OptionError
 from .layouts import LAYOUTS, Layout
 from .structures import INF, Ideal, ideal_of_series
 
-SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 PERCENT = (0.0, 100.0)
 
 
@@ -81,7 +81,7 @@ def setting(
     layout = LAYOUTS[one_of(form, "form", tuple(LAYOUTS))]
     if time_unit is not None and layout.unit is not None and time_unit != layout.unit:
         raise OptionError(f"time_unit={time_unit!r}; form={form!r} has its times in {layout.unit}")
-    unit = one_of(time_unit or layout.unit or "s", "time_unit", tuple(SECONDS))
+    unit = checked_time_unit(time_unit or layout.unit or "s")
     measured = _span(measured_range, "measured_range")
     output = _span(output_range, "output_range")
     scale = {"none": 1.0, "output": 100 / output, "both": measured / output}[layout.percent]

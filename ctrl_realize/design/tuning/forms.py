@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._parameters import SECONDS, slope_unit
 from ..._wording import in_digits
 from ...errors import OptionError
 from ...results import Result
-from .entered import PERCENT, SECONDS, from_form, labels_of, setting
+from .entered import PERCENT, from_form, labels_of, setting
 from .layouts import LAYOUTS, Layout
 from .structures import INF, Ideal, structured
 
@@ -154,6 +155,7 @@ def to_form(
     measured_range: tuple[float, float] | None = None,
     output_range: tuple[float, float] | None = None,
     time_unit: str | None = None,
+    gain_unit: str = "",
 ) -> PIDForm:
     """Write the parameters of the ideal form in another form; see `PIDController.as_form`."""
     layout, scale, unit = setting(form, measured_range, output_range, time_unit)
@@ -163,7 +165,8 @@ def to_form(
             f"form={form!r} is known for P and PI only, since no description of its derivative "
             f"was available; got td={td:g} s. Tune a PI controller: design.pid(sys, kind='PI')"
         )
-    shown = _shown(ideal, layout, scale, unit)
+    physical = layout.percent == "none" or (layout.percent == "output" and output_range is None)
+    shown = _shown(ideal, layout, scale, unit, gain_unit if physical else "")
     typed = from_form(
         form,
         {each.name: each.value for each in shown},
@@ -180,7 +183,9 @@ def to_form(
     return PIDForm(form, layout.title, tuple(shown), reverse, typed, layout.source, tuple(notes))
 
 
-def _shown(ideal: Ideal, layout: Layout, scale: float, unit: str) -> list[FormValue]:
+def _shown(
+    ideal: Ideal, layout: Layout, scale: float, unit: str, gain_unit: str
+) -> list[FormValue]:
     """Parameters in the units of a form; without sign if the form has none."""
     gain, integral, derivative, tf = structured(ideal, layout)
     if not layout.signed:
@@ -189,18 +194,20 @@ def _shown(ideal: Ideal, layout: Layout, scale: float, unit: str) -> list[FormVa
     parallel = layout.structure == "parallel"
     gain *= scale
     shown = [FormValue(layout.gain, 100 / gain, "%") if layout.band else
-             FormValue(layout.gain, gain)]  # fmt: skip
+             FormValue(layout.gain, gain, gain_unit)]  # fmt: skip
     if ideal[1] < INF:
         if parallel:
-            written = FormValue(layout.integral, integral * scale * seconds, f"1/{unit}")
+            written = FormValue(
+                layout.integral, integral * scale * seconds, slope_unit(gain_unit, unit)
+            )
         elif layout.rate:
             written = FormValue(layout.integral, seconds / integral, f"repeats/{unit}")
         else:
             written = FormValue(layout.integral, integral / seconds, unit)
         shown.append(written)
     if ideal[2]:
-        size = scale if parallel else 1.0
-        shown.append(FormValue(layout.derivative, derivative * size / seconds, unit))
+        size, name = (scale, f"{unit} {gain_unit}".rstrip()) if parallel else (1.0, unit)
+        shown.append(FormValue(layout.derivative, derivative * size / seconds, name))
         if layout.filter_kind == "time":
             shown.append(FormValue(str(layout.filter_label), tf / seconds, unit))
         elif layout.filter_kind == "ratio":

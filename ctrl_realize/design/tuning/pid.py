@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..._checks import one_of, positive, real
+from ..._parameters import SECONDS, gain_unit
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
@@ -205,8 +206,22 @@ def tuned(
         rule=rule,
         model=model,
         name=options.name,
+        **_units(plant),
     )
     return made, plant
+
+
+def _units(plant: DelayedStateSpace) -> dict[str, str]:
+    """Units of the gain and of shown times, from the first record of an identified plant."""
+    records = () if plant.fit is None else plant.fit.records
+    if not records:
+        return {}
+    first = records[0]
+    unit = first.units.get("time", "s")
+    return {
+        "gain_unit": gain_unit(first.input_units[0], first.output_units[0]),
+        "time_unit": unit if unit in SECONDS else "s",
+    }
 
 
 def closed_on(system: Any, plant: DelayedStateSpace, controller: PIDController) -> LoopCheck:
