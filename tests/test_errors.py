@@ -25,6 +25,7 @@ QUIET = cr.Record(T, np.zeros(400), RNG.standard_normal(400))
 SINE = cr.Record(T / 10, np.sin(2 * T), np.sin(2 * T - 0.1))
 STEP = step_record(before=150, after=500)
 HOLES = cr.Record(T, DRIVEN.input, np.r_[np.nan, DRIVEN.output[1:]], missing="keep")
+NO_INPUT = cr.Record(T, np.r_[np.nan, DRIVEN.input[1:]], DRIVEN.output, missing="keep")
 ONES, PULSE = np.ones(50), 0.9 ** np.arange(300)
 F = np.linspace(0.2, 4.0, 60)
 LAG = ct.tf([1.0], [1.0, 1.0])
@@ -102,8 +103,9 @@ ERRORS = {
         (lambda: realize(["a", "b", "c"]), "real numbers"),
         (lambda: cr.identify_campaign([]), "no records"),
         (lambda: cr.identify_campaign(["a.csv"]), "records.0. is a str"),
-        (lambda: cr.fit_output_error(HOLES), "missing samples in this record: 1"),
-        (lambda: cr.detect_step(HOLES), "missing samples in this record: 1"),
+        (lambda: cr.fit_output_error(NO_INPUT), "missing samples in the input: 1.*from_samples"),
+        (lambda: cr.detect_step(NO_INPUT), "missing samples in the input: 1"),
+        (lambda: cr.unit_step(HOLES), "missing samples in this record: 1.*identify"),
         (lambda: cr.spectral_frf(HOLES), "missing samples in this record: 1"),
         (lambda: cr.stepped_sine_frf([HOLES]), "missing samples in this record: 1"),
         (lambda: cr.validation.predict(TWO_STATES, HOLES, 1), "missing samples in this record: 1"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from ..errors import DataError
 from .record import Record
 
@@ -43,6 +45,23 @@ def as_records(given: Any) -> tuple[Record, ...]:
     return tuple(map(as_record, several))
 
 
+def check_input(record: Record, task: str) -> None:
+    """Refuse a record whose input has missing samples; those of its output may be missing.
+
+    Raises
+    ------
+    DataError
+        A value of the input is NaN.
+    """
+    missing = int(np.isnan(as_record(record).input).sum())
+    if missing:
+        raise DataError(
+            f"{task} needs the input at every sample; missing samples in the input: {missing}. If "
+            "it holds its last value, Record.from_samples(record.time, record.input, "
+            "record.output) fills them"
+        )
+
+
 def check_complete(record: Record, task: str) -> None:
     """Refuse a record with missing samples; `task` names the operation in the message.
 
@@ -55,5 +74,6 @@ def check_complete(record: Record, task: str) -> None:
     if record.missing == "keep" and record.n_missing:
         raise DataError(
             f"{task} needs complete data; missing samples in this record: {record.n_missing}. "
-            "Select a complete part with record.between(t0, t1), or interpolate"
+            "identify(record) and fit_output_error use the samples that there are; otherwise "
+            "select a complete part with record.between(t0, t1), or interpolate"
         )

@@ -25,8 +25,8 @@ def on_one_axis(
 
     See `Record.from_samples`.
     """
-    stamps = _stamps(time, "time")
-    moves = stamps if input_time is None else _stamps(input_time, "input_time")
+    stamps = _stamps(time, "time", MIN_SAMPLES)
+    moves = stamps if input_time is None else _stamps(input_time, "input_time", 1)
     u, y = numbers(input, "input"), numbers(output, "output")
     for what, values, count in (("input", u, moves.size), ("output", y, stamps.size)):
         check_shape(values, what, count)
@@ -71,10 +71,10 @@ def on_one_axis(
     return axis, held[0] if u.ndim == 1 else held, spread
 
 
-def _stamps(time: ArrayLike, what: str) -> FloatArray:
+def _stamps(time: ArrayLike, what: str, least: int) -> FloatArray:
     stamps = numbers(time, what)
-    if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
-        raise DataError(f"{what} has shape {stamps.shape}; expected (N,), N >= {MIN_SAMPLES}")
+    if stamps.ndim != 1 or stamps.size < least:
+        raise DataError(f"{what} has shape {stamps.shape}; expected (N,), N >= {least}")
     check_finite(stamps, what)
     check_size(stamps, what)
     fault = axis_fault(stamps) if np.any(np.diff(stamps) <= 0) else None

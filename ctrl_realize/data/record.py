@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .._checks import numbers, one_of, real, spelled_out
 from ..errors import DataError, OptionError, TimeAxisError
-from ..numerics.arrays import FloatArray, read_only
+from ..numerics.arrays import BoolArray, FloatArray, read_only
 from ..numerics.signals.time_axis import axis_fault, sample_time
 from ..results import Drawable
 from .frames import frame_of_signals, signals_of_frame
@@ -50,8 +50,9 @@ class Record(Drawable):
         Unit of each signal by its label, such as ``{"u": "%", "y": "degC"}``; under ``"time"`` the
         unit in which times are to be shown (`time` itself is in s).
     missing : {"refuse", "keep"}, optional
-        How NaN in `input` and `output` is treated. With ``"keep"`` they are missing samples, which
-        `impulse_from_io` can handle; the step functions need complete records.
+        How NaN in `input` and `output` is treated. With ``"keep"`` they are missing samples:
+        `identify`, `fit_output_error` and `impulse_from_io` use the outputs that there are; the
+        scans and the step functions need complete records.
 
     Attributes
     ----------
@@ -216,6 +217,11 @@ class Record(Drawable):
     def output_units(self) -> tuple[str, ...]:
         """Units of the output signals; empty where they are not known."""
         return tuple(self.units.get(label, "") for label in self.output_labels)
+
+    @property
+    def seen(self) -> BoolArray:
+        """Samples (N,) at which no output is missing."""
+        return np.asarray(~np.isnan(np.atleast_2d(self.output)).any(axis=0))
 
     def issiso(self) -> bool:
         """Whether there is one input and one output."""

@@ -123,8 +123,8 @@ def identify(
     smaller by 10 or more, on the same samples and with an autoregressive noise model for each. Its
     `fit` has `dead_time`, `interval` and `total_delay`; the interval spans the delays that are not
     ruled out at its order and the interval of the lag model (``fit.lags``), unless the residual of
-    the latter is more than twice as large. If `order`, `structures` or `known` is given, no other
-    model class is tried.
+    the latter is more than twice as large. If `order`, `structures` or `known` is given, or if
+    samples are missing, no other model class is tried.
 
     ``"paper"`` and ``"scan"`` are the method of [1]_; for the sources of the output-error fit see
     `fit_output_error`.
@@ -193,8 +193,9 @@ def identify(
             include_known=include_known,
             gains=gains,
         )
-        stepped = np.isfinite(fit_of(system, OutputErrorFit).onset)
-        if stepped or known is not None:
+        fit = fit_of(system, OutputErrorFit)
+        missing = any(record.n_missing for record in fit.records)
+        if np.isfinite(fit.onset) or known is not None or missing:
             return system
         asked = order is not None or structures is not None
         return with_modes_judged(system, max_delay, asked=asked)

@@ -158,8 +158,8 @@ def _chosen(
     flags = [*cut, *modes.flags, *kept]
     if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
         check = modes.checks[0]
-        signals = check.record.output, check.simulated, check.record.input
-        shown, total = Shown(*map(np.ravel, signals)), _total_delay(system)
+        output, drive = np.ravel(check.record.output), np.ravel(check.record.input)
+        shown, total = Shown(output, np.ravel(check.simulated), drive), _total_delay(system)
         flags += against_one_model(shown, _delay(system))
         if total is not None and all(flag.code != "not_linear" for flag in flags):
             flags += nonlinear_flags(shown, _delay(system), total / dt)

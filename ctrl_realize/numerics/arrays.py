@@ -20,6 +20,15 @@ def read_only(values: FloatArray) -> FloatArray:
     return locked(np.asarray(values, dtype=np.float64))
 
 
+def without_gaps(values: FloatArray) -> FloatArray:
+    """Interpolate missing values (NaN) of a signal (N,), for starting values and displays only."""
+    missing = np.isnan(values)
+    if not missing.any():
+        return values
+    index = np.arange(values.size)
+    return np.interp(index, index[~missing], values[~missing])
+
+
 def later(values: FloatArray, samples: int) -> FloatArray:
     """Delay signals (..., N) that were zero before their first sample."""
     if samples == 0:

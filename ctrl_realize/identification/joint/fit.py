@@ -26,6 +26,7 @@ from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
 from ...numerics.rational.search import points_as_one
 from ...numerics.separable.varpro import Structure
+from ..output_error.any_input import joined_signals
 from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
@@ -186,17 +187,10 @@ def _part(first: OutputErrorFit, latest: float | None) -> tuple[RecordPart, Step
     used = [r for r, name in zip(first.records, names, strict=True) if name not in left_out]
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
     data = sampled_data(outputs, inputs, first.dt, first.dead_time)
-    times: list[FloatArray] = []
-    signals = []
-    for r, u, offset, start, y in zip(
-        used, data.inputs, data.offsets, data.starts, data.outputs, strict=True
-    ):
-        time = r.time[offset + start : offset + y.size]
-        times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
-        signals.append(u[start:])
+    time, signal = joined_signals(used, data)
     part = sampled_part(data, first.estimate, latest)
-    shown = bare_data(part.output, np.concatenate(signals), data.dt, first.residual)
-    return part, shown, np.concatenate(times)
+    span = sum(data.lengths) * data.dt
+    return part, bare_data(part.output, signal, data.dt, first.residual, span), time
 
 
 def _spread(first: OutputErrorFit) -> list[tuple[EffectKey, float]]:

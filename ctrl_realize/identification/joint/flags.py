@@ -19,7 +19,7 @@ _MUCH = 0.5  # of the largest shift of a response: where it is told to be
 
 def joint_flags(fit: JointFit, max_delay: float | None) -> tuple[Flag, ...]:
     """List the flags of the joint model, and that of a contradiction first."""
-    length = (fit.data.output.size - fit.data.edge) * fit.dt
+    length = fit.data.length
     return tuple(
         flag
         for flag in (_contradiction(fit), *model_flags(fit.estimate, fit.dt, length, max_delay))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
+from ...numerics.output_error.input_data import SampledData
 from ...numerics.output_error.input_fit import SampledFit, fit_sampled
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
@@ -97,7 +98,7 @@ def _fit(
 
 def _check_moves(record: Record) -> None:
     for name, values in zip(("output", "input"), _signals(record), strict=True):
-        moves = float(np.ptp(values))
+        moves = float(np.ptp(values[~np.isnan(values)]))
         if moves < SMALLEST:
             raise DataError(
                 f"the {name} of {named('record', record.name)} is constant (range "
@@ -143,16 +144,11 @@ def _summary(
 ) -> OutputErrorFit:
     """Concatenate what was fitted on one time axis."""
     data = found.data
-    times: list[FloatArray] = []
-    parts = zip(used, data.offsets, data.starts, data.outputs, strict=True)
-    for i, offset, start, output in parts:
-        time = records[i].time[offset + start : offset + output.size]
-        times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
-    measured = [y[start:] for y, start in zip(data.outputs, data.starts, strict=True)]
-    signal = [u[start:] for u, start in zip(data.inputs, data.starts, strict=True)]
+    time, signal = joined_signals([records[i] for i in used], data)
     length = max(y.size for y in data.outputs) * data.dt
     flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
-    joined = bare_data(np.concatenate(measured), np.concatenate(signal), data.dt, fit.residual)
+    span = sum(data.lengths) * data.dt
+    joined = bare_data(np.concatenate(data.measured), signal, data.dt, fit.residual, span)
     fit = replace(fit, fitted=np.concatenate(found.fitted))
     sums = found.condensed
     reasons: tuple[str, ...] = ()
@@ -165,12 +161,22 @@ def _summary(
     return summarise(
         fit,
         joined,
-        np.concatenate(times),
+        time,
         records,
         flags,
         repeatability=repeats,
         choices=reasons,
     )
+
+
+def joined_signals(records: Sequence[Record], data: SampledData) -> tuple[FloatArray, FloatArray]:
+    """Times of the samples that are fitted, record after record, and the input there."""
+    times: list[FloatArray] = []
+    for record, offset, rows in zip(records, data.offsets, data.rows, strict=True):
+        time = record.time[offset + rows]
+        times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
+    signals = [u[rows] for u, rows in zip(data.inputs, data.rows, strict=True)]
+    return np.concatenate(times), np.concatenate(signals)
 
 
 def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:

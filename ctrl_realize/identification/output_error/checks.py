@@ -59,20 +59,22 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     flags: list[Flag] = []
     low, high = fit.interval
     stepped = bool(np.isfinite(fit.onset))
-    loop = () if stepped else feedback_flags(fit.records, fit.delay_interval[1])
+    # Regressions on past samples need all of them.
+    complete = tuple(record for record in fit.records if not record.n_missing)
+    loop = () if stepped or not complete else feedback_flags(complete, fit.delay_interval[1])
     flags += loop
-    if not fit.at_noise_level:  # else an unstable plant is excluded
-        flags += unstable_flags(fit.records, fit.delay_interval[1])
+    if complete and not fit.at_noise_level:  # else an unstable plant is excluded
+        flags += unstable_flags(complete, fit.delay_interval[1])
     if len(fit.records) == 1:
         shown = _shown(fit)
         flags += _limit_flags(shown.output)
         if "coarse_quantisation" not in codes:
-            held, hold = _held_flags(shown, fit.dt)
+            held, hold = _held_flags(shown, fit.dt * shown.spacing)
             flags += held
             low = max(low - hold, 0.0)
         if stepped:
             flags += _earlier_input(fit, codes)
-        coloured = alone and "coloured_residual" in codes
+        coloured = alone and complete and "coloured_residual" in codes
         step = generalised_step(fit, shown.output, shown.drive) if coloured else None
         if step is not None:
             low = max(min(low, step.dead_time - Z_95 * step.dead_time_error), 0.0)
@@ -81,7 +83,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         # Parts of one step are not several responses.
         if not loop and not (stepped and _moves(shown.drive) < 2):
             flags += against_one_model(shown, fit.delay)
-            if not stepped and all(flag.code != "not_linear" for flag in flags):
+            if complete and not stepped and all(flag.code != "not_linear" for flag in flags):
                 flags += nonlinear_flags(shown, fit.delay, fit.total_delay / fit.dt)
     known = [flag for flag in flags if flag.code not in codes]
     estimate = replace(fit.estimate, low=low, high=high)
@@ -90,24 +92,40 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Part of a record that was fitted: output, model and input, shape (M,) each."""
+    """Part of a record that was fitted: output and model (M,), and input (N,).
+
+    `rows` (M,) are the samples at which there is an output; without them none is missing.
+    """
 
     output: FloatArray
     fitted: FloatArray
     drive: FloatArray
+    rows: IntArray | None = None
 
     @property
     def residual(self) -> FloatArray:
         """Measured minus simulated output."""
         return np.asarray(self.output - self.fitted)
 
+    @property
+    def spacing(self) -> float:
+        """Mean distance of the outputs, in samples."""
+        return 1.0 if self.rows is None else float(np.mean(np.diff(self.rows)))
+
+    def earlier(self, samples: int) -> FloatArray:
+        """Input so many samples before each output, shape (M,)."""
+        rows = np.arange(self.output.size) if self.rows is None else self.rows
+        return self.drive[np.clip(rows - samples, 0, None)]
+
 
 def _shown(fit: OutputErrorFit) -> Shown:
     record = fit.records[0]
-    first = round((float(fit.time[0]) - float(record.time[0])) / fit.dt)
     count = min(fit.measured.size, _MOST_SAMPLES)
-    drive = np.ravel(record.input)[first : first + count]
-    return Shown(fit.measured[:count], fit.fitted[:count], drive)
+    rows = np.round((fit.time[:count] - record.time[0]) / fit.dt).astype(np.int64)
+    first, last = int(rows[0]), int(rows[-1]) + 1
+    drive = np.ravel(record.input)[first:last]
+    gaps = None if last - first == count else rows - first
+    return Shown(fit.measured[:count], fit.fitted[:count], drive, gaps)
 
 
 def _moves(drive: FloatArray) -> int:
@@ -117,10 +135,10 @@ def _moves(drive: FloatArray) -> int:
 def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
     """Test whether one gain and one dead time (in samples) hold for the whole record."""
     fitted, residual, size = shown.fitted, shown.residual, shown.fitted.size
-    late = shown.drive[np.clip(np.arange(size) - round(delay), 0, None)]
+    late = shown.earlier(round(delay))
     parts = np.minimum(3 * np.arange(size) // size, 2)
     flags = []
-    if told := _told(parameter_change(residual, fitted, parts), delay):
+    if told := _told(parameter_change(residual, fitted, parts, shown.rows), delay):
         flags.append(
             Flag(
                 "time_varying",
@@ -133,7 +151,7 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
         ("level of the output", _thirds(fitted)),
         ("direction", (np.gradient(fitted) > 0).astype(np.int64)),
     ):
-        if told := _told(parameter_change(residual, fitted, groups), delay):
+        if told := _told(parameter_change(residual, fitted, groups, shown.rows), delay):
             flags.append(
                 Flag(
                     "not_linear",

@@ -13,7 +13,7 @@ import numpy as np
 from ..._checks import one_of, positive
 from ..._wording import named
 from ...data import Record, StepEdge
-from ...data.given import as_records, check_complete
+from ...data.given import as_records, check_input
 from ...delayed import DelayedStateSpace
 from ...errors import DataError, NoStepError
 from ...numerics.arrays import FloatArray
@@ -74,8 +74,9 @@ def fit_output_error(
     ----------
     records : Record or sequence of Record
         One input, one output, any input that moves. Several records of one plant are fitted
-        together: step records are aligned and averaged; for other inputs poles, gain and dead time
-        are common, and level, drift and initial state are estimated for each record.
+        together: step records are aligned and averaged; for other inputs, and if samples are
+        missing, poles, gain and dead time are common, and level, drift and initial state are
+        estimated for each record.
     structures : optional
         Models to try: (order, relative degree), a process model by name (``"P1D"``, ``"P2DZ"``,
         ``"P2DU"``, ``"P1DI"``, ``"FOPDT"``, ``"SOPDT"``, ...), a `ProcessStructure` with fixed or
@@ -135,6 +136,10 @@ def fit_output_error(
     A slope before the step is modelled as a drift, the free response of the plant, or not at all,
     as chosen by the information criterion.
 
+    Samples may be missing (NaN outputs, see `Record.from_samples`): the model is evaluated at the
+    samples that there are, with the input at every sample. Their noise is white, or its correlation
+    is taken as if they were neighbours; it is not prewhitened.
+
     In a model with more zeros than the plant the dead time has no Fisher information: a superfluous
     zero can take its place. Therefore the relative degree is chosen, not left free.
 
@@ -186,8 +191,8 @@ def fit_output_error(
         "whiten": noise == "auto",
     }
     if len(several) > 1:
-        # If all records are step experiments they can be averaged.
-        stepped = all(map(_edges, several))
+        # If all records are complete step experiments they can be averaged.
+        stepped = all(not record.n_missing and _edges(record) for record in several)
         way = _fit_mean if stepped else fit_any_input
         if gains == "own":
             start = relative_gains(aligned_steps(several)) if stepped else None
@@ -221,7 +226,7 @@ def _fit_one(
     latest = None if limit is None else limit * record.dt
     fit = fit_step_record(data, latest=latest, **settings)
     flags = fit_flags(data, fit, limit)
-    return summarise(fit, data, record.time, (record,), flags), fit
+    return summarise(fit, data, record.time[data.rows], (record,), flags), fit
 
 
 def _fit_mean(
@@ -262,13 +267,14 @@ def _fit_mean(
 def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
     several = as_records(records)
     for record in several:
-        check_complete(record, "fit_output_error")
-        if record.n_samples < FEWEST_SAMPLES:
+        check_input(record, "fit_output_error")
+        seen = int(np.count_nonzero(record.seen))
+        if seen < FEWEST_SAMPLES:
             raise DataError(
-                f"{named('record', record.name)} has {record.n_samples} samples; a fit of delay, "
+                f"{named('record', record.name)} has {seen} samples; a fit of delay, "
                 f"gain and lags needs at least {FEWEST_SAMPLES}"
             )
-        moves = float(np.ptp(record.output))
+        moves = float(np.ptp(record.output[..., record.seen]))
         if moves < SMALLEST:
             raise DataError(
                 f"the output of {named('record', record.name)} does not leave its baseline: "

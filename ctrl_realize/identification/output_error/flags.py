@@ -24,9 +24,8 @@ def fit_flags(
     data: StepData, fit: OutputErrorEstimate, max_delay: float | None
 ) -> tuple[Flag, ...]:
     """List the flags of a fit of one (mean) step record."""
-    length = (data.output.size - data.edge) * data.dt
     found = [
-        *model_flags(fit, data.dt, length, max_delay),
+        *model_flags(fit, data.dt, data.length, max_delay),
         _misfit(fit),
         *_disturbances(data, fit),
     ]

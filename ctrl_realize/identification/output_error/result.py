@@ -147,7 +147,7 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def _plain_poles(self) -> ComplexArray:
         """Poles of the estimate; those of integrators are exactly 0."""
-        length = (self.data.output.size - self.data.edge) * self.dt
+        length = self.data.length
         poles = self.estimate.poles.copy()
         poles[np.abs(poles) < INTEGRATOR / length] = 0.0
         return poles

@@ -9,7 +9,7 @@ import numpy as np
 from ..._checks import real, whole
 from ..._wording import named
 from ...data import Record, StepEdge, StepResponse
-from ...data.given import as_record, check_complete
+from ...data.given import as_record, check_complete, check_input
 from ...errors import DataError, NoStepError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
@@ -197,7 +197,7 @@ def unit_step(
 
 
 def _single(signal: FloatArray, what: str, record: Record) -> FloatArray:
-    check_complete(record, "a step response")
+    (check_input if what == "input" else check_complete)(record, "a step response")
     if signal.ndim == 2 and signal.shape[0] > 1:
         raise DataError(
             f"the record has {signal.shape[0]} {what}s ({', '.join(_labels(record, what))}); "

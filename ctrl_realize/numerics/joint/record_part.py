@@ -124,7 +124,7 @@ def sampled_part(data: SampledData, fit: OutputErrorEstimate, latest: float | No
         Scales(
             max(fit.dead_time, 0.5 * data.dt),
             max(lag, 2 * data.dt),
-            max(data.counts) * data.dt,
+            max(data.lengths) * data.dt,
             data.dt,
             quarter if latest is None else latest,
         ),

@@ -43,10 +43,13 @@ alone."""
 def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
     """Fit by generalised least squares if the baseline noise is coloured; otherwise return `whole`.
 
-    White baseline noise is not changed: correlation of the residual is then a misfit.
+    White baseline noise is not changed: correlation of the residual is then a misfit. Neither are
+    records with missing samples, between which the noise model has no lags.
     """
     bins = whole.window.bins
     if data.coarse or bins is None or whole.problem.segments is not None:
+        return whole
+    if whole.window.spacing > 1:
         return whole
     error = whole.window.output - whole.window.predict(whole.problem, whole.best)
     rest = error[: data.edge]

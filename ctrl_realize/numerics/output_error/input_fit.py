@@ -24,7 +24,7 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, without_gaps
 from ..parameters.process_form import ProcessForm
 from ..separable.batch_search import fit_batch
 from ..separable.compared_fits import converged, settled
@@ -107,7 +107,7 @@ def fit_sampled(
     Parameters
     ----------
     outputs, inputs : sequence of ndarray
-        One of each for every record.
+        One of each for every record; outputs are NaN where a sample is missing.
     dt : float
         Sample time in s.
     structures, forms, latest, known, huber
@@ -119,18 +119,22 @@ def fit_sampled(
     level and drift. The input within the dead time before the record is unknown: samples for one
     and a half dead times of the best first-order model are left out, at most half of the record. If
     the residual is coloured and slow cosines explain half of it, they are added to the local terms.
+
+    Where samples are missing, the correlation of the residual is that of its samples as if they
+    were neighbours: an average over the gaps, as it counts for the errors of slow parameters.
     """
     factor = known or KnownFactor()
     data = cut(outputs, inputs, dt)
     n = max(y.size for y in data.outputs)
     limit = 0.25 * n * dt if latest is None else latest
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs))
-    rough = _first_order(data.problem(factor), n, dt, limit, _seen(data, limit))
+    usual = data.spacing * dt
+    rough = _first_order(data.problem(factor), n, dt, usual, limit, _seen(data, limit))
     lag = float(-1.0 / rough.poles[0].real)
     late = int(np.ceil(_BEYOND * rough.dead_time / dt))
     data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
     scales = Scales(
-        max(rough.dead_time, 0.5 * dt), max(lag, 2 * dt), max(data.counts) * dt, dt, limit
+        max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual), max(data.lengths) * dt, dt, limit
     )
     tried = ORDERS if structures is None else tuple(structures)
     whole = _fit(data, factor, tried, scales, huber)
@@ -140,14 +144,15 @@ def fit_sampled(
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
         whole = _fit(data, factor, tried, scales, huber)
     period = _SLOW * (rough.dead_time + lag)
-    if whole.correlation > WHITE and period >= _SHORTEST * dt:
+    if whole.correlation > WHITE and period >= _SHORTEST * usual:
         without = replace(data, period=period)
         calm = _fit(without, factor, tried, scales, huber)
         if calm.variance < _CALMER * whole.variance:
             data, whole = without, calm
     stretch = whole
     long = any(y.size > part.size for y, part in zip(outputs, data.outputs, strict=True))
-    sums = _condensed(outputs, inputs, data, stretch, huber) if long else None
+    usable = long and not any(np.isnan(y).any() for y in outputs)
+    sums = _condensed(outputs, inputs, data, stretch, huber) if usable else None
     if sums is not None:
         whole = _fit_condensed(sums, stretch, factor)
     if structures is None and whole.best.structure.order == ORDERS[-1].order:
@@ -194,10 +199,11 @@ def _fit(
 ) -> WindowFit:
     problem = data.problem(known)
     window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
+    window = replace(window, spacing=data.spacing)
     # after a spike at the start there may be nothing left that moves
-    whole = 1e-9 * max(float(np.ptp(y)) for y in data.outputs)
+    whole = 1e-9 * max(float(np.ptp(y[~np.isnan(y)])) for y in data.outputs)
     sigma = _SMALLEST * max(float(np.ptp(problem.data)), whole)
-    noise = sigma, max(map(quantisation_step, data.outputs))
+    noise = sigma, max(quantisation_step(y[~np.isnan(y)]) for y in data.outputs)
     return fit_window(window, structures, scales, noise, huber)
 
 
@@ -282,25 +288,28 @@ def _seen(data: SampledData, limit: float) -> list[float]:
     """First lag, in samples, at which the output responds to the input; empty if there is none.
 
     For an input that changes at every sample the minima are as narrow as the plant is fast, and may
-    lie between the dead times that are tried otherwise.
+    lie between the dead times that are tried otherwise. Missing samples are interpolated here.
     """
     found = []
     for u, y in zip(data.inputs, data.outputs, strict=True):
         most = int(min(limit / data.dt, u.size // 3))
         if most > 1 and np.ptp(u) > 0:
-            found.append(correlation_onset(u, y, most, _CONFIDENCE).onset)
+            found.append(correlation_onset(u, without_gaps(y), most, _CONFIDENCE).onset)
     onsets = [float(lag) for lag in found if lag > 0]
     return [float(np.median(onsets))] if onsets else []
 
 
 def _first_order(
-    problem: Problem, n: int, dt: float, limit: float, seen: Sequence[float]
+    problem: Problem, n: int, dt: float, usual: float, limit: float, seen: Sequence[float]
 ) -> Candidate:
-    """Best first-order model from a grid of dead times and time constants."""
+    """Best first-order model from a grid of dead times and time constants.
+
+    `usual` is the mean distance of the samples in s, of which `n` would follow every `dt`.
+    """
     scales = [
-        Scales(min(onset * dt, limit), min(rise, n / 4) * dt, n * dt, dt, limit)
+        Scales(min(onset, limit), min(rise * usual, n * dt / 4), n * dt, dt, limit)
         for rise in _RISES
-        for onset in (*_ONSETS, *seen)
+        for onset in (*(usual * onset for onset in _ONSETS), *(dt * lag for lag in seen))
     ]
     tries = [search(problem, [Structure(1, 1)], each)[Structure(1, 1)] for each in scales]
     best = min(tries, key=lambda candidate: candidate.cost)

@@ -36,6 +36,7 @@ from ..signals.step_sequence import input_moves
 
 _BINS_RELAXING = 60  # of a rest in which the output comes to rest, so that lags show in it
 _MANY = 100  # samples at rest in which dither would show more than two levels
+_MOST_MISSING = 0.5  # of the samples at rest, for a sinusoid to be looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +45,16 @@ class StepData:
 
     Attributes
     ----------
-    output, input : ndarray, shape (N,)
+    output : ndarray, shape (N,)
+        Samples that there are.
+    input : ndarray, shape (K,)
+        At every sample, K >= N.
     dt : float
         Sample time in s.
     edges : list of (index, samples)
         Samples at which the input moves, and the durations.
+    rows : ndarray of int, shape (N,)
+        Samples at which there is an output; 0...N - 1 if none is missing.
     sigma, quantum : float
         Noise level and quantisation step of the output.
     drift : float
@@ -63,12 +69,15 @@ class StepData:
         Output without hum and without the extrapolated motion before the step.
     relaxing : bool
         The output was not in steady state before the step: the model includes a free response.
+    span : float or None
+        Duration of records without a step, in s.
     """
 
     output: FloatArray
     input: FloatArray
     dt: float
     edges: list[tuple[int, int]]
+    rows: IntArray
     sigma: float
     quantum: float
     drift: float
@@ -77,11 +86,27 @@ class StepData:
     motion: FirstMotion | None
     quiet: FloatArray
     relaxing: bool = False
+    span: float | None = None
 
     @property
     def edge(self) -> int:
-        """First sample at which the input has moved."""
-        return self.edges[0][0]
+        """Number of outputs before the sample at which the input has first moved."""
+        return self.before(self.edges[0][0])
+
+    @property
+    def length(self) -> float:
+        """Duration of the record from its first edge on, in s."""
+        whole = (self.input.size - self.edges[0][0]) * self.dt
+        return whole if self.span is None else self.span
+
+    @property
+    def since(self) -> IntArray:
+        """Samples (N,) from the first edge to each output."""
+        return self.rows - self.edges[0][0]
+
+    def before(self, sample: int) -> int:
+        """Number of outputs before a sample."""
+        return int(np.searchsorted(self.rows, sample))
 
     @property
     def coarse(self) -> bool:
@@ -106,40 +131,54 @@ class StepData:
 def step_data(
     output: FloatArray, signal: FloatArray, dt: float, edges: list[tuple[int, int]]
 ) -> StepData:
-    """Determine noise, drift, hum and visible onset of a step record."""
-    edge = edges[0][0]
+    """Determine noise, drift, hum and visible onset of a step record.
+
+    The output (K,) is NaN where a sample is missing. The noise is that of the samples that there
+    are, as if they were neighbours: its correlation is then an average over the gaps.
+    """
+    rows = np.flatnonzero(~np.isnan(output))
+    since = rows - edges[0][0]
+    edge = int(np.searchsorted(since, 0))
+    gaps = at_rest = None
+    if rows.size < output.size:
+        output, gaps, at_rest = output[rows], since, since[:edge]
     quantum = quantisation_step(output)
-    sigma, drift = rest_noise(output[:edge], output, quantum)
+    sigma, drift = rest_noise(output[:edge], output, quantum, at_rest)
     hum: list[float] = []
     colour, quiet, relaxing = 1.0, output, False
     if edge >= 8:
-        columns = np.stack([np.ones(edge), np.arange(-edge, 0) / edge], axis=1)
+        columns = np.stack([np.ones(edge), since[:edge] / edge], axis=1)
         line = columns @ np.linalg.lstsq(columns, output[:edge], rcond=None)[0]
-        hum = hum_frequencies(output[:edge] - line)
-        curve = None if hum else relaxation(output, edge)
+        hum = _hum(output[:edge] - line, at_rest)
+        curve = None if hum else relaxation(output, edge, gaps)
         if hum:
-            waves = _hum_columns(output.size, hum)
+            waves = _hum_columns(rows, hum)
             columns = np.concatenate([columns, waves[:edge]], axis=1)
             weights = np.linalg.lstsq(columns, output[:edge], rcond=None)[0]
             quiet = output - waves @ weights[2:]
             line = columns @ weights
-            sigma, drift = rest_noise(quiet[:edge], quiet, 0.0)
+            sigma, drift = rest_noise(quiet[:edge], quiet, 0.0, at_rest)
             sigma = max(sigma, quantum / np.sqrt(12))
         elif curve is not None:
             quiet, line, relaxing = output - curve, curve[:edge], True
-            sigma, drift = rest_noise(quiet[:edge], quiet, quantum)[0], 0.0
+            sigma, drift = rest_noise(quiet[:edge], quiet, quantum, at_rest)[0], 0.0
         colour = colouring(output[:edge] - line, sigma)
     span = float(np.ptp(output))
     sigma = max(sigma, 1e-4 * span)
-    motion = first_motion(quiet, edge, sigma, quantum, drift)
+    motion = first_motion(quiet, edge, sigma, quantum, drift, gaps)
     return StepData(
-        output, signal, dt, edges, sigma, quantum, drift, colour, hum, motion, quiet, relaxing
+        output, signal, dt, edges, rows, sigma, quantum, drift, colour, hum, motion, quiet, relaxing
     )
 
 
-def bare_data(output: FloatArray, signal: FloatArray, dt: float, sigma: float) -> StepData:
-    """Data of a record without a step: there is no baseline."""
-    return StepData(output, signal, dt, [(0, 1)], sigma, 0.0, 0.0, 1.0, [], None, output)
+def bare_data(
+    output: FloatArray, signal: FloatArray, dt: float, sigma: float, span: float
+) -> StepData:
+    """Data of records without a step, with a duration `span` in s: there is no baseline."""
+    rows = np.arange(output.size)
+    return StepData(
+        output, signal, dt, [(0, 1)], rows, sigma, 0.0, 0.0, 1.0, [], None, output, span=span
+    )
 
 
 def stop_at(data: StepData, part: float) -> int:
@@ -153,23 +192,35 @@ def stop_at(data: StepData, part: float) -> int:
     reached = np.flatnonzero(moved[edge:] * motion.sign > part * motion.span)
     if not reached.size:
         reached = np.flatnonzero(np.abs(moved[edge:]) > part * motion.span)
-    first = int(reached[0]) if reached.size else n - edge
-    return min(n, edge + max(first, int(motion.onset) + 10, motion.crossing + 3))
+    first = edge + int(reached[0]) if reached.size else n
+    step = data.edges[0][0]
+    onset, crossing = data.before(step + int(motion.onset)), data.before(step + motion.crossing)
+    return min(n, max(first, onset + 10, crossing + 3))
 
 
 def settled_at(data: StepData) -> int:
-    """Sample from which on a response has settled: twice the rise to 95 % after the step."""
-    return data.edge + 2 * (stop_at(data, 0.95) - data.edge)
+    """Output from which on a response has settled: twice the rise to 95 % after the step."""
+    step, stop = data.edges[0][0], stop_at(data, 0.95)
+    end = int(data.rows[stop]) if stop < data.rows.size else data.input.size
+    return data.before(step + 2 * (end - step))
 
 
 def window(data: StepData, stop: int, known: KnownFactor) -> Window:
-    """Set up the fit of the samples up to `stop`."""
+    """Set up the fit of the outputs up to `stop`, which is not among them."""
     crossing = data.motion.crossing if data.motion else 0
     at_rest = _BINS_RELAXING if data.relaxing else BINS_AT_REST
-    bins = response_bins(stop, [i for i, _ in data.edges if i < stop], crossing, at_rest)
-    index, size = input_moves(data.input, data.edges, stop)
+    rows = data.rows[:stop]
+    end = int(rows[-1]) + 1
+    bins = response_bins(end, [i for i, _ in data.edges if i < end], crossing, at_rest)
+    index, size = input_moves(data.input, data.edges, end)
+    times = _at(rows, data.dt)
+    if rows.size < end:
+        bins = bins.holding(rows)
     moves = _at(index, data.dt)
     columns = fixed_regressors(data)[:stop]
+    drive = StepSequence(times[bins.first], bins.width, data.dt, moves, size)
+    if rows.size < end:
+        drive = replace(drive, samples=times)
     own: tuple[Segments | None, Segments | None] = None, None
     if data.relaxing:
         own = _free_response(data, bins, columns)
@@ -177,21 +228,25 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     problem = Problem(
         bins.average(data.output[:stop]),
         np.sqrt(_weights(data, bins)),
-        StepSequence(_at(bins.first, data.dt), bins.width, data.dt, moves, size),
+        drive,
         bins.average(columns),
         known,
         own[0],
     )
     single = np.broadcast_to(np.int64(1), stop)  # no memory for ones
-    drive = StepSequence(_at(np.arange(stop), data.dt), single, data.dt, moves, size)
-    return Window(data.edge, data.output[:stop], problem, drive, columns, bins, own[1])
+    drive = StepSequence(times, single, data.dt, moves, size)
+    spacing = float(rows[-1] - rows[0]) / max(rows.size - 1, 1)
+    return Window(
+        data.edge, data.output[:stop], problem, drive, columns, bins, own[1], spacing=spacing
+    )
 
 
 def _free_response(data: StepData, bins: Bins, columns: FloatArray) -> tuple[Segments, Segments]:
     """Local terms of the record, on bins and at every sample: regressors and free response."""
     # In the middle of a bin, which is narrow compared with the decay of the free response there.
-    middle = data.dt * (bins.first + (bins.width - 1) / 2)
-    every = data.dt * np.arange(len(columns), dtype=np.float64)
+    rows = data.rows[: len(columns)].astype(np.float64)
+    middle = data.dt * bins.average(rows)
+    every = data.dt * rows
     return (
         Segments(np.array([0, middle.size]), middle, bins.average(columns)),
         Segments(np.array([0, every.size]), every, columns),
@@ -202,12 +257,14 @@ def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
     """Initial guesses of the times of the response, from its onset and its 63 % point."""
     assert data.motion is not None
     motion, dt = data.motion, data.dt
-    rise = min(stop, stop_at(data, 0.63)) - data.edge - motion.onset
+    end = int(data.rows[stop - 1]) + 1
+    risen = int(data.rows[min(stop, stop_at(data, 0.63)) - 1]) + 1
+    rise = risen - data.edges[0][0] - motion.onset
     last = (motion.crossing + max(1.0, 0.05 * motion.crossing)) * dt
     return Scales(
         onset=max(motion.onset, 0.5) * dt,
         rise=max(rise, 2.0) * dt,
-        length=(stop - data.edge) * dt,
+        length=(end - data.edges[0][0]) * dt,
         dt=dt,
         latest=last if latest is None else min(last, latest),
     )
@@ -220,9 +277,9 @@ def fixed_regressors(data: StepData) -> FloatArray:
         return np.broadcast_to(1.0, (n, 1))  # no memory for ones
     columns = [np.ones((n, 1))]
     if data.drift:
-        columns.append(((np.arange(n) - data.edge) / n)[:, None])
+        columns.append((data.since / data.input.size)[:, None])
     if data.hum:
-        columns.append(_hum_columns(n, data.hum))
+        columns.append(_hum_columns(data.rows, data.hum))
     return np.concatenate(columns, axis=1)
 
 
@@ -234,7 +291,7 @@ def own_regressors(data: StepData, poles: ComplexArray | None) -> FloatArray:
     fixed = fixed_regressors(data)
     if poles is None:
         return fixed
-    clock = data.dt * np.arange(len(fixed), dtype=np.float64)
+    clock = _at(data.rows, data.dt)
     stretch = Segments(np.array([0, clock.size]), clock, fixed)
     return np.asarray(local_columns(stretch, poles[None])[0])
 
@@ -250,6 +307,16 @@ def _at(index: IntArray, dt: float) -> FloatArray:
     return np.asarray(dt * index.astype(np.float64))
 
 
-def _hum_columns(n: int, frequencies: list[float]) -> FloatArray:
-    index = np.arange(n, dtype=np.float64)
+def _hum(rest: FloatArray, rows: IntArray | None) -> list[float]:
+    """Sinusoids of the baseline; `rows` are the samples that there are if others are missing."""
+    if rows is None:
+        return hum_frequencies(rest)
+    if rest.size < _MOST_MISSING * -rows[0]:
+        return []
+    # The line through a gap weakens a sinusoid, and leaves its frequency.
+    return hum_frequencies(np.interp(np.arange(rows[0], 0), rows, rest))
+
+
+def _hum_columns(rows: IntArray, frequencies: list[float]) -> FloatArray:
+    index = rows.astype(np.float64)
     return np.concatenate([sine_pair(index, f) for f in frequencies], axis=1)

@@ -319,22 +319,30 @@ class _FlowFit:
         return float(np.sqrt(variance) * np.linalg.norm(on_dead_time))
 
     def _response(self, x: FloatArray) -> FloatArray:
-        """Unit response in means over the bins, by Simpson's rule for wide bins."""
-        dead_time, *shape = self.times(x)
+        """Unit response in means over the bins, by Simpson's rule for wide bins.
+
+        Where samples are missing, in means over two times, as in `StepSequence`.
+        """
         drive = self.drive
+        if drive.samples is not None:
+            early, late = (self._sampled(x, drive.first + node) for node in drive.nodes)
+            return np.asarray((early + late) / 2)
         wide = drive.width > 1
-        span = (drive.width[wide] - 1) * drive.dt
+        span = drive.lengths[wide]
         since = np.concatenate(
             [drive.first, drive.first[wide] + span / 2, drive.first[wide] + span]
         )
-        since -= dead_time
-        every = sum(
-            size * self._step(since - move, *shape)
-            for move, size in zip(drive.moves, drive.sizes, strict=True)
-        )
+        every = self._sampled(x, since)
         total, middle, end = np.split(every, [wide.size, wide.size + span.size])
         total[wide] = (total[wide] + 4 * middle + end) / 6
         return total
+
+    def _sampled(self, x: FloatArray, times: FloatArray) -> FloatArray:
+        """Unit response at given times."""
+        dead_time, *shape = self.times(x)
+        since = times - dead_time
+        moves = zip(self.drive.moves, self.drive.sizes, strict=True)
+        return np.asarray(sum(size * self._step(since - move, *shape) for move, size in moves))
 
     def _step(self, time: FloatArray, mean: float, spread: float, lag: float) -> FloatArray:
         """Step response of the flow, the lag and the known dynamics."""

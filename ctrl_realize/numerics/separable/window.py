@@ -67,6 +67,8 @@ class Window:
         Local terms at every sample, if the problem has them on bins.
     samples : int or None
         Represented by the output, if it is different from them.
+    spacing : float
+        Mean distance of the samples, in sample times; 1 if none is missing.
     """
 
     start: int
@@ -77,6 +79,7 @@ class Window:
     bins: Bins | None
     own: Segments | None = None
     samples: int | None = None
+    spacing: float = 1.0
 
     @cached_property
     def counted(self) -> float:
@@ -220,7 +223,8 @@ def fit_window(
     problem = window.problem
     rough = search(problem, [Structure(1, 1)], scales)[Structure(1, 1)]
     error = window.output - window.predict(problem, rough)
-    scales = replace(scales, ringing=_ringing(error[window.start :], scales.dt))
+    spacing = window.spacing * scales.dt
+    scales = replace(scales, ringing=_ringing(error[window.start :], spacing))
     candidates = search(problem, structures, scales)
     passes = _PASSES if huber else 0
     rivals: dict[Structure, float] = {}

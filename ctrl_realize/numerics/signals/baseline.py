@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from .edges import difference_noise
 from .noise import correlation_time, is_drift, rounding_error
 
@@ -71,7 +71,7 @@ _SIGNIFICANT = 30.0  # chi-square to beat the line; ablation: exponential before
 _RATES = np.geomspace(0.5, 30.0, 24)  # decay over the samples before the step, next ones 20 % apart
 
 
-def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
+def relaxation(output: FloatArray, edge: int, rows: IntArray | None = None) -> FloatArray | None:
     """Exponential before the step, extrapolated over the whole record.
 
     After an earlier change of its input a plant continues to move by its free response, which is
@@ -82,6 +82,8 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
     output : ndarray, shape (N,)
     edge : int
         Samples before the step.
+    rows : ndarray, shape (N,), optional
+        Samples that there are, relative to the step, if others are missing.
 
     Returns
     -------
@@ -93,7 +95,8 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
         return None
     # Single outliers are not a curve, especially the first sample of a record.
     before = median_filter(output[:edge], size=5, mode="mirror")
-    time = np.arange(edge) / edge
+    clock = np.arange(output.size) / edge if rows is None else 1 - rows / rows[0]
+    time = clock[:edge]
     line = np.stack([np.ones(edge), time], axis=1)
     straight = before - line @ np.linalg.lstsq(line, before, rcond=None)[0]
     best, rate, residual = np.inf, 0.0, straight
@@ -110,7 +113,7 @@ def relaxation(output: FloatArray, edge: int) -> FloatArray | None:
     variance = noise * correlation_time(residual)
     if float(straight @ straight) - best <= _SIGNIFICANT * variance:
         return None
-    return np.asarray(_level_and_decay(rate, np.arange(output.size) / edge) @ weights)
+    return np.asarray(_level_and_decay(rate, clock) @ weights)
 
 
 def _level_and_decay(rate: float, time: FloatArray) -> FloatArray:

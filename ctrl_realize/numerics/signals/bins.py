@@ -34,6 +34,12 @@ class Bins:
         sums = np.add.reduceat(values[: int(self.first[-1] + self.width[-1])], self.first, axis=0)
         return np.asarray(sums / self.width.reshape(-1, *[1] * (values.ndim - 1)))
 
+    def holding(self, rows: IntArray) -> Bins:
+        """Bins of those samples that there are: numbers among `rows` (N,), no bin empty."""
+        first = np.searchsorted(rows, self.first)
+        width = np.searchsorted(rows, self.first + self.width) - first
+        return Bins(first[width > 0], width[width > 0])
+
 
 def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BINS_AT_REST) -> Bins:
     """Divide samples 0...stop - 1 of a record into bins.

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from ..hankel.matrix import fft_length
 
 _DITHER = 0.6
@@ -96,7 +96,9 @@ def winsorised_sigma(values: FloatArray, quantum: float, lost: int = 0) -> float
     return float(np.sqrt(np.sum(clipped**2) / max(values.size - lost, 1))) / 0.96
 
 
-def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[float, float]:
+def rest_noise(
+    before: FloatArray, record: FloatArray, quantum: float, rows: IntArray | None = None
+) -> tuple[float, float]:
     """Noise level and significant drift of the baseline.
 
     Parameters
@@ -109,6 +111,8 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
         The whole record.
     quantum : float
         Quantisation step; the noise is at least ``quantum / sqrt(12)``.
+    rows : ndarray, shape (P,), optional
+        Samples before the step that there are, if others are missing: the slope is in their unit.
 
     Returns
     -------
@@ -121,14 +125,16 @@ def rest_noise(before: FloatArray, record: FloatArray, quantum: float) -> tuple[
         # 1, -3, 3, -1: white noise has 20 times its variance in these differences.
         third = np.diff(record, 3) / np.sqrt(20)
         return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0
-    slope, left = _robust_line(before, quantum)
+    index = np.arange(before.size) if rows is None else rows
+    slope, left = _robust_line(before, index.astype(np.float64), quantum)
     sigma = max(winsorised_sigma(left, quantum, lost=2), floor)
     if before.size < _MANY:
         # A dozen samples determine sigma to a factor of two: the settled half of the record helps.
         settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
         if settled.size:
             sigma = max(sigma, winsorised_sigma(settled, quantum / np.sqrt(20)))
-    return sigma, float(slope) if is_drift(slope, sigma, left) else 0.0
+    spacing = 1.0 if rows is None else float(rows[-1] - rows[0]) / (rows.size - 1)
+    return sigma, float(slope) if is_drift(slope * spacing, sigma, left) else 0.0
 
 
 def is_drift(slope: float, sigma: float, residual: FloatArray) -> bool:
@@ -145,16 +151,15 @@ def is_drift(slope: float, sigma: float, residual: FloatArray) -> bool:
     return bool(abs(slope) > _DRIFT_ERRORS * error)
 
 
-def _robust_line(values: FloatArray, quantum: float) -> tuple[float, FloatArray]:
+def _robust_line(values: FloatArray, index: FloatArray, quantum: float) -> tuple[float, FloatArray]:
     """Slope per sample, and the residual; outliers are clipped at four standard deviations."""
-    index = np.arange(values.size, dtype=np.float64)
     tamed = values
     for _ in range(_TURNS):
         line = np.polyval(np.polyfit(index, tamed, 1), index)
         left = values - line
         limit = 4 * max(mad_sigma(left), 0.5 * quantum)
         tamed = line + np.clip(left, -limit, limit)
-    return float(line[1] - line[0]), left
+    return float(line[1] - line[0]) / float(index[1] - index[0]), left
 
 
 def correlation_time(residual: FloatArray) -> float:

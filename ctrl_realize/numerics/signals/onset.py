@@ -17,7 +17,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -122,7 +122,12 @@ class FirstMotion:
 
 
 def first_motion(
-    output: FloatArray, edge: int, sigma: float, quantum: float, drift: float
+    output: FloatArray,
+    edge: int,
+    sigma: float,
+    quantum: float,
+    drift: float,
+    rows: IntArray | None = None,
 ) -> FirstMotion | None:
     """Find the visible onset of a record; None if the output does not move.
 
@@ -135,10 +140,30 @@ def first_motion(
         Noise level and quantisation step of the output.
     drift : float
         Slope before the step, per sample. It is extrapolated for as long as it was observed.
+    rows : ndarray, shape (N,), optional
+        Samples that there are, relative to the edge of the input, if others are missing. Slope and
+        times are then in these units, and every duration is one of existing samples.
     """
+    found = _motion(output, edge, sigma, quantum, drift, rows)
+    if found is None or rows is None:
+        return found
+    after = rows[edge:]
+    onset = float(np.interp(found.onset, np.arange(after.size), after))
+    return replace(found, crossing=int(after[found.crossing]), onset=onset)
+
+
+def _motion(
+    output: FloatArray,
+    edge: int,
+    sigma: float,
+    quantum: float,
+    drift: float,
+    rows: IntArray | None,
+) -> FirstMotion | None:
+    """Visible onset in existing samples; arguments of `first_motion`."""
     n = output.size
     if edge >= 8:
-        level = output - drift * _clipped_index(n, edge) if drift else output
+        level = output - drift * _clipped_index(n, edge, rows) if drift else output
         rest = float(np.median(level[max(edge - 200, 0) : edge]))
     else:
         level = output
@@ -175,8 +200,10 @@ def first_motion(
     )
 
 
-def _clipped_index(n: int, edge: int) -> FloatArray:
+def _clipped_index(n: int, edge: int, rows: IntArray | None) -> FloatArray:
     """Samples from the edge on, at most as many as before it."""
+    if rows is not None:
+        return np.clip(rows.astype(np.float64), rows[0], -rows[0])
     index = np.arange(-edge, n - edge, dtype=np.float64)
     return np.clip(index, -edge, edge, out=index)
 

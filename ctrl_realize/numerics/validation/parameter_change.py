@@ -48,7 +48,7 @@ class ParameterChange:
 
 
 def parameter_change(
-    residual: FloatArray, fitted: FloatArray, groups: IntArray
+    residual: FloatArray, fitted: FloatArray, groups: IntArray, rows: IntArray | None = None
 ) -> ParameterChange | None:
     """Test whether gain and dead time are the same in all groups of samples.
 
@@ -58,13 +58,15 @@ def parameter_change(
         Residual and response of the model.
     groups : ndarray of int, shape (N,)
         Group number of each sample, 0 ... g - 1.
+    rows : ndarray of int, shape (N,), optional
+        Numbers of these samples, if others are missing.
 
     Returns
     -------
     ParameterChange
         None if fewer than two groups move enough, or there are too few samples.
     """
-    slope, size = _derivatives(fitted)
+    slope, size = _derivatives(fitted, rows)
     energy = np.bincount(groups, slope**2)
     used = np.flatnonzero(energy > _LEAST_SHARE * energy.sum())
     if used.size < 2 or not np.any(residual):
@@ -100,9 +102,10 @@ def parameter_change(
     )
 
 
-def _derivatives(fitted: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _derivatives(fitted: FloatArray, rows: IntArray | None) -> tuple[FloatArray, FloatArray]:
     """Derivatives of a response w.r.t. its delay in samples and its relative gain."""
-    return -np.gradient(fitted), fitted - np.mean(fitted)
+    slope = np.gradient(fitted) if rows is None else np.gradient(fitted, rows)
+    return -slope, fitted - np.mean(fitted)
 
 
 def whitened(columns: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray, int]:
