@@ -160,8 +160,8 @@ def closed_loop_plot(
     controllers: Mapping[str, Any],
     *,
     span: float | None = None,
-    setpoint: float = 1.0,
-    load: float = 1.0,
+    setpoint_step: float = 1.0,
+    load_step: float = 1.0,
     output_limits: tuple[float, float] | None = None,
     noise_std: float = 0.0,
     ax: style.AxesLike = None,
@@ -181,7 +181,7 @@ def closed_loop_plot(
     span : float, optional
         Time to show in s. Default: 1.25 times the time until all responses stay within 2 % of their
         final values.
-    setpoint, load : float, optional
+    setpoint_step, load_step : float, optional
         Heights of the steps.
     output_limits : tuple of float, optional
         Lower and upper limit of the controller's output, as changes from its value before the step.
@@ -216,9 +216,9 @@ def closed_loop_plot(
         for number, (name, controller) in enumerate(controllers.items()):
             if noise_std or output_limits or isinstance(controller, PIDAlgorithm):
                 settings = {"noise_std": noise_std, "output_limits": output_limits}
-                signals = _simulated(plant, controller, count, (setpoint, load), settings)
+                signals = _simulated(plant, controller, count, (setpoint_step, load_step), settings)
             else:
-                signals = _linear_signals(plant, controller, count, (setpoint, load))
+                signals = _linear_signals(plant, controller, count, (setpoint_step, load_step))
             for where, signal in enumerate(signals):
                 drawn[where] += axes[where].plot(
                     time,
@@ -228,7 +228,7 @@ def closed_loop_plot(
                     drawstyle="steps-post" if where > 1 else "default",
                     label=plain(name),
                 )
-        axes[0].axhline(setpoint, color=style.INPUT, linewidth=1)
+        axes[0].axhline(setpoint_step, color=style.INPUT, linewidth=1)
         axes[1].axhline(0, color=style.INPUT, linewidth=1)
         for limit in _drawn_limits(controllers, output_limits):
             for each in axes[2:]:
@@ -272,7 +272,7 @@ def _simulated(
 ) -> list[FloatArray]:
     # The steps are at the second sample, which is time 0 here.
     loops = [
-        simulate_loop(plant, controller, count + 1, setpoint=r, load=d, **settings)
+        simulate_loop(plant, controller, count + 1, setpoint_step=r, load_step=d, **settings)
         for r, d in ((steps[0], 0.0), (0.0, steps[1]))
     ]
     return [loop.measured[1:] for loop in loops] + [loop.output[1:] for loop in loops]

@@ -74,18 +74,20 @@ def test_rules_that_ring_stand_at_the_edge_with_their_peak():
 def test_the_loop_is_drawn_with_its_actuator_limits_and_noise(valve):
     plant = valve(37)
     pid = cr.design.pid(plant, "simc", "PI")
-    drawn = cr.plots.closed_loop_plot(plant, {"PI": pid}, span=0.3, setpoint=2.0)
+    drawn = cr.plots.closed_loop_plot(plant, {"PI": pid}, span=0.3, setpoint_step=2.0)
     assert drawn.axes.shape == (2, 2)
     # the linear responses against the simulation sample by sample
     count = len(drawn.lines[0, 0][0].get_ydata())
-    for column, step in enumerate(({"setpoint": 2.0}, {"setpoint": 0.0, "load": 1.0})):
+    for column, step in enumerate(
+        ({"setpoint_step": 2.0}, {"setpoint_step": 0.0, "load_step": 1.0})
+    ):
         simulated = cr.design.simulate_loop(plant, pid, count + 1, **step)
         for row, signal in enumerate((simulated.measured, simulated.output)):
             np.testing.assert_allclose(
                 drawn.lines[row, column][0].get_ydata(), signal[1:], rtol=0, atol=1e-5
             )
     limited = cr.plots.closed_loop_plot(
-        plant, {"PI": pid}, span=0.3, setpoint=2.0, output_limits=(-2, 2.1), noise_std=0.01
+        plant, {"PI": pid}, span=0.3, setpoint_step=2.0, output_limits=(-2, 2.1), noise_std=0.01
     )
     output = limited.lines[1, 0][0].get_ydata()
     assert output.max() == 2.1

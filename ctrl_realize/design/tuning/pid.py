@@ -196,6 +196,7 @@ def tuned(
         )
     else:
         kp, ti, td = _ultimate(plant, kind)
+    units = _units(plant)
     made = PIDController(
         kp,
         ti,
@@ -206,22 +207,21 @@ def tuned(
         rule=rule,
         model=model,
         name=options.name,
-        **_units(plant),
+        gain_unit=units[0],
+        time_unit=units[1],
     )
     return made, plant
 
 
-def _units(plant: DelayedStateSpace) -> dict[str, str]:
+def _units(plant: DelayedStateSpace) -> tuple[str, str]:
     """Units of the gain and of shown times, from the first record of an identified plant."""
     records = () if plant.fit is None else plant.fit.records
     if not records:
-        return {}
+        return "", "s"
     first = records[0]
     unit = first.units.get("time", "s")
-    return {
-        "gain_unit": gain_unit(first.input_units[0], first.output_units[0]),
-        "time_unit": unit if unit in SECONDS else "s",
-    }
+    ratio = gain_unit(first.input_units[0], first.output_units[0])
+    return ratio, unit if unit in SECONDS else "s"
 
 
 def closed_on(system: Any, plant: DelayedStateSpace, controller: PIDController) -> LoopCheck:

@@ -54,8 +54,8 @@ def simulate_loop(
     controller: Any,
     count: int,
     *,
-    setpoint: float = 1.0,
-    load: float = 0.0,
+    setpoint_step: float = 1.0,
+    load_step: float = 0.0,
     noise_std: float = 0.0,
     output_limits: tuple[float, float] | None = None,
     rng: int | np.random.Generator = 0,
@@ -71,7 +71,7 @@ def simulate_loop(
         limited at their output.
     count : int
         Number of samples.
-    setpoint, load : float
+    setpoint_step, load_step : float
         Heights of the steps of set-point and of load at the plant input, at the second sample.
     noise_std : float
         Standard deviation of white noise on the measured value.
@@ -93,13 +93,15 @@ def simulate_loop(
     --------
     >>> import ctrl_realize as cr
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=10.0, dead_time=2.0).system(0.5)
-    >>> loop = cr.design.simulate_loop(plant, cr.design.pid(plant), 200, setpoint=0, load=1)
+    >>> pid = cr.design.pid(plant)
+    >>> loop = cr.design.simulate_loop(plant, pid, 200, setpoint_step=0, load_step=1)
     >>> print(loop.measured[-1].round(3), loop.output[-1].round(3))
     0.0 -1.0
     """
     plant = delayed_system(system, "simulate_loop")
     whole(count, "count", 2, MOST)
-    height, disturbance = real(setpoint, "setpoint", "step"), real(load, "load", "step")
+    height = real(setpoint_step, "setpoint_step", "height of a step")
+    disturbance = real(load_step, "load_step", "height of a step")
     noise = real(noise_std, "noise_std", "standard deviation")
     core, delay = plant.delay_free, plant.delay
     if delay == 0 and core.D[0, 0] != 0:
