@@ -16,10 +16,10 @@ import ctrl_realize as cr
 
 export = cr.export
 RNG = np.random.default_rng(8)
-COUNT = 240
+COUNT = 120
 SETPOINT = np.repeat(RNG.uniform(30, 70, 8), COUNT // 8)
 MEASURED = 50 + np.cumsum(RNG.standard_normal(COUNT))
-MANUAL = np.where((np.arange(COUNT) // 60) % 3 == 1, 42.0, np.nan)
+MANUAL = np.where((np.arange(COUNT) // 30) % 3 == 1, 42.0, np.nan)
 PID = cr.design.PIDController(2.3, 7.0, 1.5, 0.2, dt=0.25, name="TIC 101.OP")
 ALGORITHMS = {
     "full": PID.algorithm(

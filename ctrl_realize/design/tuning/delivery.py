@@ -44,6 +44,8 @@ class Delivered:
         measured_range: tuple[float, float] | None = None,
         output_range: tuple[float, float] | None = None,
         time_unit: str | None = None,
+        setpoint_weight: float | None = None,
+        derivative_weight: float = 0.0,
     ) -> PIDForm:
         """Write the parameters as another controller asks for them.
 
@@ -57,6 +59,8 @@ class Delivered:
             refers to percent of these. Default: (0, 100).
         time_unit : {"s", "ms", "min", "h", "day"}, optional
             For forms without a unit of their own. Default: that of the controller.
+        setpoint_weight, derivative_weight : float, optional
+            Weights of the set-point, as for `algorithm`, for blocks that have them.
 
         Returns
         -------
@@ -75,7 +79,9 @@ class Delivered:
         Honeywell HC900, PID block (P and PI)
           Prop Band  50 %
           Reset      0.5 repeats/min
-          ! gain in percent of range: measured value 0...400, output 0...100
+          - gain in percent of range: measured value 0...400, output 0...100
+          - source: Honeywell, HC900 Hybrid Control Designer Function Block Reference Guide,
+            revision 11 (2007), page 281
         """
         layout = LAYOUTS.get(form)
         if time_unit is None and layout is not None and layout.unit is None:
@@ -87,6 +93,7 @@ class Delivered:
             output_range=output_range,
             time_unit=time_unit,
             gain_unit=self.gain_unit,
+            weights=None if setpoint_weight is None else (setpoint_weight, derivative_weight),
         )
 
     def forms(self, **ranges: Any) -> pd.DataFrame:

@@ -24,7 +24,7 @@ def from_form(
     """Parameters of the ideal form from those of another; see `PIDController.from_form`."""
     layout, scale, unit = setting(form, measured_range, output_range, time_unit)
     labels = labels_of(layout)
-    unknown = sorted(set(values) - set(labels))
+    unknown = sorted(set(values) - {*labels, *layout.weights})
     if unknown or layout.gain not in values:
         raise OptionError(
             f"form={form!r} got {', '.join(map(repr, values)) or 'no values'}; expected "

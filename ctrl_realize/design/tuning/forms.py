@@ -63,7 +63,9 @@ class PIDForm(Result):
     source : str
         Where the form is documented.
     notes : tuple of str
-        What differs from the controller, and what the values refer to.
+        What differs from the controller.
+    choices : tuple of str
+        What the values refer to, and the document.
 
     Examples
     --------
@@ -75,7 +77,9 @@ class PIDForm(Result):
       Ti           40 s
       Td           6 s
       TdFiltRatio  0.1
-      ! output in 0...100, measured value in its unit
+      - output in 0...100, measured value in its unit
+      - source: Siemens, S7-1200 system manual A5E02486680 (2012), section 9.2.2 (equation); PID
+        control function manual A5E35300227-AC (2017), pages 258 to 261
     """
 
     form: str
@@ -85,6 +89,7 @@ class PIDForm(Result):
     ideal: Ideal
     source: str
     notes: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float:
         for each in self.values:
@@ -139,7 +144,7 @@ def pid_forms() -> pd.DataFrame:
                 "form": form,
                 "title": layout.title,
                 "structure": layout.structure,
-                "parameters": ", ".join(labels_of(layout)),
+                "parameters": ", ".join([*labels_of(layout), *layout.weights]),
                 "time_unit": layout.unit or "chosen",
                 "source": layout.source,
             }
@@ -156,6 +161,7 @@ def to_form(
     output_range: tuple[float, float] | None = None,
     time_unit: str | None = None,
     gain_unit: str = "",
+    weights: tuple[float, float] | None = None,
 ) -> PIDForm:
     """Write the parameters of the ideal form in another form; see `PIDController.as_form`."""
     layout, scale, unit = setting(form, measured_range, output_range, time_unit)
@@ -179,8 +185,18 @@ def to_form(
         typed = (-typed[0], *typed[1:])
     if layout.filter_kind == "none" and td:
         typed = (*typed[:3], tf)
-    notes = _notes(layout, ideal, typed, measured_range, output_range)
-    return PIDForm(form, layout.title, tuple(shown), reverse, typed, layout.source, tuple(notes))
+    if weights is not None and layout.weights:
+        shown += map(FormValue, layout.weights, weights)
+    return PIDForm(
+        form,
+        layout.title,
+        tuple(shown),
+        reverse,
+        typed,
+        layout.source,
+        _notes(layout, ideal, typed, weights),
+        (*_ranges(layout, measured_range, output_range), f"source: {layout.source}"),
+    )
 
 
 def _shown(
@@ -216,26 +232,34 @@ def _shown(
 
 
 def _notes(
-    layout: Layout,
-    ideal: Ideal,
-    typed: Ideal,
-    measured_range: tuple[float, float] | None,
-    output_range: tuple[float, float] | None,
-) -> list[str]:
+    layout: Layout, ideal: Ideal, typed: Ideal, weights: tuple[float, float] | None
+) -> tuple[str, ...]:
+    """What differs between the controller and what the values give."""
     notes = []
-    low, high = output_range or PERCENT
-    if layout.percent == "both":
-        bottom, top = measured_range or PERCENT
-        notes.append(
-            f"gain in percent of range: measured value {bottom:g}...{top:g}, output "
-            f"{low:g}...{high:g}"
-        )
-    elif layout.percent == "output":
-        notes.append(f"output in {low:g}...{high:g}, measured value in its unit")
     if ideal[2] and layout.filter_kind == "none":
         notes.append(f"the derivative filter, tf = {ideal[3]:.4g} s, cannot be entered")
     elif ideal[2] and not np.isclose(ideal[3], typed[3], rtol=1e-6):
         notes.append(
             f"the filter of the block is fixed: tf = {typed[3]:.4g} s instead of {ideal[3]:.4g} s"
         )
-    return notes
+    if weights is not None and not layout.weights:
+        notes.append("set-point weights are no parameters of this form")
+    return tuple(notes)
+
+
+def _ranges(
+    layout: Layout,
+    measured_range: tuple[float, float] | None,
+    output_range: tuple[float, float] | None,
+) -> list[str]:
+    """Ranges that the gain refers to."""
+    low, high = output_range or PERCENT
+    if layout.percent == "both":
+        bottom, top = measured_range or PERCENT
+        return [
+            f"gain in percent of range: measured value {bottom:g}...{top:g}, output "
+            f"{low:g}...{high:g}"
+        ]
+    if layout.percent == "output":
+        return [f"output in {low:g}...{high:g}, measured value in its unit"]
+    return []
