@@ -184,7 +184,7 @@ def closed_loop_plot(
     setpoint_step, load_step : float, optional
         Heights of the steps.
     output_limits : tuple of float, optional
-        Lower and upper limit of the controller's output, as changes from its value before the step.
+        Lower and upper limit of the controller's output, relative to its value before the step.
     noise_std : float, optional
         Standard deviation of the noise of the measured value, to see what of it arrives at the
         actuator.
@@ -283,7 +283,7 @@ def _drawn_limits(controllers: Mapping[str, Any], given: tuple[float, float] | N
     limits = set(given or ())
     for each in controllers.values():
         if isinstance(each, PIDAlgorithm):
-            limits |= set(each.output_limits)
+            limits |= set(each.in_deviations().output_limits)
     return sorted(limit for limit in limits if np.isfinite(limit))
 
 

@@ -210,6 +210,9 @@ def test_anti_windup_leaves_the_limit_early_and_limits_hold():
         algorithm = pid.algorithm(output_limits=(-0.2, 1.1), tracking_time=tracking)
         results[tracking] = cr.design.simulate_loop(plant, algorithm, 200)
         assert results[tracking].output.max() == 1.1
+    shifted = pid.algorithm(output_limits=(39.8, 41.1), bias=40.0)
+    again = cr.design.simulate_loop(plant, shifted, 200)
+    np.testing.assert_allclose(again.output, results[None].output, atol=1e-9)
     assert results[None].measured.max() < 1.01 < 1.04 < results[1e9].measured.max()
     assert results[None].measured[-1] == pytest.approx(1, abs=1e-3)
 

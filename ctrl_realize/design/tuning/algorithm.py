@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,7 +85,7 @@ class PIDAlgorithm(Result):
         Of the anti-windup, in s, at least `dt`. Default: ``sqrt(ti td)``, without a derivative
         `ti`.
     bias : float
-        Output at zero error without integral.
+        Output at the operating point, at zero error.
     name : str
 
     Attributes
@@ -94,8 +94,8 @@ class PIDAlgorithm(Result):
 
     Notes
     -----
-    The algorithm is that of [1]_, section 3.5 (set-point weights 3.4); back-calculation with
-    tracking time ``sqrt(ti td)`` is its proposal.
+    The algorithm is that of [1]_ (set-point weighting, windup, digital implementation);
+    back-calculation with tracking time ``sqrt(ti td)`` is its proposal.
 
     References
     ----------
@@ -171,6 +171,11 @@ class PIDAlgorithm(Result):
             float(low),
             float(high),
         )
+
+    def in_deviations(self) -> PIDAlgorithm:
+        """The same algorithm for deviations from the operating point: limits relative to `bias`."""
+        low, high = self.output_limits
+        return replace(self, bias=0.0, output_limits=(low - self.bias, high - self.bias))
 
     def start(self) -> PIDRun:
         """Start a run, sample by sample."""

@@ -62,13 +62,15 @@ def simulate_loop(
 ) -> LoopSimulation:
     """Simulate a loop with limits and noise, sample by sample.
 
+    All signals are deviations from the operating point.
+
     Parameters
     ----------
     system : DelayedStateSpace
         Plant with one input and one output, and at least one sample of delay from input to output.
     controller : PIDAlgorithm, PIDController, or a discrete system from error to plant input
         A `PIDController` runs as its `algorithm`, which has anti-windup; other systems are only
-        limited at their output.
+        limited at their output. The bias of an algorithm is the operating point.
     count : int
         Number of samples.
     setpoint_step, load_step : float
@@ -76,7 +78,8 @@ def simulate_loop(
     noise_std : float
         Standard deviation of white noise on the measured value.
     output_limits : tuple of float, optional
-        Of the controller; a `PIDAlgorithm` keeps its own.
+        Of the controller, relative to its output at the operating point; a `PIDAlgorithm` keeps
+        its own.
     rng : int or numpy Generator
         Of the noise.
 
@@ -135,7 +138,7 @@ def _stepper(controller: Any, plant: DelayedStateSpace, limits: tuple[float, flo
                 f"the controller has dt={controller.dt:g} s, the plant {plant.dt:g} s; expected "
                 "the same sample time"
             )
-        return controller.start().step
+        return controller.in_deviations().start().step
     linear = same_rate(controller, float(plant.dt), "simulate_loop")
     if hasattr(controller, "algorithm"):
         algorithm: PIDAlgorithm = controller.algorithm(derivative_weight=1.0, **given)
