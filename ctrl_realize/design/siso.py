@@ -50,6 +50,37 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
     return DelayedStateSpace(proper_ss(system, purpose), 0, name=system.name)
 
 
+def is_continuous(system: Any) -> bool:
+    """Whether a linear system is one in continuous time."""
+    linear = isinstance(system, (ct.StateSpace, ct.TransferFunction))
+    return linear and system.dt is not None and not system.dt
+
+
+def core_and_dead_time(system: Any, purpose: str) -> tuple[ct.StateSpace, float]:
+    """Split a continuous plant of one input and output into its core and its dead time in s.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Several channels, or a dead time in a loop or one of several paths.
+    """
+    if not system.issiso():
+        raise UnsuitableSystemError(
+            f"{purpose} needs one input and one output; {system.name!r} has {system.ninputs} "
+            f"inputs and {system.noutputs} outputs"
+        )
+    if not isinstance(system, DelaySystem):
+        return proper_ss(system, purpose), 0.0
+    rest, dead_time = system.delay_apart()
+    if rest.internal_delays:
+        raise UnsuitableSystemError(
+            f"{system.name!r} has internal delays {system.internal_delays} s; {purpose} needs a "
+            "plant with its dead time at the input or output. Approximate the others: "
+            "sys.pade(order)"
+        )
+    return rest.core, dead_time
+
+
 def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
     """Convert to state space; an improper transfer function is refused with advice."""
     if isinstance(system, ct.StateSpace):
@@ -85,7 +116,7 @@ def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
 
 
 def interval_of_dead_time(
-    system: DelayedStateSpace, given: tuple[float, float] | None
+    system: ct.StateSpace, given: tuple[float, float] | None
 ) -> tuple[float, float] | None:
     """Return the given interval, or that of the identification; None without both.
 
@@ -94,7 +125,8 @@ def interval_of_dead_time(
     OptionError
         Not an interval of dead times.
     """
-    fitted = None if system.fit is None else system.fit.dead_time_interval
+    fit = getattr(system, "fit", None)
+    fitted = None if fit is None else fit.dead_time_interval
     interval = fitted if given is None else given
     if interval is None:
         return None

@@ -44,7 +44,7 @@ def delay_robustness_plot(
         low, high = result.dead_time_interval
         axes.axvspan(low * factor, high * factor, color=style.BAND, alpha=0.2, label="interval")
         axes.axvline(
-            (result.nominal * result.dt - result.fractional_time) * factor,
+            result.nominal_dead_time * factor,
             color=style.INPUT,
             linewidth=1,
         )

@@ -114,6 +114,91 @@ def test_the_gang_of_four_are_the_four_quotients(plant, controller, points):
     assert (four.input_labels, four.output_labels) == (["r", "d"], ["y", "v"])
 
 
+@pytest.mark.parametrize("fast", [1e-3, 1e-5])
+def test_margins_of_a_loop_with_dead_time_and_a_fast_pole_count_right(fast):
+    core = ct.tf([1], [0.08, 1]) * ct.tf([1], [fast, 1])
+    pi = design.PIDController(1.3, 0.08)
+    plant = core * cr.delay(0.029)
+    limit = design.margins(plant, pi).gain_margin
+    for share, stable in ((0.5, True), (0.99, True), (1.01, False)):
+        loop = share * limit * pi
+        assert design.margins(plant, loop).stable is stable
+        assert design.margins(core, loop, dead_time=0.029).stable is stable
+        assert ct.feedback(plant * loop).is_stable() is stable
+
+
+@pytest.mark.parametrize("rule", ["simc", "amigo", "ziegler_nichols_ultimate", "optimal"])
+@pytest.mark.parametrize("kind", ["PI", "PID"])
+def test_a_continuous_plant_is_tuned_as_the_limit_of_short_samples(rule, kind):
+    plant = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * cr.delay(0.03)
+    ours = design.pid(plant, rule, kind)
+    fine = design.pid(plant.to_discrete(1e-4), rule, kind)
+    assert ours.dt == 0
+    # half a sample of 0.1 ms more dead time, of 30 ms
+    assert_allclose([ours.kp, ours.ti, ours.td], [fine.kp, fine.ti, fine.td], rtol=4e-3)
+    exact = design.margins(plant, ours)
+    assert ours.check.margins.ms == exact.ms
+    assert ct.feedback(plant * ours).is_stable()
+    if rule == "optimal":
+        assert exact.ms == pytest.approx(1.4, rel=2e-3)  # read on a grid of 0.05 rad
+
+
+def test_the_ultimate_gain_of_a_continuous_plant_is_exact():
+    # tan(w) = -w at the ultimate frequency of exp(-s) / (s + 1), K = sqrt(1 + w^2)
+    omega = 2.028757838110434
+    found = design.pid(ct.tf([1], [1, 1]) * cr.delay(1.0), "ziegler_nichols_ultimate", "P")
+    assert found.kp == pytest.approx(0.5 * np.sqrt(1 + omega**2), rel=1e-9)
+    of_model = design.pid(design.ProcessModel(1.0, 1.0, 1.0), "ziegler_nichols_ultimate", "P")
+    assert of_model.kp == pytest.approx(found.kp, rel=1e-12)
+    sampled = design.pid(ct.tf([1], [1, 1]) * cr.delay(1.0), "simc", dt=0.01)
+    assert sampled.dt == 0.01
+    table = design.compare_pid(ct.tf([1], [1, 1]) * cr.delay(1.0), ["simc"], ["PI"])
+    assert table.margins[0].ms == design.pid(ct.tf([1], [1, 1]) * cr.delay(1.0)).check.margins.ms
+
+
+def test_robustness_to_the_dead_time_ends_where_the_loop_becomes_unstable():
+    plant = ct.tf([1], [0.08, 1]) * cr.delay(0.1)
+    predictor = design.smith_predictor(plant, ct.tf([0.24, 3.0], [0.08, 0]))
+    found = design.delay_robustness(plant, predictor, (0.08, 0.12))
+    assert found.dt == 0
+    assert found.delays[[0, -1]].tolist() == [0.08, 0.12]
+    assert found.nominal == 0.1
+    core = ct.tf([1], [0.08, 1])
+    for dead_time, inside in ((found.stable_from, 1), (found.stable_to, -1)):
+        for step, stable in ((1e-6 * inside, True), (-1e-6 * inside, False)):
+            loop = ct.feedback(core * cr.delay(dead_time + step) * predictor)
+            assert loop.is_stable() is stable
+    assert found.stable == (found.stable_from <= 0.08 and found.stable_to >= 0.12)
+    for delay, size in zip(found.delays[::7], found.modulus_margin[::7], strict=True):
+        exact = design.margins(core * cr.delay(delay), predictor)
+        assert size == pytest.approx(exact.modulus_margin if exact.stable else 0.0, rel=1e-9)
+    assert "samples" not in found.report()
+    assert found.plot().axes.size == 1
+
+
+def test_a_bound_for_continuous_plants_holds_all_of_them():
+    others = [1.2 * P, CORE * cr.delay(0.36), ct.tf([2], [1.3, 1]) * cr.delay(0.3)]
+    bound = design.uncertainty_bound(others, P, dead_time_interval=(0.25, 0.33))
+    s = 1j * bound.omega
+    for other in others:
+        assert np.all(np.abs(other(s) / P(s) - 1) <= bound.bound + 1e-12)
+    assert_allclose(bound.delay_part, 2 * np.sin(np.minimum(0.05 * bound.omega, np.pi) / 2))
+    pi = design.pid(P, "amigo")
+    found = bound.check(pi)
+    assert found.robust
+    for other in others:
+        assert ct.feedback(other * pi).is_stable()
+        assert design.margins(other, pi).ms <= found.performance * (1 + 1e-6)
+
+
+def test_lqg_of_a_continuous_plant_is_designed_for_its_sampled_form():
+    plant = ct.tf([1], [1, -0.5]) * cr.delay(0.4)
+    sampled = plant.to_discrete(0.05)
+    controller = design.lqg(sampled, 1.0, 1.0, 1.0, 1.0)
+    assert controller.check.stable
+    assert ct.feedback(sampled * controller).is_stable()
+
+
 def test_margins_of_an_outer_loop_count_the_poles_of_the_inner_one():
     # the inner loop alone is unstable: K = 20 with a critical gain of 6.2 / 2
     inner = ct.feedback(10 * P)
@@ -186,7 +271,21 @@ BAD = {
         UnsuitableSystemError,
         "is unstable",
     ),
-    "discrete designs": (lambda: design.pid(P), UnsuitableSystemError, r"sys\.to_discrete"),
+    "discrete designs": (
+        lambda: design.lqg(P, 1.0, 1.0, 1.0, 1.0),
+        UnsuitableSystemError,
+        r"sys\.to_discrete",
+    ),
+    "rules for a loop": (
+        lambda: design.pid(ct.feedback(P)),
+        UnsuitableSystemError,
+        "internal delays.*dead time at the input or output",
+    ),
+    "no dead time to vary": (
+        lambda: design.delay_robustness(P, C),
+        OptionError,
+        "dead_time_interval=",
+    ),
     "dead time twice": (
         lambda: design.to_discrete(P, 0.1, 0.1),
         OptionError,

@@ -14,7 +14,13 @@ from ...numerics.arrays import BoolArray, FloatArray, IntArray, locked, read_onl
 from ...numerics.blas_threads import single_threaded
 from ...results import Result
 from ..resolved import warn_unresolved
-from ..siso import delayed_system, held_fraction, interval_of_dead_time
+from ..siso import (
+    core_and_dead_time,
+    delayed_system,
+    held_fraction,
+    interval_of_dead_time,
+    is_continuous,
+)
 from .loop import Loop, open_loop
 from .margin_result import Margins
 from .margins import loop_margins
@@ -36,18 +42,19 @@ class DelayRobustness(Result):
 
     Attributes
     ----------
-    delays : ndarray of int, shape (K,)
-        Delays that were tried, in samples, increasing.
+    delays : ndarray, shape (K,)
+        Delays that were tried, increasing: in samples, or in s for a continuous loop.
     stable_at : ndarray of bool, shape (K,)
     modulus_margin : ndarray, shape (K,)
         ``min |1 + L|``; 0 if unstable.
     dead_time_interval : tuple of float
         In s, from the identification or as given.
-    nominal : int
-        Nominal delay of the system.
+    nominal : float
+        Nominal delay of the system, in samples or s.
     dt : float
+        Sample time in s; 0 for a continuous loop.
     stable_from, stable_to : float
-        Dead times in s, in whole samples; beyond them the loop is unstable.
+        Dead times in s, of a discrete loop in whole samples; beyond them the loop is unstable.
     fractional_time : float
         Time in s by which the delay exceeds the dead time, if the core contains a fraction of a
         sample: ``dead_times = delays * dt - fractional_time``.
@@ -65,11 +72,11 @@ class DelayRobustness(Result):
     worst modulus margin 0.11
     """
 
-    delays: IntArray
+    delays: IntArray | FloatArray
     stable_at: BoolArray
     modulus_margin: FloatArray
     dead_time_interval: tuple[float, float]
-    nominal: int
+    nominal: float
     dt: float
     stable_from: float
     stable_to: float
@@ -79,7 +86,7 @@ class DelayRobustness(Result):
     def stable(self) -> bool:
         """Stable over the whole interval, including delays between those tried."""
         times = self.dead_times[self._inside()]
-        slack = 1e-6 * self.dt
+        slack = 1e-6 * self.dt or 1e-9 * times.max()
         # nan, for a loop that is unstable at the nominal delay, compares as false.
         return bool(
             self.stable_from <= max(times.min(), 0.0) + slack
@@ -94,10 +101,18 @@ class DelayRobustness(Result):
     @property
     def dead_times(self) -> FloatArray:
         """Dead times in s that belong to `delays`."""
-        return np.asarray(self.delays * self.dt - self.fractional_time, dtype=np.float64)
+        return np.asarray(self.delays * (self.dt or 1.0) - self.fractional_time, dtype=np.float64)
+
+    @property
+    def nominal_dead_time(self) -> float:
+        """Nominal dead time in s."""
+        return self.nominal * (self.dt or 1.0) - self.fractional_time
 
     def _inside(self) -> BoolArray:
         low, high = self.dead_time_interval
+        if not self.dt:
+            inside = (self.delays >= low) & (self.delays <= high)
+            return np.asarray(inside | (self.delays == self.nominal), dtype=np.bool_)
         inside = (self.delays >= np.floor((low + self.fractional_time) / self.dt + 1e-9)) & (
             self.delays <= np.ceil((high + self.fractional_time) / self.dt - 1e-9)
         )
@@ -124,8 +139,8 @@ class DelayRobustness(Result):
         return [
             (
                 "nominal",
-                f"{in_time(self.nominal * self.dt - self.fractional_time, 4)} "
-                f"({self.nominal} samples)",
+                in_time(self.nominal_dead_time, 4)
+                + (f" ({self.nominal} samples)" if self.dt else ""),
             ),
             ("interval", interval_in_time(low, high)),
             ("over the interval", "stable" if self.stable else "UNSTABLE somewhere"),
@@ -147,10 +162,11 @@ def delay_robustness(
 
     Parameters
     ----------
-    system : DelayedStateSpace
-        Plant; its core is kept, its delay is varied.
+    system : DelayedStateSpace or DelaySystem
+        Plant; its core is kept, its delay is varied. A continuous `DelaySystem` has its dead time
+        at input or output.
     controller : system
-        Of the same sample time.
+        Of the same time base.
     dead_time_interval : (float, float), optional
         In s; default: that of the identification, ``system.fit.dead_time_interval``.
 
@@ -162,6 +178,8 @@ def delay_robustness(
     ------
     OptionError
         No interval is given or known, or it is invalid.
+    UnsuitableSystemError
+        Several channels, mixed time bases, or a plant with delays in a loop.
 
     Notes
     -----
@@ -181,16 +199,56 @@ def delay_robustness(
     >>> predictor = cr.design.smith_predictor(plant, ct.tf([2.0, -1.8], [1, -1], 0.01))
     >>> cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
     <DelayRobustness stable in 0.08...0.12 s>
+
+    In continuous time:
+
+    >>> plant = ct.tf([1], [0.08, 1]) * cr.delay(0.1)
+    >>> predictor = cr.design.smith_predictor(plant, ct.tf([0.16, 2.0], [0.08, 0]))
+    >>> found = cr.design.delay_robustness(plant, predictor, (0.08, 0.12))
+    >>> print(f"stable from {found.stable_from:.4f} to {found.stable_to:.4f} s")
+    stable from 0.0377 to 0.1623 s
     """
+    if is_continuous(system):
+        return _continuous(system, controller, dead_time_interval)
     plant = delayed_system(system, "robustness to the dead time")
     warn_unresolved(plant)
-    interval = interval_of_dead_time(plant, dead_time_interval)
+    interval = _interval(plant, dead_time_interval)
+    loop = open_loop(plant, controller)
+    return over_interval(plant, loop, loop_margins(loop), interval, MAX_DELAYS)
+
+
+def _interval(plant: Any, given: tuple[float, float] | None) -> tuple[float, float]:
+    interval = interval_of_dead_time(plant, given)
     if interval is None:
         raise OptionError(
             "the model has no dead-time interval; give dead_time_interval=(low, high) in s"
         )
-    loop = open_loop(plant, controller)
-    return over_interval(plant, loop, loop_margins(loop), interval, MAX_DELAYS)
+    return interval
+
+
+def _continuous(system: Any, controller: Any, given: tuple[float, float] | None) -> DelayRobustness:
+    core, nominal = core_and_dead_time(system, "robustness to the dead time")
+    interval = _interval(system, given)
+    loop = open_loop(core, controller, nominal)
+    found = loop_margins(loop)
+    delays = np.unique([*np.linspace(*interval, MAX_DELAYS), nominal])
+    sizes = np.array(
+        [
+            _modulus(found if d == nominal else loop_margins(replace(loop, dead_time=float(d))))
+            for d in delays
+        ]
+    )
+    earlier, later = _room(found)
+    return DelayRobustness(
+        delays=read_only(delays),
+        stable_at=locked(sizes > 0),
+        modulus_margin=read_only(sizes),
+        dead_time_interval=interval,
+        nominal=nominal,
+        dt=0.0,
+        stable_from=float(np.maximum(0.0, nominal - earlier)),
+        stable_to=nominal + later,
+    )
 
 
 def over_interval(
@@ -236,7 +294,7 @@ def _modulus(found: Margins) -> float:
 
 
 def _room(found: Margins) -> tuple[float, float]:
-    """Samples by which the delay may decrease and increase; nan if the nominal loop is unstable.
+    """Samples, or s, by which the delay may decrease and increase; nan for an unstable loop.
 
     The gain of the loop does not depend on the delay: stability is only lost where the loop
     response at one of its gain crossovers passes -1.
@@ -244,6 +302,8 @@ def _room(found: Margins) -> tuple[float, float]:
     if not found.stable:
         return float("nan"), float("nan")
     lag = np.mod(np.radians(found.phase_margins), 2 * np.pi)
-    waits = np.array([2 * np.pi - lag, lag]) / found.gain_crossovers / found.dt
-    earlier, later = np.ceil(waits.min(axis=1, initial=np.inf)) - 1
+    waits = np.array([2 * np.pi - lag, lag]) / found.gain_crossovers / (found.dt or 1.0)
+    earlier, later = waits.min(axis=1, initial=np.inf)
+    if found.dt:
+        earlier, later = np.ceil(earlier) - 1, np.ceil(later) - 1
     return float(earlier), float(later)

@@ -66,11 +66,24 @@ class Loop:
 
     def characteristic(self, omega: FloatArray) -> ComplexArray:
         """Closed-loop characteristic function, without poles outside the stable region."""
+        return np.asarray((1 + self(omega)) * self.open_characteristic(omega), dtype=np.complex128)
+
+    def open_characteristic(self, omega: FloatArray) -> ComplexArray:
+        """Open-loop characteristic function: the product of those of the factors."""
         w = self.variable(omega)
-        value = 1 + self(omega)
+        value = np.ones(omega.size, dtype=np.complex128)
         for part in self.factors:
             value = value * part.characteristic(w)
         return np.asarray(value, dtype=np.complex128)
+
+    def beyond(self, top: float) -> FloatArray:
+        """Frequencies from `top` to where no factor of a continuous loop turns any more."""
+        wait = self.delay + sum(part.hidden_delay for part in self.factors)
+        sizes = [float(np.abs(part.features).max(initial=0.0)) for part in self.factors]
+        end = 1e4 * max([*sizes, 1 / wait if wait else 0.0])
+        if end <= top:
+            return np.zeros(0)
+        return np.geomspace(top, end, int(40 * np.log10(end / top)) + 2)
 
     @property
     def poles(self) -> ComplexArray:

@@ -191,6 +191,12 @@ def closed_loop_count(loop: Loop, omega: FloatArray) -> tuple[int, bool]:
         A closed-loop pole is too close to the boundary for a decision.
     """
     _, values = follow(loop.characteristic, omega)
+    if not loop.dt:
+        # The grid ends where the loop has no gain left that could encircle -1. Its factors may
+        # still turn there, as those of a controller with a pole at 0 and a fast one do.
+        rest = loop.beyond(float(omega[-1]))
+        if rest.size:
+            values = np.concatenate([values, follow(loop.open_characteristic, rest)[1]])
     if np.any(values == 0):
         return 0, True
     steps = np.abs(np.angle(values[1:] / values[:-1]))

@@ -11,14 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import numbers
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import DataError, OptionError
 from ...identification.campaign.campaign import Campaign
 from ...numerics.arrays import ComplexArray, FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...results import Result
 from ..resolved import warn_unresolved
-from ..siso import delayed_system, held_fraction, interval_of_dead_time
+from ..siso import (
+    core_and_dead_time,
+    delayed_system,
+    held_fraction,
+    interval_of_dead_time,
+    is_continuous,
+)
 from .loop import open_loop
 from .margin_result import Margins
 from .margins import margins
@@ -40,7 +46,7 @@ class UncertaintyBound(Result):
         rad/s.
     bound, spread, delay_part : ndarray, shape (K,)
         Ratios.
-    nominal : DelayedStateSpace
+    nominal : DelayedStateSpace or DelaySystem
     n_systems : int
         Number of systems behind the spread.
 
@@ -61,7 +67,7 @@ class UncertaintyBound(Result):
     bound: FloatArray
     spread: FloatArray
     delay_part: FloatArray
-    nominal: DelayedStateSpace
+    nominal: DelayedStateSpace | DelaySystem
     n_systems: int
 
     @property
@@ -155,7 +161,7 @@ class RobustnessCheck(Result):
 
 def uncertainty_bound(
     systems: Any,
-    nominal: DelayedStateSpace | None = None,
+    nominal: DelayedStateSpace | DelaySystem | None = None,
     omega: ArrayLike | None = None,
     *,
     dead_time_interval: tuple[float, float] | None = None,
@@ -165,11 +171,13 @@ def uncertainty_bound(
     Parameters
     ----------
     systems : Campaign or sequence of systems
-        Models of the same plant; may be empty if only the dead time is uncertain.
-    nominal : DelayedStateSpace, optional
+        Models of the same plant, all discrete or all continuous; may be empty if only the dead time
+        is uncertain.
+    nominal : DelayedStateSpace or DelaySystem, optional
         Default: the campaign's ``system``, or the first of the sequence.
     omega : array_like, optional
-        rad/s, increasing, > 0; default: 400 points up to the Nyquist frequency.
+        rad/s, increasing, > 0; default: 400 points up to the Nyquist frequency, for a continuous
+        system up to a hundred times its fastest pole or the inverse of its dead time.
     dead_time_interval : (float, float), optional
         In s; default: that of the nominal model's identification, if it has one. Its effect is
         added to the spread of the systems, which is computed at their own delays.
@@ -214,25 +222,24 @@ def uncertainty_bound(
         raise OptionError(
             "expected systems or a nominal system, got neither; give nominal and dead_time_interval"
         )
-    plant = delayed_system(nominal, "an uncertainty bound")
+    plant, wait = _plant(nominal)
     warn_unresolved(plant)
     interval = interval_of_dead_time(plant, dead_time_interval)
     if not models and interval is None:
         raise OptionError(
             "no systems to compare and no dead-time interval; give dead_time_interval in s"
         )
-    grid = _grid(plant, omega)
+    grid = _grid(plant, wait, omega)
     base = _response(plant, grid)
     spread = np.zeros(grid.size)
     for model in models:
-        other = delayed_system(model, "an uncertainty bound")
+        other = _plant(model)[0]
         if not np.isclose(other.dt, plant.dt, rtol=1e-6, atol=0):
-            raise DataError(f"a system has dt={other.dt:g} s, the nominal one {plant.dt:g} s")
+            raise DataError(f"a system has dt={other.dt:g} s, the nominal one dt={plant.dt:g} s")
         spread = np.maximum(spread, np.abs(_response(other, grid) / base - 1))
     delay_part = np.zeros(grid.size)
     if interval is not None:
         low, high = interval
-        wait = plant.dead_time - held_fraction(plant)
         off = max(abs(low - wait), abs(high - wait))
         # |exp(-jx) - 1| increases to 2 at x = pi; beyond that a smaller error gives 2.
         delay_part = 2 * np.sin(np.minimum(grid * off, np.pi) / 2)
@@ -313,19 +320,36 @@ def _models(systems: Any) -> list[Any]:
     return list(systems)
 
 
-def _grid(plant: DelayedStateSpace, omega: ArrayLike | None) -> FloatArray:
+def _plant(system: Any) -> tuple[DelayedStateSpace | DelaySystem, float]:
+    """Check a system, and return it with its dead time in s."""
+    if is_continuous(system):
+        _, dead_time = core_and_dead_time(system, "an uncertainty bound")
+        plain = isinstance(system, DelaySystem)
+        return system if plain else DelaySystem(ct.ss(system)), dead_time
+    plant = delayed_system(system, "an uncertainty bound")
+    return plant, float(plant.dead_time) - held_fraction(plant)
+
+
+def _grid(
+    plant: DelayedStateSpace | DelaySystem, wait: float, omega: ArrayLike | None
+) -> FloatArray:
     if omega is None:
-        top = np.pi / plant.dt
-        slow = np.abs(np.log(np.abs(np.asarray(plant.delay_free.poles())) + 1e-12)) / plant.dt
+        if isinstance(plant, DelayedStateSpace):
+            top = 0.999 * np.pi / plant.dt
+            slow = np.abs(np.log(np.abs(np.asarray(plant.delay_free.poles())) + 1e-12)) / plant.dt
+        else:
+            slow = np.abs(plant.core.poles())
+            top = 100 * max(float(slow.max(initial=0.0)), 1 / wait if wait else 0.0) or 1.0
         low = float(
             np.clip(1e-3 * slow[slow > 1e-9 * top].min(initial=top), 1e-8 * top, 0.01 * top)
         )
-        return np.geomspace(low, 0.999 * top, GRID_POINTS)
+        return np.geomspace(low, top, GRID_POINTS)
     grid = numbers(omega, "omega")
     if grid.ndim != 1 or grid.size == 0 or grid[0] <= 0 or np.any(np.diff(grid) <= 0):
         raise DataError("omega must be increasing and > 0, in rad/s")
     return grid
 
 
-def _response(system: DelayedStateSpace, omega: FloatArray) -> ComplexArray:
-    return np.asarray(system.horner(np.exp(1j * omega * system.dt))[0, 0], dtype=np.complex128)
+def _response(system: DelayedStateSpace | DelaySystem, omega: FloatArray) -> ComplexArray:
+    points = np.exp(1j * omega * system.dt) if system.dt else 1j * omega
+    return np.asarray(system.horner(points)[0, 0], dtype=np.complex128)

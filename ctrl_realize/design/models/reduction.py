@@ -17,7 +17,7 @@ from ...numerics.blas_threads import single_threaded
 from ...numerics.state_space.balancing import split_modes
 from ...numerics.state_space.process_models import half_rule, process_step
 from ..resolved import warn_unresolved
-from ..siso import delayed_system, held_fraction, proper_ss
+from ..siso import core_and_dead_time, delayed_system, held_fraction
 from .conversions import ContinuousModel, to_continuous, to_discrete
 from .process_model import ProcessModel
 
@@ -35,7 +35,7 @@ def reduce_fopdt(
 
     Parameters
     ----------
-    system : DelayedStateSpace, ContinuousModel, or a continuous control system
+    system : DelayedStateSpace, ContinuousModel, DelaySystem, or a continuous control system
         One input and one output, stable or with one integrator. An integrating system is reduced to
         ``gain exp(-theta s) / s``.
     method : {"optimal", "half_rule"}, optional
@@ -44,7 +44,7 @@ def reduce_fopdt(
         Skogestad's, from the poles and zeros of the continuous core (a complex pair counts as two
         equal lags with the same sum).
     dead_time : float, optional
-        In s, for a continuous control system.
+        In s, for a continuous control system, in addition to that of a `DelaySystem`.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> Pr
     if isinstance(system, ProcessModel):
         core = ct.ss(system.transfer_function())
         system = ContinuousModel(core, system.dead_time, _resolution(system))
-    continuous, plant = _both_forms(system, dead_time)
+    continuous, plant = both_forms(system, dead_time)
     time, step, integrating, gain = _step_record(plant)
     if method == "half_rule":
         model = _by_half_rule(continuous or to_continuous(plant), order, integrating, gain)
@@ -138,14 +138,18 @@ def _resolution(model: ProcessModel) -> float:
     return max(model.lag + model.second_lag, model.dead_time) / 500
 
 
-def _both_forms(
-    system: Any, dead_time: float | None
+def both_forms(
+    system: Any, dead_time: float | None = None
 ) -> tuple[ContinuousModel | None, DelayedStateSpace]:
+    """Return a plant in continuous time, if it is given so, and sampled.
+
+    A continuous one is sampled so fast that it has no effect.
+    """
     if isinstance(system, ContinuousModel):
         return system, to_discrete(system)
     if isinstance(system, ct.LTI) and (system.dt is None or system.dt == 0):
-        core = proper_ss(system, "a reduction")
-        wait = 0.0 if dead_time is None else dead_time
+        core, wait = core_and_dead_time(system, "a reduction")
+        wait += 0.0 if dead_time is None else dead_time
         speeds = np.abs(core.poles())
         speeds = speeds[speeds > 1e-12]
         span = float(np.sum(1 / speeds)) + wait

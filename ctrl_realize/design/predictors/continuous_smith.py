@@ -11,7 +11,7 @@ from ..._checks import positive
 from ...delayed import DelaySystem
 from ...errors import OptionError, UnsuitableSystemError
 from ..loops.margins import margins
-from ..siso import proper_ss
+from ..siso import core_and_dead_time, proper_ss
 
 ON_AXIS = 1e-9
 
@@ -23,18 +23,8 @@ def continuous_smith_predictor(
 
     One copy of the core serves both models, and the dead time is an internal delay.
     """
-    if not plant.issiso():
-        raise UnsuitableSystemError(
-            f"a Smith predictor needs one input and one output; {plant.name!r} has "
-            f"{plant.ninputs} inputs and {plant.noutputs} outputs"
-        )
-    core, dead_time = plant.delay_apart()
-    if core.internal_delays:
-        raise UnsuitableSystemError(
-            f"{plant.name!r} has internal delays {plant.internal_delays} s; a Smith predictor "
-            "needs a plant with its dead time at the input or output"
-        )
-    unstable = core.core.poles()
+    core, dead_time = core_and_dead_time(plant, "a Smith predictor")
+    unstable = core.poles()
     unstable = unstable[unstable.real > -ON_AXIS * (1 + np.abs(unstable))]
     if unstable.size:
         raise UnsuitableSystemError(

@@ -83,7 +83,8 @@ def lqg(
     Parameters
     ----------
     system : DelayedStateSpace
-        The delays may differ between channels.
+        The delays may differ between channels. For a continuous plant its sampled form,
+        ``sys.to_discrete(dt)``, exact for a dead time at the input.
     Q, R
         As for `predictor_lqr`.
     QN, RN

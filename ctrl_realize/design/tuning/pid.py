@@ -5,20 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from ..._checks import one_of, positive, real
 from ..._parameters import SECONDS, gain_unit
-from ...delayed import DelayedStateSpace
+from ...delayed import DelayedStateSpace, DelaySystem, delay
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
-from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
+from ..loops.loop_check import loop_check, refuse_unstable, warn_of
 from ..loops.margins import margins
+from ..models.conversions import to_discrete
 from ..models.process_model import ProcessModel
 from ..models.reduction import METHODS as REDUCTIONS
-from ..models.reduction import reduce_fopdt, reduce_sopdt
+from ..models.reduction import both_forms, reduce_fopdt, reduce_sopdt
 from ..resolved import check_sign, warn_unresolved
-from ..siso import delayed_system
+from ..siso import core_and_dead_time, delayed_system, is_continuous
 from .controller import DISCRETIZATIONS, PIDController
 from .optimal import optimal
 from .rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
@@ -54,10 +56,11 @@ def pid(
 
     Parameters
     ----------
-    system : DelayedStateSpace or ProcessModel
-        Plant with one input and one output. For a system the controller is discrete with its sample
-        time; the rules then use half a sample more dead time, for the hold. For a process model the
-        controller is continuous unless `dt` is given.
+    system : DelayedStateSpace, DelaySystem or ProcessModel
+        Plant with one input and one output. For a discrete system the controller is discrete with
+        its sample time; the rules then use half a sample more dead time, for the hold. For a
+        process model or a continuous system, with its dead time at input or output, the controller
+        is continuous unless `dt` is given.
     rule : str, optional
         ``"simc"``, ``"lambda"``, ``"imc"``, ``"amigo"``, ``"ziegler_nichols"`` and ``"cohen_coon"``
         use a reduced model; ``"ziegler_nichols_ultimate"`` the exact ultimate gain; ``"optimal"``
@@ -75,7 +78,7 @@ def pid(
     method : {"tustin", "forward", "backward"}, optional
         Discretization of the integral.
     dt : float, optional
-        Sample time in s, for a process model only.
+        Sample time in s, for a process model or a continuous system.
     name : str, optional
 
     Returns
@@ -135,12 +138,16 @@ def pid(
     <PIDController 'PI_simc': kp = 1.356, ti = 0.08 s, dt = 0.001 s>
     >>> cr.design.pid(cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029))
     <PIDController 'PI_simc': kp = 1.379, ti = 0.08 s, continuous>
+    >>> plant = ct.tf([1], [0.08, 1]) * cr.delay(0.029)
+    >>> controller = cr.design.pid(plant)
+    >>> controller.check.margins
+    <Margins stable: gain 3.142, phase 61.35 deg, modulus 0.6298, delay 0.06211 s>
     """
     options = TuningOptions(
         closed_loop_time, max_sensitivity, derivative_filter, reduction, method, dt, name
     )
     made, plant = tuned(system, rule, kind, options)
-    check = closed_on(system, plant, made)
+    check = loop_check(plant, made)
     if not check.stable:
         works = _one_that_works(system, rule, kind, options)
         refuse_unstable(check, f"the {kind} controller of rule={rule!r}", works)
@@ -163,8 +170,11 @@ class TuningOptions:
 
 def tuned(
     system: Any, rule: str, kind: str, options: TuningOptions
-) -> tuple[PIDController, DelayedStateSpace]:
-    """Tune by a rule without checking the loop; return the controller and its plant."""
+) -> tuple[PIDController, DelayedStateSpace | DelaySystem]:
+    """Tune by a rule without checking the loop; return the controller and its plant.
+
+    The plant is in the time base of the controller.
+    """
     rule = one_of(rule, "rule", RULES)
     kind = one_of(kind, "kind", KINDS)
     method = one_of(options.method, "method", DISCRETIZATIONS)
@@ -184,7 +194,7 @@ def tuned(
     limit = real(options.max_sensitivity, "max_sensitivity", "Ms")
     if not 1.01 <= limit <= 10:
         raise OptionError(f"max_sensitivity={limit:g}; expected Ms in 1.01...10")
-    plant, step = reference_plant(system, options.dt)
+    plant, exact, step = reference_plant(system, options.dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
         model = _model(system, plant, rule, kind, options.reduction, step)
@@ -195,7 +205,7 @@ def tuned(
             plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method
         )
     else:
-        kp, ti, td = _ultimate(plant, kind)
+        kp, ti, td = _ultimate(plant, exact, kind)
     units = _units(plant)
     made = PIDController(
         kp,
@@ -210,7 +220,7 @@ def tuned(
         gain_unit=units[0],
         time_unit=units[1],
     )
-    return made, plant
+    return made, exact
 
 
 def _units(plant: DelayedStateSpace) -> tuple[str, str]:
@@ -222,13 +232,6 @@ def _units(plant: DelayedStateSpace) -> tuple[str, str]:
     unit = first.units.get("time", "s")
     ratio = gain_unit(first.input_units[0], first.output_units[0])
     return ratio, unit if unit in SECONDS else "s"
-
-
-def closed_on(system: Any, plant: DelayedStateSpace, controller: PIDController) -> LoopCheck:
-    """Check a controller on the system that it was tuned for, `plant` in discrete form."""
-    if isinstance(system, ProcessModel) and not controller.dt:
-        return loop_check(system.transfer_function(), controller, system.dead_time)
-    return loop_check(plant, controller)
 
 
 def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
@@ -249,30 +252,44 @@ def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -
             made, plant = tuned(system, name, form, changed)
         except ValueError:
             continue
-        found = closed_on(system, plant, made).margins
+        found = loop_check(plant, made).margins
         if found.stable and found.ms <= MOST_SENSITIVE:
             how = f"rule={name!r}, kind={form!r}, reduction={reduction!r}"
             return f"Use {how}, which is stable on it with Ms = {found.ms:.3g}"
     return "No other rule does better; see design.compare_pid, or use design.lqg"
 
 
-def reference_plant(system: Any, dt: float | None) -> tuple[DelayedStateSpace, float]:
-    """Discrete plant, and the sample time of the controller (0: continuous)."""
+def reference_plant(
+    system: Any, dt: float | None
+) -> tuple[DelayedStateSpace, DelayedStateSpace | DelaySystem, float]:
+    """Discrete plant, the plant in the time base of the controller, and its sample time.
+
+    A continuous controller, with a sample time of 0, is tuned on a plant sampled so fast that it
+    has no effect.
+    """
     if isinstance(system, ProcessModel):
-        if dt is not None:
-            step = positive(dt, "dt", "sample time in s")
-            return system.system(step), step
-        # A continuous controller is tuned on a plant sampled so fast that it has no effect.
-        return system.system(system.total_time / FINE), 0.0
+        if dt is None:
+            exact = DelaySystem(ct.ss(system.transfer_function())) * delay(system.dead_time)
+            return system.system(system.total_time / FINE), exact, 0.0
+        step = positive(dt, "dt", "sample time in s")
+        plant = system.system(step)
+        return plant, plant, step
+    if is_continuous(system):
+        if dt is None:
+            exact = system if isinstance(system, DelaySystem) else DelaySystem(ct.ss(system))
+            return both_forms(system)[1], exact, 0.0
+        core, dead_time = core_and_dead_time(system, "a PID controller")
+        plant = to_discrete(core, dead_time, dt)
+        return plant, plant, float(plant.dt)
     plant = delayed_system(system, "a PID controller")
     check_sign(plant, "a PID controller")
     warn_unresolved(plant)
     if dt is not None:
         raise OptionError(
-            f"dt={dt:g} is an argument for process models; the controller of a sampled system "
-            f"has its sample time, {plant.dt:g} s"
+            f"dt={dt:g} is an argument for process models and continuous systems; the controller "
+            f"of a sampled system has its sample time, {plant.dt:g} s"
         )
-    return plant, float(plant.dt)
+    return plant, plant, float(plant.dt)
 
 
 def _model(
@@ -284,7 +301,8 @@ def _model(
         if system.second_lag and not second:
             found = reduce_fopdt(system, method=reduction)
     else:
-        found = (reduce_sopdt if second else reduce_fopdt)(plant, method=reduction)
+        given = system if is_continuous(system) else plant
+        found = (reduce_sopdt if second else reduce_fopdt)(given, method=reduction)
     # A held controller output is half a sample old on average.
     return replace(found, dead_time=found.dead_time + step / 2)
 
@@ -295,11 +313,13 @@ def _total_time(system: Any, plant: DelayedStateSpace) -> float:
     return reduce_sopdt(plant).total_time + float(plant.dt)
 
 
-def _ultimate(plant: DelayedStateSpace, kind: str) -> Parameters:
+def _ultimate(
+    plant: DelayedStateSpace, exact: DelayedStateSpace | DelaySystem, kind: str
+) -> Parameters:
     if np.any(np.abs(np.asarray(plant.delay_free.poles())) > 1 + 1e-9):
         raise UnsuitableSystemError("the plant is unstable and has no ultimate gain")
     reverse = bool(np.real(plant.step(plant.delay + SETTLED)[-1]) < 0)
-    found = margins(-plant if reverse else plant)
+    found = margins(-exact if reverse else exact)
     if found.gain_margins.size == 0:
         raise UnsuitableSystemError(
             "the phase of the plant never reaches -180 deg: it has no ultimate gain"

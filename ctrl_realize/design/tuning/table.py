@@ -147,8 +147,9 @@ def compare_pid(
 
     Parameters
     ----------
-    system : DelayedStateSpace or ProcessModel
-        See `pid`. A process model is sampled finely (1000 samples per total time).
+    system : DelayedStateSpace, DelaySystem or ProcessModel
+        See `pid`. For the responses of a continuous plant and controller both are sampled finely
+        (1000 samples per total time).
     rules : sequence of str, optional
         All by default.
     kinds : sequence of str, optional
@@ -182,7 +183,7 @@ def compare_pid(
     tried = [one_of(rule, "rule", RULES) for rule in rules or RULES]
     kinds = [one_of(kind, "kind", KINDS) for kind in kinds]
     settings = TuningOptions(**options)
-    plant, _ = reference_plant(system, settings.dt)
+    plant, _, _ = reference_plant(system, settings.dt)
     total = _span(system, plant)
     made: list[tuple[PIDController, Margins, Performance]] = []
     refused: list[tuple[str, str, str]] = []
@@ -191,13 +192,13 @@ def compare_pid(
             if kind not in kinds_of(rule):
                 continue
             try:
-                controller, _ = tuned(system, rule, kind, settings)
+                controller, exact = tuned(system, rule, kind, settings)
             except ValueError as error:
                 # A rule that does not apply to this plant becomes a row of the result.
                 refused.append((rule, kind, str(error)))
                 continue
             sampled = controller if controller.dt else controller.discretised(plant.dt)
-            check = loop_check(plant, sampled)
+            check = loop_check(exact, controller)
             reached = _performance(plant, sampled, total) if check.stable else UNSTABLE
             made.append((controller.checked(check), check.margins, reached))
     if not made:
