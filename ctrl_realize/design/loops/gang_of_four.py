@@ -53,7 +53,7 @@ def gang_of_four(plant: Any, controller: Any) -> Any:
     >>> plant = ct.tf([2], [1, 1]) * cr.delay(0.3)
     >>> four = cr.design.gang_of_four(plant, ct.tf([0.8, 0.8], [1, 0]))
     >>> four
-    <DelaySystem: r, d -> y, v, order 2, internal delay 0.3 s, continuous>
+    <DelaySystem 'gang_of_four': r, d -> y, v, order 2, internal delay 0.3 s, continuous>
     >>> print(abs(four(0.01j)).round(2))
     [[1.   0.01]
      [0.5  0.01]]
@@ -66,7 +66,7 @@ def gang_of_four(plant: Any, controller: Any) -> Any:
     # plant input v = d + u, controller input e = r - y; inputs (d, r), outputs (y, u)
     loop = both.feedback(np.array([[0.0, 1.0], [-1.0, 0.0]]), sign=1)
     four = (loop + np.array([[0.0, 0.0], [1.0, 0.0]]))[:, ::-1]
-    four.update_names(inputs=["r", "d"], outputs=["y", "v"])
+    four.update_names(name="gang_of_four", inputs=["r", "d"], outputs=["y", "v"])
     return four
 
 

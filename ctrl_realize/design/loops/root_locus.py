@@ -74,7 +74,7 @@ def root_locus(system: Any, gains: ArrayLike | None = None, *, count: int = 10) 
     >>> plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=1.0, dt=0.001)
     >>> locus = cr.design.root_locus(plant, [0.5, 1.0, 1.1])
     >>> print(np.abs(locus.loci).max(axis=1).round(4))
-    [0.9994 1.     1.0001]
+    [0.9993 1.     1.0001]
     """
     wanted = whole(count, "count", 1)
     loop = _with_delays(system)

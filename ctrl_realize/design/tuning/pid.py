@@ -5,24 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..._checks import one_of, positive, real
 from ..._parameters import SECONDS, gain_unit
-from ...delayed import DelayedStateSpace, DelaySystem, delay
+from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
 from ..loops.loop_check import loop_check, refuse_unstable, warn_of
 from ..loops.margins import margins
-from ..models.conversions import to_discrete
 from ..models.process_model import ProcessModel
 from ..models.reduction import METHODS as REDUCTIONS
-from ..models.reduction import both_forms, reduce_fopdt, reduce_sopdt
-from ..resolved import check_sign, warn_unresolved
-from ..siso import core_and_dead_time, delayed_system, is_continuous
 from .controller import DISCRETIZATIONS, PIDController
 from .optimal import optimal
+from .plant import reduced, reference_plant, total_time
 from .rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
 
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
@@ -32,8 +28,6 @@ SAFE = ("amigo", "simc", "lambda")
 MOST_SENSITIVE = 2.0
 """Largest Ms of a suggested loop: gain and phase margin are then at least 2 and 29 deg (Astrom and
 Hagglund, Advanced PID Control, 2006, chapter 4)."""
-FINE = 1000
-"""Samples within the total time of a process model, so many that sampling has no effect."""
 SETTLED = 10_000
 """Samples after the delay at which a step response has the sign of the gain."""
 
@@ -141,7 +135,7 @@ def pid(
     >>> plant = ct.tf([1], [0.08, 1]) * cr.delay(0.029)
     >>> controller = cr.design.pid(plant)
     >>> controller.check.margins
-    <Margins stable: gain 3.142, phase 61.35 deg, modulus 0.6298, delay 0.06211 s>
+    <Margins stable: gain 3.142, phase 61.35 deg, modulus 0.6287, delay 0.06211 s>
     """
     options = TuningOptions(
         closed_loop_time, max_sensitivity, derivative_filter, reduction, method, dt, name
@@ -197,10 +191,10 @@ def tuned(
     plant, exact, step = reference_plant(system, options.dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
-        model = _model(system, plant, rule, kind, options.reduction, step)
+        model = reduced(system, plant, rule, kind, options.reduction, step)
         kp, ti, td = MODEL_RULES[rule][0](model, kind, target)
     elif rule == "optimal":
-        total = _total_time(system, plant)
+        total = total_time(system, plant)
         kp, ti, td = optimal(
             plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method
         )
@@ -257,60 +251,6 @@ def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -
             how = f"rule={name!r}, kind={form!r}, reduction={reduction!r}"
             return f"Use {how}, which is stable on it with Ms = {found.ms:.3g}"
     return "No other rule does better; see design.compare_pid, or use design.lqg"
-
-
-def reference_plant(
-    system: Any, dt: float | None
-) -> tuple[DelayedStateSpace, DelayedStateSpace | DelaySystem, float]:
-    """Discrete plant, the plant in the time base of the controller, and its sample time.
-
-    A continuous controller, with a sample time of 0, is tuned on a plant sampled so fast that it
-    has no effect.
-    """
-    if isinstance(system, ProcessModel):
-        if dt is None:
-            exact = DelaySystem(ct.ss(system.transfer_function())) * delay(system.dead_time)
-            return system.system(system.total_time / FINE), exact, 0.0
-        step = positive(dt, "dt", "sample time in s")
-        plant = system.system(step)
-        return plant, plant, step
-    if is_continuous(system):
-        if dt is None:
-            exact = system if isinstance(system, DelaySystem) else DelaySystem(ct.ss(system))
-            return both_forms(system)[1], exact, 0.0
-        core, dead_time = core_and_dead_time(system, "a PID controller")
-        plant = to_discrete(core, dead_time, dt)
-        return plant, plant, float(plant.dt)
-    plant = delayed_system(system, "a PID controller")
-    check_sign(plant, "a PID controller")
-    warn_unresolved(plant)
-    if dt is not None:
-        raise OptionError(
-            f"dt={dt:g} is an argument for process models and continuous systems; the controller "
-            f"of a sampled system has its sample time, {plant.dt:g} s"
-        )
-    return plant, plant, float(plant.dt)
-
-
-def _model(
-    system: Any, plant: DelayedStateSpace, rule: str, kind: str, reduction: str, step: float
-) -> ProcessModel:
-    second = rule == "simc" and "D" in kind
-    if isinstance(system, ProcessModel):
-        found = system
-        if system.second_lag and not second:
-            found = reduce_fopdt(system, method=reduction)
-    else:
-        given = system if is_continuous(system) else plant
-        found = (reduce_sopdt if second else reduce_fopdt)(given, method=reduction)
-    # A held controller output is half a sample old on average.
-    return replace(found, dead_time=found.dead_time + step / 2)
-
-
-def _total_time(system: Any, plant: DelayedStateSpace) -> float:
-    if isinstance(system, ProcessModel):
-        return system.total_time
-    return reduce_sopdt(plant).total_time + float(plant.dt)
 
 
 def _ultimate(

@@ -16,7 +16,8 @@ from ..loops.margin_result import Margins
 from ..loops.performance import Performance, measured, plant_time, settled_responses
 from ..models.process_model import ProcessModel
 from .controller import PIDController
-from .pid import KINDS, RULES, TuningOptions, reference_plant, tuned
+from .pid import KINDS, RULES, TuningOptions, tuned
+from .plant import reference_plant
 from .rules import kinds_of
 
 if TYPE_CHECKING:

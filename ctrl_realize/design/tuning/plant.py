@@ -1,0 +1,76 @@
+"""The plant of a tuning rule: sampled, in the time base of the controller, and reduced."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import control as ct
+
+from ..._checks import positive
+from ...delayed import DelayedStateSpace, DelaySystem, delay
+from ...errors import OptionError
+from ..models.conversions import to_discrete
+from ..models.process_model import ProcessModel
+from ..models.reduction import both_forms, reduce_fopdt, reduce_sopdt
+from ..resolved import check_sign, warn_unresolved
+from ..siso import core_and_dead_time, delayed_system, is_continuous
+
+FINE = 1000
+"""Samples within the total time of a process model, so many that sampling has no effect."""
+
+
+def reference_plant(
+    system: Any, dt: float | None
+) -> tuple[DelayedStateSpace, DelayedStateSpace | DelaySystem, float]:
+    """Discrete plant, the plant in the time base of the controller, and its sample time.
+
+    A continuous controller, with a sample time of 0, is tuned on a plant sampled so fast that it
+    has no effect.
+    """
+    if isinstance(system, ProcessModel):
+        if dt is None:
+            exact = DelaySystem(ct.ss(system.transfer_function())) * delay(system.dead_time)
+            return system.system(system.total_time / FINE), exact, 0.0
+        step = positive(dt, "dt", "sample time in s")
+        plant = system.system(step)
+        return plant, plant, step
+    if is_continuous(system):
+        if dt is None:
+            exact = system if isinstance(system, DelaySystem) else DelaySystem(ct.ss(system))
+            return both_forms(system)[1], exact, 0.0
+        core, dead_time = core_and_dead_time(system, "a PID controller")
+        plant = to_discrete(core, dead_time, dt)
+        return plant, plant, float(plant.dt)
+    plant = delayed_system(system, "a PID controller")
+    check_sign(plant, "a PID controller")
+    warn_unresolved(plant)
+    if dt is not None:
+        raise OptionError(
+            f"dt={dt:g} is an argument for process models and continuous systems; the controller "
+            f"of a sampled system has its sample time, {plant.dt:g} s"
+        )
+    return plant, plant, float(plant.dt)
+
+
+def reduced(
+    system: Any, plant: DelayedStateSpace, rule: str, kind: str, reduction: str, step: float
+) -> ProcessModel:
+    """Reduce the plant to the model that a rule needs, with the dead time of the hold."""
+    second = rule == "simc" and "D" in kind
+    if isinstance(system, ProcessModel):
+        found = system
+        if system.second_lag and not second:
+            found = reduce_fopdt(system, method=reduction)
+    else:
+        given = system if is_continuous(system) else plant
+        found = (reduce_sopdt if second else reduce_fopdt)(given, method=reduction)
+    # A held controller output is half a sample old on average.
+    return replace(found, dead_time=found.dead_time + step / 2)
+
+
+def total_time(system: Any, plant: DelayedStateSpace) -> float:
+    """Dead time and lags of the plant together, in s."""
+    if isinstance(system, ProcessModel):
+        return system.total_time
+    return reduce_sopdt(plant).total_time + float(plant.dt)
