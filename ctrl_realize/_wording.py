@@ -2,18 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 import numpy as np
 
 from .numerics.arrays import FloatArray
 
-UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6}
+UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6, "min": 1 / 60, "h": 1 / 3600, "day": 1 / 86400}
 """Name of a unit of time -> number of it in a second."""
+
+_SHOWN: ContextVar[str] = ContextVar("unit of time in which texts are written", default="s")
+
+_SLOW = ("min", "h", "day")
+_SLOW_HZ = 1e-3  # below which a frequency tells less than its period
+
+
+@contextmanager
+def times_in(unit: str) -> Iterator[None]:
+    """Write times in a unit, such as that of a record, in the block; s is s, ms or µs by size.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import in_time, times_in
+    >>> with times_in("min"):
+    ...     in_time(2700.0), in_time(3.0)
+    ('45 min', '0.05 min')
+    """
+    token = _SHOWN.set(unit)
+    try:
+        yield
+    finally:
+        _SHOWN.reset(token)
 
 
 def time_unit(largest: float) -> tuple[float, str]:
-    """Choose s, ms or µs for times up to `largest` s; returns (units per second, name).
+    """Choose a unit for times up to `largest` s; returns (units per second, name).
+
+    That of `times_in`; for seconds s, ms or µs by size.
 
     Examples
     --------
@@ -21,6 +48,9 @@ def time_unit(largest: float) -> tuple[float, str]:
     >>> time_unit(3.0), time_unit(0.029)
     ((1.0, 's'), (1000.0, 'ms'))
     """
+    shown = _SHOWN.get()
+    if shown != "s":
+        return UNITS[shown], shown
     name = "s" if largest >= 0.5 else "ms" if largest >= 0.5e-3 else "µs"
     return UNITS[name], name
 
@@ -50,6 +80,8 @@ def poles_in_words(poles: Iterable[complex]) -> str:
     >>> from ctrl_realize._wording import poles_in_words
     >>> poles_in_words([-2.0, -20 + 99j, -20 - 99j, 0.0])
     'lag 0.5 s, pair at 16.1 Hz (damping 0.2), integrator'
+    >>> poles_in_words([-0.0004 + 0.0003j, -0.0004 - 0.0003j])
+    'pair with a period of 12566 s (damping 0.8)'
     >>> poles_in_words([-1300 + 10700j, -1300 - 10700j])
     'pair at 1715 Hz (damping 0.12)'
     """
@@ -62,8 +94,25 @@ def _pole_in_words(pole: complex) -> str:
         return "integrator"
     size = abs(pole)
     if pole.imag > 0:
-        return f"pair at {plainly(size / (2 * np.pi), 3)} Hz (damping {-pole.real / size:.2g})"
+        damping = f"(damping {-pole.real / size:.2g})"
+        if _SHOWN.get() in _SLOW or size < 2 * np.pi * _SLOW_HZ:
+            return f"pair with a period of {in_time(2 * np.pi / size)} {damping}"
+        return f"pair at {plainly(size / (2 * np.pi), 3)} Hz {damping}"
     return f"{'lag' if pole.real < 0 else 'growing in'} {in_time(1 / size)}"
+
+
+def rate_in_time(per_second: float, digits: int = 3) -> str:
+    """Write a slope per unit of time.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import rate_in_time, times_in
+    >>> with times_in("min"):
+    ...     rate_in_time(0.5)
+    '30 per min'
+    """
+    shown = _SHOWN.get()
+    return f"{per_second / UNITS[shown]:.{digits}g} per {shown}"
 
 
 def interval_in_time(low: float, high: float) -> str:

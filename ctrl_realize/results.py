@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
+from ._parameters import SECONDS, checked_time_unit, formula, parameter_table
 from ._parameters import Parameter as Parameter
-from ._parameters import checked_time_unit, formula, parameter_table
 from ._shown import html_card, text_card
+from ._wording import times_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,6 +182,8 @@ class ModelFit(Result):
         without `parameters`.
     time_unit : str
         Unit of time of the records (``"s"``, ``"min"``, ...), in which results are written.
+    input_unit, output_unit : str
+        Of the signals; empty if they are not known.
     sampling : str or None
         Sampling of the impulse response that the model was realized from.
     records : tuple of Record
@@ -292,7 +295,39 @@ class ModelFit(Result):
     @property
     def time_unit(self) -> str:
         """Unit of time in which results are written: that of the records."""
-        return "s"
+        unit = self.records[0].units.get("time", "s") if self.records else "s"
+        return unit if unit in SECONDS else "s"
+
+    @property
+    def input_unit(self) -> str:
+        """Unit of the input; empty if it is not known, or there are several inputs."""
+        return _common(self.records[0].input_units) if self.records else ""
+
+    @property
+    def output_unit(self) -> str:
+        """Unit of the output; empty if it is not known, or there are several outputs."""
+        return _common(self.records[0].output_units) if self.records else ""
+
+    def report(self, *, time_unit: str | None = None) -> str:
+        """Return the result as plain text, choices and flags included.
+
+        Parameters
+        ----------
+        time_unit : {"ms", "s", "min", "h", "day"}, optional
+            Of its rows. Default: `time_unit` of the fit.
+
+        Raises
+        ------
+        OptionError
+            Another unit of time.
+        """
+        unit = self.time_unit if time_unit is None else checked_time_unit(time_unit)
+        with times_in(unit):
+            return super().report()
+
+    def _repr_html_(self) -> str:
+        with times_in(self.time_unit):
+            return super()._repr_html_()
 
     @property
     def formula(self) -> str:
@@ -344,6 +379,10 @@ class ModelFit(Result):
     def _method(self) -> str:
         """Name of the method, in words."""
         return "model with dead time"
+
+
+def _common(units: tuple[str, ...]) -> str:
+    return units[0] if len(units) == 1 else ""
 
 
 class FractionalDelayFit(ModelFit):

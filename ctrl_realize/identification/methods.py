@@ -12,6 +12,7 @@ import numpy as np
 from .._checks import one_of, whole
 from ..data import Record, StepResponse
 from ..data.given import as_records
+from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
@@ -55,6 +56,7 @@ SCANNED_ORDERS = range(1, 6)
 
 
 @single_threaded
+@in_shown_units
 def identify(
     record: Record | Sequence[Record],
     *,

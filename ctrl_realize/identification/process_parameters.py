@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._parameters import SECONDS, Parameter, gain_unit, slope_unit
-from ..data import Record
+from .._parameters import Parameter, slope_unit
 from ..numerics.constants import Z_95
 from ..numerics.parameters.physical import ProcessParameter
 
@@ -16,7 +15,7 @@ Interval = tuple[float, float]
 
 def with_intervals(
     found: Sequence[ProcessParameter],
-    records: Sequence[Record],
+    ratio: str,
     *,
     gain: tuple[float, float, Interval],
     dead_time: tuple[float, Interval],
@@ -27,8 +26,8 @@ def with_intervals(
     Parameters
     ----------
     found : sequence of ProcessParameter
-    records : sequence of Record
-        Those that were fitted; the first has the units.
+    ratio : str
+        Unit of the output over that of the input; empty if they are not known.
     gain : tuple
         Value, standard error for the structure, and interval for all structures.
     dead_time : tuple
@@ -36,7 +35,6 @@ def with_intervals(
     integrating : bool
         Whether the gain is a slope.
     """
-    ratio = ratio_unit(records)
     parameters = []
     for name, value, std in found:
         if name == "gain":
@@ -57,17 +55,3 @@ def with_intervals(
                 Parameter(name, value, std, value - reach, value + reach, False, unit, times)
             )
     return tuple(parameters)
-
-
-def ratio_unit(records: Sequence[Record]) -> str:
-    """Unit of the gain: that of the output over that of the input; empty if not known."""
-    if not records:
-        return ""
-    first = records[0]
-    return gain_unit(first.output_units[0], first.input_units[0])
-
-
-def time_unit_of(records: Sequence[Record]) -> str:
-    """Unit of time in which results of these records are written."""
-    unit = records[0].units.get("time", "s") if records else "s"
-    return unit if unit in SECONDS else "s"

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast, get_args
 import numpy as np
 
 from .._parameters import SECONDS, Parameter
+from .._wording import times_in
 from ..errors import FileFormatError
 from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
 from .json_content import MAX_TEXT, field
@@ -27,6 +28,7 @@ _KEPT = (
     "delay", "order", "dead_time", "dead_time_interval", "interval", "delay_interval",
     "total_delay", "total_delay_interval", "gain", "gain_interval", "gain_std_given_structure",
     "onset", "interval_kind", "residual_std", "sampling", "time_unit", "integrators",
+    "input_unit", "output_unit",
 )  # fmt: skip
 """Attributes that are stored if the fit has them."""
 _MAX_ROWS = 200
@@ -181,7 +183,17 @@ class FitSummary(ModelFit):
     def time_unit(self) -> str:
         """Unit of time in which results are written."""
         unit = _text(self._value("time_unit"))
-        return unit if unit in SECONDS else "s"
+        return unit if unit is not None and unit in SECONDS else "s"
+
+    @property
+    def input_unit(self) -> str:
+        """Unit of the input; empty if it is not known."""
+        return _text(self._value("input_unit")) or ""
+
+    @property
+    def output_unit(self) -> str:
+        """Unit of the output; empty if it is not known."""
+        return _text(self._value("output_unit")) or ""
 
     @property
     def integrators(self) -> int:
@@ -231,10 +243,13 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     if fit.parameters:
         values["formula"] = fit.formula
         values["parameters"] = _plain([tuple(vars(one).values()) for one in fit.parameters])
+    with times_in(fit.time_unit):
+        rows = tuple((str(label), str(value)) for label, value in fit._rows())
+        title = fit._title()
     return FitSummary(
         kind=type(fit).__name__,
-        title=fit._title(),
-        rows=tuple((str(label), str(value)) for label, value in fit._rows()),
+        title=title,
+        rows=rows,
         values=tuple(pair for pair in values.items() if pair[1] is not None),
         flags=fit.flags,
         choices=fit.choices,

@@ -15,7 +15,7 @@ from ..errors import OptionError
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.step.steps import unit_step
 from . import style
-from .names import plain, wrapped
+from .names import plain, with_unit, wrapped
 from .shared_docs import documented
 from .style import axis_time_unit
 
@@ -183,7 +183,7 @@ def _output_label(result: OutputErrorFit) -> str:
     if _averaged(result):  # records with different steps were scaled before they were averaged
         return "unit step\nresponse"
     label = result.records[0].output_labels[0] if result.records else "y"
-    return "output" if label == "y" else wrapped(label, 18)
+    return wrapped(with_unit("output" if label == "y" else label, result.output_unit), 18)
 
 
 def evidence_height(result: OutputErrorFit) -> float:

@@ -42,6 +42,18 @@ def _shown(text: str, longest: int) -> str:
     return shown or "signal"
 
 
+def with_unit(label: str, unit: str) -> str:
+    """Add a unit to the name of a signal, unless it contains it already.
+
+    Examples
+    --------
+    >>> from ctrl_realize.plots.names import with_unit
+    >>> with_unit("T", "degC"), with_unit("T [degC]", "degC"), with_unit("u", "")
+    ('T [degC]', 'T [degC]', 'u')
+    """
+    return f"{label} [{unit}]" if unit and f"[{unit}]" not in label else label
+
+
 @cache
 def _letters(families: tuple[str, ...], sans: tuple[str, ...]) -> frozenset[int]:
     """Code points that the fonts of these families contain."""

@@ -19,7 +19,7 @@ from ..identification.step.steps import unit_step
 from ..numerics.arrays import FloatArray
 from . import style
 from .delays import mark_dead_time
-from .names import plain, wrapped
+from .names import plain, with_unit, wrapped
 from .shared_docs import documented
 from .style import axis_time_unit
 
@@ -59,8 +59,8 @@ def record_plot(
         time = factor * record.time
         measured = _signals(upper, time, record.output, record.output_labels, **kwargs)
         driven = _signals(lower, time, record.input, record.input_labels, color=style.INPUT)
-        upper.set_ylabel(_axis_label(record.output_labels, "output"))
-        lower.set_ylabel(_axis_label(record.input_labels, "input", 16))
+        upper.set_ylabel(_axis_label(record.output_labels, record.output_units, "output"))
+        lower.set_ylabel(_axis_label(record.input_labels, record.input_units, "input", 16))
         lower.set_xlabel(f"time [{unit}]")
         several = [row for row, n in enumerate((record.noutputs, record.ninputs)) if n > 1]
         return style.finished([upper, lower], [measured, driven], legends=several)
@@ -240,8 +240,8 @@ def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
     return float(min(max(3 * wait, 1.3 * rise, 12 * step.dt), step.time[-1]))
 
 
-def _axis_label(labels: Sequence[str], kind: str, width: int = 26) -> str:
+def _axis_label(labels: Sequence[str], units: Sequence[str], kind: str, width: int = 26) -> str:
     if len(labels) > 1:
         return f"{kind}s"
     default = {"output": "y", "input": "u"}[kind]
-    return kind if labels[0] == default else wrapped(labels[0], width)
+    return wrapped(with_unit(kind if labels[0] == default else labels[0], units[0]), width)

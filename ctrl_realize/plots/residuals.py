@@ -18,7 +18,7 @@ from ..identification.validation.prediction import Prediction
 from ..identification.validation.residuals_result import ResidualAnalysis
 from ..numerics.arrays import FloatArray
 from . import style
-from .names import plain, wrapped
+from .names import plain, with_unit, wrapped
 from .shared_docs import documented
 from .style import axis_time_unit
 
@@ -141,7 +141,9 @@ def model_comparison_plot(
         axes[1].sharex(axes[0])
         axes[0].tick_params(labelbottom=False)
         axes[1].set_xlabel(f"time [{unit}]")
-        axes[0].set_ylabel(wrapped(record.output_labels[row], 16))
+        axes[0].set_ylabel(
+            wrapped(with_unit(record.output_labels[row], record.output_units[row]), 16)
+        )
         axes[1].set_ylabel("residual")
         axes[2].set_ylabel("residual with\nitself")
         axes[3].set_ylabel("residual with\ninput before")
@@ -220,7 +222,7 @@ def _signals(
     settings = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": label, **looks}
     lines = axes.plot(time, measured, color=style.MEASURED, label="measured")
     lines += axes.plot(time, values, **settings)
-    axes.set_ylabel(wrapped(record.output_labels[row], 16))
+    axes.set_ylabel(wrapped(with_unit(record.output_labels[row], record.output_units[row]), 16))
     axes.set_xlabel(f"time [{unit}]")
     return list(lines)
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar, cast
+
+from ..data.shown_units import in_shown_units
 
 Plot = TypeVar("Plot", bound=Callable[..., object])
 
@@ -19,6 +21,8 @@ control.ControlPlot"""
 def documented(axes: str = "Axes") -> Callable[[Plot], Plot]:
     """Add `ax`, `title` and the returned plot to the docstring of a plot function.
 
+    Times on its axes have the unit of what is drawn.
+
     Parameters
     ----------
     axes : str
@@ -26,9 +30,10 @@ def documented(axes: str = "Axes") -> Callable[[Plot], Plot]:
     """
     shared = {"ax": f"ax : {axes} or Figure, optional\n    Default: a new figure.", "title": _TITLE}
 
-    def complete(function: Plot) -> Plot:
+    def complete(plot: Plot) -> Plot:
+        function: Any = in_shown_units(plot)
         if function.__doc__ is None:  # python -OO
-            return function
+            return cast("Plot", function)
         arguments = inspect.signature(function).parameters
         text = inspect.cleandoc(function.__doc__)
         head, rest = re.split(r"\n\n(?=Raises\n-|Examples\n-)", text, maxsplit=1)
@@ -36,6 +41,6 @@ def documented(axes: str = "Axes") -> Callable[[Plot], Plot]:
         entries = [entry for name, entry in shared.items() if name in arguments]
         head = "\n".join([head, *entries]) + keywords + looks
         function.__doc__ = "\n\n".join([head, _RETURNS, rest]) + "\n"
-        return function
+        return cast("Plot", function)
 
     return complete

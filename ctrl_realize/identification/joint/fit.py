@@ -12,6 +12,7 @@ import numpy as np
 from ..._wording import in_time
 from ...data import Record
 from ...data.given import as_records
+from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
 from ...frequency.fit_frf import fit_frf
 from ...frequency.frf_fit import FRFFit
@@ -40,6 +41,7 @@ _LEAST = 1e-6  # of the response: noise of exact points, for which the weights m
 
 
 @single_threaded
+@in_shown_units
 def fit_joint(
     records: Record | Sequence[Record],
     frf: ct.FrequencyResponseData,

@@ -14,6 +14,7 @@ from ..._checks import one_of, positive
 from ..._wording import named
 from ...data import Record, StepEdge
 from ...data.given import as_records, check_input
+from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
 from ...errors import DataError, NoStepError
 from ...numerics.arrays import FloatArray
@@ -57,6 +58,7 @@ _DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 
 
 @single_threaded
+@in_shown_units
 def fit_output_error(
     records: Record | Sequence[Record],
     *,

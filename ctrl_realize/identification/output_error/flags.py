@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..._wording import in_time, interval_in_time, plainly, time_within
+from ..._wording import in_time, interval_in_time, plainly, rate_in_time, time_within
 from ...numerics.arrays import FloatArray
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate
@@ -268,10 +268,8 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
         flags.append(
             Flag(
                 "drift",
-                (
-                    f"a drift of {data.drift / data.dt:.3g} per s was estimated together with the "
-                    "model"
-                ),
+                f"a drift of {rate_in_time(data.drift / data.dt)} was estimated together with the "
+                "model",
             )
         )
     if data.hum:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._parameters import Parameter
+from ..._parameters import Parameter, gain_unit
 from ..._wording import (
     in_time,
     interval_in_time,
@@ -23,7 +23,7 @@ from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
-from ..process_parameters import time_unit_of, with_intervals
+from ..process_parameters import with_intervals
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
@@ -211,16 +211,11 @@ class OutputErrorFit(FractionalDelayFit):
         """
         return with_intervals(
             self.estimate.parameters,
-            self.records,
+            gain_unit(self.output_unit, self.input_unit),
             gain=(self.gain, self.gain_std_given_structure, self.gain_interval),
             dead_time=(self.std_given_structure, self.interval),
             integrating=self.integrators > 0,
         )
-
-    @property
-    def time_unit(self) -> str:
-        """Unit of time of the records, in which results are written."""
-        return time_unit_of(self.records)
 
     @property
     def at_noise_level(self) -> bool:

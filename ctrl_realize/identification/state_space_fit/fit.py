@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..._checks import whole
 from ...data import Record
+from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.simulation import as_delayed
 from ...errors import DataError, OptionError, OrderError, UnsuitableSystemError
@@ -26,6 +27,7 @@ from .starts import from_starts
 
 
 @single_threaded
+@in_shown_units
 def fit_state_space(
     records: Record | Sequence[Record],
     order: int | Sequence[int] | None = None,

@@ -115,3 +115,27 @@ def test_a_model_file_keeps_the_parameters(tmp_path):
 )
 def test_an_estimate_is_rounded_like_its_error(value, error, text):
     assert cr.results.Parameter("lag_1", value, error).text() == text
+
+
+def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
+    t = 60.0 * np.arange(400)
+    after = np.clip(t - 60 * 100 - 360, 0, None)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(t.size)
+    y = 20 - 8 * np.expm1(-after / 2400) + 2e-4 * t + noise
+    units = {"u": "%", "y": "degC", "time": "min"}
+    record = cr.Record(t, 30 + 10 * (t >= 6000), y, units=units)
+    system = cr.fit_output_error(record, structures="FOPDT")
+    rows = dict(line.strip().split("  ", 1) for line in system.fit.report().splitlines()[1:5])
+    assert rows["dead time"].strip().startswith("6.0") and " min = 6.0" in rows["dead time"]
+    assert rows["95 % interval"].endswith(" min")
+    flag = next(flag for flag in system.fit.flags if flag.code == "drift")
+    assert flag.message.startswith("a drift of 0.012 per min")
+    assert system.fit.plot().figure.axes[1].get_xlabel() == "time [min]"
+    above, below = record.plot().figure.axes
+    assert (above.get_ylabel(), below.get_ylabel()) == ("output [degC]", "input [%]")
+    assert below.get_xlabel() == "time [min]"
+    cr.save_model(tmp_path / "furnace.json", system)
+    again = cr.load_model(tmp_path / "furnace.json").fit
+    assert again.report() == system.fit.report()
+    assert (again.output_unit, again.input_unit, again.time_unit) == ("degC", "%", "min")
+    assert " h = 6.0" in system.fit.report(time_unit="h")
