@@ -88,7 +88,8 @@ class Parameter:
         """Name in words."""
         base, _, number = self.name.rpartition("_")
         if base in _LABELS and number.isdigit():
-            return _LABELS[base] + (f" {number}" if number != "1" else "")
+            alone = number == "1" and not base.startswith("l")  # one pair, but several lags
+            return _LABELS[base] + ("" if alone else f" {number}")
         return _LABELS.get(self.name, self.name)
 
     def in_time_unit(self, unit: str) -> Parameter:

@@ -41,11 +41,12 @@ def shown_time_unit(given: Any) -> str:
 
 
 def in_shown_units(function: Callable[P, T]) -> Callable[P, T]:
-    """Write times in the unit of the first argument while a function runs."""
+    """Write times in the unit of the first argument that has one while a function runs."""
 
     @functools.wraps(function)
     def writing(*args: P.args, **kwargs: P.kwargs) -> T:
-        with times_in(shown_time_unit(args[0] if args else next(iter(kwargs.values()), None))):
+        units = map(shown_time_unit, (*args, *kwargs.values()))
+        with times_in(next((unit for unit in units if unit != "s"), "s")):
             return function(*args, **kwargs)
 
     return writing

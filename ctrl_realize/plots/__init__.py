@@ -5,7 +5,7 @@ from __future__ import annotations
 from .campaigns import campaign_plot, gain_plot
 from .delays import bootstrap_plot, delay_comparison_plot, track_plot
 from .dispatch import draw
-from .fits import dead_time_plot, fit_plot
+from .fits import dead_time_plot, each_record_plot, fit_plot
 from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
 from .loops import closed_loop_plot, margins_plot
@@ -31,6 +31,7 @@ __all__ = [
     "delay_plot",
     "delay_robustness_plot",
     "draw",
+    "each_record_plot",
     "fit_plot",
     "frf_fit_plot",
     "frf_plot",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import control as ct
@@ -10,10 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from .._wording import interval_in_time, time_within
+from ..data import Record
 from ..delayed import DelayedStateSpace
+from ..delayed.simulation import simulate_record
 from ..errors import OptionError
+from ..identification.output_error.repeatability import distinct
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.step.steps import unit_step
+from ..numerics.signals.correlation import fit_percent
 from . import style
 from .names import plain, with_unit, wrapped
 from .shared_docs import documented
@@ -23,6 +28,8 @@ _RULED_OUT = 10.0
 """Structures with a larger difference of the criterion are not drawn."""
 _MOST_STRUCTURES = 8
 _MOST_RECORDS = 40  # drawn behind their mean
+MOST_BESIDE = 12
+"""Most records that are drawn each beside the model."""
 
 
 @documented("sequence of three Axes")
@@ -105,6 +112,79 @@ def dead_time_plot(
     size = (8.0, 1.0 + evidence_height(result))
     with style.canvas(ax, title=title, default_title=_name(result), size=size) as (axes,):
         return style.finished([axes], [_evidence(axes, result, **kwargs)], legends=())
+
+
+@documented("sequence of Axes, one for each record,")
+def each_record_plot(
+    system: DelayedStateSpace,
+    records: Sequence[Record] | None = None,
+    *,
+    output: int = 0,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw each record beside the model that is simulated with its input.
+
+    Parameters
+    ----------
+    system : DelayedStateSpace
+    records : sequence of Record, optional
+        Without missing samples; the first 12 are drawn. Default: those of its `fit`.
+    output : int, optional
+        Channel to show.
+    **kwargs
+        Line properties of the model's response.
+
+    Raises
+    ------
+    OptionError
+        There are no records.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.bench.valve()
+    >>> records = [valve.step_record(16, rng=seed) for seed in (5, 6)]
+    >>> sys = cr.fit_output_error(records, structures=[(2, 2)])
+    >>> cplt = cr.plots.each_record_plot(sys)
+    >>> [axes.get_title(loc="left") for axes in cplt.figure.axes]
+    ['valve_16mA (0), 99.6 %', 'valve_16mA (1), 99.6 %']
+    """
+    held = () if system.fit is None else system.fit.records
+    given = [record for record in (held if records is None else records) if not record.n_missing]
+    shown = given[:MOST_BESIDE]
+    if not shown:
+        raise OptionError("no complete records; expected a model with its fit, or records")
+    names = distinct(record.name for record in shown)
+    columns = 1 if len(shown) == 1 else 2
+    rows = each_record_rows(len(given))
+    with style.canvas(
+        ax, rows, title=title, size=(8.0, 1.0 + 1.6 * rows), columns=columns, sharex=False
+    ) as axes:
+        lines: list[list[Line2D]] = []
+        for axis, record, name in zip(axes, shown, names, strict=False):
+            factor, unit = axis_time_unit(float(np.ptp(record.time)), axis)
+            measured = np.atleast_2d(record.output)[output]
+            model = simulate_record(system, record, "estimate")[output]
+            looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
+            time = factor * record.time
+            drawn = list(axis.plot(time, measured, color=style.MEASURED, label="measured"))
+            lines.append([*drawn, *axis.plot(time, model, **looks)])
+            fit = float(fit_percent(measured[None], model[None])[0])
+            axis.set_title(f"{plain(name, 30)}, {fit:.1f} %", loc="left", fontsize=10)
+            axis.set_xlabel(f"time [{unit}]")
+            label = with_unit(record.output_labels[output], record.output_units[output])
+            axis.set_ylabel(wrapped(label, 16))
+        for axis in axes[len(shown) :]:
+            axis.set_visible(False)
+            lines.append([])
+        return style.finished(axes, lines, columns=columns, loc="lower right")
+
+
+def each_record_rows(count: int) -> int:
+    """Rows of axes of `each_record_plot` for a number of records."""
+    return 1 if count == 1 else -(-min(count, MOST_BESIDE) // 2)
 
 
 def _delay_fit(given: Any) -> OutputErrorFit:

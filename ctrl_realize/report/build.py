@@ -9,12 +9,15 @@ from typing import Any
 
 import control as ct
 
+from .._wording import times_in
 from ..data import Record
 from ..data.given import as_record
+from ..data.shown_units import in_shown_units, shown_time_unit
 from ..delayed import DelayedStateSpace
 from ..errors import UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
+from ..results import ModelFit
 from .page import Page, Table, pairs, write_page
 from .provenance import own_version, versions
 from .sketches import (
@@ -32,11 +35,13 @@ from .tables import (
     data_table,
     fit_tables,
     model_table,
+    parameter_table,
     settings_tables,
 )
 from .verdict import Verdict, campaign_verdict, comparison_verdict, verdict_of
 
 
+@in_shown_units
 def write_identification(
     path: str | os.PathLike[str],
     system: DelayedStateSpace,
@@ -111,7 +116,7 @@ def write_identification(
         path,
         title=f"Model of {record.name}" if record.name else "Identified model",
         subtitle=_kind(system),
-        verdict=verdict_of(system, () if comparison is None else comparison.flags),
+        verdict=verdict_of(system, comparison=comparison),
         sketches=identification_sketches(system, record, frf=frf, comparison=comparison),
         tables=[
             *fit_tables(system.fit),
@@ -123,6 +128,7 @@ def write_identification(
         calls=calls,
         simulated=simulated,
         figures=figures,
+        fit=system.fit,
     )
 
 
@@ -187,31 +193,34 @@ def write_campaign(
     4 figures
     """
     system = campaign.system
-    sketches = campaign_sketches(campaign, truth=truth)
-    if frf is not None:
-        sketches += frf_sketches([system], frf, comparison)
-    return write_report(
-        path,
-        title=title,
-        subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
-        verdict=campaign_verdict(campaign, () if comparison is None else comparison.flags),
-        sketches=[*sketches, *more_sketches],
-        tables=[
-            campaign_table(campaign),
-            amplitude_table(campaign),
-            *more_tables,
-            *comparison_tables(comparison),
-            *fit_tables(system.fit),
-            model_table(system),
-            *([data_table(records, files)] if files or records else []),
-            *settings_tables(settings),
-        ],
-        calls=calls,
-        simulated=simulated,
-        figures=figures,
-    )
+    with times_in(shown_time_unit(system)):
+        sketches = campaign_sketches(campaign, truth=truth)
+        if frf is not None:
+            sketches += frf_sketches([system], frf, comparison)
+        return write_report(
+            path,
+            title=title,
+            subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
+            verdict=campaign_verdict(campaign, comparison=comparison),
+            sketches=[*sketches, *more_sketches],
+            tables=[
+                campaign_table(campaign),
+                amplitude_table(campaign),
+                *more_tables,
+                *comparison_tables(comparison),
+                *fit_tables(system.fit),
+                model_table(system),
+                *([data_table(records, files)] if files or records else []),
+                *settings_tables(settings),
+            ],
+            calls=calls,
+            simulated=simulated,
+            figures=figures,
+            fit=system.fit,
+        )
 
 
+@in_shown_units
 def write_comparison(
     path: str | os.PathLike[str],
     system: DelayedStateSpace,
@@ -277,6 +286,7 @@ def write_comparison(
         calls=calls,
         simulated=simulated,
         figures=figures,
+        fit=system.fit,
     )
 
 
@@ -291,6 +301,7 @@ def write_report(
     calls: Sequence[tuple[str, str]],
     simulated: bool,
     figures: str | os.PathLike[str] | None,
+    fit: ModelFit | None = None,
 ) -> Path:
     """Write a page and, if a folder is given, its figures."""
     if figures is not None:
@@ -301,9 +312,10 @@ def write_report(
         verdict=verdict,
         version=own_version(),
         figures=[sketch.on_page() for sketch in sketches],
-        tables=[*tables, pairs("Versions", versions())],
+        tables=[*tables, pairs("Versions", versions(), folded=True)],
         calls=calls,
         simulated=simulated,
+        parameters=parameter_table(fit) if fit is not None and fit.parameters else None,
     )
     return write_page(path, page)
 

@@ -90,6 +90,8 @@ class Table:
         Kinds of the columns of a table without headings, as in `Column`.
     note : str
         A sentence below.
+    folded : bool
+        Whether only the title is shown until the reader opens it.
 
     Examples
     --------
@@ -106,6 +108,7 @@ class Table:
     columns: tuple[Column, ...] = ()
     kinds: tuple[str, ...] = ()
     note: str = ""
+    folded: bool = False
 
     def kind_of(self, position: int) -> str:
         """Return the kind of the column at `position`."""
@@ -131,6 +134,8 @@ class Page:
         Commands that reproduce the result.
     simulated : bool
         Whether the data are simulated, which is stated at the top.
+    parameters : Table or None
+        Parameters of the model, above the figures.
 
     Examples
     --------
@@ -142,8 +147,8 @@ class Page:
     >>> page = report.Page(
     ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
     ... )
-    >>> print(page.title, "-", page.verdict.facts[0])
-    Valve 7 - ('dead time', '34.4 ms')
+    >>> print(page.title, "-", page.verdict.headline[:17])
+    Valve 7 - Dead time 34.4 ms
     """
 
     title: str
@@ -154,9 +159,12 @@ class Page:
     tables: Sequence[Table] = ()
     calls: Sequence[tuple[str, str]] = field(default=())
     simulated: bool = False
+    parameters: Table | None = None
 
 
-def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) -> Table:
+def pairs(
+    title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False, folded: bool = False
+) -> Table:
     """Make a table of labels and values.
 
     Parameters
@@ -165,6 +173,8 @@ def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) ->
     rows : sequence of (label, value)
     mono : bool, default False
         Show the values in a fixed-width font.
+    folded : bool, default False
+        Show the title only until the reader opens the table.
 
     Returns
     -------
@@ -181,6 +191,7 @@ def pairs(title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False) ->
         title,
         tuple(Row(tuple(row)) for row in rows),
         kinds=("label", "mono" if mono else "text"),
+        folded=folded,
     )
 
 

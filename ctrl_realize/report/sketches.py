@@ -26,7 +26,7 @@ from ..identification.realization.result import Realization
 from ..identification.state_space_fit.result import StateSpaceFit
 from ..identification.step.steps import unit_step
 from ..io.atomic import replaced_when_complete
-from ..plots.fits import evidence_height
+from ..plots.fits import MOST_BESIDE, each_record_rows, evidence_height
 from ..results import ModelFit
 from .page import PageFigure
 from .svg import inline_svg, laid_out, missing_glyphs_allowed
@@ -111,6 +111,9 @@ def identification_sketches(
             )
         )
     sketches += fit_sketches(system, step)
+    several = [] if system.fit is None else [one for one in system.fit.records if not one.n_missing]
+    if len(several) > 1:
+        sketches.append(_each_record(system, several))
     sketches.append(
         Sketch(
             "record",
@@ -175,6 +178,18 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
             )
         )
     return sketches
+
+
+def _each_record(system: DelayedStateSpace, records: Sequence[Record]) -> Sketch:
+    more = len(records) - MOST_BESIDE
+    return Sketch(
+        "each_record",
+        "Each record beside the model",
+        "The model is simulated with the input of each record; the title has its fit."
+        + (f" {more} more records are not shown." if more > 0 else ""),
+        lambda figure: plots.each_record_plot(system, records, ax=figure),
+        (6.2, 0.6 + 1.7 * each_record_rows(len(records))),
+    )
 
 
 def _output_sketch(fit: StateSpaceFit, output: int, label: str) -> Sketch:

@@ -9,7 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from .._wording import in_digits, numbers_alike, time_unit
+from .._parameters import Parameter
+from .._wording import (
+    in_digits,
+    in_time,
+    interval_in_time,
+    number_within,
+    numbers_alike,
+    time_unit,
+    time_within,
+)
 from ..data import Record
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
@@ -21,13 +30,53 @@ from .provenance import file_sha256, record_sha256
 
 Paths = Sequence[str | os.PathLike[str]]
 
+_ABOVE = frozenset(
+    {
+        "transfer function", "dead time", "apparent dead time", "visible onset", "total delay",
+        "poles", "gain", "fit", "residual",
+    }
+)  # fmt: skip
+"""Rows of a fit that a report shows above."""
+
 
 def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[Table]:
     """List how a model was found, and what was chosen and why."""
     if fit is None:
         return []
     choices = [("choice", choice) for choice in fit.choices]
-    return [pairs(title, [*fit._rows(), *choices])]
+    rows = fit._rows()
+    if fit.parameters:
+        # These stand in the verdict and among the parameters.
+        rows = [row for row in rows if row[0] not in {*_ABOVE, fit.interval_label}]
+    return [pairs(title, [*rows, *choices])]
+
+
+def parameter_table(fit: ModelFit) -> Table:
+    """List gain, dead time, lags, ... with standard errors and 95 % intervals."""
+    columns = (
+        Column("parameter"),
+        Column("estimate", "number"),
+        Column("standard error", "number"),
+        Column("95 % interval", "number"),
+        Column("interval for"),
+    )
+    return Table("Parameters", tuple(map(_parameter_row, fit.parameters)), columns)
+
+
+def _parameter_row(one: Parameter) -> Row:
+    known = bool(np.isfinite([one.low, one.high]).all())
+    if one.times == 1:
+        error = in_time(one.std, 2) if np.isfinite(one.std) else ""
+        ends = one.low, one.high
+        value = time_within(one.value, *ends) if known else in_time(one.value, 4)
+        interval = interval_in_time(*ends) if known else ""
+    else:
+        unit = one.unit and f" {one.unit}"
+        error = f"{one.std:.2g}{unit}" if np.isfinite(one.std) else ""
+        value = number_within(one.value, one.low, one.high) + unit
+        interval = one.interval_text()
+    holds = "all structures not ruled out" if one.all_structures else "this structure"
+    return Row((one.label, value, error, interval, holds if interval else ""))
 
 
 def comparison_tables(
@@ -47,7 +96,9 @@ def model_table(system: DelayedStateSpace) -> Table:
         ("C", _matrix(core.C)),
         ("D", _matrix(core.D)),
     ]
-    return pairs("State-space matrices of the model without its delay", rows, mono=True)
+    return pairs(
+        "State-space matrices of the model without its delay", rows, mono=True, folded=True
+    )
 
 
 def _matrix(values: Any) -> str:

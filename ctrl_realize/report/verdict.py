@@ -8,15 +8,24 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .._wording import in_time, interval_in_time, number_within, poles_in_words, time_within
+from .._wording import in_time, interval_in_time, number_within, time_within
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
-from ..identification.output_error.words import gain_in_words, sign_is_told
+from ..identification.output_error.words import sign_is_told
 from ..identification.realization.delay_scan_result import DelayScan
 from ..plots.delays import estimate_of, interval_of
-from ..results import INTERVAL_LABELS, Flag, ModelFit
+from ..results import Flag
+from .facts import (
+    INTEGRATING,
+    disagreement,
+    facts_of,
+    formula_of,
+    gain_of,
+    gain_scatter,
+    interval_name,
+)
 
 _CONTRADICTED = "frf_disagrees"
 
@@ -42,11 +51,6 @@ SCANNED = (
 )
 """Limitation of any scan, however good the record."""
 
-INTEGRATING = "none: the model integrates"
-
-_REAL, _AT_ONE = 1e-12, 1e-9
-"""Imaginary part of a z-plane pole that counts as rounding, and distance to 1 of an integrator."""
-
 Level = Literal["good", "caution", "poor"]
 
 _JUDGEMENTS: dict[Level, str] = {
@@ -60,16 +64,22 @@ _CONTRADICTION = "The measured frequency response contradicts this model: see th
 
 @dataclass(frozen=True)
 class Verdict:
-    """Judgement, headline, main numbers and reasons."""
+    """Judgement, headline, transfer function, further numbers and reasons."""
 
     level: Level
     headline: str
     facts: tuple[tuple[str, str], ...]
     reasons: tuple[str, ...]
     judgement: str
+    formula: str = ""
 
 
-def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Verdict:
+def verdict_of(
+    system: DelayedStateSpace,
+    more_flags: Sequence[Flag] = (),
+    *,
+    comparison: FRFComparison | None = None,
+) -> Verdict:
     """Judge a model by the flags of its fit.
 
     Parameters
@@ -77,7 +87,9 @@ def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Ve
     system : DelayedStateSpace
         Model with its `fit`.
     more_flags : sequence of Flag, optional
-        Further flags, from a comparison with an FRF for example.
+        Further flags.
+    comparison : FRFComparison, optional
+        Comparison of the model with a measured frequency response, with its flags.
 
     Returns
     -------
@@ -93,16 +105,24 @@ def verdict_of(system: DelayedStateSpace, more_flags: Sequence[Flag] = ()) -> Ve
     >>> print(verdict.level, "-", verdict.judgement)
     caution - Use with care: see the remarks below.
     """
-    flags = (*more_flags, *_flags_of(system))
+    flags = (*_flags_in(comparison), *more_flags, *_flags_of(system))
     level, judgement = _judged(system, flags)
-    return Verdict(level, headline_of(system), facts_of(system), _reasons(flags), judgement)
+    facts = (*disagreement(comparison), *facts_of(system))
+    return Verdict(
+        level, headline_of(system), facts, _reasons(flags), judgement, formula_of(system)
+    )
 
 
-def campaign_verdict(campaign: Campaign, more_flags: Sequence[Flag] = ()) -> Verdict:
+def campaign_verdict(
+    campaign: Campaign,
+    more_flags: Sequence[Flag] = (),
+    *,
+    comparison: FRFComparison | None = None,
+) -> Verdict:
     """Judge a campaign by its final model, its flags and `more_flags`."""
     system = campaign.system
     own = tuple(campaign.flags)
-    flags = (*more_flags, *own, *_flags_of(system))
+    flags = (*_flags_in(comparison), *more_flags, *own, *_flags_of(system))
     summary = campaign.statistics()
     scatter = "unknown: a single record has no scatter"
     if np.isfinite(summary.variance):
@@ -114,10 +134,19 @@ def campaign_verdict(campaign: Campaign, more_flags: Sequence[Flag] = ()) -> Ver
             f"{summary.mean:.2f} samples, {in_time(summary.mean * campaign.dt, 4)}",
         ),
         ("scatter (std)", scatter),
+        *gain_scatter(np.array([row.gain for row in campaign.good], dtype=np.float64)),
+        *disagreement(comparison),
         *facts_of(system),
     ]
     level, judgement = _judged(system, flags)
-    return Verdict(level, headline_of(system), tuple(facts), _reasons(flags), judgement)
+    return Verdict(
+        level,
+        headline_of(system),
+        tuple(facts),
+        _reasons(flags),
+        judgement,
+        formula_of(system),
+    )
 
 
 def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> Verdict:
@@ -137,7 +166,13 @@ def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> 
         "caution": "Use with care: see the errors and remarks below.",
         "poor": f"Model and measurement disagree: the error is above {100 * FAR:.0f} %.",
     }[level]
-    return Verdict(level, headline, facts_of(system), _reasons(flags), judgement)
+    return Verdict(
+        level, headline, facts_of(system), _reasons(flags), judgement, formula_of(system)
+    )
+
+
+def _flags_in(comparison: FRFComparison | None) -> tuple[Flag, ...]:
+    return () if comparison is None else comparison.flags
 
 
 def headline_of(system: DelayedStateSpace) -> str:
@@ -154,85 +189,18 @@ def headline_of(system: DelayedStateSpace) -> str:
     if interval is not None:
         sentence += f", {interval_name(system)} {interval_in_time(*interval)}"
     order = system.delay_free.nstates
-    gain = _gain(system)
+    gain = gain_of(system)
+    if formula_of(system) and _sign_is_told(system):
+        return f"{sentence}."
     if not _sign_is_told(system):
         return f"{sentence}. Model without the delay: order {order}, gain not determined."
     behind = "integrating" if gain == INTEGRATING else f"gain {gain}"
     return f"{sentence}. Model without the delay: order {order}, {behind}."
 
 
-def interval_name(system: DelayedStateSpace) -> str:
-    """Name the interval by its kind."""
-    return INTERVAL_LABELS[None] if system.fit is None else system.fit.interval_label
-
-
-def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
-    """List the main numbers of a model."""
-    wait, interval = estimate_of(system), interval_of(system)
-    facts = [("dead time", in_time(wait, 4) if interval is None else time_within(wait, *interval))]
-    if interval is not None:
-        name = interval_name(system)
-        facts.append((name, interval_in_time(*interval)))
-    if system.fit is not None:
-        facts += _times_of(system.fit, integrating=_gain(system) == INTEGRATING)
-    facts.append(("order (without the delay)", str(system.delay_free.nstates)))
-    facts.append(("gain", _gain_with_interval(system)))
-    facts.append(("poles", poles_of(system)))
-    facts.append(("sample time", in_time(system.dt, 6)))
-    return tuple(facts)
-
-
-def poles_of(system: DelayedStateSpace) -> str:
-    """Write the core's poles as continuous ones if possible, otherwise as poles of z."""
-    poles = np.asarray(system.delay_free.poles(), dtype=np.complex128)
-    alternating = (np.abs(poles.imag) <= _REAL) & (poles.real <= 0)
-    plant = np.log(poles[~alternating]) / system.dt
-    plant[np.abs(poles[~alternating] - 1) < _AT_ONE] = 0.0
-    real = np.abs(poles[~alternating].imag) <= _REAL
-    plant[real] = plant[real].real
-    words = [poles_in_words(plant)] if plant.size else []
-    words += [f"z = {pole.real:.3g}" for pole in sorted(poles[alternating], key=lambda z: -abs(z))]
-    return ", ".join(words) or "none"
-
-
-def _gain(system: DelayedStateSpace) -> str:
-    gain = float(np.real(np.ravel(system.delay_free.dcgain())[0]))
-    return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
-
-
 def _sign_is_told(system: DelayedStateSpace) -> bool:
     flagged = any(_code(flag) == _GAIN_OPEN for flag in _flags_of(system))
     return not flagged or sign_is_told(None if system.fit is None else system.fit.gain_interval)
-
-
-def _gain_with_interval(system: DelayedStateSpace) -> str:
-    gain = _gain(system)
-    interval = None if system.fit is None else system.fit.gain_interval
-    if interval is None or gain == INTEGRATING:
-        return gain
-    return gain_in_words(float(np.real(np.ravel(system.delay_free.dcgain())[0])), interval)
-
-
-def _times_of(fit: ModelFit, *, integrating: bool) -> list[tuple[str, str]]:
-    facts = []
-    for label, value in (
-        ("standard error for this structure", fit._std()),
-        ("visible onset", fit.onset),
-    ):
-        if value is not None and np.isfinite(value):
-            facts.append((label, in_time(value, 4)))
-    total = fit.total_delay
-    if total is not None and np.isfinite(total) and not integrating:
-        facts.append(("total delay at DC", _total(total, fit.total_delay_interval)))
-    return facts
-
-
-def _total(value: float, interval: tuple[float, float] | None) -> str:
-    if interval is None or np.isnan(interval[1]):
-        return in_time(value, 4)
-    if interval[1] == np.inf:
-        return "not determined by this record"
-    return f"{time_within(value, *interval)} ({interval_in_time(*interval)})"
 
 
 def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:

@@ -118,6 +118,42 @@ def test_the_verdict_comes_first_with_dead_time_and_interval(page, fitted):
     assert text.index("simulated data") < verdict
 
 
+def test_the_transfer_function_stands_in_place_of_the_matrices(page, fitted):
+    text = parsed(page).text
+    assert text.count(fitted.fit.formula) == 1
+    assert text.index(fitted.fit.formula) < text.index("Parameters") < text.index("Figures")
+    html = page.read_text(encoding="utf-8")
+    fold = html.index("<summary>State-space matrices")
+    assert html.rindex("<details>", 0, fold) < fold < html.index("</details>", fold)
+    # said once beside the figures, and once among the parameters
+    low, high = fitted.fit.interval
+    outside = re.sub(r"<svg.*?</svg>", "", html, flags=re.DOTALL)
+    assert outside.count(interval_in_time(low, high)) == 2
+
+
+def test_several_records_stand_each_beside_the_model_with_the_scatter_of_their_gains(
+    tmp_path, valve, measured
+):
+    records = [valve.step_record(16.0, rng=seed, name=f"run {seed}") for seed in range(3)]
+    system = cr.fit_output_error(records, structures=[(2, 2)])
+    away = cr.MeasuredFRF(
+        1.5 * measured.frdata[0, 0], measured.omega / 2 / np.pi, coherence=np.ones(40)
+    )
+    comparison = cr.compare_frf(system, away)
+    path = report.write_identification(
+        tmp_path / "r.html", system, records[0], frf=away, comparison=comparison
+    )
+    text = parsed(path).text
+    assert "Each record beside the model" in text
+    facts = dict(verdict_of(system, comparison=comparison).facts)
+    away_by = 100 * comparison.rms_relative_error
+    assert 30 < away_by < 40  # the response was made larger by half
+    assert facts["from the measured response"] == f"{away_by:.3g} % rms, 0.1 to 20 Hz"
+    assert "(std 0.0" in facts["gains of the records"]
+    assert all(value in text for value in facts.values())
+    assert verdict_of(system, comparison=comparison).level == "poor"
+
+
 def test_hostile_names_stay_text(tmp_path, record, fitted):
     hostile = cr.Record(
         record.time, record.input, record.output, name=HOSTILE, input_labels=[HOSTILE],

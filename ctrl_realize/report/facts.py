@@ -1,0 +1,183 @@
+"""Numbers of a report: transfer function, and what stands beside it."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+
+from .._parameters import Parameter, formula
+from .._wording import (
+    in_time,
+    interval_in_time,
+    numbers_alike,
+    plainly,
+    poles_in_words,
+    time_within,
+)
+from ..delayed import DelayedStateSpace
+from ..design.models.conversions import to_continuous
+from ..errors import CtrlRealizeError
+from ..frequency.comparison import FRFComparison
+from ..identification.output_error.result import OutputErrorFit
+from ..identification.output_error.words import gain_in_words
+from ..numerics.arrays import FloatArray
+from ..numerics.constants import SMALLEST
+from ..numerics.parameters.physical import process_parameters
+from ..numerics.separable.static_gain import INTEGRATOR
+from ..results import INTERVAL_LABELS, ModelFit
+
+INTEGRATING = "none: the model integrates"
+
+_EVER = 1e8
+"""Length in s of a record in which a pole would not look like an integrator, for models alone."""
+_REAL, _AT_ONE = 1e-12, 1e-9
+"""Imaginary part of a z-plane pole that counts as rounding, and distance to 1 of an integrator."""
+_VANISHING = 1e-9  # part of the coefficients of a numerator that is rounding
+
+
+def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
+    """List the main numbers of a model, those that are not in its transfer function."""
+    if system.fit is not None and system.fit.parameters:
+        return _facts_beside(system, system.fit)
+    facts = []
+    if system.fit is not None:
+        facts += _times_of(system.fit, integrating=gain_of(system) == INTEGRATING)
+    facts.append(("order (without the delay)", str(system.delay_free.nstates)))
+    if not formula_of(system):
+        facts.append(("gain", _gain_with_interval(system)))
+        facts.append(("poles", poles_of(system)))
+    facts.append(("sample time", in_time(system.dt, 6)))
+    return tuple(facts)
+
+
+def _facts_beside(system: DelayedStateSpace, fit: ModelFit) -> tuple[tuple[str, str], ...]:
+    """List what stands neither in the transfer function nor in the table of parameters."""
+    facts = []
+    followed = getattr(fit, "fit_percent", None)
+    if isinstance(followed, float) and np.isfinite(followed):
+        facts.append(("fit", f"{followed:.1f} %"))
+    if isinstance(fit, OutputErrorFit):
+        over = f"{plainly(fit.normalized_rms, 2)} x noise"
+        facts.append(("residual", f"{fit.residual:.3g} {fit.output_unit}".rstrip() + f", {over}"))
+        if fit.repeatability is not None:
+            facts += gain_scatter(fit.gain * fit.repeatability.gains)
+    facts += [
+        (label, value) for label, value in _times_of(fit, integrating=False) if "error" not in label
+    ]
+    facts.append(("sample time", in_time(system.dt, 6)))
+    return tuple(facts)
+
+
+def poles_of(system: DelayedStateSpace) -> str:
+    """Write the core's poles as continuous ones if possible, otherwise as poles of z."""
+    poles = np.asarray(system.delay_free.poles(), dtype=np.complex128)
+    alternating = (np.abs(poles.imag) <= _REAL) & (poles.real <= 0)
+    plant = np.log(poles[~alternating]) / system.dt
+    plant[np.abs(poles[~alternating] - 1) < _AT_ONE] = 0.0
+    real = np.abs(poles[~alternating].imag) <= _REAL
+    plant[real] = plant[real].real
+    words = [poles_in_words(plant)] if plant.size else []
+    words += [f"z = {pole.real:.3g}" for pole in sorted(poles[alternating], key=lambda z: -abs(z))]
+    return ", ".join(words) or "none"
+
+
+def interval_name(system: DelayedStateSpace) -> str:
+    """Name the interval by its kind."""
+    return INTERVAL_LABELS[None] if system.fit is None else system.fit.interval_label
+
+
+def gain_of(system: DelayedStateSpace) -> str:
+    """Write the gain at zero frequency, or that there is none."""
+    gain = float(np.real(np.ravel(system.delay_free.dcgain())[0]))
+    return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
+
+
+def _gain_with_interval(system: DelayedStateSpace) -> str:
+    gain = gain_of(system)
+    interval = None if system.fit is None else system.fit.gain_interval
+    if interval is None or gain == INTEGRATING:
+        return gain
+    return gain_in_words(float(np.real(np.ravel(system.delay_free.dcgain())[0])), interval)
+
+
+def _times_of(fit: ModelFit, *, integrating: bool) -> list[tuple[str, str]]:
+    facts = []
+    for label, value in (
+        ("standard error for this structure", fit._std()),
+        ("visible onset", fit.onset),
+    ):
+        if value is not None and np.isfinite(value):
+            facts.append((label, in_time(value, 4)))
+    total = fit.total_delay
+    if total is not None and np.isfinite(total) and not integrating:
+        facts.append(("total delay at DC", _total(total, fit.total_delay_interval)))
+    return facts
+
+
+def _total(value: float, interval: tuple[float, float] | None) -> str:
+    if interval is None or np.isnan(interval[1]):
+        return in_time(value, 4)
+    if interval[1] == np.inf:
+        return "not determined by this record"
+    return f"{time_within(value, *interval)} ({interval_in_time(*interval)})"
+
+
+def disagreement(comparison: FRFComparison | None) -> list[tuple[str, str]]:
+    """State how far a model is from a measured frequency response."""
+    if comparison is None:
+        return []
+    low, high = comparison.band_hz
+    error = 100 * comparison.rms_relative_error
+    return [("from the measured response", f"{error:.3g} % rms, {low:.3g} to {high:.3g} Hz")]
+
+
+def gain_scatter(gains: FloatArray) -> list[tuple[str, str]]:
+    """State the spread of the gains of several records."""
+    told = gains[np.isfinite(gains)]
+    if told.size < 2:
+        return []
+    low, high = float(told.min()), float(told.max())
+    share = 100 * float(np.std(told, ddof=1)) / max(abs(float(np.mean(told))), SMALLEST)
+    ends = " to ".join(numbers_alike((low, high), low, high))
+    return [("gains of the records", f"{ends} (std {share:.2g} %)")]
+
+
+def formula_of(system: DelayedStateSpace) -> str:
+    """Transfer function in one line: that of the fit, or of the equivalent continuous model.
+
+    Empty for several channels, and if no continuous model has the same samples.
+    """
+    if system.fit is not None and system.fit.formula:
+        return system.fit.formula
+    if not system.issiso():
+        return ""
+    try:
+        core, wait = to_continuous(system)
+        transfer = ct.ss2tf(core)
+    except CtrlRealizeError:
+        return ""
+    above, below = (np.real(part[0][0]) for part in (transfer.num, transfer.den))
+    poles = np.roots(below).astype(np.complex128)
+    moving = np.abs(poles[np.abs(poles) * _EVER >= INTEGRATOR])
+    pace = float(np.exp(np.mean(np.log(moving)))) if moving.size else 1.0
+    numerator = np.asarray(above[::-1] / below[0], dtype=np.float64)
+    # Powers of s that are rounding would be zeros far away.
+    size = np.abs(numerator) * pace ** np.arange(numerator.size)
+    kept = np.flatnonzero(size > _VANISHING * size.max(initial=0.0))
+    if not kept.size or kept[0] > 0:
+        return ""
+    numerator = numerator[: kept[-1] + 1]
+    found = process_parameters(poles, numerator, wait, _EVER)
+    unit = "s" if system.fit is None else system.fit.time_unit
+    integrators = int(np.sum(np.abs(poles) * _EVER < INTEGRATOR))
+    shown = [
+        Parameter(one.name, one.value, times=_power(one.name, integrators)).in_time_unit(unit)
+        for one in found
+    ]
+    return formula(shown, integrators, unit)
+
+
+def _power(name: str, integrators: int) -> int:
+    if name == "gain":
+        return -1 if integrators else 0
+    return 0 if "damping" in name else 1
