@@ -2,7 +2,7 @@
 
 from .frf import read_frf
 from .models import load_model, save_model
-from .records import read_record
+from .records import read_record, read_records
 from .store import CampaignStore
 from .stored_fit import FitSummary
 
@@ -12,6 +12,7 @@ __all__ = [
     "load_model",
     "read_frf",
     "read_record",
+    "read_records",
     "save_model",
 ]
 

@@ -36,10 +36,10 @@ BAD_VALUES = frozenset(
 write in place of a value."""
 
 STATES = {
-    "on": 1.0, "true": 1.0, "open": 1.0, "yes": 1.0, "ein": 1.0, "an": 1.0, "auf": 1.0,
-    "wahr": 1.0, "ja": 1.0, "running": 1.0, "opened": 1.0,
-    "off": 0.0, "false": 0.0, "closed": 0.0, "no": 0.0, "aus": 0.0, "zu": 0.0, "falsch": 0.0,
-    "nein": 0.0, "stopped": 0.0, "close": 0.0,
+    "on": "1", "true": "1", "open": "1", "yes": "1", "ein": "1", "an": "1", "auf": "1",
+    "wahr": "1", "ja": "1", "running": "1", "opened": "1",
+    "off": "0", "false": "0", "closed": "0", "no": "0", "aus": "0", "zu": "0", "falsch": "0",
+    "nein": "0", "stopped": "0", "close": "0",
 }  # fmt: skip
 """Positions of a switch, as numbers."""
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ..errors import DataError, OptionError
-from .cells import NUMBER
+from .cells import NUMBER, without_percent
 from .tables import Table
 from .units import split_unit
 
@@ -100,10 +100,10 @@ def named(table: Table, names: Iterable[str], taken: Iterable[int] = ()) -> list
 
 def holds_numbers(table: Table, index: int) -> bool:
     """Whether a column contains numbers, even if some cells are bad."""
-    cells = table.columns[index].first(10)
+    cells = table.columns[index].first(100)
     if cells.dtype.kind in "biufc":
         return True
-    first = [str(cell).strip() for cell in cells]
+    first = [without_percent(str(cell).strip()) for cell in cells]
     return any(NUMBER[table.decimal].fullmatch(cell) for cell in first)
 
 

@@ -1,4 +1,4 @@
-"""Read a measured record from a file."""
+"""Read measured records from a file."""
 
 from __future__ import annotations
 
@@ -15,38 +15,27 @@ import numpy as np
 from .._checks import one_of
 from ..data import Record
 from ..errors import DataError, OptionError, TimeAxisError
-from ..numerics.arrays import FloatArray
 from .checks import MAX_BYTES
-from .columns import (
-    Selector,
-    check_lengths,
-    find_column,
-    find_columns,
-    has_header,
-    holds_numbers,
-    named,
-)
+from .columns import Selector, find_columns
 from .read import read_table
+from .signals.long_format import long_table, tags_as_columns
+from .signals.names import choose_columns
+from .signals.quality import Rules, rules_of
+from .signals.samples import (
+    Samples,
+    labels_of,
+    long_samples,
+    span_of,
+    wide_axis,
+    wide_samples,
+)
 from .tables import Table
 from .text_options import TextOptions
-from .time_column import time_in_seconds
+from .time_column import time_axis
 
-TIME_NAMES = frozenset(
-    {"t", "time", "times", "timestamp", "timestamps", "datetime", "date time", "elapsed",
-     "elapsed time", "time elapsed", "seconds", "sec", "zeit", "zeitstempel", "temps", "tiempo",
-     "tempo", "tijd", "tid", "czas"}
-)  # fmt: skip
-INPUT_NAMES = frozenset(
-    {"u", "in", "input", "inputs", "input signal", "drive", "command", "cmd", "excitation",
-     "stimulus", "op", "controller output", "manipulated variable", "eingang", "entrée", "entree",
-     "entrada", "ingresso"}
-)  # fmt: skip
-OUTPUT_NAMES = frozenset(
-    {"y", "out", "output", "outputs", "output signal", "response", "measured", "measurement",
-     "pv", "process variable", "process value", "ausgang", "sortie", "salida", "uscita"}
-)  # fmt: skip
-_DT_NAMES = frozenset({"dt", "ts", "sample time", "sampletime", "sampling time"})
-_RATE_NAMES = frozenset({"fs", "sample rate", "samplerate", "sampling rate"})
+_JUMP = 10.0
+"""Length of a jump of time that separates two tests, in usual steps; missing samples of one test
+leave shorter gaps, and tests are mostly hours apart."""
 
 
 def read_record(
@@ -65,33 +54,43 @@ def read_record(
     header: bool | Literal["auto"] = "auto",
     skip_rows: int = 0,
     variable: str | None = None,
+    start: Any = None,
+    stop: Any = None,
     missing: Literal["refuse", "keep"] = "refuse",
+    na_values: Any = None,
+    quality: str | int | None = "auto",
+    good: Any = None,
     resample: bool = False,
+    rest: Sequence[Any] | None = None,
     name: str | None = None,
     max_bytes: float = MAX_BYTES,
 ) -> Record:
-    r"""Read a measured record from a CSV, TSV, ``.npz``, ``.mat`` or Parquet file.
+    r"""Read a measured record from a text, Excel, ``.mat``, ``.npz``, Parquet, HDF5 or TDMS file.
 
-    Columns are identified by their names (``time_s``, ``t``, ``Zeit [ms]``; ``input``, ``u``;
-    ``output``, ``y``; numbered ones are channels). Without a header, three columns are time, input
-    and output, and two with `dt` are input and output. Ambiguous columns are an error that lists
-    them.
+    Columns are identified by their names (``time_s``, ``t``, ``Zeit [ms]``; ``input``, ``u``,
+    ``OP``, ``TIC101_MV``; ``output``, ``y``, ``PV``; numbered ones are channels). Without a header,
+    three columns are time, input and output, and two with `dt` are input and output. A long table
+    (columns of tag, time and value, as historians export) is read by its tags. Ambiguous columns
+    are an error that lists them.
 
     Parameters
     ----------
     path : path-like
         The file; its type is determined from its first bytes.
     time : str or int, optional
-        Time column, by name or by number from 0: numbers, ISO dates or times of day.
+        Time column, by name or by number from 0: numbers, dates or times of day (with their date in
+        a column of its own, too).
     input, output : str, int or sequence of them, optional
-        Columns of the signals; several make a record of several channels.
+        Columns (or tags) of the signals; several make a record of several channels. Columns of
+        ``ON`` and ``OFF`` are 1 and 0; ``12.5 %`` is 12.5.
     dt : float, optional
         Sample time in s, instead of a time column.
     time_unit : str, optional
         ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``; ``"auto"``: that of
         the header, or s. For a clock such as ``12:34`` it is the unit of the first number.
     time_format : str, optional
-        Format of dates, as for `datetime.strptime`, if it is not ISO 8601.
+        Format of dates, as for `datetime.strptime`. Default: ISO 8601 or, where the cells tell, the
+        order of day and month.
     delimiter, decimal, encoding, comment : str, optional
         Format of text; ``"auto"``: determined from the first lines.
     header : bool or "auto", optional
@@ -99,11 +98,26 @@ def read_record(
     skip_rows : int, optional
         Number of lines to skip at the start.
     variable : str, optional
-        Matrix or struct of a ``.mat`` or ``.npz`` file to use.
+        Matrix or struct of a ``.mat`` or ``.npz`` file, group of an HDF5 or TDMS file, or sheet of
+        a workbook to use.
+    start, stop : float, str or datetime, optional
+        First and last time to read: in s, or a date and time where the file has dates.
     missing : {"refuse", "keep"}, optional
-        Treatment of empty cells and ``NaN`` in input and output; see `Record`.
+        Treatment of cells without a value (empty, ``NaN``, ``Bad``, ``I/O Timeout``, ...), of bad
+        qualities, gaps, and repeated or irregular time stamps: an error, or missing samples of the
+        record. An input that was not stored holds its last value; see `Record.from_samples`.
+    na_values : str, float or sequence of them, optional
+        Further words and numbers that stand for a missing value, such as -9999.
+    quality : str or int, optional
+        Column of the quality; ``"auto"``: ``Quality``, ``Status``, and ``TIC101.PV.Quality`` for
+        one signal. None: qualities are ignored.
+    good : str, float or sequence of them, optional
+        Good qualities. Default: all but ``Bad...`` and OPC codes below 64.
     resample : bool, optional
         Resample samples with time jitter onto a uniform time axis, see `Record.resampled`.
+    rest : (float, float), optional
+        Input and output in the steady state before a record that begins with its step; see
+        `Record.with_baseline`.
     name : str, optional
         Name of the record; default: the file's, without its ending.
     max_bytes : float, optional
@@ -124,7 +138,12 @@ def read_record(
     TimeAxisError
         Time jitters, has gaps, repeats or decreases.
     OptionError
-        The columns are ambiguous, or the requested ones do not exist.
+        The columns or the order of day and month are ambiguous, or the requested columns do not
+        exist.
+
+    See Also
+    --------
+    read_records : Several tests in one file.
 
     Warns
     -----
@@ -143,7 +162,117 @@ def read_record(
     >>> record
     <Record 'valve': 3 samples of 0.01 s, 1 input, 1 output>
     """
-    options = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
+    how = _checked(
+        time=time, input=input, output=output, dt=dt, time_unit=time_unit,
+        time_format=time_format, delimiter=delimiter, decimal=decimal, encoding=encoding,
+        comment=comment, header=header, skip_rows=skip_rows, variable=variable, start=start,
+        stop=stop, missing=missing, na_values=na_values, quality=quality, good=good,
+        resample=resample, rest=rest, name=name, max_bytes=max_bytes,
+    )  # fmt: skip
+    table = read_table(path, how.text, variable=variable, max_bytes=max_bytes)
+    return _record(table, how, Path(path).stem if name is None else name)
+
+
+def read_records(
+    path: str | os.PathLike[str],
+    *,
+    by: str | int | None = None,
+    **options: Any,
+) -> list[Record]:
+    r"""Read several tests in one file as a list of records.
+
+    Parameters
+    ----------
+    path : path-like
+    by : str or int, optional
+        Column that tells the tests apart, by its name or number. Default: a new test begins where
+        time jumps back, or forward by more than ten usual steps.
+    **options
+        Arguments of `read_record`.
+
+    Returns
+    -------
+    list of Record
+        In the order of the file; their names are that of the file and the value in the column, or
+        a number.
+
+    Raises
+    ------
+    CtrlRealizeError
+        As for `read_record`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import ctrl_realize as cr
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "tests.csv"
+    ...     _ = file.write_text("test,t,u,y\nup,0,0,5\nup,1,1,5\nup,2,1,6\n"
+    ...                         "down,0,1,6\ndown,1,0,6\ndown,2,0,5\n")
+    ...     records = cr.io.read_records(file, by="test")
+    >>> [record.name for record in records]
+    ['tests up', 'tests down']
+    """
+    how = _checked(**options)
+    table = read_table(path, how.text, variable=how.variable, max_bytes=how.max_bytes)
+    label = Path(path).stem if how.name is None else how.name
+    taken = [] if by is None else find_columns(table, by, "by")
+    return [
+        _record(table.rows(rows, range(len(table.columns))), how, f"{label} {value}", taken)
+        for value, rows in _tests(table, how, taken)
+    ]
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """Arguments of `read_record` that concern the signals, checked."""
+
+    time: str | int | None
+    input: Selector | None
+    output: Selector | None
+    dt: float | None
+    time_unit: str
+    time_format: str | None
+    start: Any
+    stop: Any
+    resample: bool
+    rest: tuple[Any, Any] | None
+    rules: Rules
+    text: TextOptions
+    variable: str | None
+    name: str | None
+    max_bytes: float
+
+
+def _checked(
+    *,
+    time: str | int | None = None,
+    input: Selector | None = None,
+    output: Selector | None = None,
+    dt: float | None = None,
+    time_unit: str = "auto",
+    time_format: str | None = None,
+    delimiter: str = "auto",
+    decimal: str = "auto",
+    encoding: str = "auto",
+    comment: str | None = "auto",
+    header: bool | str = "auto",
+    skip_rows: int = 0,
+    variable: str | None = None,
+    start: Any = None,
+    stop: Any = None,
+    missing: str = "refuse",
+    na_values: Any = None,
+    quality: str | int | None = "auto",
+    good: Any = None,
+    resample: bool = False,
+    rest: Any = None,
+    name: str | None = None,
+    max_bytes: float = MAX_BYTES,
+) -> _Reading:
+    """Check the arguments of `read_record`; the defaults are those of its own."""
+    text = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
     if dt is not None and not (_is_number(dt) and dt > 0 and math.isfinite(dt)):
         raise OptionError(f"dt={dt!r} must be a positive number of seconds")
     keep = one_of(missing, "missing", ("refuse", "keep")) == "keep"
@@ -151,118 +280,85 @@ def read_record(
         raise OptionError(
             "missing='keep' and resample=True exclude each other: expected one of them"
         )
-    table = read_table(path, options, variable=variable, max_bytes=max_bytes)
-    parts = _parts(table, time, input, output, dt)
-    used = [*parts.inputs, *parts.outputs] + ([] if parts.time is None else [parts.time])
-    check_lengths(table, used)
-    signals = (_stacked(table, parts.inputs, keep), _stacked(table, parts.outputs, keep))
-    if parts.time is None:
-        stamps = parts.dt * np.arange(signals[0].shape[-1])
-    else:
-        stamps = time_in_seconds(table, parts.time, time_unit, time_format)
-    labels: dict[str, Any] = {
-        "name": Path(path).stem if name is None else name,
-        "input_labels": _labels(table, parts.inputs),
-        "output_labels": _labels(table, parts.outputs),
-    }
+    if rest is not None and (isinstance(rest, str) or np.shape(rest)[:1] != (2,)):
+        raise OptionError(f"rest={rest!r}; expected input and output in the steady state")
+    return _Reading(
+        time, input, output, dt, time_unit, time_format, start, stop, resample,
+        None if rest is None else (rest[0], rest[1]),
+        rules_of(keep, na_values, quality, good), text, variable, name, max_bytes,
+    )  # fmt: skip
+
+
+def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -> Record:
+    """Make a record of a table; columns that are `taken` are no signals."""
+    samples, labels = _samples(table, how, taken)
+    labels["name"] = name
     try:
-        if resample:
-            return Record.resampled(stamps, *signals, **labels)
-        return Record(stamps, *signals, missing=missing, **labels)
+        record = samples.record(labels, keep=how.rules.keep, resample=how.resample)
     except TimeAxisError as error:
-        row = re.search(r"row (\d+)", str(error))
-        place = f" ({table.place(int(row[1]))})" if row else ""
-        # many repeated time stamps: the samples are faster than the resolution of the clock
-        coarse = np.mean(np.diff(stamps) == 0) > 0.2
-        advice = "; the clock is coarser than the sample time, give dt= instead" if coarse else ""
-        raise TimeAxisError(f"{table.path}{place}: {error}{advice}") from error
+        raise TimeAxisError(_explained(error, table, samples)) from error
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from error
+    return record if how.rest is None else record.with_baseline(*how.rest)
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """Positions of the columns; ``dt`` is used if there is no time column."""
-
-    time: int | None
-    dt: float
-    inputs: list[int]
-    outputs: list[int]
-
-
-def _parts(
-    table: Table,
-    time: str | int | None,
-    input: Selector | None,
-    output: Selector | None,
-    dt: float | None,
-) -> _Parts:
-    if time is not None and dt is not None:
-        raise OptionError("expected time= or dt=, got both")
-    inputs = [] if input is None else find_columns(table, input, "input")
-    outputs = [] if output is None else find_columns(table, output, "output")
-    clock = None if time is None else find_column(table, time, "time")
-    step = dt
-    if clock is None and dt is None:
-        clock, step = _guessed_clock(table, [*inputs, *outputs])
-    # with dt= given, a time column in the file is still not a signal
-    clocks = named(table, TIME_NAMES) if clock is None else [clock]
-    inputs = inputs or named(table, INPUT_NAMES, [*clocks, *outputs])
-    outputs = outputs or named(table, OUTPUT_NAMES, [*clocks, *inputs])
-    rest = [
-        k
-        for k in range(len(table.columns))
-        if k not in (*clocks, *inputs, *outputs) and holds_numbers(table, k)
-    ]
-    if not inputs and not outputs and not has_header(table) and len(rest) == 2:
-        inputs, outputs = rest[:1], rest[1:]
-    elif len(rest) == 1 and bool(inputs) != bool(outputs):
-        inputs, outputs = inputs or rest, outputs or rest
-    for signal, found in (("input", inputs), ("output", outputs)):
-        if not found:
-            raise OptionError(
-                f"{table.path}: cannot tell which column is the {signal}; give {signal}=name or "
-                f"number; it has {table.listing()}"
-            )
-    used = [*inputs, *outputs] + ([] if clock is None else [clock])
-    if len(set(used)) != len(used):
-        raise OptionError("a column is selected twice among time=, input= and output=")
-    return _Parts(clock, math.nan if step is None else step, inputs, outputs)
+def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples, dict[str, Any]]:
+    long = long_table(table, how.time, (how.input, how.output))
+    if long is not None:
+        axis = time_axis(table, long.time, how.time_unit, how.time_format)
+        tags = tags_as_columns(table, long)
+        parts = choose_columns(tags, None, how.input, how.output, 1.0)
+        span = span_of(how.start, how.stop, axis)
+        samples = long_samples(table, long, parts, axis, span, how.rules)
+        return samples, labels_of(tags, parts, None)
+    taken = [*taken, *how.rules.columns(table)]
+    parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
+    axis, rows = wide_axis(table, parts, how.time_unit, how.time_format)
+    low, high = span_of(how.start, how.stop, axis)
+    inside = (axis.seconds >= low) & (axis.seconds <= high)
+    samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
+    return samples, labels_of(table, parts, parts.time)
 
 
-def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, float | None]:
-    """Time column by name, otherwise the sample time in the file, otherwise the first column."""
-    clocks = named(table, TIME_NAMES, taken)
-    if len(clocks) == 1:
-        return clocks[0], None
-    if len(clocks) > 1:
+def _explained(error: TimeAxisError, table: Table, samples: Samples) -> str:
+    """Message of a fault of the time axis, with its place in the file and what helps."""
+    row = re.search(r"row (\d+)", str(error))
+    place = f" ({samples.place(int(row[1]))})" if row else ""
+    # many repeated time stamps: the samples are faster than the resolution of the clock
+    steps = np.diff(samples.time)
+    if np.mean(steps == 0) > 0.2:
+        advice = "; the clock is coarser than the sample time, give dt= instead"
+    elif np.any(steps < 0):
+        advice = "; if the file has several tests, read them with read_records(path, by=)"
+    else:
+        advice = "; missing='keep' takes the samples as they are"
+    return f"{table.path}{place}: {error}{advice}"
+
+
+def _tests(
+    table: Table, how: _Reading, separating: Sequence[int]
+) -> list[tuple[str, np.ndarray[Any, np.dtype[np.intp]]]]:
+    """Name and rows of each test."""
+    if separating:
+        cells = [str(cell).strip() for cell in table.columns[separating[0]].cells]
+        rows: dict[str, list[int]] = {}
+        for row, cell in enumerate(cells):
+            rows.setdefault(cell, []).append(row)
+        rows.pop("", None)
+        return [(value, np.array(found)) for value, found in rows.items()]
+    taken = how.rules.columns(table)
+    parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
+    if parts.time is None:
         raise OptionError(
-            f"{table.path} has {len(clocks)} columns that could be time; give time=name or "
-            f"number; it has {table.listing()}"
+            f"{table.path} has no time whose jumps would separate tests; give by=, the column "
+            "that tells them apart"
         )
-    for key, value in table.constants.items():
-        plain = key.rpartition(".")[2].replace("_", " ").lower()
-        if plain in _DT_NAMES | _RATE_NAMES:
-            step = value if plain in _DT_NAMES else 1 / value if value else math.inf
-            if not (math.isfinite(step) and step > 0):
-                raise DataError(f"{table.path}: {key}={value} is not a sample time; give dt=")
-            return None, step
-    if 0 not in taken and not has_header(table) and len(table.columns) >= 3:
-        return 0, None
-    raise OptionError(
-        f"{table.path}: cannot tell which column is time; give time=name or number, or dt= in "
-        f"s; it has {table.listing()}"
-    )
-
-
-def _stacked(table: Table, indices: list[int], keep_missing: bool) -> FloatArray:
-    rows = [table.numbers(k, keep_missing=keep_missing) for k in indices]
-    return rows[0] if len(rows) == 1 else np.stack(rows)
-
-
-def _labels(table: Table, indices: list[int]) -> list[str] | None:
-    names = [table.columns[k].name for k in indices]
-    return names if all(names) and len(set(names)) == len(names) else None
+    seconds = time_axis(table, parts.time, how.time_unit, how.time_format, parts.date).seconds
+    steps = np.diff(seconds)
+    usual = float(np.median(np.abs(steps))) if steps.size else 0.0
+    cuts = np.flatnonzero((steps < 0) | (steps > _JUMP * usual)) + 1
+    groups = np.split(np.arange(seconds.size), cuts)
+    return [(str(number), rows) for number, rows in enumerate(groups, start=1)]
 
 
 def _is_number(value: object) -> bool:

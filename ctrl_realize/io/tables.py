@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from ..errors import DataError
-from ..numerics.arrays import FloatArray
-from .cells import MISSING, NUMBER
+from ..numerics.arrays import BoolArray, FloatArray
+from .cells import BAD_VALUES, MISSING, NUMBER, STATES, without_percent
+
+_NOTHING = np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,25 +74,61 @@ class Table:
         more = f", ... ({len(names)} in all)" if len(names) > 20 else ""
         return "columns " + ", ".join(names[:20]) + more
 
-    def numbers(self, index: int, *, keep_missing: bool = False) -> FloatArray:
+    def rows(self, chosen: np.ndarray[Any, np.dtype[Any]], columns: Iterable[int]) -> Table:
+        """Return the table with the chosen rows of some columns; the others are empty."""
+        kept = set(columns)
+        parts = tuple(
+            Column(one.name, one.unit, one.cells[chosen] if k in kept else _NOTHING)
+            for k, one in enumerate(self.columns)
+        )
+        return replace(self, columns=parts, place=lambda row: self.place(int(chosen[row])))
+
+    def numbers(
+        self,
+        index: int,
+        *,
+        keep_missing: bool = False,
+        words: frozenset[str] = frozenset(),
+        ignored: BoolArray | None = None,
+    ) -> FloatArray:
         """Return a column as finite real numbers; missing ones are refused, or become NaN.
+
+        Parameters
+        ----------
+        index : int
+        keep_missing : bool, optional
+        words : frozenset of str, optional
+            Further words and numbers that stand for a missing value.
+        ignored : ndarray of bool, shape (N,), optional
+            Cells that become NaN, whatever they are.
 
         Raises
         ------
         DataError
             A cell is not a finite number; the message names the first one.
         """
-        values = self.values(index, keep_missing=keep_missing)
+        values = self.values(index, keep_missing=keep_missing, words=words, ignored=ignored)
         if np.iscomplexobj(values):
             raise DataError(f"{self.path}: {self.title(index)} is complex; expected real numbers")
         return np.asarray(values, dtype=np.float64)
 
-    def values(self, index: int, *, keep_missing: bool = False) -> np.ndarray[Any, np.dtype[Any]]:
+    def values(
+        self,
+        index: int,
+        *,
+        keep_missing: bool = False,
+        words: frozenset[str] = frozenset(),
+        ignored: BoolArray | None = None,
+    ) -> np.ndarray[Any, np.dtype[Any]]:
         """Return a column as finite numbers, real or complex."""
         cells = self.columns[index].cells
         if cells.dtype.kind not in "biufc":
-            cells = self._parsed(index, keep_missing)
+            cells = self._parsed(index, keep_missing, words, ignored)
+        elif words or (ignored is not None and ignored.any()):
+            cells = self._without(index, keep_missing, words, ignored)
         finite = ~np.isinf(cells) if keep_missing else np.isfinite(cells)
+        if ignored is not None:
+            finite |= ignored
         if not finite.all():
             row = int(np.argmin(finite))
             raise DataError(
@@ -99,25 +137,54 @@ class Table:
             )
         return cells
 
-    def _parsed(self, index: int, keep_missing: bool) -> FloatArray:
+    def _without(
+        self, index: int, keep_missing: bool, words: frozenset[str], ignored: BoolArray | None
+    ) -> np.ndarray[Any, np.dtype[Any]]:
+        """Numbers with NaN for those that stand for a missing value."""
+        cells = self.columns[index].cells
+        standing = [float(word) for word in words if NUMBER["."].fullmatch(word)]
+        missing = np.isin(cells, standing)
+        if missing.any() and not keep_missing:
+            row = int(np.argmax(missing))
+            self._refuse(index, row, f"{cells[row]:g}", missing=True)
+        if ignored is not None:
+            missing |= ignored
+        return np.where(missing, np.nan, cells)
+
+    def _parsed(
+        self, index: int, keep_missing: bool, words: frozenset[str], ignored: BoolArray | None
+    ) -> FloatArray:
         pattern = NUMBER[self.decimal]
-        values = np.empty(self.columns[index].cells.size)
-        for row, cell in enumerate(self.columns[index].cells):
-            text = str(cell).strip()
-            missing = text.lower() in MISSING
-            if missing and keep_missing:
+        cells = [str(cell).strip() for cell in self.columns[index].cells]
+        empty = MISSING | BAD_VALUES | {word.strip().lower() for word in words}
+        positions = self._positions(cells, empty)
+        values = np.empty(len(cells))
+        for row, text in enumerate(cells):
+            missing = text.lower() in empty
+            if (missing and keep_missing) or (ignored is not None and ignored[row]):
                 values[row] = np.nan
                 continue
-            if not pattern.fullmatch(text):
-                what = "a value is missing" if missing else "is not a number"
-                advice = "; try decimal=',' or '.'" if "," in text or "." in text else ""
-                if "," in text and "." in text:
-                    advice = "; write it without thousands separators"
-                if missing:
-                    advice = "; missing='keep' keeps gaps in a record"
-                raise DataError(
-                    f"{self.path}: {self.title(index)}, {self.place(row)}: {text[:60]!r}"
-                    f": {what}{advice}"
-                )
-            values[row] = float(text.replace(",", "."))
+            number = positions.get(text.lower()) or without_percent(text)
+            if missing or not pattern.fullmatch(number):
+                self._refuse(index, row, text, missing=missing)
+            values[row] = float(number.replace(",", "."))
         return values
+
+    @staticmethod
+    def _positions(cells: list[str], empty: frozenset[str]) -> Mapping[str, str]:
+        """Numbers of the positions of a switch, if the cells hold nothing else."""
+        found = {cell.lower() for cell in cells} - empty
+        return STATES if found and found <= STATES.keys() else {}
+
+    def _refuse(self, index: int, row: int, text: str, *, missing: bool) -> NoReturn:
+        what = "a value is missing" if missing else "is not a number"
+        advice = "; try decimal=',' or '.'" if "," in text or "." in text else ""
+        if "," in text and "." in text:
+            advice = "; write it without thousands separators"
+        if missing:
+            advice = "; missing='keep' keeps gaps in a record"
+        elif not advice and not any(letter.isdigit() for letter in text):
+            advice = f"; na_values={text[:60]!r} if it stands for a missing value"
+        raise DataError(
+            f"{self.path}: {self.title(index)}, {self.place(row)}: {text[:60]!r}: {what}{advice}"
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from .columns import holds_numbers
 from .tables import Table
-from .units import checked_time_unit, plain_unit, to_seconds
+from .text.dates import stamps_of
+from .units import checked_time_unit, plain_unit, to_seconds, unit_named
 
 # from here on neighbouring integers are the same double
 _EXACT_INTEGERS = 2**53
@@ -28,7 +29,16 @@ _FIRST = {"hh:mm": "h", "h:mm": "h", "h:min": "h", "mm:ss": "min", "m:ss": "min"
 _HALF_AN_HOUR = 1 / 48
 
 
-def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None) -> FloatArray:
+class TimeAxis(NamedTuple):
+    """Time in s, and the date of second 0 where the column has dates."""
+
+    seconds: FloatArray
+    start: np.datetime64 | None
+
+
+def time_axis(
+    table: Table, index: int, unit: str, time_format: str | None, date: int | None = None
+) -> TimeAxis:
     """Return the time column in s; dates and times of day are relative to the first row.
 
     Parameters
@@ -39,32 +49,35 @@ def time_in_seconds(table: Table, index: int, unit: str, time_format: str | None
     unit : str
         Unit of numbers, or ``"auto"``: that of the header, otherwise s.
     time_format : str or None
-        Format of dates (as for `datetime.strptime`), if it is not ISO 8601.
+        Format of dates (as for `datetime.strptime`), if it cannot be told from the cells.
+    date : int, optional
+        Position of a column with the dates of times of day.
 
     Raises
     ------
     DataError
         A cell is not a time.
     OptionError
-        Not a unit of time.
+        Not a unit of time, or dates whose day and month cannot be told apart.
     """
     cells = table.columns[index].cells
     if cells.dtype.kind in "mM":
-        return _from_stamps(table, index, cells)
+        return _since_first(table, index, cells)
+    named = table.columns[index].unit or unit_named(table.columns[index].name)
     if time_format is not None or not holds_numbers(table, index):
-        told = table.columns[index].unit if unit == "auto" else unit
-        return _from_stamps(table, index, _parsed_dates(table, index, time_format, told))
-    untold = unit == "auto" and not table.columns[index].unit
+        told = named if unit == "auto" else unit
+        return _since_first(table, index, _parsed_dates(table, index, time_format, told, date))
+    untold = unit == "auto" and not named
     if untold:
         _check_epoch(table, index, cells)
-    unit = checked_time_unit((table.columns[index].unit or "s") if unit == "auto" else unit)
+    unit = checked_time_unit((named or "s") if unit == "auto" else unit)
     if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
         # nanoseconds since 1970 do not fit into a double, but their differences do
-        return to_seconds((cells - cells[0]).astype(np.float64), unit)
+        return TimeAxis(to_seconds((cells - cells[0]).astype(np.float64), unit), None)
     values = table.numbers(index)
     if untold:
         _check_day_count(table, index, values)
-    return to_seconds(values, unit)
+    return TimeAxis(to_seconds(values, unit), None)
 
 
 def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
@@ -99,41 +112,47 @@ def _check_day_count(table: Table, index: int, values: FloatArray) -> None:
     )
 
 
-def _from_stamps(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> FloatArray:
+def _since_first(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> TimeAxis:
     missing = np.isnat(stamps)
     if missing.any():
         row = int(np.argmax(missing))
         raise DataError(
             f"{table.path}: {table.title(index)}, {table.place(row)}: the time is missing"
         )
-    return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
+    if not stamps.size:
+        return TimeAxis(np.empty(0), None)
+    seconds = np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
+    return TimeAxis(seconds, stamps[0] if stamps.dtype.kind == "M" else None)
 
 
 def _parsed_dates(
-    table: Table, index: int, time_format: str | None, unit: str
+    table: Table, index: int, time_format: str | None, unit: str, date: int | None
 ) -> np.ndarray[Any, Any]:
-    import pandas as pd
-
     cells = [str(cell).strip() for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
-        if all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
-            return _parsed_times_of_day(table, index, cells, unit)
+    if _are_times_of_day(cells) and date is not None:
+        days = [str(cell).strip() for cell in table.columns[date].cells]
+        cells = [f"{day} {cell}" for day, cell in zip(days, cells, strict=True)]
+    elif time_format is None and all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
+        return _parsed_times_of_day(table, index, cells, unit)
     try:
-        stamps = pd.to_datetime(
-            pd.Series(cells), format=time_format or "ISO8601", utc=True, errors="coerce"
-        )
-    except (ValueError, TypeError) as error:
-        raise OptionError(f"time_format={time_format!r} is not a time format: {error}") from error
-    bad = stamps.isna().to_numpy()
+        stamps, form = stamps_of(cells, time_format)
+    except OptionError as error:
+        raise OptionError(f"{table.path}: {table.title(index)}: {error}") from error
+    bad = np.isnat(stamps)
     if bad.any():
         row = int(np.argmax(bad))
         raise DataError(
             f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is "
-            f"neither a number nor a time in the format {time_format or 'ISO 8601'}; give "
-            "time_format=, or dt= to ignore the column"
+            f"neither a number nor a time in the format {form}; give time_format=, or dt= to "
+            "ignore the column"
         )
-    return np.asarray(stamps.dt.tz_localize(None).to_numpy())
+    return stamps
+
+
+def _are_times_of_day(cells: list[str]) -> bool:
+    return all(re.fullmatch(_CLOCK + r"( ?[AaPp][Mm])?", cell) for cell in cells[:3])
 
 
 def _parsed_times_of_day(
@@ -151,7 +170,7 @@ def _parsed_times_of_day(
                 "is not a time of day"
             )
     short = next((row for row, part in enumerate(parts) if part and part[3] is None), None)
-    factors = _FACTORS.get(_FIRST.get(unit, plain_unit(unit)))
+    factors = _FACTORS.get(_FIRST.get(unit.lower(), plain_unit(unit)))
     if short is None:
         factors = _FACTORS["h"]
     elif factors is None:

@@ -72,6 +72,12 @@ def unit_of(name: str) -> str:
     return bare_unit(_parted(name.strip())[1])
 
 
+def unit_named(name: str) -> str:
+    """Return the unit of time that is a column's whole name (``millis``), or ``""``."""
+    plain = plain_unit(name)
+    return plain if plain in TIME_UNITS else ""
+
+
 def bare_unit(text: str) -> str:
     """Return a unit without brackets and blanks."""
     return text.strip().strip("[](){}<>").strip()

@@ -543,15 +543,35 @@ def test_a_clock_of_seconds_may_show_what_a_day_count_shows_but_is_not_coarse(tm
     assert read_record(file, dt=0.1).n_samples == 40
 
 
-def test_dates_of_other_kinds_need_their_format(tmp_path):
+@pytest.mark.parametrize("start", ["2025-01-31 23:59:30", "2025-01-02 23:59:30"])
+@pytest.mark.parametrize(
+    "form",
+    ["%Y-%m-%d %H:%M:%S", "%Y/%m/%d %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%y %H:%M:%S,%f",
+     "%d/%m/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%d-%b-%y %H:%M:%S"],
+)  # fmt: skip
+def test_dates_of_the_world_stand_beside_text_and_numbers(tmp_path, form, start):
     file = tmp_path / "a.csv"
-    rows = [f"03.02.2026 10:00:0{k},{k},{k}" for k in range(4)]
+    stamps = pd.date_range(start, periods=8, freq="10s").strftime(form)
+    delimiter = ";" if "," in form else ","
+    lines = [
+        delimiter.join((stamp, "1.0", f"{k}.5", "Good", "x", "y", "z"))
+        for k, stamp in enumerate(stamps)
+    ]
+    names = "date time,u,y,Quality,Unit,Operator,Remark".replace(",", delimiter)
+    file.write_text("\n".join([names, *lines]) + "\n")
+    assert_array_equal(read_record(file).time, 10.0 * np.arange(8))
+
+
+def test_dates_whose_day_and_month_cannot_be_told_apart_are_asked_about(tmp_path):
+    file = tmp_path / "a.csv"
+    rows = [f"0{k}/02/2026 10:00:00,{k},{k}" for k in range(1, 5)]
     file.write_text("\n".join(["date time,u,y", *rows]) + "\n")
-    with pytest.raises(DataError, match=r"line 2: '03\.02\.2026 10:00:00'.*time_format="):
+    with pytest.raises(OptionError, match=r"column 'date time'.*time_format='%d/%m/%Y.*'%m/%d/%Y"):
         read_record(file)
     with pytest.raises(OptionError, match="time_format='%' is not a time format"):
         read_record(file, time_format="%")
-    assert_array_equal(read_record(file, time_format="%d.%m.%Y %H:%M:%S").time, np.arange(4.0))
+    record = read_record(file, time_format="%d/%m/%Y %H:%M:%S")
+    assert_array_equal(record.time, 86400 * np.arange(4.0))
 
 
 LAST = "t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n1.5,1.5,12.5000\n2,-1.5,12.0000"

@@ -1,0 +1,64 @@
+"""Long tables, with one row for each sample of each tag, as historians export them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import DataError
+from ..columns import Selector, holds_numbers, named
+from ..tables import Column, Table
+from .names import DATE_NAMES, TIME_NAMES
+
+TAG_NAMES = frozenset(
+    {"tag", "tags", "tagname", "tag name", "point", "point name", "pointname", "point id",
+     "variable", "item", "item id", "itemid", "node id", "nodeid", "signal", "sensor",
+     "messstelle", "kennzeichen"}
+)  # fmt: skip
+VALUE_NAMES = frozenset({"value", "values", "wert", "messwert", "reading", "vvalue", "valeur"})
+_MOST_TAGS = 1000
+
+
+class LongTable(NamedTuple):
+    """A long table: columns of time, tag and value, and the rows of each tag."""
+
+    time: int
+    value: int
+    rows: dict[str, np.ndarray[tuple[int], np.dtype[np.intp]]]
+
+
+def long_table(
+    table: Table, time: str | int | None, signals: Sequence[Selector | None]
+) -> LongTable | None:
+    """Rows of each tag, or None if the table is not long.
+
+    It is long if it has one column of tags, one of values and one of time by their names, and no
+    column has the name of a requested signal.
+    """
+    tags = [k for k in named(table, TAG_NAMES) if not holds_numbers(table, k)]
+    values = named(table, VALUE_NAMES)
+    clocks = named(table, TIME_NAMES) or named(table, DATE_NAMES)
+    if isinstance(time, str):
+        clocks = [k for k, one in enumerate(table.columns) if one.name == time]
+    names = {column.name for column in table.columns}
+    asked = {one for signal in signals if signal is not None for one in _each(signal)}
+    if not len(tags) == len(values) == len(clocks) == 1 or asked & names:
+        return None
+    cells = np.array([str(cell).strip() for cell in table.columns[tags[0]].cells])
+    found = list(dict.fromkeys(cells.tolist()))
+    if len(found) > _MOST_TAGS:
+        raise DataError(f"{table.path} has {len(found)} tags; the limit is {_MOST_TAGS}")
+    return LongTable(clocks[0], values[0], {tag: np.flatnonzero(cells == tag) for tag in found})
+
+
+def tags_as_columns(table: Table, long: LongTable) -> Table:
+    """Table with a column for each tag, from which those of the signals are chosen."""
+    cells = table.columns[long.value].cells
+    columns = [Column(tag, "", cells[rows]) for tag, rows in long.rows.items()]
+    return Table(table.path, tuple(columns), decimal=table.decimal)
+
+
+def _each(signal: Selector) -> Sequence[str | int]:
+    return [signal] if isinstance(signal, str | int) else list(signal)

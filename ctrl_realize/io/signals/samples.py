@@ -1,0 +1,213 @@
+"""Samples of input and output with their time stamps, and the record that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...data import Record
+from ...errors import OptionError
+from ...numerics.arrays import FloatArray
+from ...numerics.signals.time_axis import axis_fault
+from ..columns import check_lengths
+from ..tables import Table
+from ..time_column import TimeAxis, time_axis
+from ..units import TIME_UNITS, plain_unit, unit_named
+from .long_format import LongTable
+from .names import Parts
+from .quality import Rules
+
+Rows = np.ndarray[Any, np.dtype[np.intp]]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Input and output with the stamps of each, as they stand in a file.
+
+    ``input_time`` is None where the samples of the input are those of the output.
+    """
+
+    time: FloatArray
+    input: FloatArray
+    output: FloatArray
+    input_time: FloatArray | None
+    place: Callable[[int], str]
+
+    def record(self, labels: dict[str, Any], *, keep: bool, resample: bool) -> Record:
+        """Make a record: as it is, with gaps on a finer time axis, or interpolated."""
+        if resample:
+            return Record.resampled(self.time, self.at_outputs(), self.output, **labels)
+        if not keep:
+            return Record(self.time, self.at_outputs(), self.output, **labels)
+        time, input, output = self.time, self.input, self.output
+        if self.input_time is None:
+            # a stamp that comes twice was stored twice, or corrected: the later one holds
+            last = np.r_[np.diff(time) != 0, True]
+            time, input, output = time[last], input[..., last], output[..., last]
+            if axis_fault(time) is None:
+                return Record(time, input, output, missing="keep", **labels)
+        return Record.from_samples(time, input, output, input_time=self.input_time, **labels)
+
+    def at_outputs(self) -> FloatArray:
+        """Input at the stamps of the output; it holds its value between its own."""
+        if self.input_time is None:
+            return self.input
+        last = np.searchsorted(self.input_time, self.time, side="right") - 1
+        held = np.array(self.input[..., np.maximum(last, 0)])
+        held[..., last < 0] = np.nan  # before its first sample it is unknown
+        return held
+
+
+def wide_axis(
+    table: Table, parts: Parts, time_unit: str, time_format: str | None
+) -> tuple[TimeAxis, Rows]:
+    """Time axis of a table with a column for each signal, and its rows in the order of time."""
+    used = [*parts.inputs, *parts.outputs] + ([] if parts.time is None else [parts.time])
+    check_lengths(table, used)
+    count = table.columns[parts.outputs[0]].cells.size
+    if parts.time is None:
+        return TimeAxis(parts.dt * np.arange(count), None), np.arange(count)
+    axis = time_axis(table, parts.time, time_unit, time_format, parts.date)
+    seconds, rows = axis.seconds, np.arange(count)
+    if count > 1 and np.all(np.diff(seconds) <= 0) and seconds[-1] < seconds[0]:
+        # historians list the newest sample first
+        rows, seconds = rows[::-1], seconds[::-1]
+        if axis.start is not None:
+            start = axis.start + np.timedelta64(round(1e9 * float(seconds[0])), "ns")
+            return TimeAxis(seconds - seconds[0], start), rows
+    return TimeAxis(seconds, axis.start), rows
+
+
+def wide_samples(
+    table: Table, parts: Parts, seconds: FloatArray, rows: Rows, rules: Rules
+) -> Samples:
+    """Samples in some rows of a table with a column for each signal."""
+    used = [*parts.inputs, *parts.outputs, *rules.columns(table)]
+    part = table.rows(rows, used)
+    input, output = (
+        _stacked([rules.values(part, k) for k in chosen])
+        for chosen in (parts.inputs, parts.outputs)
+    )
+    return Samples(seconds, input, output, None, part.place)
+
+
+def long_samples(
+    table: Table,
+    long: LongTable,
+    parts: Parts,
+    axis: TimeAxis,
+    span: tuple[float, float],
+    rules: Rules,
+) -> Samples:
+    """Samples of the chosen tags of a long table, each at its own stamps."""
+    tags = list(long.rows)
+    both = []
+    for chosen in (parts.inputs, parts.outputs):
+        series = [
+            _series(table, long, tags[k], axis.seconds, rules, span, holds=chosen is parts.inputs)
+            for k in chosen
+        ]
+        time = np.unique(np.concatenate([stamps for stamps, _ in series]))
+        values = np.full((len(series), time.size), np.nan)
+        for row, (stamps, numbers) in zip(values, series, strict=True):
+            row[np.searchsorted(time, stamps)] = numbers
+        both.append((time, values[0] if len(series) == 1 else values))
+    (input_time, input), (time, output) = both
+    if input_time.size and time.size and input_time[-1] < time[-1]:
+        # a valve that did not move again has held its place to the end
+        input_time = np.r_[input_time, time[-1]]
+        input = np.concatenate([input, input[..., -1:]], axis=-1)
+    return Samples(time, input, output, input_time, "sample {}".format)
+
+
+def _series(
+    table: Table,
+    long: LongTable,
+    tag: str,
+    seconds: FloatArray,
+    rules: Rules,
+    span: tuple[float, float],
+    *,
+    holds: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Stamps and values of one tag in the order of time; of equal stamps the last one holds."""
+    rows = long.rows[tag]
+    rows = rows[np.argsort(seconds[rows], kind="stable")]
+    stamps = seconds[rows]
+    rows = rows[np.r_[np.diff(stamps) != 0, True]]
+    first, last = span
+    inside = (seconds[rows] >= first) & (seconds[rows] <= last)
+    if holds and rows.size:
+        # what was set before the part begins still holds there
+        before = np.flatnonzero(seconds[rows] < first)
+        inside[before[-1:]] = True
+    rows = rows[inside]
+    part = table.rows(rows, [long.value, *rules.columns(table)])
+    values = rules.values(part, long.value)
+    known = ~np.isnan(values)  # a sample without a value is no sample
+    return np.maximum(seconds[rows][known], first), values[known]
+
+
+def span_of(start: Any, stop: Any, axis: TimeAxis) -> tuple[float, float]:
+    """First and last time in s of the wanted part; dates are compared with those of the file."""
+    low = -np.inf if start is None else _second(start, "start", axis)
+    high = np.inf if stop is None else _second(stop, "stop", axis)
+    if not low < high:
+        raise OptionError(f"start={start!r} is not before stop={stop!r}")
+    return low, high
+
+
+def _second(given: Any, name: str, axis: TimeAxis) -> float:
+    if isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool):
+        return float(given)
+    import pandas as pd
+
+    if axis.start is None:
+        raise OptionError(
+            f"{name}={given!r}: the time of the file has no dates; expected a time in s"
+        )
+    try:
+        stamp = pd.Timestamp(given)
+    except (ValueError, TypeError) as error:
+        raise OptionError(
+            f"{name}={given!r}; expected a time in s, or a date and time such as "
+            f"{str(axis.start)[:19].replace('T', ' ')!r}"
+        ) from error
+    if stamp.tzinfo is not None:
+        stamp = stamp.tz_convert("UTC").tz_localize(None)
+    return float((stamp - pd.Timestamp(axis.start)) / pd.Timedelta(1, "s"))
+
+
+def labels_of(table: Table, parts: Parts, time_column: int | None) -> dict[str, Any]:
+    """Names and units of the signals, and the unit of time, as the file has them."""
+    labels: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    for argument, letter, chosen in (
+        ("input_labels", "u", parts.inputs),
+        ("output_labels", "y", parts.outputs),
+    ):
+        names = [table.columns[k].name for k in chosen]
+        unique = all(names) and len(set(names)) == len(names)
+        labels[argument] = names if unique else None
+        default = [letter] if len(chosen) == 1 else [f"{letter}[{k}]" for k in range(len(chosen))]
+        for name, k in zip(names if unique else default, chosen, strict=True):
+            unit = table.columns[k].unit or ("%" if _is_percent(table.columns[k].first(1)) else "")
+            if plain_unit(unit):
+                units[name] = unit
+    if time_column is not None:
+        column = table.columns[time_column]
+        unit = plain_unit(column.unit) or unit_named(column.name)
+        if unit in TIME_UNITS:
+            units["time"] = unit
+    return labels | {"units": units}
+
+
+def _is_percent(cells: np.ndarray[Any, np.dtype[Any]]) -> bool:
+    return bool(cells.size) and isinstance(cells[0], str) and cells[0].strip().endswith("%")
+
+
+def _stacked(rows: Sequence[FloatArray]) -> FloatArray:
+    return rows[0] if len(rows) == 1 else np.stack(rows)
