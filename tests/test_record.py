@@ -90,3 +90,15 @@ def test_the_steady_state_before_a_step_makes_a_record_that_begins_with_it_usabl
     assert fit.dead_time == pytest.approx(0.6, abs=0.02)  # a sample
     with pytest.raises(DataError, match="baseline of the output has 2 values"):
         record.with_baseline(0.0, [1, 2])
+
+
+def test_a_held_input_keeps_its_levels_when_samples_with_jitter_are_resampled():
+    rng = np.random.default_rng(0)
+    t = np.arange(60.0) + rng.uniform(-0.2, 0.2, 60)
+    u = np.where(t < 20, 34.0, np.where(t < 40, 38.0, 31.0))
+    record = cr.Record.resampled(t, u, t)
+    assert set(record.input) == {31.0, 34.0, 38.0}
+    np.testing.assert_allclose(
+        record.time[np.flatnonzero(np.diff(record.input)) + 1], [20, 40], atol=0.7
+    )
+    np.testing.assert_allclose(cr.Record.resampled(t, 2 * t, t).input, 2 * record.time)

@@ -367,6 +367,9 @@ class Record(Drawable):
     ) -> Record:
         """Make a record from samples with time jitter, by linear interpolation.
 
+        An input that holds its levels (most of its values repeat the one before) is not
+        interpolated: it has the value of the nearest time stamp.
+
         Parameters
         ----------
         time, input, output : array_like

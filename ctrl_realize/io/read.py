@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 from ..errors import FileFormatError
 from .checks import read_head, usable_file
+from .containers.excel import is_workbook, sheet_as_text
 from .tables import Table
+from .text.delimited import read_delimited
+from .text.source import TextSource
 from .text_options import TextOptions
 
 _NOT_READABLE = {
-    b"\x89HDF": "an HDF5 file that MATLAB has not written: save it as .mat, .npz, Parquet or CSV",
-    b"\xd0\xcf\x11\xe0": "an old Excel workbook: save it as CSV",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook (.xls): save it as .xlsx or CSV",
     b"\x1f\x8b": "compressed with gzip: unpack it first",
     b"BZh": "compressed with bzip2: unpack it first",
     b"\xfd7zXZ": "compressed with xz: unpack it first",
     b"7z\xbc\xaf": "a 7z archive: unpack it first",
     b"\x80\x04\x95": "a Python pickle: these can run code when read and are refused",
-    b"TDSm": "a LabVIEW TDMS file: export it as CSV",
     b"%PDF": "a PDF document",
 }
 
@@ -29,7 +31,7 @@ def read_table(
     variable: str | None,
     max_bytes: float,
 ) -> Table:
-    """Read the columns of a text table, ``.npz``, ``.mat`` or Parquet file.
+    """Read the columns of a text, Excel, ``.npz``, ``.mat``, Parquet, HDF5 or TDMS file.
 
     The type is determined from the first bytes; the file name only matters for the oldest ``.mat``
     files, which have no signature.
@@ -40,7 +42,8 @@ def read_table(
     options : TextOptions
         Format of text.
     variable : str or None
-        The only variable of a ``.mat`` or ``.npz`` file (a matrix or a struct) to use.
+        The only variable of a ``.mat`` or ``.npz`` file (a matrix or a struct), group of an HDF5 or
+        TDMS file, or sheet of a workbook to use.
     max_bytes : float
         Largest size, in the file and unpacked.
 
@@ -54,6 +57,10 @@ def read_table(
     for mark, what in _NOT_READABLE.items():
         if head.startswith(mark):
             raise FileFormatError(f"{file} is {what}")
+    if head.startswith(b"PK\x03\x04") and is_workbook(file):
+        sheet = sheet_as_text(file, variable, max_bytes)
+        plain = replace(options, delimiter="\t", decimal=".", encoding="utf-8", comment=None)
+        return read_delimited(sheet, plain)
     if head.startswith((b"PK\x03\x04", b"\x93NUMPY")):
         from .containers.npz import read_npz
 
@@ -62,6 +69,14 @@ def read_table(
         from .containers.parquet import read_parquet
 
         return read_parquet(file, max_bytes=max_bytes)
+    if head.startswith(b"TDSm"):
+        from .containers.tdms import read_tdms
+
+        return read_tdms(file, variable=variable, max_bytes=max_bytes)
+    if head.startswith(b"\x89HDF"):
+        from .containers.mat import read_hdf5
+
+        return read_hdf5(file, variable=variable, max_bytes=max_bytes)
     if (
         head.startswith((b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"))
         or file.suffix.lower() == ".mat"
@@ -69,6 +84,4 @@ def read_table(
         from .containers.mat import read_mat
 
         return read_mat(file, variable=variable, max_bytes=max_bytes)
-    from .text.delimited import read_delimited
-
-    return read_delimited(file, options)
+    return read_delimited(TextSource(file), options)

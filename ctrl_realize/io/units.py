@@ -34,6 +34,12 @@ _SPELLINGS = {
 
 _KNOWN = {*TIME_UNITS, "hz", "khz", "mhz", "rad/s", "deg", "rad", "db"}
 
+_BELOW_NAMES = {
+    "%", "°c", "degc", "°f", "degf", "bar", "mbar", "kpa", "mpa", "rpm", "1/min", "l/min", "l/h",
+    "m3/h", "m³/h", "kg/h", "kg/s", "t/h", "mm", "cm",
+}  # fmt: skip
+"""Further units that stand alone below a header, and are hardly names of signals."""
+
 _PER_SECOND = ("rad_s", "rad/s", "rad/sec")
 _SEPARATORS = " _/"
 _OPENING = "[({<"
@@ -103,7 +109,7 @@ def is_units_line(cells: list[str]) -> bool:
     """Whether the cells below a header are units, not names or numbers."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     bracketed = [cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled]
-    known = [plain_unit(cell) in _KNOWN for cell in filled]
+    known = [plain_unit(cell) in _KNOWN | _BELOW_NAMES for cell in filled]
     return bool(filled) and (all(bracketed) or any(known))
 
 

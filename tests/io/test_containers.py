@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import inspect
 import pickle
 import struct
@@ -344,10 +345,84 @@ def test_what_cannot_be_opened_says_what_to_do(tmp_path, monkeypatch):
     with zipfile.ZipFile(tmp_path / "a.xlsx", "w") as archive:
         archive.writestr("xl/workbook.xml", "<xml/>")
     (tmp_path / "a.parquet").write_bytes(b"PAR1" + bytes(100))
-    monkeypatch.setitem(sys.modules, "pyarrow", None)  # not installed
+    (tmp_path / "a.tdms").write_bytes(b"TDSm" + bytes(100))
+    for name in ("xlsx", "tdms"):
+        with pytest.raises(FileFormatError, match=f"a.{name} is a damaged"):
+            read_record(tmp_path / f"a.{name}")
+    for package in ("pyarrow", "openpyxl", "nptdms"):
+        monkeypatch.setitem(sys.modules, package, None)  # not installed
     for name, match in (
         ("a.parquet", "pip install pyarrow"),
-        ("a.xlsx", r"an Excel workbook .* save the data as CSV"),
+        ("a.xlsx", r"an Excel workbook.*ctrl-realize\[excel\].* save it as CSV"),
+        ("a.tdms", r"TDMS file.*ctrl-realize\[tdms\].*as CSV"),
     ):
         with pytest.raises(FileFormatError, match=match):
             read_record(tmp_path / name)
+
+
+def test_a_sheet_is_read_like_a_text_table(tmp_path):
+    """Titles above the header, a unit line, dates, percentages, switches, and a column of text."""
+    openpyxl = pytest.importorskip("openpyxl")
+    sheet = openpyxl.Workbook().active
+    sheet.title = "Run 1"
+    for row in (["Oven 3"], [], [None, "Date", "MV", "Istwert", "Fan", "Remark"],
+                [None, None, "%", "°C", None, None]):  # fmt: skip
+        sheet.append(row)
+    noon = datetime.datetime(2025, 2, 1, 23, 59, 59, 500_000)
+    for k in range(6):
+        sheet.append([None, noon + datetime.timedelta(seconds=k / 2), k / 10, 20.5 + k, k > 2, "x"])
+        sheet.cell(sheet.max_row, 3).number_format = "0%"
+    path = tmp_path / "a.xlsx"
+    sheet.parent.save(path)
+    record = read_record(path)
+    assert_array_equal(record.time, 0.5 * np.arange(6))
+    np.testing.assert_allclose(record.input, 10.0 * np.arange(6), rtol=1e-15)
+    assert_array_equal(record.output, 20.5 + np.arange(6))
+    assert (record.input_units, record.output_units) == (("%",), ("°C",))
+    assert_array_equal(read_record(path, input="Fan").input, [0, 0, 0, 1, 1, 1])
+    sheet.cell(7, 4).value = "Bad"
+    sheet.parent.save(path)
+    with pytest.raises(DataError, match="column 'Istwert', row 7: 'Bad': a value is missing"):
+        read_record(path)
+    assert read_record(path, missing="keep").n_missing == 1
+    sheet.parent.copy_worksheet(sheet)
+    sheet.parent.save(path)
+    with pytest.raises(OptionError, match="2 sheets with data; give variable= one of 'Run 1', 'R"):
+        read_record(path)
+    assert read_record(path, variable="Run 1", missing="keep").n_samples == 6
+    with pytest.raises(OptionError, match="has the sheets"):
+        read_record(path, variable="Run 2")
+    with pytest.raises(FileFormatError, match="unpacked"):
+        read_record(path, max_bytes=7000)
+
+
+def test_hdf5_files_of_others_are_read(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        for name, values in (("time", T), ("u", U), ("y", Y)):
+            file[f"run/{name}"] = values
+        file["run/y"].attrs["units"] = "bar"
+        file["note"] = "bench 3"
+    check(read_record(path))
+    assert read_record(path, variable="run").output_units == ("bar",)
+    stamps = [f"2025-02-01 08:15:{t:05.2f}" for t in T]
+    kinds = [("timestamp", "S30"), ("u", "f8"), ("y", "f8")]
+    rows = np.array(list(zip(stamps, U, Y, strict=True)), kinds)
+    with h5py.File(path, "w") as file:
+        file["table"] = rows
+    check(read_record(path))
+
+
+def test_tdms_files_are_read(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    path = tmp_path / "a.tdms"
+    waveform = {"wf_increment": T[1], "unit_string": "V"}
+    for channels in (
+        [("time", T, {}), ("u", U, {}), ("y", Y, {})],
+        [("u", U, waveform), ("y", Y, waveform)],
+    ):
+        with nptdms.TdmsWriter(path) as writer:
+            writer.write_segment([nptdms.ChannelObject("run", *channel) for channel in channels])
+        check(read_record(path))
+    assert read_record(path).input_units == ("V",)

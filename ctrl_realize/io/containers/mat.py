@@ -1,4 +1,4 @@
-"""MATLAB's ``.mat`` files: numbers, structs and cells, by SciPy; by h5py for version 7.3.
+"""MATLAB's ``.mat`` files: numbers, structs and cells, by SciPy; HDF5 and version 7.3 by h5py.
 
 Both are compiled readers that a damaged file can crash: they run in a separate process, so that
 such a file gives an error.
@@ -38,6 +38,24 @@ def read_mat(path: Path, *, variable: str | None, max_bytes: float) -> Table:
     return table_of_arrays(path, _arrays(path, max_bytes), variable)
 
 
+def read_hdf5(path: Path, *, variable: str | None, max_bytes: float) -> Table:
+    """Read the datasets of an HDF5 file as columns, named ``group.dataset``.
+
+    The fields of a compound dataset are columns; an attribute ``unit`` or ``units`` is the unit.
+
+    Raises
+    ------
+    FileFormatError
+        Damaged, too large when unpacked, without numbers, or h5py is not installed.
+    """
+    if find_spec("h5py") is None:
+        raise FileFormatError(
+            f"{path} is an HDF5 file: pip install 'ctrl-realize[hdf5]' (h5py) to read it, or save "
+            "it as .mat, .npz, Parquet or CSV"
+        )
+    return table_of_arrays(path, _by_worker(path, max_bytes, "an HDF5 file"), variable)
+
+
 def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
     """Read all numeric arrays of a ``.mat`` file, including those in structs and cells."""
     head = read_head(path, 128)
@@ -48,6 +66,11 @@ def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
             f"{path} is a v7.3 (HDF5) .mat file: pip install 'ctrl-realize[matlab]' (h5py) to "
             "read it, or in MATLAB save it with save(file, '-v7')"
         )
+    return _by_worker(path, max_bytes, "a .mat file")
+
+
+def _by_worker(path: Path, max_bytes: float, kind: str) -> dict[str, AnyArray]:
+    """Read all arrays in a separate process."""
     try:
         done = subprocess.run(
             [sys.executable, "-P", str(_WORKER), str(path), str(max_bytes)],
@@ -63,7 +86,10 @@ def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
         words = done.stderr.decode("utf-8", "replace").strip().splitlines()
         # a negative code is the signal that terminated the reader
         reason = words[-1][:300] if words and done.returncode > 0 else "its reader crashed"
-        raise FileFormatError(f"{path} is not a .mat file, or a damaged one: {reason}")
+        raise FileFormatError(
+            f"{path} is not {kind}, or a damaged one: {reason}; expected a file that "
+            f"{'h5py' if 'HDF5' in kind else 'SciPy'} opens, or .mat, .npz, Parquet, Excel or CSV"
+        )
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
         return {str(name): found[f"arr_{k}"] for k, name in enumerate(found["names"])}
 

@@ -1,4 +1,4 @@
-"""Program that reads one ``.mat`` file and writes its arrays to standard output as ``.npz``.
+"""Program that reads one ``.mat`` or HDF5 file and writes its arrays to stdout as ``.npz``.
 
 ``python mat_worker.py FILE MAX_BYTES``; the arrays are ``arr_0``, ``arr_1``, ... of ``names``. It
 imports nothing from this package, so that it starts quickly.
@@ -27,6 +27,12 @@ def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
             for name in hdf5:
                 if not name.startswith("#"):
                     yield from _inside_hdf5(hdf5, name, hdf5[name], _MAX_DEPTH)
+        return
+    if head.startswith(b"\x89HDF"):
+        import h5py
+
+        with h5py.File(path, "r") as hdf5:
+            yield from _datasets("", hdf5, _MAX_DEPTH)
         return
     import scipy.io
 
@@ -87,6 +93,34 @@ def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple
             numbers = numbers["real"] + 1j * numbers["imag"]
         if numbers.dtype.kind in "biufc":
             yield name, numbers.T
+
+
+def _datasets(name: str, group: Any, depth: int) -> Iterator[tuple[str, Any]]:
+    """Yield the numbers and texts of a group of HDF5, with units from the attributes."""
+    import h5py
+
+    if depth == 0:
+        raise ValueError(f"more than {_MAX_DEPTH} levels of groups")
+    for key, value in group.items():
+        place = f"{name}.{key}" if name else str(key)
+        if isinstance(value, h5py.Group):
+            yield from _datasets(place, value, depth - 1)
+        elif isinstance(value, h5py.Dataset) and value.shape:
+            unit = value.attrs.get("units", value.attrs.get("unit", b""))
+            unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
+            for field in value.dtype.names or ("",):
+                cells = value[field] if field else value[()]
+                if cells.dtype.kind in "OS" and h5py.check_string_dtype(cells.dtype):
+                    cells = np.array([_text(one) for one in cells.ravel()], dtype=str)
+                if cells.dtype.kind in "biufcU":
+                    called = ".".join(part for part in (place, field) if part)
+                    yield called + (f" [{unit}]" if unit and not field else ""), cells
+        elif isinstance(value, h5py.Dataset) and value.dtype.kind in "iuf":
+            yield place, value[()]
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def main(path: str, max_bytes: float) -> None:

@@ -52,8 +52,7 @@ def _members(path: Path, max_bytes: float) -> dict[str, AnyArray]:
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
         if not any(member.filename.endswith(".npy") for member in members):
-            kind = "an Excel workbook" if "xl/workbook.xml" in archive.namelist() else "a zip file"
-            raise FileFormatError(f"{path} is {kind} without arrays: save the data as CSV")
+            raise FileFormatError(f"{path} is a zip file without arrays: save the data as CSV")
         if len(members) > MAX_ARRAYS:
             raise FileFormatError(f"{path} has {len(members)} arrays, the limit is {MAX_ARRAYS}")
         check_size(path, sum(member.file_size for member in members), max_bytes, ", unpacked,")

@@ -11,16 +11,16 @@ from typing import Any
 
 from ...errors import DataWarning, FileFormatError
 from ..cells import NUMBER, split_line
-from ..checks import read_tail
 from ..tables import Column, Table
 from ..text_options import TextOptions
 from .sniff import TextLayout, sniff
+from .source import TextSource
 
 _TAIL_BYTES = 1 << 16
 _TAIL_LINES = 50
 
 
-def read_delimited(path: Path, options: TextOptions) -> Table:
+def read_delimited(source: TextSource, options: TextOptions) -> Table:
     """Read a text table (CSV, TSV, columns between blanks).
 
     An incomplete last line, as if writing was interrupted, is left out with a `DataWarning`.
@@ -30,10 +30,10 @@ def read_delimited(path: Path, options: TextOptions) -> Table:
     FileFormatError
         It is not a table: binary, without numbers, or with rows longer than the others.
     """
-    layout = sniff(path, options)
-    frame = _parse(path, layout)
+    path, layout = source.path, sniff(source, options)
+    frame = _parse(source, layout)
     _check_parsed(path, layout, frame)
-    cut = _cut_last_line(path, layout)
+    cut = _cut_last_line(source, layout)
     if cut and len(frame) > 1:
         warnings.warn(f"{path}: the last line is skipped: {cut}", DataWarning, stacklevel=4)
         # columns that are text only because of the incomplete line become numbers in Table.numbers
@@ -48,13 +48,14 @@ def read_delimited(path: Path, options: TextOptions) -> Table:
         # every line ends in a delimiter
         columns.pop()
     return Table(
-        path, tuple(columns), decimal=layout.decimal, place=lambda row: _place(path, layout, row)
+        path, tuple(columns), decimal=layout.decimal, place=lambda row: _place(source, layout, row)
     )
 
 
-def _parse(path: Path, layout: TextLayout) -> Any:
+def _parse(source: TextSource, layout: TextLayout) -> Any:
     import pandas as pd
 
+    path = source.path
     separator = r"\s+" if layout.delimiter == " " else layout.delimiter
     keywords: dict[str, Any] = {"low_memory": False}
     if not (layout.delimiter + (layout.comment or "")).isascii():
@@ -64,7 +65,7 @@ def _parse(path: Path, layout: TextLayout) -> Any:
         # the default of later versions; without it, the last digit could be wrong
         keywords["float_precision"] = "round_trip"
     try:
-        with path.open(encoding=layout.encoding, errors="replace", newline="") as file:
+        with source.open(layout.encoding, newline="") as file:
             # Not by skiprows: the parser counts lines differently, and would leave out more.
             file.read(layout.start)
             frame = pd.read_csv(
@@ -119,9 +120,9 @@ def _is_blank(cells: Any) -> bool:
     return all(isinstance(cell, str) and not cell.strip() for cell in cells)
 
 
-def _cut_last_line(path: Path, layout: TextLayout) -> str:
+def _cut_last_line(source: TextSource, layout: TextLayout) -> str:
     """Return why the last line seems incomplete, or ``""``."""
-    raw = read_tail(path, _TAIL_BYTES)
+    raw = source.tail(_TAIL_BYTES)
     # the byte order mark is not in the tail; UTF-16 without it is recognised by its zeros
     encoding = layout.encoding
     if encoding == "utf-16":
@@ -151,9 +152,9 @@ def _cut_last_line(path: Path, layout: TextLayout) -> str:
     return ""
 
 
-def _place(path: Path, layout: TextLayout, row: int) -> str:
+def _place(source: TextSource, layout: TextLayout, row: int) -> str:
     """Line of the file that contains a row of the table."""
-    with path.open(encoding=layout.encoding, errors="replace") as file:
+    with source.open(layout.encoding) as file:
         numbered = enumerate(file, start=1)
         data = (
             number
@@ -163,4 +164,4 @@ def _place(path: Path, layout: TextLayout, row: int) -> str:
             and not (layout.comment and line.lstrip().startswith(layout.comment))
         )
         number = next(islice(data, row, None), None)
-    return f"row {row}" if number is None else f"line {number}"
+    return f"row {row}" if number is None else f"{source.row_name} {number}"

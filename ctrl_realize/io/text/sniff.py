@@ -22,10 +22,11 @@ from pathlib import Path
 
 from ...errors import FileFormatError
 from ..cells import DELIMITERS, FILLED, kind_of, refuse_thousands, split_line
-from ..checks import MAX_COLUMNS, MAX_NAME, read_head
+from ..checks import MAX_COLUMNS, MAX_NAME
 from ..head_lines import HEAD_BYTES, MAX_HEAD_LINES, head_lines
 from ..text_options import TextOptions
 from .header import Head, column_names, first_data_row
+from .source import TextSource
 
 _SAMPLE_LINES = 60
 """Number of lines on which every pair of delimiter and decimal sign is tried."""
@@ -67,15 +68,15 @@ class TextLayout:
     whole: bool
 
 
-def sniff(path: Path, options: TextOptions) -> TextLayout:
-    """Determine the format of the text table in `path`.
+def sniff(source: TextSource, options: TextOptions) -> TextLayout:
+    """Determine the format of a text table.
 
     Raises
     ------
     FileFormatError
         It is not text, or there are no columns of numbers in its first lines.
     """
-    head_bytes = read_head(path, HEAD_BYTES)
+    path, head_bytes = source.path, source.head(HEAD_BYTES)
     encoding = _encoding(path, head_bytes) if options.encoding == "auto" else options.encoding
     found = head_lines(path, head_bytes, encoding, options.skip_rows)
     lines = [line.text for line in found]

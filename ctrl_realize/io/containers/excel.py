@@ -1,0 +1,127 @@
+"""Sheets of Excel workbooks (``.xlsx``), if openpyxl is installed.
+
+A sheet is written as text, with one line for each of its rows, and read like a text table: titles,
+headers, units, dates and bad cells follow the same rules.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import io
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from ...errors import FileFormatError, OptionError
+from ..checks import MAX_COLUMNS, check_size
+from ..text.source import TextSource
+
+_FEWEST_ROWS = 3
+"""A sheet with fewer filled rows is no record."""
+
+
+def is_workbook(path: Path) -> bool:
+    """Whether a zip file is a workbook."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "xl/workbook.xml" in archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError):
+        return False
+
+
+def sheet_as_text(path: Path, name: str | None, max_bytes: float) -> TextSource:
+    """Return a sheet as tab-separated text.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    name : str or None
+        Name of the sheet; None: the only one with data.
+    max_bytes : float
+        Largest size, unpacked.
+
+    Raises
+    ------
+    FileFormatError
+        openpyxl is not installed, or the workbook is damaged, too large or without data.
+    OptionError
+        There is no such sheet, or several have data; they are listed.
+    """
+    try:
+        import openpyxl
+    except ImportError as error:
+        raise FileFormatError(
+            f"{path} is an Excel workbook: pip install 'ctrl-realize[excel]' (openpyxl) to read "
+            "it, or save it as CSV"
+        ) from error
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        check_size(path, size, max_bytes, ", unpacked,")
+        with path.open("rb") as file:
+            book = openpyxl.load_workbook(file, read_only=True, data_only=True)
+            sheets = {sheet.title: sheet for sheet in book.worksheets}
+            if name is not None and name not in sheets:
+                raise OptionError(f"variable={name!r}: {path} has the sheets {_listed(sheets)}")
+            chosen = sheets if name is None else {name: sheets[name]}
+            texts = {title: _text(path, sheet.rows) for title, sheet in chosen.items()}
+    except (FileFormatError, OptionError):
+        raise
+    # damaged workbooks raise errors of zipfile, of the XML parser, KeyError and others
+    except Exception as error:
+        reason = str(error).partition("\n")[0][:200]
+        raise FileFormatError(f"{path} is a damaged Excel workbook: {reason}") from error
+    filled = {title: text for title, text in texts.items() if text.count("\n") >= _FEWEST_ROWS}
+    if len(filled) > 1:
+        raise OptionError(
+            f"{path} has {len(filled)} sheets with data; give variable= one of {_listed(filled)}"
+        )
+    if not filled:
+        raise FileFormatError(f"{path} has no sheet with data; it has {_listed(texts)}")
+    (text,) = filled.values()
+    return TextSource(path, text.encode("utf-8"), row_name="row")
+
+
+def _text(path: Path, rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as lines of tab-separated cells, without columns that are empty throughout."""
+    table = [[_cell(cell) for cell in row] for row in rows]
+    while table and not any(table[-1]):
+        table.pop()
+    width = max(map(len, table), default=0)
+    if width > MAX_COLUMNS:
+        raise FileFormatError(f"{path} has {width} columns, the limit is {MAX_COLUMNS}")
+    table = [row + [""] * (width - len(row)) for row in table]
+    used = [k for k in range(width) if any(row[k] for row in table)]
+    out = io.StringIO()
+    writer = csv.writer(out, delimiter="\t", lineterminator="\n")
+    writer.writerows([row[k] for k in used] for row in table)
+    return out.getvalue()
+
+
+def _cell(cell: Any) -> str:
+    """Text of a cell that the reader of text tables understands."""
+    value = cell.value
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if isinstance(value, int | float):
+        # what is shown as 20 % is stored as 0.2
+        if "%" in str(cell.number_format):
+            return f"{100 * value:.15g}%"
+        return repr(value)
+    if isinstance(value, datetime.datetime):
+        midnight = value.time() == datetime.time()
+        return value.date().isoformat() if midnight else value.isoformat(" ")
+    if isinstance(value, datetime.date | datetime.time):
+        return value.isoformat()
+    if isinstance(value, datetime.timedelta):
+        minutes, seconds = divmod(value.total_seconds(), 60)
+        return f"{int(minutes) // 60}:{int(minutes) % 60:02}:{seconds:09.6f}"
+    return " ".join(str(value).split())
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(repr(name) for name in list(names)[:20])
