@@ -17,9 +17,7 @@ from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
-from .compare_command import compare
-from .demo_command import demo
-from .identify_command import identify
+from .signatures import compare, demo, identify
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
 
 app = typer.Typer(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
-
-import typer
+from typing import Any
 
 from ..data import MeasuredFRF
 from ..delayed import fit_of
@@ -14,15 +12,15 @@ from ..errors import CtrlRealizeError, DataError, OptionError
 from ..frequency import compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
+from ..identification.methods import Method
 from ..identification.methods import identify as identify_record
 from ..io import read_frf
 from ..results import ModelFit
 from .inputs import (
     Reading,
     Settings,
+    Source,
     calls_again,
-    check_files,
-    reading,
     typed_call,
     words_again,
 )
@@ -33,131 +31,76 @@ from .terminal import complain, one_line, printable, progress, say
 
 _MANY = 12
 """Number of records from which on all cores are used."""
-_OPTION = typer.Option
 
 
-class Method(str, Enum):  # noqa: UP042  # typer shows the values of a plain str Enum
-    """Ways to find a model."""
-
-    output_error = "output_error"
-    scan = "scan"
-    paper = "paper"
-
-
-def identify(
-    files: Annotated[list[Path], typer.Argument(help="Records: CSV, TSV, .mat, .npz, Parquet.")],
-    output: Annotated[Path, _OPTION("--output", "-o", help="Output folder.")],
-    method: Annotated[
-        Method, _OPTION(help="output_error fits the raw record; scan and paper use realization.")
-    ] = Method.output_error,
-    order: Annotated[
-        int | None, _OPTION(min=1, help="Model order without the delay. Default: estimated.")
-    ] = None,
-    max_delay: Annotated[
-        int | None, _OPTION(min=1, help="Largest delay to consider, in samples.")
-    ] = None,
-    frf: Annotated[
-        Path | None, _OPTION(help="Measured frequency response to compare the model with.")
-    ] = None,
-    separate: Annotated[
-        bool, _OPTION("--separate", help="Treat the records as different plants: one folder each.")
-    ] = False,
-    time: Annotated[str | None, _OPTION(help="Time column, name or number from 0.")] = None,
-    input_column: Annotated[
-        str | None, _OPTION("--input", help="Input column, name or number from 0.")
-    ] = None,
-    output_column: Annotated[
-        str | None, _OPTION("--response", help="Output column, name or number from 0.")
-    ] = None,
-    dt: Annotated[
-        float | None, _OPTION(help="Sample time in s, where there is no time column.")
-    ] = None,
-    time_unit: Annotated[str | None, _OPTION(help="s, ms, us, ns, min, h or day.")] = None,
-    delimiter: Annotated[
-        str | None, _OPTION(help="Column separator: ',' ';' tab. Default: detected.")
-    ] = None,
-    decimal: Annotated[str | None, _OPTION(help="'.' or ','. Default: detected.")] = None,
-    skip_rows: Annotated[int, _OPTION(min=0, help="Lines to skip at the start.")] = 0,
-    resample: Annotated[
-        bool, _OPTION("--resample", help="Resample jittering samples onto a uniform time axis.")
-    ] = False,
-    jobs: Annotated[
-        int | None,
-        _OPTION(
-            help="Number of processes; -1: all cores. Default: all cores for 12 records or more."
-        ),
-    ] = None,
-    overwrite: Annotated[
-        bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
-    ] = False,
+def run_identify(
+    files: list[Path],
+    output: Path,
+    *,
+    method: Method,
+    choices: Mapping[str, Any],
+    frf: Path | None,
+    joint: bool,
+    separate: bool,
+    tests: Mapping[str, Any],
+    reading: Mapping[str, Any],
+    response: Mapping[str, Any],
+    jobs: int | None,
+    report: bool,
+    overwrite: bool,
 ) -> int:
-    """Identify a model with dead time from one record, or from many of one plant.
-
-    One record gives model.json, report.html and figures/. Several records of one plant are a
-    campaign: the output also contains a table of their delays (records.csv), a model for each
-    (models/) and a final model. A record that fails becomes a row of the table with its error. If a
-    campaign is interrupted, the finished records are kept in rows/, and the same command resumes
-    from there.
-
-    \b
-    Examples:
-      ctrl-realize identify step.csv -o results
-      ctrl-realize identify valve_*.csv -o valve --method scan --jobs 2
-      ctrl-realize identify log.txt -o out --time 0 --input current --response position
-      ctrl-realize identify step.csv -o out --frf frf.csv
-    """  # noqa: D301  # \b keeps the lines of the examples apart
-    given = [*files, *([frf] if frf else [])]
-    check_files(given)
-    settings = Settings(method.value, order, max_delay)
-    how = reading(
-        time=time,
-        input=input_column,
-        output=output_column,
-        dt=dt,
-        time_unit=time_unit,
-        delimiter=delimiter,
-        decimal=decimal,
-        skip_rows=skip_rows,
-        resample=resample,
-    )
-    measured = None if frf is None else read_frf(frf)
-    words = words_again(files, settings, how, frf, separate)
-    run = Run(typed_call("identify", words), tuple(given), overwrite)
+    """Identify, write the results, and return the exit code."""
+    if joint and separate:
+        raise OptionError("expected --joint or --separate, got both")
+    if len(tests) > 1:
+        raise OptionError("expected --by or --split, got both")
+    settings = Settings(method, dict(choices), joint)  # type: ignore[arg-type]
+    how = Reading(reading, tests)
+    measured = None if frf is None else read_frf(frf, **response)
+    words = words_again(files, settings, how, frf, response, separate)
+    run = Run(typed_call("identify", words), (*files, *([frf] if frf else [])), overwrite)
     words += ["--output", str(output)]
-    calls = calls_again(files, settings, how, words)
-    if separate and len(files) > 1:
-        return _each_alone(files, output, settings, how, measured, words, run)
+    calls = calls_again(files, settings, how, words, None if frf is None else (frf, response))
+    sources = how.sources(files)
+    if separate and len(sources) > 1:
+        return _each_alone(sources, output, settings, how, measured, words, run, report)
     refuse_other_results(output, run)
-    if len(files) > 1:
-        return _many(files, output, settings, how, measured, calls, jobs, run)
+    if len(sources) > 1 and not joint:
+        return _many(sources, output, settings, measured, calls, jobs, run, report)
     with appearing(output, run) as folder:
-        reported = _one(files[0], folder, settings, how, measured, calls)
-    _say_what_is_written(output, ["model.json"], reported)
-    return 0 if reported else 1
+        written = _one(sources, folder, settings, measured, calls, report)
+    _say_what_is_written(output, ["model.json"], report and written)
+    return 0 if written else 1
 
 
 def _one(
-    file: Path,
+    sources: list[Source],
     folder: Path,
     settings: Settings,
-    how: Reading,
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
+    report: bool,
 ) -> bool:
-    """Identify one file into a folder; return whether its report was written."""
-    record = how.source(file)()
-    system = identify_record(record, method=settings.method, **settings.options)
+    """Identify one model into a folder; return whether its report was written as asked."""
+    records = [source.record() for source in sources]
+    options: dict[str, Any] = {**settings.choices}
+    if settings.joint and frf is not None:
+        options["frf"] = frf
+    system = identify_record(
+        records[0] if len(records) == 1 else records, method=settings.method, **options
+    )
     comparison = None if frf is None else compare_frf(system, frf)
-    reported = write_record_files(
-        folder, system, record, file,
-        frf=frf, comparison=comparison, settings=settings.given, calls=calls,
+    written = write_record_files(
+        folder, system, records[0], [source.file for source in sources],
+        frf=frf, comparison=comparison, settings=settings.given, calls=calls, with_report=report,
     )  # fmt: skip
-    say(printable(f"{file}: {record!r}"))
+    for source, record in zip(sources, records, strict=True):
+        say(printable(f"{source.file}: {record!r}"))
     say(fit_of(system, ModelFit).report())
     if comparison is not None:
         say()
         say(comparison.report())
-    return reported
+    return written
 
 
 def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None:
@@ -166,27 +109,28 @@ def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None
 
 
 def _many(
-    files: list[Path],
+    sources: list[Source],
     output: Path,
     settings: Settings,
-    how: Reading,
     frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
     jobs: int | None,
     run: Run,
+    report: bool,
 ) -> int:
-    n_jobs = jobs if jobs is not None else -1 if len(files) >= _MANY else 1
-    sources = [how.source(file) for file in files]
+    n_jobs = jobs if jobs is not None else -1 if len(sources) >= _MANY else 1
     with kept_rows(output) as store:
         campaign = identify_campaign(
-            sources, n_jobs=n_jobs, method=settings.method, store=store, **settings.options
-        )
+            [source.content for source in sources],
+            n_jobs=n_jobs, method=settings.method, store=store, **settings.choices,
+        )  # fmt: skip
         _refuse_useless(campaign)
         comparison = None if frf is None else compare_frf(campaign.system, frf)
         with appearing(output, run) as folder:
-            reported = write_campaign_files(
-                folder, campaign, files,
+            written = write_campaign_files(
+                folder, campaign, [source.file for source in sources],
                 frf=frf, comparison=comparison, settings=settings.given, calls=calls,
+                with_report=report,
             )  # fmt: skip
     say(campaign_table(campaign))
     say()
@@ -197,15 +141,15 @@ def _many(
     if comparison is not None:
         say()
         say(comparison.report())
-    _say_what_is_written(output, ["model.json", "records.csv", "models/"], reported)
-    return 1 if campaign.failed or not reported else 0
+    _say_what_is_written(output, ["model.json", "records.csv", "models/"], report and written)
+    return 1 if campaign.failed or not written else 0
 
 
 def _refuse_useless(campaign: Campaign) -> None:
     """Raise an error if the records have no common result."""
     if not campaign.good:
         for row in campaign.rows:
-            complain(printable(f"{row.name}: {row.error}"))
+            complain(printable(f"{row.name}: {one_line(DataError(row.error or ''))}"))
         raise DataError(f"none of the {len(campaign.rows)} records could be identified")
     try:
         _ = campaign.dt
@@ -214,39 +158,40 @@ def _refuse_useless(campaign: Campaign) -> None:
 
 
 def _each_alone(
-    files: list[Path],
+    sources: list[Source],
     output: Path,
     settings: Settings,
     how: Reading,
     frf: MeasuredFRF | None,
     words: list[str],
     run: Run,
+    report: bool,
 ) -> int:
-    """Identify each file into its own folder; failures do not stop the rest."""
+    """Identify each record into its own folder; failures do not stop the rest."""
     refuse_a_file(output)
     failed = 0
-    names = unique_names([folder_name(file) for file in files])
+    names = unique_names([source.name for source in sources])
     for name in names:
         refuse_other_results(output / name, run)
-    for file, name in progress(zip(files, names, strict=True), len(files), "identify"):
+
+    def position(source: Source) -> int:
+        """Number of a test in its file."""
+        return [one for one in sources if one.file == source.file].index(source)
+
+    for source, name in progress(zip(sources, names, strict=True), len(sources), "identify"):
         try:
             # each folder appears as soon as it is finished, so that an interruption loses no other
             with appearing(output / name, run) as folder:
-                calls = calls_again([file], settings, how, words)
-                failed += not _one(file, folder, settings, how, frf, calls)
+                calls = calls_again([source.file], settings, how, words, None, position(source))
+                failed += not _one([source], folder, settings, frf, calls, report)
         except (CtrlRealizeError, OSError) as error:
             failed += 1
-            complain(f"{printable(str(file))}: {one_line(error)}")
+            complain(f"{printable(str(source.file))}: {one_line(error)}")
         say()
-    if failed == len(files):
-        raise DataError(f"none of the {len(files)} records could be identified")
+    if failed == len(sources):
+        raise DataError(f"none of the {len(sources)} records could be identified")
     say(f"written to {printable(str(output))}: a folder for each record")
     return 1 if failed else 0
-
-
-def folder_name(file: Path) -> str:
-    """Name of a record's folder: that of the file without extension, and never "." or ".."."""
-    return file.stem if file.stem.strip(".") else "record"
 
 
 def unique_names(names: list[str]) -> list[str]:

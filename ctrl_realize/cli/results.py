@@ -27,23 +27,28 @@ def write_record_files(
     folder: Path,
     system: DelayedStateSpace,
     record: Record,
-    file: Path,
+    files: Sequence[Path],
     *,
     frf: ct.FrequencyResponseData | None,
     comparison: FRFComparison | None,
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
+    with_report: bool,
 ) -> bool:
-    """Write model, report and figures of one record; return whether the report was written."""
-    save_model(folder / "model.json", system, settings=settings, note=f"from {file.name}")
+    """Write model, report and figures of one model; return whether they were written as asked."""
+    files = list(dict.fromkeys(files))  # several tests may be in one
+    names = ", ".join(file.name for file in files)
+    save_model(folder / "model.json", system, settings=settings, note=f"from {names}")
     if comparison is not None:
         write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
+    if not with_report:
+        return True
     with told_if_it_fails(folder, "the model") as written:
         report.write_identification(
             folder / "report.html",
             system,
             record,
-            files=[file],
+            files=files,
             frf=frf,
             comparison=comparison,
             settings=settings,
@@ -63,8 +68,10 @@ def write_campaign_files(
     comparison: FRFComparison | None,
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
+    with_report: bool,
 ) -> bool:
-    """Write table, models, report and figures of many records; return if the report was written."""
+    """Write table, models, report and figures of many records; return if all were written."""
+    files = list(dict.fromkeys(files))
     system = campaign.system
     note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
     save_model(folder / "model.json", system, settings=settings, note=note)
@@ -72,6 +79,8 @@ def write_campaign_files(
     save_models(folder, campaign, settings)
     if comparison is not None:
         write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
+    if not with_report:
+        return True
     with told_if_it_fails(folder, "the model") as written:
         report.write_campaign(
             folder / "report.html",

@@ -9,6 +9,8 @@ from typing import Any, TextIO
 
 import typer
 
+from .options import as_options
+
 EXIT_CODES = (
     "Exit codes: 0 done; 1 done, but some records or the report failed; 2 wrong usage or unusable "
     "input, nothing written; 3 a defect of the program; 130 interrupted; 143 terminated."
@@ -39,15 +41,16 @@ def _write(text: str, *, to_stderr: bool) -> None:
 
 
 def one_line(problem: object) -> str:
-    """Convert the message of an error to one line."""
+    """Convert the message of an error to one line; of our own errors, in terms of options."""
     if isinstance(problem, OSError) and problem.strerror and not _is_ours(problem):
         text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
     else:
         text = str(problem)
-    return " ".join(text.split())
+    text = " ".join(text.split())
+    return as_options(text) if _is_ours(problem) else text
 
 
-def _is_ours(problem: OSError) -> bool:
+def _is_ours(problem: object) -> bool:
     return type(problem).__module__.startswith("ctrl_realize")
 
 

@@ -1,0 +1,186 @@
+"""The commands with their options; what they do is loaded when one of them runs.
+
+Loading python-control and its dependencies takes seconds, which ``--help``, ``--version`` and a
+misspelt option need not wait for.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from . import options as o
+
+
+def identify(
+    files: o.Files,
+    output: o.Folder,
+    method: o.MethodOption = o.Method.output_error,
+    order: o.Order = None,
+    max_delay: o.MaxDelay = None,
+    frf: o.Frf = None,
+    joint: o.Joint = False,
+    gains: o.GainsOption = None,
+    separate: o.Separate = False,
+    by: o.By = None,
+    split: o.Split = False,
+    time: o.Time = None,
+    input_column: o.Input = None,
+    output_column: o.OutputColumn = None,
+    dt: o.Dt = None,
+    time_unit: o.TimeUnit = None,
+    time_format: o.TimeFormat = None,
+    start: o.From = None,
+    stop: o.To = None,
+    missing: o.MissingOption = None,
+    na_values: o.NaValues = None,
+    quality: o.Quality = None,
+    good: o.Good = None,
+    resample: o.Resample = False,
+    rest: o.Rest = None,
+    delimiter: o.Delimiter = None,
+    decimal: o.Decimal = None,
+    encoding: o.Encoding = None,
+    comment: o.Comment = None,
+    no_header: o.NoHeader = False,
+    skip_rows: o.SkipRows = None,
+    variable: o.Variable = None,
+    max_bytes: o.MaxBytes = None,
+    frequency: o.Frequency = None,
+    magnitude: o.Magnitude = None,
+    phase: o.Phase = None,
+    real: o.Real = None,
+    imag: o.Imag = None,
+    frequency_unit: o.FrequencyUnit = None,
+    magnitude_unit: o.MagnitudeUnit = None,
+    phase_unit: o.PhaseUnit = None,
+    jobs: o.Jobs = None,
+    no_report: o.NoReport = False,
+    overwrite: o.Overwrite = False,
+) -> int:
+    """Identify a model with dead time from one record, or from many of one plant.
+
+    One record gives model.json, report.html and figures/. Several records of one plant are a
+    campaign: the output also contains a table of their delays (records.csv), a model for each
+    (models/) and a final model. A record that fails becomes a row of the table with its error. If a
+    campaign is interrupted, the finished records are kept in rows/, and the same command resumes
+    from there. With --joint, one model is fitted to all records together.
+
+    \b
+    Examples:
+      ctrl-realize identify step.csv -o results
+      ctrl-realize identify valve_*.csv -o valve --method scan --jobs 2
+      ctrl-realize identify log.txt -o out --time 0 --input current --output-column position
+      ctrl-realize identify historian.csv -o out --missing keep --from "2025-02-01 08:00"
+      ctrl-realize identify tests.csv -o out --by test --joint --gains own
+      ctrl-realize identify step.csv -o out --frf frf.csv --joint
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    from .files import check_files, given
+
+    check_files([*files, *([frf] if frf else [])])
+    from .identify_command import run_identify
+
+    any_file = given(
+        delimiter=delimiter, decimal=decimal, encoding=encoding, comment=comment,
+        no_header=no_header, skip_rows=skip_rows, variable=variable, max_bytes=max_bytes,
+    )  # fmt: skip
+    reading = given(
+        time=time, input=input_column, output=output_column, dt=dt, time_unit=time_unit,
+        time_format=time_format, start=start, stop=stop, missing=missing, na_values=na_values,
+        quality=quality, good=good, resample=resample, rest=rest,
+    )  # fmt: skip
+    response = given(
+        frequency=frequency, magnitude=magnitude, phase=phase, real=real, imag=imag,
+        frequency_unit=frequency_unit, magnitude_unit=magnitude_unit, phase_unit=phase_unit,
+    )  # fmt: skip
+    return run_identify(
+        files,
+        output,
+        method=method.value,
+        choices=given(order=order, max_delay=max_delay, gains=gains),
+        frf=frf,
+        joint=joint or gains is not None,
+        separate=separate,
+        tests=given(by=by, split=split),
+        reading=reading | any_file,
+        response=response,
+        jobs=jobs,
+        report=not no_report,
+        overwrite=overwrite,
+    )
+
+
+def compare(
+    model: Annotated[o.Path, typer.Argument(help="Model file written by identify: model.json.")],
+    frf: Annotated[
+        o.Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")
+    ],
+    output: o.MaybeFolder = None,
+    min_coherence: o.MinCoherence = None,
+    band: o.Band = None,
+    hold: o.HoldOption = o.Hold.auto,
+    frequency: o.Frequency = None,
+    magnitude: o.Magnitude = None,
+    phase: o.Phase = None,
+    real: o.Real = None,
+    imag: o.Imag = None,
+    frequency_unit: o.FrequencyUnit = None,
+    magnitude_unit: o.MagnitudeUnit = None,
+    phase_unit: o.PhaseUnit = None,
+    delimiter: o.Delimiter = None,
+    decimal: o.Decimal = None,
+    encoding: o.Encoding = None,
+    comment: o.Comment = None,
+    no_header: o.NoHeader = False,
+    skip_rows: o.SkipRows = None,
+    variable: o.Variable = None,
+    max_bytes: o.MaxBytes = None,
+    overwrite: o.Overwrite = False,
+) -> int:
+    """Compare a model with a measured frequency response.
+
+    Gain and phase errors are those in the trusted band: by coherence, by standard deviation, or as
+    given.
+
+    \b
+    Examples:
+      ctrl-realize compare results/model.json frf.csv
+      ctrl-realize compare results/model.json frf.csv -o frf --band 0.1 13
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    from .files import check_files, given
+
+    check_files([model, frf])
+    from .compare_command import run_compare
+
+    reading = given(
+        frequency=frequency, magnitude=magnitude, phase=phase, real=real, imag=imag,
+        frequency_unit=frequency_unit, magnitude_unit=magnitude_unit, phase_unit=phase_unit,
+        delimiter=delimiter, decimal=decimal, encoding=encoding, comment=comment,
+        no_header=no_header, skip_rows=skip_rows, variable=variable, max_bytes=max_bytes,
+    )  # fmt: skip
+    choices: dict[str, Any] = {"min_coherence": min_coherence, "band_hz": band, "hold": hold.value}
+    return run_compare(model, frf, output, choices=choices, reading=reading, overwrite=overwrite)
+
+
+def demo(
+    output: o.Folder,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,
+    jobs: Annotated[int, typer.Option(help="Number of processes; -1: all cores.")] = 1,
+    overwrite: o.Overwrite = False,
+) -> int:
+    """Reproduce the paper from start to end, on simulated data.
+
+    Forty steps and a stepped sine of 500 x 5 points are simulated on a valve with a known dead time
+    of 37 samples. The paper's method gives Table 1, Figs. 2-8 and its final model; the output-error
+    fit of all records together gives a better one. The output contains report.html, model.json,
+    table_1.csv, figures/ and more.
+
+    \b
+    Examples:
+      ctrl-realize demo -o demo
+      ctrl-realize demo -o demo --seed 7 --jobs 2
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    from .demo_command import run_demo_command
+
+    return run_demo_command(output, seed, jobs, overwrite)
