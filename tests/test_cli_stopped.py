@@ -215,7 +215,7 @@ def test_a_report_that_cannot_be_written_is_told_and_costs_no_model(csv_files, t
     system = cr.identify(record(1), **OPTIONS)
     (tmp_path / "report.html").mkdir()  # in the way
     nothing = {"frf": None, "comparison": None, "settings": {}, "calls": []}
-    assert not write_record_files(tmp_path, system, record(1), Path(csv_files[0]), **nothing)
+    assert not write_record_files(tmp_path, system, record(1), [Path(csv_files[0])], **nothing)
     assert "the report could not be written (IsADirectoryError" in capsys.readouterr().err
     assert cr.load_model(tmp_path / "model.json").delay == system.delay
     assert not (tmp_path / "figures").exists()  # nothing by halves

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-import threading
 from collections.abc import Sequence
-from types import FrameType
+
+from .loading import loading
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -25,29 +24,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         interrupted. 143: terminated by the system.
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
-    stopped = []
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        stopped.append(number)
-        raise KeyboardInterrupt
-
-    # Loading takes a second or more. An interruption while compiled code is loaded may show as any
-    # error, or as none.
-    ours = (
-        threading.current_thread() is threading.main_thread()
-        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    )
     try:
-        if ours:
-            signal.signal(signal.SIGINT, stop)
-        from .commands import run
-    except BaseException:
-        if not stopped:
-            raise
-    finally:
-        if ours:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-    if stopped:
+        with loading():
+            from .commands import run
+    except KeyboardInterrupt:
         sys.stderr.write("ctrl-realize: interrupted\n")
         return 130
     return run(words)

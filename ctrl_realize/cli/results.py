@@ -33,7 +33,7 @@ def write_record_files(
     comparison: FRFComparison | None,
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
-    with_report: bool,
+    with_report: bool = True,
 ) -> bool:
     """Write model, report and figures of one model; return whether they were written as asked."""
     files = list(dict.fromkeys(files))  # several tests may be in one
@@ -68,7 +68,7 @@ def write_campaign_files(
     comparison: FRFComparison | None,
     settings: Mapping[str, Any],
     calls: Sequence[tuple[str, str]],
-    with_report: bool,
+    with_report: bool = True,
 ) -> bool:
     """Write table, models, report and figures of many records; return if all were written."""
     files = list(dict.fromkeys(files))

@@ -11,6 +11,8 @@ from typing import Annotated, Any
 import typer
 
 from . import options as o
+from .files import check_files, given
+from .loading import loading
 
 
 def identify(
@@ -76,10 +78,9 @@ def identify(
       ctrl-realize identify tests.csv -o out --by test --joint --gains own
       ctrl-realize identify step.csv -o out --frf frf.csv --joint
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    from .files import check_files, given
-
     check_files([*files, *([frf] if frf else [])])
-    from .identify_command import run_identify
+    with loading():
+        from .identify_command import run_identify
 
     any_file = given(
         delimiter=delimiter, decimal=decimal, encoding=encoding, comment=comment,
@@ -148,10 +149,9 @@ def compare(
       ctrl-realize compare results/model.json frf.csv
       ctrl-realize compare results/model.json frf.csv -o frf --band 0.1 13
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    from .files import check_files, given
-
     check_files([model, frf])
-    from .compare_command import run_compare
+    with loading():
+        from .compare_command import run_compare
 
     reading = given(
         frequency=frequency, magnitude=magnitude, phase=phase, real=real, imag=imag,
@@ -181,6 +181,7 @@ def demo(
       ctrl-realize demo -o demo
       ctrl-realize demo -o demo --seed 7 --jobs 2
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    from .demo_command import run_demo_command
+    with loading():
+        from .demo_command import run_demo_command
 
     return run_demo_command(output, seed, jobs, overwrite)
