@@ -56,7 +56,10 @@ RETIRED = {
     "wait": "dead_time",
     "way": "pair of input and output",
 }
-ALLOWED = {("Erratum", "place")}  # of the paper: where it is printed
+ALLOWED = {
+    ("Erratum", "place"),  # of the paper: where it is printed
+    ("read_record", "rest"),  # both levels of the steady state, as the option --rest
+}
 
 
 def public_names() -> dict[str, set[str]]:

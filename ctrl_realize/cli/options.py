@@ -200,7 +200,7 @@ _ARGUMENT = re.compile(
 )
 
 
-_BARE = re.compile(r"[\w.,;+-]+")
+_BARE = re.compile(r"[\w.,;+-]+", re.ASCII)
 """A value that needs no quotes on a command line."""
 
 

@@ -6,6 +6,7 @@ misspelt option need not wait for.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -113,10 +114,8 @@ def identify(
 
 
 def compare(
-    model: Annotated[o.Path, typer.Argument(help="Model file written by identify: model.json.")],
-    frf: Annotated[
-        o.Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")
-    ],
+    model: Annotated[Path, typer.Argument(help="Model file written by identify: model.json.")],
+    frf: Annotated[Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")],
     output: o.MaybeFolder = None,
     min_coherence: o.MinCoherence = None,
     band: o.Band = None,

@@ -141,14 +141,14 @@ def read_record(
         The columns or the order of day and month are ambiguous, or the requested columns do not
         exist.
 
-    See Also
-    --------
-    read_records : Several tests in one file.
-
     Warns
     -----
     DataWarning
         The last line is incomplete, as if writing was interrupted; it is left out.
+
+    See Also
+    --------
+    read_records : Several tests in one file.
 
     Examples
     --------

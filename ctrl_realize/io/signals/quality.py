@@ -84,7 +84,8 @@ class Rules:
         if cells.dtype.kind in "iuf":
             codes = np.nan_to_num(cells.astype(np.float64))
             # other numbers, such as a count or a flag of 0 and 1, say nothing by themselves
-            return (codes < _BAD_BELOW) & (np.max(codes, initial=0) >= _GOOD_FROM)
+            are_codes = bool(np.max(codes, initial=0) >= _GOOD_FROM)
+            return np.asarray(codes < _BAD_BELOW) & are_codes
         return np.array([_is_bad(str(cell)) for cell in cells], dtype=bool)
 
 

@@ -69,7 +69,7 @@ def wide_axis(
     check_lengths(table, used)
     count = table.columns[parts.outputs[0]].cells.size
     if parts.time is None:
-        return TimeAxis(parts.dt * np.arange(count), None), np.arange(count)
+        return TimeAxis(parts.dt * np.arange(count, dtype=np.float64), None), np.arange(count)
     axis = time_axis(table, parts.time, time_unit, time_format, parts.date)
     seconds, rows = axis.seconds, np.arange(count)
     if count > 1 and np.all(np.diff(seconds) <= 0) and seconds[-1] < seconds[0]:
