@@ -137,15 +137,15 @@ def loop_under_pid(path):
         integral += 0.8 / 10 * dt * (sp[k] - y[k])
         u[k] = round(30 + 0.8 * (sp[k] - y[k]) + integral, 4)
         x[k + 1] = pole * x[k] + 2.0 * (1 - pole) * delayed
-    # u[k] acts from t[k] on: x above is one sample late by its order of computation, as it must be
     rows = [f"{dt * k:.1f},{sp[k]},{y[k]:.4f},{u[k]:.4f}" for k in range(n)]
     path.write_text("Time,SP,PV,OP\n" + "\n".join(rows) + "\n")
 
 
 def furnace(path):
-    t = 0.5 * np.arange(700)  # min
+    """Two hours before the step, without which the drift could as well be a slow response."""
+    t = 0.5 * np.arange(900)  # min
     rng = np.random.default_rng(5)
-    u = steps(t, [(0, 50), (40, 60)])
+    u = steps(t, [(0, 50), (120, 60)])
     walk = np.cumsum(0.002 * rng.standard_normal(t.size))
     y = 700 + response(t, u, 2.0, 6.0, (40.0,)) + 0.003 * t + walk
     y += 0.05 * rng.standard_normal(t.size)

@@ -1,0 +1,245 @@
+"""From the files of plants and laboratories to stable loops, and what is asked on the way."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import shlex
+from importlib.util import find_spec
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_array_equal
+
+import ctrl_realize as cr
+from ctrl_realize.cli import main
+from ctrl_realize.cli.options import ARGUMENTS, option_of
+from ctrl_realize.errors import DataError, OptionError, TimeAxisError
+from tests.io.plant_files import FILES, historian_signals
+
+AMBIGUOUS = {"german.csv": "output", "four_tests.csv": "input", "level.csv": "input"}
+"""Files with several columns that could be a signal."""
+NEEDED = {"workbook.xlsx": "openpyxl"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plants")
+    for file in FILES:
+        if find_spec(NEEDED.get(file.name, "numpy")):
+            file.write(folder / file.name)
+    return folder
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_a_file_becomes_a_stable_loop_in_two_calls(folder, file):
+    pytest.importorskip(NEEDED.get(file.name, "numpy"))
+    path = folder / file.name
+    if (signal := AMBIGUOUS.get(file.name)) is not None:
+        options = {} if file.many else {"missing": "keep"}
+        with pytest.raises(OptionError, match=rf"{signal}; give {signal}=.* it has columns 0 '"):
+            cr.read_record(path, **options)
+    # the two calls
+    record = cr.io.read_records(path, **file.reading) if file.many else cr.read_record(
+        path, **file.reading
+    )  # fmt: skip
+    model = cr.identify(record)
+    assert model.fit.dead_time == pytest.approx(file.dead_time, abs=file.within)
+    if "integrating" not in {flag.code for flag in model.fit.flags}:
+        assert model.fit.gain == pytest.approx(file.gain, rel=0.02)
+    assert cr.design.margins(model, cr.design.pid(model)).stable
+
+
+def test_a_held_input_is_held_and_missing_outputs_are_missing(folder):
+    """In the wide file bad rows, a gap and a repeated stamp; in the long one tags of their own."""
+    t, u, y, _ = historian_signals()
+    for name, fewest in (("historian_wide.csv", 380), ("historian_long.csv", 395)):
+        record = cr.read_record(folder / name, missing="keep")
+        assert set(record.input) == set(u)
+        seen = np.flatnonzero(~np.isnan(record.output))
+        assert fewest <= seen.size <= 400
+        at = np.searchsorted(t - t[0], record.time[seen])
+        assert_array_equal(t[at] - t[0], record.time[seen])
+        np.testing.assert_allclose(record.output[seen], y[at], atol=5.1e-4)  # three decimals
+        with pytest.raises(DataError, match=r"line \d+: its quality is bad; missing='keep'"):
+            cr.read_record(folder / name)
+
+
+def written(tmp_path, header, rows, name="a.csv"):
+    path = tmp_path / name
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+STAMPS = [f"2025-01-01 00:{minute:02}:00" for minute in range(6)]
+QUALITIES = {  # header, cells behind time, u and y, what is asked, and which of them are bad
+    "words": ("Quality", ["Good", "bad", "Good", "Bad Input", "Uncertain", "Good"], {}, [1, 3]),
+    "OPC codes": ("Status", [192, 0, 216, 64, 24, 192], {}, [1, 4]),
+    "other numbers": ("Status", [0, 1, 0, 1, 0, 1], {}, []),
+    "good ones that are told": ("State", list("aabbaa"), {"quality": "State", "good": "a"}, [2, 3]),
+    "good numbers": ("Flag", [1, 0, 1, 1, 1, 1], {"quality": "Flag", "good": [1]}, [1]),
+    "ignored": ("Quality", ["Good", *["Bad"] * 5], {"quality": None}, []),
+    "of the output": ("y.Quality", ["Good", "Bad", *["Good"] * 4], {}, [1]),
+    "of another signal": ("z.Quality", ["Good", *["Bad"] * 5], {}, []),
+}
+
+
+@pytest.mark.parametrize("kind", QUALITIES)
+def test_samples_of_bad_quality_are_missing(tmp_path, kind):
+    header, cells, asked, bad = QUALITIES[kind]
+    rows = [f"{at},1,{k},{cell}" for k, (at, cell) in enumerate(zip(STAMPS, cells, strict=True))]
+    path = written(tmp_path, f"Timestamp,u,y,{header}", rows)
+    record = cr.read_record(path, missing="keep", **asked)
+    assert_array_equal(np.flatnonzero(np.isnan(record.output)), bad)
+    if bad:
+        with pytest.raises(DataError, match=f"line {bad[0] + 2}: its quality is bad"):
+            cr.read_record(path, **asked)
+
+
+@pytest.mark.parametrize("cell", ["Bad", "I/O Timeout", "No Data", "#DIV/0!", "-9999", "dead"])
+def test_words_that_stand_for_no_value_are_missing(tmp_path, cell):
+    rows = [f"{at},1,{cell if k == 2 else k}" for k, at in enumerate(STAMPS)]
+    path = written(tmp_path, "Timestamp,u,y", rows)
+    options = {"na_values": [-9999.0, "dead"]} if cell in ("-9999", "dead") else {}
+    with pytest.raises(DataError, match=f"line 4: '?{cell}'?: a value is missing; missing='keep'"):
+        cr.read_record(path, **options)
+    assert_array_equal(
+        cr.read_record(path, missing="keep", **options).output, [0, 1, np.nan, 3, 4, 5]
+    )
+
+
+def test_a_part_is_read_by_its_dates_newest_first_or_not(tmp_path):
+    rows = [f"{at.replace(' ', ',')},{k},{k}" for k, at in enumerate(STAMPS)]
+    for lines in (rows, rows[::-1]):
+        path = written(tmp_path, "Date,Time,MV,PV", lines)
+        part = cr.read_record(path, start="2025-01-01 00:01", stop="2025-01-01 00:04:30")
+        assert_array_equal(part.output, [1, 2, 3, 4])
+        assert_array_equal(part.time, [60, 120, 180, 240])
+        assert_array_equal(cr.read_record(path, start=100, stop=250).output, [2, 3, 4])
+    with pytest.raises(OptionError, match=r"start='yesterday'; expected .*'2025-01-01 00:00:00'"):
+        cr.read_record(path, start="yesterday")
+    plain = written(tmp_path, "t,u,y", [f"{k},{k},{k}" for k in range(9)])
+    assert_array_equal(cr.read_record(plain, start=2, stop=5).output, [2, 3, 4, 5])
+    with pytest.raises(OptionError, match="has no dates"):
+        cr.read_record(plain, start="2025-01-01")
+
+
+def test_tests_are_told_apart_by_a_column_or_by_jumps_of_time(tmp_path):
+    rows = [f"{name},{start + k},{k > 3},{k}" for name, start in (("a", 0), ("b", 0), ("c", 500))
+            for k in range(8)]  # fmt: skip
+    path = written(tmp_path, "test,t,u,y", rows)
+    with pytest.raises(TimeAxisError, match=r"several tests, read them with read_records"):
+        cr.read_record(path)
+    for options, names in (({"by": "test"}, "abc"), ({}, "123")):
+        records = cr.io.read_records(path, **options, rest=(0.0, 1.0))
+        assert [record.name for record in records] == [f"a {name}" for name in names]
+        for record in records:
+            assert_array_equal(record.output, [1, *range(8)])
+    with pytest.raises(OptionError, match=r"by='x'.*columns 0 'test'"):
+        cr.io.read_records(path, by="x")
+    with pytest.raises(OptionError, match="expected input and output in the steady state"):
+        cr.io.read_records(path, by="test", rest=3)
+
+
+COLUMNS = {  # names of columns, and which of them are input and output; None is asked about
+    "a loop": ("SP,PV,OP", 2, 1),
+    "tags": ("TIC101.SP,TIC101.PV,TIC101.OP", 2, 1),
+    "tags with units": ("TIC101_MV [%],TIC101_PV [degC],FI_7 [l/h]", 0, 1),
+    "words and tags": ("Room,Gas valve CO (%),Zone PV (°C)", 1, 2),
+    "German": ("Stellgröße,Istwert,Sollwert", 0, 1),
+    "one left beside a set-point": ("CO,Setpoint,Temp", 0, 2),
+    "a controller's output and its valve": ("OP,MV,PV", None, None),
+    "two loops": ("A_PV,B_PV,OP", 2, None),
+}
+
+
+@pytest.mark.parametrize("kind", COLUMNS)
+def test_signals_have_the_names_of_process_control(tmp_path, kind):
+    header, input, output = COLUMNS[kind]
+    path = written(
+        tmp_path, f"millis,{header}", [f"{20 * k},{k},{k + 10},{k + 20}" for k in range(5)]
+    )
+    if input is None or output is None:
+        with pytest.raises(OptionError, match=r"(could be|which column is) the .*it has columns"):
+            cr.read_record(path)
+        return
+    record = cr.read_record(path)
+    assert record.dt == 0.02
+    assert (record.input[0], record.output[0]) == (10 * input, 10 * output)
+
+
+def test_percent_signs_and_switches_are_numbers(tmp_path):
+    rows = [f"{k},{5 * k}.5 %,{'ON' if k > 2 else 'off'}" for k in range(6)]
+    record = cr.read_record(written(tmp_path, "t,y,u", rows))
+    assert_array_equal(record.output, 5 * np.arange(6) + 0.5)
+    assert_array_equal(record.input, [0, 0, 0, 1, 1, 1])
+    assert record.output_units == ("%",)
+    rows[2] = rows[2].replace("off", "between")
+    with pytest.raises(DataError, match=r"'.*': is not a number"):
+        cr.read_record(written(tmp_path, "t,y,u", rows))
+
+
+OWN_MISTAKES = {  # what is wrong, and the option that the message offers
+    "columns": ("t,a,b,c", "{k},{k},{k},{k}", "--input NAME-OR-NUMBER"),
+    "a date": ("time,u,y", "0{k}/02/2026 10:00,{k},{k}", "--time-format '%d/%m/%Y %H:%M'"),
+    "a clock": ("time,u,y", "{k}:00,{k},{k}", "--time-unit h or --time-unit min"),
+    "an empty cell": ("t,u,y", "{k},{k},", "--missing keep keeps gaps"),
+    "no time": ("a,u,y", "{k},{k},{k}", "or --dt in s"),
+    "a gap": ("t,u,y", "{gap},{k},{k}", "--missing keep takes"),
+    "a constant input": ("t,u,y", "{k},5,{k}", "--rest U0 Y0"),
+}
+
+
+@pytest.mark.parametrize("kind", OWN_MISTAKES)
+def test_the_command_line_offers_options_and_no_arguments_of_python(tmp_path, capsys, kind):
+    header, row, told = OWN_MISTAKES[kind]
+    lines = [row.format(k=k, gap=k**2) for k in range(1, 8)]
+    path = written(tmp_path, header, lines)
+    assert main(["identify", str(path), "-o", str(tmp_path / "out"), "--method", "scan"]) == 2
+    said = capsys.readouterr().err
+    assert told in said
+    assert not any(f"{name}=" in said for name in ("time", "input", "missing", "dt", "resample"))
+    assert "read_record" not in said
+
+
+def test_every_argument_of_the_readers_is_an_option(capsys):
+    reader = set(inspect.signature(cr.read_record).parameters) - {"path", "name"}
+    units = {"frequency_unit", "magnitude_unit", "phase_unit"}
+    assert reader | units | {"by", "gains"} <= ARGUMENTS
+    assert main(["identify", "--help"]) == 0
+    said = capsys.readouterr().out
+    assert [name for name in reader | units if f"{option_of(name)}" not in said] == []
+
+
+def test_joint_fits_and_steady_states_have_options(folder, tmp_path):
+    grid = np.geomspace(0.02, 1, 20)
+    s = 2j * np.pi * grid
+    frf = np.exp(-0.6 * s) / (0.8 * s + 1)
+    table = pd.DataFrame({"f": grid, "re": frf.real, "im": frf.imag})
+    table.to_csv(tmp_path / "frf.csv", index=False)
+    four, start = folder / "four_tests.csv", folder / "step_at_start.csv"
+    columns = {"input": "valve", "output": "flow"}
+    tests = cr.io.read_records(four, by="test", **columns)
+    response = cr.read_frf(tmp_path / "frf.csv", frequency="f", real="re", imag="im")
+    for words, expected in (
+        ([str(four), "--by", "test", "--gains", "own", "--input", "valve", "--response", "flow"],
+         cr.identify(tests, order=1, gains="own")),
+        ([str(start), "--rest", "0", "20.3", "--joint", "--frf", str(tmp_path / "frf.csv"),
+          "--frequency", "f", "--real", "re", "--imag", "im"],
+         cr.identify(cr.read_record(start, rest=(0, 20.3)), order=1, frf=response)),
+    ):  # fmt: skip
+        out = tmp_path / "out"
+        more = ["--order", "1", "--no-report", "--overwrite"]
+        assert main(["identify", *words, "-o", str(out), *more]) == 0
+        assert cr.load_model(out / "model.json").dead_time == expected.dead_time
+        # the command that is kept makes the same model
+        command = shlex.split(json.loads((out / "manifest.json").read_text())["command"])
+        assert main([*command[1:], "-o", str(tmp_path / "again"), "--no-report"]) == 0
+        again = cr.load_model(tmp_path / "again" / "model.json")
+        assert again.dead_time == expected.dead_time
+        (tmp_path / "again").rename(tmp_path / f"again {len(words)}")
+        assert not (out / "report.html").exists()
+    both = ["--by", "test", "--split"], ["--joint", "--separate"]
+    for words in both:
+        assert main(["identify", str(four), "-o", str(tmp_path / "none"), *words]) == 2
