@@ -84,11 +84,12 @@ def to_matlab(
     elif isinstance(system, ContinuousModel):
         variable = identifier(name or str(system.core.name), "plant")
         delays = [system.dead_time] * system.core.ninputs
-        text = _state_space(system.core, variable, "0", delays, [])
+        text = _state_space(system.core, str(system.core.name), variable, "0", delays, [])
     elif isinstance(system, DelayedStateSpace):
         variable = identifier(name or str(system.name), "plant")
         text = _state_space(
             system.delay_free,
+            str(system.name),
             variable,
             _number(float(system.dt)),
             list(system.input_delays),
@@ -113,18 +114,24 @@ def _process(model: ProcessModel, variable: str) -> str:
 
 
 def _state_space(
-    core: ct.StateSpace, variable: str, dt: str, before: list[float], behind: list[float]
+    core: ct.StateSpace,
+    name: str,
+    variable: str,
+    dt: str,
+    before: list[float],
+    behind: list[float],
 ) -> str:
     unit = "s" if dt == "0" else "samples"
     lines = [
-        f"% {_comment(str(core.name))}: {core.nstates} states, sample time {dt} s (0: continuous), "
+        f"% {_comment(name)}: {core.nstates} states, sample time {dt} s (0: continuous), "
         f"delays in {unit}"
     ]
     for letter in "ABCD":
         matrix = getattr(core, letter)
         shape = f"zeros({matrix.shape[0]}, {matrix.shape[1]})"
-        lines.append(f"{letter} = {_matrix(matrix) if matrix.size else shape};")
-    given = f"{variable} = ss(A, B, C, D, {dt}"
+        lines.append(f"{variable}_{letter} = {_matrix(matrix) if matrix.size else shape};")
+    matrices = ", ".join(f"{variable}_{letter}" for letter in "ABCD")
+    given = f"{variable} = ss({matrices}, {dt}"
     if any(before):
         given += f", 'InputDelay', {_matrix(np.array([before]).T)}"
     if any(behind):
@@ -133,7 +140,7 @@ def _state_space(
     for what, labels in (("InputName", core.input_labels), ("OutputName", core.output_labels)):
         names = ", ".join("'" + _comment(str(each)).replace("'", "''") + "'" for each in labels)
         lines.append(f"{variable}.{what} = {{{names}}};")
-    return "\n".join([*lines, "clear A B C D", ""])
+    return "\n".join([*lines, ""])
 
 
 def _pid(system: PIDController | PIDAlgorithm, variable: str) -> str:

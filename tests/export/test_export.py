@@ -185,6 +185,23 @@ def test_an_fmu_is_valid_and_simulates_the_model(tmp_path):
     np.testing.assert_allclose(result["y"][1:100], expected[0, :99], rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("write", "grammar"),
+    [
+        (export.to_structured_text, "tree_sitter_iec61131_3_st"),
+        (export.to_matlab, "tree_sitter_matlab"),
+    ],
+)
+def test_a_second_parser_accepts_the_text(write, grammar, tmp_path):
+    tree_sitter = pytest.importorskip("tree_sitter", reason="tree-sitter parses exported text")
+    language = pytest.importorskip(grammar, reason="the grammar of the exported text").language()
+    parser = tree_sitter.Parser(tree_sitter.Language(language))
+    for system in (*ALGORITHMS.values(), *PLANTS.values(), PID):
+        text = write(system, tmp_path / "unit.m").read_bytes()
+        assert not parser.parse(text).root_node.has_error
+        assert parser.parse(text + b"\nx = (1 + ;\n").root_node.has_error
+
+
 def read_script(path):
     """Variables of a script of MATLAB: matrices as arrays, calls as (name, arguments)."""
     found = {}
@@ -204,9 +221,9 @@ def test_a_script_of_matlab_has_all_digits_and_the_delays(kind, tmp_path):
     plant = PLANTS[kind]
     script = read_script(export.to_matlab(plant, tmp_path / "plant.m", name="G"))
     for letter in "ABCD":
-        np.testing.assert_array_equal(script[letter], getattr(plant.delay_free, letter))
+        np.testing.assert_array_equal(script[f"G_{letter}"], getattr(plant.delay_free, letter))
     name, (a, b, c, d, dt, *delays) = script["G"]
-    assert (name, a, b, c, d, float(dt)) == ("ss", "A", "B", "C", "D", 0.25)
+    assert (name, a, b, c, d, float(dt)) == ("ss", "G_A", "G_B", "G_C", "G_D", 0.25)
     expected = {
         "siso": ["InputDelay", "8"],
         "mimo": ["InputDelay", "[4; 0]", "OutputDelay", "[0; 2]"],
@@ -219,7 +236,7 @@ def test_scripts_of_continuous_models_and_controllers(tmp_path):
     continuous = read_script(export.to_matlab(SISO, path, name="G", continuous=True))
     assert continuous["G"][1][4:6] == ["0", "InputDelay"]
     assert float(continuous["G"][1][6]) == pytest.approx(1.83, rel=1e-9)
-    poles = np.linalg.eigvals(continuous["A"])
+    poles = np.linalg.eigvals(continuous["G_A"])
     np.testing.assert_allclose(np.sort(poles), [-0.5, -0.4], rtol=1e-9)
     name, gains = read_script(export.to_matlab(PID, path, name="C"))["C"]
     assert name == "pid"
