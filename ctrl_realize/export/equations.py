@@ -143,8 +143,10 @@ def plant_program(plant: DelayedStateSpace, name: str) -> Program:
     for i, (u, delay) in enumerate(zip(inputs, plant.input_delays, strict=True)):
         if delay:
             states += _line(u, delay)
-            scratch.append(Variable(late[i]))
-            body += [Assign(late[i], f"{u}_line[{u}_at]"), *_push(u, u, delay)]
+            if core.B[:, i].any():
+                scratch.append(Variable(late[i]))
+                body.append(Assign(late[i], f"{u}_line[{u}_at]"))
+            body += _push(u, u, delay)
             if core.D[:, i].any():
                 scratch.append(Variable(newest[i]))
                 body.append(Assign(newest[i], f"{u}_line[{u}_at]"))

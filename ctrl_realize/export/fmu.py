@@ -18,7 +18,7 @@ from .program import Program
 
 TEMPLATE = """
 
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Slave, Real
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 
 
 class {unit}(Fmi2Slave):
@@ -111,6 +111,7 @@ def _script(program: Program, dt: float) -> str:
             kind, start = ("Boolean", "False") if boolean else ("Real", "0.0")
             # An output of known initial value has no unknown for the importer to ask for.
             initial = ", initial=Fmi2Initial.exact" if causality == "output" else ""
+            initial += ", variability=Fmi2Variability.discrete" if boolean else ""
             lines += [
                 f"self.{each.name} = {start}",
                 f"self.register_variable({kind}({each.name!r}, "

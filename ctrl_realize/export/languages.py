@@ -145,7 +145,7 @@ def python_class(program: Program) -> str:
     lines += ['    """', ""]
     for each in program.constants:
         lines.append(f"    {each.name} = {literal(each.value)}  # {_plain(each.words)}")
-    lines += ["", "    def __init__(self):"]
+    lines += [*([""] if program.constants else []), "    def __init__(self):"]
     for each in program.states:
         start = f"[0.0] * {each.length}" if each.length else PYTHON_ZERO[each.kind]
         lines.append(f"        self.{each.name} = {start}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 from typing import Literal
 
@@ -117,10 +118,11 @@ def identifier(name: str, fallback: str) -> str:
     --------
     >>> from ctrl_realize.export.program import identifier
     >>> identifier("FIC 101.OP", "plant"), identifier("für", "plant"), identifier("step", "plant")
-    ('FIC_101_OP', 'f_r', 'step_1')
+    ('FIC_101_OP', 'fur', 'step_1')
     """
     # IEC 61131-3 allows ASCII letters, digits and single underscores.
-    text = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    text = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
     if not text:
         return fallback
     if text[0].isdigit():

@@ -44,7 +44,12 @@ MIMO = cr.DelayedStateSpace(
     output_delay=[0, 2],
     name="two by two",
 )
-PLANTS = {"siso": SISO, "mimo": MIMO, "lag": cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.25), 0)}
+PLANTS = {
+    "gain": cr.delayed_ss(ct.ss([], [], [], [[2.0]], 0.25), 3, name="für [1]"),
+    "siso": SISO,
+    "mimo": MIMO,
+    "lag": cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.25), 0),
+}
 gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc compiles the exported C")
 
 
@@ -171,6 +176,7 @@ def test_an_fmu_is_valid_and_simulates_the_model(tmp_path):
     path = export.to_fmu(SISO, tmp_path / "column.fmu")
     assert sys.path == places
     assert validate_fmu(str(path)) == []
+    assert validate_fmu(str(export.to_fmu(ALGORITHMS["full"], tmp_path / "pid.fmu"))) == []
     u, expected = simulated(SISO)
     time = 0.25 * np.arange(COUNT)
     held = np.array(list(zip(time, u[0], strict=True)), dtype=[("time", float), ("u", float)])
