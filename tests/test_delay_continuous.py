@@ -158,6 +158,90 @@ def test_neutral_systems_are_told_by_their_direct_terms(a, b, c, stable):
     assert ct.feedback(P * ct.tf([1], [0.1, 1])).neutral_gain() == 0
 
 
+def lagging(A0: np.ndarray, A1: np.ndarray, tau: float) -> cr.DelaySystem:
+    """x' = A0 x + A1 x(t - tau)."""
+    n = A0.shape[0]
+    core = ct.ss(A0, np.hstack([np.eye(n), A1]), np.vstack([np.eye(n)] * 2), np.zeros((2 * n,) * 2))
+    return cr.DelaySystem(core, [tau] * n)
+
+
+def neutral(A: np.ndarray, B: np.ndarray, C: np.ndarray, tau: float) -> cr.DelaySystem:
+    """(x - C x(t - tau))' = A x + B x(t - tau), by v = x - C x(t - tau)."""
+    n = A.shape[0]
+    core = ct.ss(
+        A,
+        np.hstack([np.eye(n), A @ C + B]),
+        np.vstack([np.eye(n)] * 2),
+        np.block([[np.zeros((n, n)), C]] * 2),
+    )
+    return cr.DelaySystem(core, [tau] * n)
+
+
+def crossing(sign: int) -> float:
+    """Delay at which s^2 - 0.1 s + 2 - exp(-s r) has a root on the imaginary axis."""
+    w = np.sqrt((3.99 + sign * np.sqrt(3.99**2 - 12)) / 2)
+    return -float(np.angle(2 - w**2 - 0.1j * w)) / w
+
+
+GU = np.array([[-2.0, 0.0], [0.0, -0.9]]), np.array([[-1.0, 0.0], [-1.0, -1.0]])
+PENDULUM = np.array([[0.0, 1.0], [-2.0, 0.1]]), np.array([[0.0, 0.0], [1.0, 0.0]])
+NEUTRAL = (
+    np.array([[-0.9, 0.2], [0.1, -0.9]]),
+    np.array([[-1.1, -0.2], [-0.1, -1.1]]),
+    np.array([[-0.2, 0.0], [0.2, -0.1]]),
+)
+SCALAR = np.array([[-1.0]]), np.array([[-2.0]]), np.array([[-0.5]])
+
+
+@pytest.mark.parametrize(
+    ("system", "limit", "stable_below"),
+    [
+        # Gu, Kharitonov and Chen, Stability of Time-Delay Systems, Birkhauser 2003, chapter 5:
+        # s + 0.9 + exp(-s r) = 0, printed as 6.17258
+        (lambda r: lagging(*GU, r), np.arccos(-0.9) / np.sqrt(1 - 0.81), True),
+        # s^2 - 0.1 s + 2 - exp(-s r) = 0: unstable without delay, stable in 0.10017 < r < 1.7178
+        # exp(-j w r) = 2 - w^2 - 0.1 j w with w^4 - 3.99 w^2 + 3 = 0
+        (lambda r: lagging(*PENDULUM, r), crossing(-1), False),
+        (lambda r: lagging(*PENDULUM, r), crossing(+1), True),
+        # a standard example of criteria for neutral systems; limit: det = 0 on the axis, by fsolve
+        (lambda r: neutral(*NEUTRAL, r), 2.22547904, True),
+        # s + 1 + (2 - 0.5 s) exp(-s r) = 0 (signs of C and B): w^2 = (4 - 1) / (1 - 0.25)
+        (lambda r: neutral(*SCALAR, r), None, True),
+    ],
+)
+def test_textbook_systems_lose_stability_at_their_printed_delays(system, limit, stable_below):
+    if limit is None:
+        w = 2.0
+        turn = -(1j * w + 1) / (0.5j * w + 2)
+        limit = (-np.angle(turn) % (2 * np.pi)) / w
+    for share, below in ((0.999, True), (1.001, False)):
+        assert system(share * limit).is_stable() is (below is stable_below)
+    # a pair on the imaginary axis; the limits are printed with six digits and more
+    assert np.abs(system(limit).dominant_poles(2).real).max() < 1e-6
+
+
+def test_a_difference_equation_is_unstable_if_small_changes_of_its_delays_make_it_so():
+    # x(t) + 0.75 x(t - 1) + 0.5 x(t - 2) = 0: |z| = sqrt(1/2) at these delays, but the sum of the
+    # gains, 1.25, decides for others close to them (Hale and Verduyn Lunel, IMA J. Math. Control
+    # Inform. 19 (2002) 5-23)
+    def loop(second):
+        lines = 0.75 * cr.delay(1.0) + 0.5 * cr.delay(second)
+        return ct.feedback(cr.DelaySystem(ct.ss([], [], [], 1.0, 0)), lines)
+
+    assert_allclose(loop(2.0).dominant_poles(6).real, -0.5 * np.log(2), atol=1e-10)
+    assert loop(2.0).neutral_gain() == pytest.approx(1.25)
+    assert not loop(2.0).is_stable()
+    s = loop(2.03).dominant_poles(200)
+    assert_allclose(1 + 0.75 * np.exp(-s) + 0.5 * np.exp(-2.03 * s), 0, atol=1e-9)
+    assert s.real.max() > 0.15
+
+
+def test_the_inverse_of_the_inverse_is_the_system():
+    system = 2 + ct.feedback(P1 * 0.5) * P2
+    assert_allclose(((system**-1) ** -1)(1j * OMEGA), system(1j * OMEGA), rtol=1e-10)
+    assert_allclose((system * system**-1)(1j * OMEGA), 1, rtol=1e-10)
+
+
 def test_two_delays_in_two_loops():
     # x' = -x(t - 1) - x(t - 2) / 2, poles of largest real part from its equation
     core = ct.ss([[0]], [[1, -1, -0.5]], np.ones((3, 1)), np.zeros((3, 3)))

@@ -8,7 +8,10 @@ import numpy as np
 
 from .._checks import whole
 from ..errors import DelayRangeError, OptionError
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import ComplexArray, FloatArray, whole_power
+
+ON_CIRCLE = 1 - 1e-12
+"""Magnitude from which on a point counts as one on the unit circle."""
 
 Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
@@ -70,6 +73,8 @@ def augment(core: Matrices, before: tuple[int, ...], behind: tuple[int, ...]) ->
 
 def powers(points: ComplexArray, delays: tuple[int, ...]) -> ComplexArray:
     """Stack x^-d for each delay, shape (delays, K)."""
+    if np.all(np.abs(points) >= ON_CIRCLE):
+        return np.stack([whole_power(1 / points, d) for d in delays])
     return np.stack([points ** (-d) for d in delays])
 
 

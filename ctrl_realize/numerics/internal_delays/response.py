@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import ComplexArray
+from ..arrays import ComplexArray, whole_power
 from ..state_space.responses import Schur, frequency_response, schur_form
 from .form import DelayForm
 
@@ -42,16 +42,18 @@ def turns(
     held, late : ndarray, shape (K, q)
         ``late / held`` is z^-d (or exp(-s tau)), and the larger of both has size 1 (to rounding).
     """
-    d = np.asarray(delays, dtype=np.float64)
+    if not delays:
+        none = np.ones((points.size, 0), dtype=np.complex128)
+        return none, none
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         if discrete:
-            # whole powers are exact where the exponential of a logarithm is not
             size = np.abs(points) >= 1 - ROUNDED
-            safe = np.where(size, points, 1.0)
-            held = np.where(size[:, None], 1.0, points[:, None] ** d)
-            late = np.where(size[:, None], safe[:, None] ** (-d), 1.0)
+            inside = np.where(size, 1 / np.where(size, points, 1.0), points)
+            turned = np.stack([whole_power(inside, int(k)) for k in delays], axis=1)
+            held = np.where(size[:, None], 1.0, turned)
+            late = np.where(size[:, None], turned, 1.0)
         else:
-            exponent = points[:, None] * d
+            exponent = points[:, None] * np.asarray(delays, dtype=np.float64)
             size = exponent.real >= 0
             held = np.where(size, 1.0, np.exp(np.where(size, 0.0, exponent)))
             late = np.where(size, np.exp(np.where(size, -exponent, 0.0)), 1.0)

@@ -33,6 +33,10 @@ from .form import DelayForm
 FIRST_POINTS, MOST_POINTS = 16, 160
 """Chebyshev points of each delay, at first and at most."""
 
+VANISHED = -36.0
+"""Logarithm of the rounding error. Where exp(s tau) is smaller, the equation of a loop without
+states can be zero to rounding without a root."""
+
 ANGLES = 24
 """Angles of each delay at which the gain of a loop of direct terms is looked at."""
 
@@ -103,6 +107,7 @@ def _of_loop(part: DelayForm, count: int) -> ComplexArray:
         starts = in_order(starts, starts.size)[: 6 * count + 30]
         roots, last = newton_polished(part, starts, discrete=False)
         near = np.abs(roots - starts) < 0.5 * (1 + np.abs(starts))
+        near &= roots.real * max(part.delays) > VANISHED
         roots = in_order(with_pairs(apart(roots[(last < RESIDUAL) & near])), count)
         same = roots.size == before.size and np.allclose(roots, before, rtol=1e-8, atol=1e-10)
         if (same and roots.size) or points >= MOST_POINTS:
