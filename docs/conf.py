@@ -78,6 +78,7 @@ TABLES = {
         "docs/campaign_table.md",
         "python -m benchmarks.campaign --output docs/campaign_table.md",
     ),
+    "missing": ("docs/missing_table.md", "python -m benchmarks.accuracy.missing"),
     "loops": ("docs/loops_table.md", "python -m benchmarks.loops"),
     "fuzz": ("docs/fuzz_table.md", "python3 tools/fuzz_table.py"),
     "peers": ("docs/peers_table.md", "python -m benchmarks.peers simulated"),

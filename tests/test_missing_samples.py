@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, TimeAxisError
@@ -125,16 +127,18 @@ def test_samples_as_they_are_give_the_dead_time_and_the_gain(kind, operating):
     assert_allclose(fit.residual, 0.01, rtol=0.15)
 
 
-def test_rows_without_samples_change_nothing():
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_rows_without_samples_change_nothing(pole):
     rng = np.random.default_rng(5)
-    time = DT * np.arange(400)
-    u, noise = 1.0 * (time >= 700), 0.01 * rng.standard_normal(400)
-    y = furnace(time, np.array([700.0]), np.array([1.0])) + noise
+    time = DT * np.arange(600)
+    u, noise = 1.0 * (time >= 2000), lfilter([0.01], [1, -pole], rng.standard_normal(600))
+    y = furnace(time, np.array([2000.0]), np.array([1.0])) + noise
     plain = cr.identify(cr.Record(time, u, y), structures=[(2, 2)]).fit
-    fine = np.full(1197, np.nan)
-    fine[::3] = y[:399]
-    finer = cr.Record(DT / 3 * np.arange(1197), np.repeat(u, 3)[:1197], fine, missing="keep")
+    fine = np.full(1798, np.nan)
+    fine[::3] = y
+    finer = cr.Record(DT / 3 * np.arange(1798), np.repeat(u, 3)[:1798], fine, missing="keep")
     other = cr.identify(finer, structures=[(2, 2)]).fit
+    assert other.estimate.whitened == plain.estimate.whitened == bool(pole)
     # bins are chosen on the grid, so that they are not the same
     assert_allclose(other.dead_time, plain.dead_time, atol=0.1 * plain.std_given_structure)
     assert_allclose(other.interval, plain.interval, atol=0.2 * plain.std_given_structure)
@@ -179,3 +183,35 @@ def test_means_over_bins_of_the_samples_that_there_are_match_their_single_respon
         means = np.stack([bins.average(values) for values in np.real(each)])
         # two samples for a bin: 1e-6 for responses, more for their derivatives by the poles
         assert_allclose(np.real(found), means, rtol=0, atol=5e-5 * np.abs(means).max())
+
+
+def test_dead_sensors_and_outliers_of_operating_data_are_named():
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0], 40), 20)
+    plant = cr.delayed_ss(ct.tf([2.0], [9, 1]), dead_time=7.3, dt=1.0)
+    clean = np.ravel(plant.simulate(u)) + 0.02 * rng.standard_normal(u.size)
+
+    def flags(y):
+        fit = cr.identify(cr.Record(np.arange(800.0), u, y), structures=[(1, 1)]).fit
+        return {flag.code: str(flag) for flag in fit.flags}
+
+    assert not flags(clean)
+    stuck, spiked, coded = clean.copy(), clean.copy(), clean.copy()
+    stuck[700:] = stuck[700]
+    told = flags(stuck)["stuck_output"]
+    assert "100 samples, from 700 s to 799 s (the end of the record)" in told
+    spiked[rng.choice(800, 12, replace=False)] += 1.0
+    assert "1.5 % of the samples are outliers" in flags(spiked)["outliers"]
+    coded[[100, 400]] = -9999.0
+    with pytest.raises(DataError, match=r"2 sample.s., the first at index .*, are -9999"):
+        flags(coded)
+
+
+def test_a_response_that_begins_in_a_gap_is_named_and_the_interval_holds():
+    rng = np.random.default_rng(4)
+    time = DT * np.arange(400)
+    y = furnace(time, np.array([700.0]), np.array([3.0])) + 0.01 * rng.standard_normal(400)
+    y[(time > 750) & (time < 950)] = np.nan
+    fit = cr.identify(cr.Record(time, 1.0 * (time >= 700) * 3, y, missing="keep")).fit
+    assert "between 50 s and 250 s" in next(str(f) for f in fit.flags if f.code == "onset_in_gap")
+    assert fit.interval[0] <= DELAY <= fit.interval[1]

@@ -311,7 +311,7 @@ SWITCHES = (
     ),
     Switch(
         "held output",
-        {f"{PUBLIC}.checks:_held_flags": giving(([], 0.0))},
+        {f"{PUBLIC}.checks:held_flags": giving(([], 0.0))},
     ),
     Switch(
         "step of generalised least squares", {f"{PUBLIC}.checks:generalised_step": giving(None)}

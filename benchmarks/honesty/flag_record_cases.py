@@ -43,6 +43,31 @@ def recorded_late(samples: int) -> Run:
     return run
 
 
+def stuck(part: float) -> Run:
+    """One lag, whose sensor holds its value for a part of the record from the middle on."""
+
+    def run(seed: int) -> Codes:
+        record = described.one_lag(np.random.default_rng([seed, 43])).records
+        y, first = record.output.copy(), record.n_samples // 2
+        y[first : first + round(part * y.size)] = y[first]
+        return codes(cr.fit_output_error(cr.Record(record.time, record.input, y)).fit)
+
+    return run
+
+
+def without(where: str) -> Run:
+    """One lag of 0.3 s behind 0.5 s, without samples where its response begins, or later."""
+
+    def run(seed: int) -> Codes:
+        rng, t = np.random.default_rng([seed, 44]), 0.02 * np.arange(400)
+        y = np.where(t < 1.5, 0.0, -np.expm1(-(t - 1.5) / 0.3)) + 0.01 * rng.standard_normal(400)
+        first = 1.3 if where == "onset" else 2.0
+        y[(t > first) & (t < first + 0.4)] = np.nan
+        return codes(cr.fit_output_error(cr.Record(t, t >= 1.0, y, missing="keep")).fit)
+
+    return run
+
+
 MOVING = "fit_output_error, moving input"
 CASES = [
     FlagCase(
@@ -57,6 +82,22 @@ CASES = [
     _case("not_settled", steps.ends_while_rising, described.two_lags),
     _case("held_output", sensors.analyser, described.fine_converter),
     _case("output_at_limit", sensors.clipped, described.one_lag),
+    FlagCase(
+        "fit_output_error",
+        "stuck_output",
+        "a tenth of the samples at one value",
+        stuck(0.1),
+        "a hundredth of the samples at one value",
+        stuck(0.01),
+    ),
+    FlagCase(
+        "fit_output_error",
+        "onset_in_gap",
+        "no samples for 0.4 s where the response begins",
+        without("onset"),
+        "no samples for 0.4 s while it rises",
+        without("rise"),
+    ),
     _case("earlier_input", steps.moved_before, described.two_lags),
     _case("not_linear", steps.fills_faster_than_it_empties, described.several_steps),
     _case("feedback", loops.set_points, described.random_binary, MOVING),

@@ -31,7 +31,7 @@ RAISED_BY = {
 
 COMPOSED = {
     "outliers": "… sample(s), the first at index …, are …, far from the others: if this value "
-    "marks missing data, interpolate these samples before the fit",
+    "marks missing data, replace it by NaN before the fit",
     "outlying_records": "outlying records, excluded from the mean: …",
     "frf_contradicts_records": "records and frequency response have no common model (likelihood "
     "ratio …): the joint model is outside of the 95 % circles of … points of the frequency "

@@ -26,6 +26,7 @@ from .own_gains import unlike_records
 from .repeat_flags import repeat_flags
 from .repeatability import Repeatability, distinct
 from .result import OutputErrorFit
+from .sensor_flags import missing_code
 from .summary import summarise
 
 FOLLOWS = 36.0
@@ -88,10 +89,12 @@ def _fit(
     ways = {name: value for name, value in settings.items() if name != "whiten"}
     found = fit_sampled(outputs, inputs, dt, latest=latest, **ways)
     if found.explained < FOLLOWS:
+        codes = [code for y in found.data.measured if (code := missing_code(y))]
         raise DataError(
             f"{_named(records)}: the output does not respond to the input (the best model "
             f"lowers the sum of squares by {found.explained:.3g} noise variances, expected at "
-            f"least {FOLLOWS:g}); check the columns, and whether the input excites the plant"
+            f"least {FOLLOWS:g}); "
+            + (codes[0] if codes else "check the columns, and whether the input excites the plant")
         )
     return found
 

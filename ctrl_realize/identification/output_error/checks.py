@@ -14,17 +14,21 @@ from ..._wording import in_time
 from ...data import Record
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import Z_95
-from ...numerics.validation.held_output import held_share, longest_hold, samples_at_limit
 from ...numerics.validation.innovations import nonlinear_chance
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
 from ...results import Flag
-from .coloured_checks import coloured_flags, generalised_step
-from .loop_flags import RARE, REGRESSED, feedback_flags, past_inputs, unstable_flags
+from .loop_flags import (
+    RARE,
+    REGRESSED,
+    coloured_flags,
+    feedback_flags,
+    generalised_step,
+    past_inputs,
+    unstable_flags,
+)
 from .result import OutputErrorFit
+from .sensor_flags import held_flags, sensor_flags
 
-_HELD = 0.5
-"""Fraction of moving samples that repeat the previous one, above which an output counts as held;
-noise of one quantisation step repeats 28 %. Ablation: held output."""
 # The following thresholds for flags are a matter of presentation.
 _GAINS_APART = 0.1
 _DELAYS_APART = 0.05
@@ -67,9 +71,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         flags += unstable_flags(complete, fit.delay_interval[1])
     if len(fit.records) == 1:
         shown = _shown(fit)
-        flags += _limit_flags(shown.output)
+        flags += sensor_flags(fit, shown.output, shown.fitted)
         if "coarse_quantisation" not in codes:
-            held, hold = _held_flags(shown, fit.dt * shown.spacing)
+            held, hold = held_flags(shown.output, shown.fitted, fit.dt * shown.spacing)
             flags += held
             low = max(low - hold, 0.0)
         if stepped:
@@ -208,34 +212,6 @@ def _told(change: ParameterChange | None, delay: float) -> str:
         f"the gain deviates by {gains} % and the delay by {shifts} samples from the common "
         f"values (p = {change.chance:.1g})"
     )
-
-
-def _held_flags(shown: Shown, dt: float) -> tuple[list[Flag], float]:
-    """Test whether an output is held between samples, and return the hold time in s."""
-    share = held_share(shown.output, shown.fitted)
-    if share <= _HELD:
-        return [], 0.0
-    hold = dt * longest_hold(shown.output, shown.fitted)
-    flag = Flag(
-        "held_output",
-        f"while the output moves, {100 * share:.0f} % of its samples repeat the previous one: "
-        "the output is held (by an analyser, or by the dead band of a historian) and "
-        f"recorded late; the dead time may be up to {in_time(hold)} shorter",
-    )
-    return [flag], hold
-
-
-def _limit_flags(output: FloatArray) -> list[Flag]:
-    count = samples_at_limit(output)
-    if not count:
-        return []
-    return [
-        Flag(
-            "output_at_limit",
-            f"{count} samples are at the highest or lowest value, without noise: the output "
-            "saturates there, and gain and lags are those of the clipped signal",
-        )
-    ]
 
 
 def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..._wording import in_time, interval_in_time, plainly, rate_in_time, time_within
-from ...numerics.arrays import FloatArray
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
 from .model_flags import cancelled_pair, slow_modes, unresolved_gain
+from .sensor_flags import outliers
 from .words import ESTIMATE_WORDS, is_firm, structure_words
 
 # Thresholds for flags alone are a matter of presentation.
 _SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it counts as zero
-_BEYOND = 20.0  # ranges: no overshoot goes as far
 _FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
 
 
@@ -287,34 +286,5 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
                 "noise: averaging does not remove the quantisation error",
             )
         )
-    error = data.output - fit.fitted
-    wild = float(np.mean(np.abs(error) > 5 * max(fit.residual, data.sigma)))
-    code = _code(data.output)
-    if code:
-        flags.append(Flag("outliers", code))
-    elif fit.adequate and wild > 0.002:
-        flags.append(
-            Flag(
-                "outliers",
-                (
-                    f"{100 * wild:.2g} % of the samples are outliers, 5 standard deviations or "
-                    "more from the model"
-                ),
-            )
-        )
-    return flags
-
-
-def _code(output: FloatArray) -> str:
-    """Find a single value far beyond all others, as loggers write for missing samples."""
-    low, high = np.percentile(output, [1, 99])
-    far = np.flatnonzero(
-        (output < low - _BEYOND * (high - low)) | (output > high + _BEYOND * (high - low))
-    )
-    if not far.size or high == low or np.ptp(output[far]) > 0:
-        return ""
-    return (
-        f"{far.size} sample(s), the first at index {far[0]}, are {output[far[0]]:g}, at least "
-        f"{_BEYOND:g} times the range of the other samples away from them: if this value "
-        "marks missing data, interpolate these samples before the fit, since they distort it"
-    )
+    noise = max(fit.residual, data.sigma) if fit.adequate else None
+    return flags + outliers(data.output, fit.fitted, noise)

@@ -23,6 +23,8 @@ _FEWEST = 8  # moving samples of which a part can be told
 _SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
 _LONG = 20  # samples: with a fifth of equal neighbours noise stands for so long by 0.2^19
+_PASSED = 0.2
+"""Part of the range of a model that it makes while an output without noise is taken for stuck."""
 _ALIKE, _MOST = 0.15, 0.9
 """Steps of 0.0445 that are recorded with two digits are 0.04 and 0.05 (the tacho of a motor): they
 differ by 12 % of their mean; of the steps of a held curve 30 % would be that near to a multiple."""
@@ -92,6 +94,29 @@ def samples_at_limit(output: FloatArray) -> int:
         if inside and elsewhere.size > _LONG and np.mean(elsewhere) <= _SELDOM:
             count += inside
     return count
+
+
+def stuck_samples(output: FloatArray, fitted: FloatArray) -> tuple[int, int]:
+    """First and last sample of the longest run of equal values that noise does not explain.
+
+    Twice the same if there is none. Where the model moves slowly a noisy output seldom repeats a
+    value, a quantised one does so most of the time. An output without noise may rest, but not while
+    the model moves.
+    """
+    same = _repeats(output)
+    starts, ends = _runs(same)
+    if not starts.size:
+        return 0, 0
+    longest = int(np.argmax(ends - starts))
+    first, last = int(starts[longest]), int(ends[longest])
+    moves = np.abs(np.diff(fitted))
+    quiet = moves < _FAST * moves.max(initial=0.0)
+    quiet[first:last] = False
+    if last - first < _LONG or quiet.sum() < _LONG or np.mean(same[quiet]) > _SELDOM:
+        return 0, 0
+    noise = float(np.median(np.abs(np.diff(output - fitted)[quiet])))
+    passed = float(np.ptp(fitted[first : last + 1])) > _PASSED * np.ptp(fitted)
+    return (first, last) if passed or noise > np.median(moves[quiet]) else (0, 0)
 
 
 def _repeats(output: FloatArray) -> BoolArray:

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.validation.held_output import held_share, longest_hold, samples_at_limit
+from ctrl_realize.numerics.validation.held_output import (
+    held_share,
+    longest_hold,
+    samples_at_limit,
+    stuck_samples,
+)
 
 TIME = np.arange(300)
 RISE = np.where(TIME > 100, -np.expm1(-(TIME - 100) / 40), 0.0)
@@ -51,3 +56,20 @@ def _strays(cut):
     """Samples at the limit before it is reached for good: short runs do not count."""
     below = np.flatnonzero(cut < 0.6)
     return int(np.count_nonzero(cut[: below[-1]] == 0.6))
+
+
+@pytest.mark.parametrize(("first", "last"), [(10, 60), (110, 140), (200, 299)])
+def test_a_value_that_stands_in_a_noisy_output_is_found(first, last):
+    output = RISE + 0.01 * np.random.default_rng(1).standard_normal(300)
+    output[first : last + 1] = output[first]
+    assert stuck_samples(output, RISE) == (first, last)
+
+
+@pytest.mark.parametrize("step", [0, 0.002, 0.02, 0.1])
+@pytest.mark.parametrize("noise", [0, 0.001, 0.01])
+def test_rest_and_quantisation_are_not_taken_for_a_stuck_sensor(step, noise):
+    for before in (100, 0):
+        output = RISE + noise * np.random.default_rng(2).standard_normal(300)
+        output = (np.round(output / step) * step if step else output)[100 - before :]
+        first, last = stuck_samples(output, RISE[100 - before :])
+        assert first == last
