@@ -215,6 +215,12 @@ def washed_out(seed: int) -> Codes:
     return shaped(np.exp(-2 * np.pi * 2.0 * t) - np.exp(-2 * np.pi * 8.0 * t), seed, _noise(seed))
 
 
+def bounded(seed: int, high: float) -> Codes:
+    """Fit two lags of which the slow one, 72 ms in truth, is bounded."""
+    asked = cr.identification.ProcessStructure("P2D", bounds={"lag_1": (0.02, high)})
+    return fit(step_case("white", "R2", _noise(seed), seed).record, structures=asked)
+
+
 def forced(seed: int, plant: str) -> Codes:
     """One lag, asked for."""
     case = step_case("white", plant, _noise(seed, LOW), seed)
@@ -392,6 +398,8 @@ CASES: list[FlagCase] = [
             ("lags_differ", "lags of 0.8, 1 and 1.2", {"lags": (0.8, 1.0, 1.2)}),
         )
     ),
+    FlagCase("fit_output_error", "parameter_at_bound", "the slow lag of R2 below 50 ms",
+             partial(bounded, high=0.05), "below 100 ms", partial(bounded, high=0.1)),
     FlagCase("fit_output_error", "apparent_dead_time", "one lag asked for of R2",
              partial(forced, plant="R2"), "one lag asked for of R1", partial(forced, plant="R1")),
     _fit("gain_not_resolved", "a response that dies away again", washed_out),

@@ -66,8 +66,9 @@ def parameter_table(fit: ModelFit) -> Table:
 def _parameter_row(one: Parameter) -> Row:
     known = bool(np.isfinite([one.low, one.high]).all())
     if one.times == 1:
-        error = in_time(one.std, 2) if np.isfinite(one.std) else ""
         ends = one.low, one.high
+        factor, name = time_unit(max(map(abs, ends)) if known else abs(one.value))
+        error = f"{factor * one.std:.2g} {name}" if np.isfinite(one.std) else ""
         value = time_within(one.value, *ends) if known else in_time(one.value, 4)
         interval = interval_in_time(*ends) if known else ""
     else:

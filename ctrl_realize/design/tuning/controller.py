@@ -11,6 +11,7 @@ from ..._checks import one_of, positive, real, system_name
 from ..._parameters import SECONDS, checked_time_unit, slope_unit
 from ..._shown import as_asked, html_card, text_card
 from ..._wording import in_time
+from ...data.shown_units import in_shown_units
 from ...delayed.operators import BesideDelays
 from ...errors import OptionError
 from ...numerics.arrays import FloatArray
@@ -232,6 +233,7 @@ class PIDController(Delivered, BesideDelays):
             return in_time(value, 4)
         return f"{value / SECONDS[self.time_unit]:.4g} {self.time_unit}"
 
+    @in_shown_units
     def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         gain = f"{self.kp:.4g} {self.gain_unit}".rstrip()
         rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", gain)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._checks import one_of, positive, real
 from ..._parameters import SECONDS, gain_unit
+from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
@@ -33,6 +34,7 @@ SETTLED = 10_000
 
 
 @single_threaded
+@in_shown_units
 def pid(
     system: Any,
     rule: str = "simc",

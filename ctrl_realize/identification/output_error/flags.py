@@ -56,6 +56,7 @@ def model_flags(
     firm = "" if any(extrapolated) else _only_total(fit)
     return [
         _apparent(fit),
+        _parameter_bound(fit),
         _bound(dt, fit, max_delay),
         _nothing(dt, fit),
         _many_lags(fit, firm),
@@ -107,6 +108,18 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
         f"structure is right; order {other.order}, relative degree {other.relative_degree} gives "
         f"{time_within(other.dead_time, *other.interval)} "
         f"({interval_in_time(*other.interval)})",
+    )
+
+
+def _parameter_bound(fit: OutputErrorEstimate) -> Flag | None:
+    """Report that parameters of a process model ended at a bound that was asked for."""
+    asked = () if fit.form is None else tuple(n for n in fit.at_bound if n in fit.form.bounds)
+    if not asked:
+        return None
+    return Flag(
+        "parameter_at_bound",
+        f"{', '.join(asked)} ended at a bound: the data suggest a value beyond it, and the other "
+        "parameters make up for that; try wider bounds",
     )
 
 

@@ -91,10 +91,6 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
         ]
     if fit.form is not None:
         reasons = [f"{form_words(fit.form)}: as requested"]
-        if fit.at_bound:
-            reasons.append(
-                f"{', '.join(fit.at_bound)} ended at a bound: the data suggest a value beyond it"
-            )
     reasons += _closest(fit)
     if fit.rounded is not None and not fit.delay_estimates:
         reasons.append(

@@ -58,8 +58,13 @@ def process_fit(
         As for `likelihood_fit`.
     """
     adequate = is_noise(whole.normalized_rms, whole.correlation)
-    if all(form.admits(whole.candidates[form.structure], whole.scales.length) for form in forms):
-        return likelihood_fit(whole, adequate=adequate, relaxing=relaxing, better=better, near=near)
+    length = whole.scales.length
+    if all(form.admits(whole.candidates[form.structure], length) for form in forms):
+        found = likelihood_fit(
+            whole, adequate=adequate, relaxing=relaxing, better=better, near=near
+        )
+        form = next(form for form in forms if form.structure == found.structure)
+        return replace(found, form=form)
     fits = [_fitted(whole, form) for form in forms]
     values = [_criterion(whole, fit) for fit in fits]
     best = int(np.argmin(values))

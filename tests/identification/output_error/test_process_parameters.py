@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import control as ct
 import numpy as np
 import pytest
@@ -140,3 +142,7 @@ def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
     assert again.report() == system.fit.report()
     assert (again.output_unit, again.input_unit, again.time_unit) == ("degC", "%", "min")
     assert " h = 6.0" in system.fit.report(time_unit="h")
+    controller = cr.design.pid(system, "simc", "PI").report()
+    assert re.search(r"gain kp +3\.\d+ %/degC", controller)
+    assert re.search(r"integral ti +(39|40)\.\d+ min", controller)
+    assert re.search(r"delay margin 1\d\.?\d* min", controller)
