@@ -12,7 +12,6 @@ from ..._checks import real, whole
 from ...delayed import DelayedStateSpace
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import FloatArray
-from ...results import Drawable
 from ..siso import delayed_system, same_rate
 from .algorithm import PIDAlgorithm
 
@@ -22,7 +21,7 @@ Step = Callable[[float, float], float]
 
 
 @dataclass(frozen=True, eq=False)
-class LoopSimulation(Drawable):
+class LoopSimulation:
     """Signals of a closed loop.
 
     Attributes
