@@ -93,7 +93,7 @@ ERRORS = {
         (lambda: cr.design.margins(LAG, DISCRETE), "time bases"),
         (lambda: cr.design.margins(ct.tf([1], [1, 0.5], True)), "dt=True"),
         (lambda: cr.design.margins(ct.tf([1, 1, 1], [1, 1])), "improper"),
-        (lambda: cr.design.pid(LAG), "discrete system"),
+        (lambda: cr.design.pid("plant"), "discrete system; got a str"),
         (lambda: cr.design.pid(GROWING), "unstable"),
         (lambda: cr.design.pid(IPDT, "imc"), "not for integrating"),
     ],
