@@ -267,6 +267,8 @@ def test_names_go_through_interconnections():
     assert isinstance(ours, cr.DelaySystem)
     assert ours.internal_delays == (30,)
     assert (ours.name, ours.input_labels, ours.output_labels) == ("loop", ["r"], ["y", "u"])
+    assert ours.core.state_labels == ["P_x[0]", "C_x[0]"]
+    assert set(ours.core.state_labels) <= set(theirs.state_labels)
     assert_allclose(ours(Z), theirs(Z), rtol=1e-9)
     assert_allclose(ours["u", "r"](Z), theirs(Z)[1, 0], rtol=1e-9)
     loop = ct.feedback(P, C)

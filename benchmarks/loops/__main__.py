@@ -39,7 +39,7 @@ def main() -> None:
 
     def line(work: str, d: int, fast: float, slow: float | None) -> None:
         cells = seconds(fast), "-" if slow is None else seconds(slow)
-        ratio = "" if slow is None else f"{slow / fast:,.0f}".replace(",", " ")
+        ratio = "" if slow is None else _ratio(slow / fast)
         lines.append(f"| {work} | {d} | {cells[0]} | {cells[1]} | {ratio} |")
         print(lines[-1], flush=True)
 
@@ -69,6 +69,10 @@ def main() -> None:
         lines.append(f"| peak memory of all three | {d} | {peak:.2g} MB | {needed} | |")
         print(lines[-1], flush=True)
     TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.2g}" if value < 10 else f"{value:,.0f}".replace(",", " ")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
 from .operands import common_dt, form_of
+from .system import DelayedStateSpace
 
 
 def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
@@ -69,8 +70,31 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     loop = forms.through(loop, of_outputs + of_inputs @ gain, into)
     total = forms.parallel(loop, forms.static(of_inputs @ into))
     return DelaySystem._joined(
-        total, dt, list(wired.input_labels), list(wired.output_labels), name=wired.name
+        total,
+        dt,
+        list(wired.input_labels),
+        list(wired.output_labels),
+        _state_names(systems),
+        name=wired.name,
     )
+
+
+def _state_names(systems: Sequence[Any]) -> list[str]:
+    """Names of the states of all cores, with those of their systems, as in python-control."""
+    delimiter = ct.config.defaults["iosys.state_name_delim"]
+    names = []
+    for system in systems:
+        if isinstance(system, DelayedStateSpace):
+            labels = system.delay_free.state_labels
+        elif isinstance(system, DelaySystem):
+            labels = system.core.state_labels
+        else:
+            labels = getattr(system, "state_labels", None) or []
+        count = form_of(system).states
+        if len(labels) != count:  # a transfer function
+            labels = [f"x[{i}]" for i in range(count)]
+        names += [f"{system.name}{delimiter}{label}" for label in labels]
+    return names
 
 
 def _time_base(systems: Sequence[Any]) -> float:

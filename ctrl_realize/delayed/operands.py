@@ -18,9 +18,12 @@ from .parts import check_entries
 Numbers = (int, float, np.number)
 
 
-def plain(form: DelayForm, dt: float) -> ct.StateSpace:
+def plain(form: DelayForm, dt: float, states: Sequence[str] | None = None) -> ct.StateSpace:
     """Convert the core of a form to a system of python-control."""
-    return ct.StateSpace(form.A, form.B, form.C, form.D, dt, remove_useless_states=False)
+    made = ct.StateSpace(form.A, form.B, form.C, form.D, dt, remove_useless_states=False)
+    if states is not None and len(states) == made.nstates == len(set(states)):
+        made.set_states(list(states))
+    return made
 
 
 def is_linear(system: Any) -> bool:

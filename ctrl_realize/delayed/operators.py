@@ -50,9 +50,13 @@ class DelayOperators(DeferredMatrices):
         dt: float,
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
+        states: Sequence[str] | None = None,
         **names: Any,
     ) -> Any:
-        """Make the system of a form, with the fewest delays; only unique names are kept."""
+        """Make the system of a form, with the fewest delays; only unique names are kept.
+
+        `states` are names for those of the core.
+        """
         try:
             form = merged(form)
         except np.linalg.LinAlgError:
@@ -65,10 +69,10 @@ class DelayOperators(DeferredMatrices):
         if dt:
             before, behind, rest = ends_apart(form)
             if not rest.delays:
-                core = plain(rest, dt)
+                core = plain(rest, dt, states)
                 whole = [int(d) for d in before], [int(d) for d in behind]
                 return cls._kinds[ENDS](core, whole[0], output_delay=whole[1], **labels)
-        return cls._kinds[INSIDE](plain(form, dt), form.delays, **labels)
+        return cls._kinds[INSIDE](plain(form, dt, states), form.delays, **labels)
 
     def _other(self, other: Any) -> DelayForm | None:
         """Form of the other operand; None if it has its own operator, or is not a system."""

@@ -25,6 +25,8 @@ SETTLED = 1e-4
 """Relative range of the last part of a response that counts as settled."""
 POINTS, DOUBLINGS = 2001, 8
 """Samples of the responses of a continuous loop, and how often their duration is doubled."""
+ROUNDING = 1e-8
+"""Relative overshoot within the error of a simulated response."""
 SETTLING_BAND = 0.02
 """Distance from the final value, relative to it, within which a response counts as settled."""
 
@@ -266,7 +268,7 @@ def measured(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
     return Performance(
         setpoint_error=float("inf") if kept[0] else float(np.abs(1 - setpoint).sum() * dt),
         load_error=float("inf") if kept[1] else float(np.abs(load).sum() * dt),
-        overshoot=max(0.0, float(setpoint.max()) / final - 1) if final else float("nan"),
+        overshoot=_overshoot(float(setpoint.max()) / final) if final else float("nan"),
         settling_time=settling(setpoint) * dt,
     )
 
@@ -283,3 +285,8 @@ def settling(response: FloatArray) -> int:
     away = np.abs(response - response[-1])
     outside = np.flatnonzero(away > SETTLING_BAND * abs(response[-1]))
     return int(outside[-1]) + 1 if outside.size else 0
+
+
+def _overshoot(peak: float) -> float:
+    """Overshoot of a peak relative to the final value; 0 within the error of a simulation."""
+    return peak - 1 if peak - 1 > ROUNDING else 0.0
