@@ -190,7 +190,7 @@ def write_campaign(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = report.write_campaign(Path(folder) / "valve.html", campaign, simulated=True)
     ...     print(path.read_text().count("<svg "), "figures")
-    4 figures
+    5 figures
     """
     system = campaign.system
     with times_in(shown_time_unit(system)):

@@ -180,8 +180,10 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     return sketches
 
 
-def _each_record(system: DelayedStateSpace, records: Sequence[Record]) -> Sketch:
-    more = len(records) - MOST_BESIDE
+def _each_record(
+    system: DelayedStateSpace, records: Sequence[Record], more: int | None = None
+) -> Sketch:
+    more = len(records) - MOST_BESIDE if more is None else more
     return Sketch(
         "each_record",
         "Each record beside the model",
@@ -275,6 +277,9 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
                 lambda figure: plots.step_plot(steps, system, ax=figure),
             ),
         ]
+    records = [one for one in _records_of(campaign, MOST_BESIDE) if not one.n_missing]
+    if len(records) > 1 and system.issiso():
+        sketches.append(_each_record(system, records, count - len(records)))
     sketches += [one for one in fit_sketches(system, None) if one.key != "impulse"]
     return sketches
 
@@ -293,8 +298,13 @@ def _step_of(record: Record) -> StepResponse | None:
 
 def _steps_of(campaign: Campaign) -> list[StepResponse]:
     """Return the step responses of a campaign's records, up to a limit."""
-    every = max(1, -(-len(campaign.good) // MOST_DRAWN))
+    steps = [_step_of(record) for record in _records_of(campaign, MOST_DRAWN)]
+    return [step for step in steps if step is not None]
+
+
+def _records_of(campaign: Campaign, most: int) -> list[Record]:
+    """Return records of a campaign that were identified, evenly spaced if there are many."""
+    every = max(1, -(-len(campaign.good) // most))
     pairs = zip(campaign.rows, campaign.sources, strict=True)
     sources = [source for row, source in pairs if row.model is not None][::every]
-    steps = [_step_of(one if isinstance(one, Record) else one()) for one in sources]
-    return [step for step in steps if step is not None]
+    return [one if isinstance(one, Record) else one() for one in sources]

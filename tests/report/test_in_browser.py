@@ -49,7 +49,7 @@ def pages(tmp_path_factory):
     records = [valve.step_record(16.0, rng=k) for k in range(3)]
     campaign = cr.identify_campaign(records, method="scan", order=3, max_delay=80, progress=False)
     many = report.write_campaign(folder / "many.html", campaign, records=records)
-    return {"one": (one, 7), "many": (many, 4)}
+    return {"one": (one, 7), "many": (many, 5)}
 
 
 in_a_browser = pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing()))
