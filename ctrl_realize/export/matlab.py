@@ -10,7 +10,7 @@ import control as ct
 import numpy as np
 
 from .._checks import one_of
-from ..delayed import DelayedStateSpace
+from ..delayed import DelayedStateSpace, DelaySystem
 from ..design import ContinuousModel, PIDAlgorithm, PIDController, ProcessModel, to_continuous
 from ..errors import OptionError, UnsuitableSystemError
 from ..io.atomic import write_text
@@ -30,10 +30,12 @@ def to_matlab(
 
     Parameters
     ----------
-    system : DelayedStateSpace, ContinuousModel, ProcessModel, PIDController or PIDAlgorithm
+    system : DelayedStateSpace, DelaySystem, ContinuousModel, ProcessModel, PIDController or \
+            PIDAlgorithm
         A discrete model becomes ``ss(A, B, C, D, dt, 'InputDelay', d)``, with whole samples of
-        delay; a continuous one ``ss`` or ``tf`` with the dead time in s; a controller ``pid``, and
-        an algorithm with set-point weights ``pid2``.
+        delay; a continuous one ``ss`` or ``tf`` with the dead time in s; delays inside of loops
+        ``setDelayModel(H, tau)``; a controller ``pid``, and an algorithm with set-point weights
+        ``pid2``.
     path : path-like
         File to write, ending in ``.m``.
     name : str, optional
@@ -95,11 +97,12 @@ def to_matlab(
             list(system.input_delays),
             list(system.output_delays),
         )
+    elif isinstance(system, DelaySystem):
+        text = _internal_delays(system, identifier(name or str(system.name), "plant"))
     else:
         raise UnsuitableSystemError(
             f"to_matlab got a {type(system).__name__}; expected a DelayedStateSpace, a "
-            "ContinuousModel, a ProcessModel, a PIDController or its algorithm. A system with "
-            "delays inside its loops: export plant and controller, and connect them there"
+            "DelaySystem, a ContinuousModel, a ProcessModel, a PIDController or its algorithm"
         )
     write_text(target, text)
     return target
@@ -136,11 +139,24 @@ def _state_space(
         given += f", 'InputDelay', {_matrix(np.array([before]).T)}"
     if any(behind):
         given += f", 'OutputDelay', {_matrix(np.array([behind]).T)}"
-    lines.append(given + ");")
-    for what, labels in (("InputName", core.input_labels), ("OutputName", core.output_labels)):
+    return "\n".join([*lines, given + ");", *_names(variable, core), ""])
+
+
+def _names(variable: str, system: ct.StateSpace) -> list[str]:
+    lines = []
+    for what, labels in (("InputName", system.input_labels), ("OutputName", system.output_labels)):
         names = ", ".join("'" + _comment(str(each)).replace("'", "''") + "'" for each in labels)
         lines.append(f"{variable}.{what} = {{{names}}};")
-    return "\n".join([*lines, ""])
+    return lines
+
+
+def _internal_delays(system: DelaySystem, variable: str) -> str:
+    """Both have the same form: the last outputs of the core come back through the delays."""
+    core = f"{variable}_core"
+    text = _state_space(system.core, str(system.name), core, _number(float(system.dt)), [], [])
+    delays = _matrix(np.array([system.internal_delays]).T)
+    lines = [f"{variable} = setDelayModel({core}, {delays});", *_names(variable, system), ""]
+    return text + "\n".join(lines)
 
 
 def _pid(system: PIDController | PIDAlgorithm, variable: str) -> str:

@@ -22,6 +22,7 @@ from ..design.loops.performance import (
     settled_responses,
     step_responses,
 )
+from ..design.siso import delayed_system
 from ..design.tuning.algorithm import PIDAlgorithm
 from ..design.tuning.controller import PIDController
 from ..design.tuning.simulated import simulate_loop
@@ -192,7 +193,7 @@ def closed_loop_plot(
     Raises
     ------
     UnsuitableSystemError
-        Without `span`, a loop that is not stable.
+        A continuous plant; without `span`, a loop that is not stable.
 
     Examples
     --------
@@ -203,6 +204,7 @@ def closed_loop_plot(
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['measured value', '', 'controller output', '']
     """
+    plant = delayed_system(plant, "closed_loop_plot")
     linear = {name: _linear(controller) for name, controller in controllers.items()}
     if span is None:
         span = _span(plant, linear)

@@ -237,6 +237,20 @@ def test_a_script_of_matlab_has_all_digits_and_the_delays(kind, tmp_path):
     assert delays == expected[kind]
 
 
+def test_delays_inside_of_loops_keep_their_form(tmp_path):
+    loop = ct.feedback(ct.tf([2.0], [3.0, 1.0]) * cr.delay(0.7), 0.4)
+    script = read_script(export.to_matlab(loop, tmp_path / "loop.m", name="T"))
+    assert script["T"] == ("setDelayModel", ["T_core", "0.7"])
+    # w(t) = z(t - tau) between the last output and the last input of the core
+    A, B, C, D = (script[f"T_core_{letter}"] for letter in "ABCD")
+    for omega in (0.1, 1.0, 4.0):
+        H = C @ np.linalg.solve(1j * omega * np.eye(1) - A, B) + D
+        late = np.exp(-0.7j * omega)
+        got = H[0, 0] + H[0, 1] * late * H[1, 0] / (1 - H[1, 1] * late)
+        plant = 2.0 * late / (3j * omega + 1)
+        assert got == pytest.approx(plant / (1 + 0.4 * plant), rel=1e-12)
+
+
 def test_scripts_of_continuous_models_and_controllers(tmp_path):
     path = tmp_path / "x.m"
     continuous = read_script(export.to_matlab(SISO, path, name="G", continuous=True))
