@@ -115,6 +115,22 @@ def test_time_responses_equal_those_of_the_augmented_matrices(seed):
     assert loop.step_response(T, return_states=True).states.shape[0] == loop.nstates
 
 
+def test_delays_of_zero_are_closed_at_once():
+    D = [[0.1, 0.2, 0.3], [0.3, 0.1, 0.0], [0.2, 0.5, 0.4]]
+    core = ct.ss([[0.5]], [[1.0, 0.3, 0.1]], [[1.0], [0.7], [0.2]], D, DT, inputs=["u", "a", "b"])
+    system = cr.DelaySystem(core, [0, 3])
+    assert (system.internal_delays, system.nstates, system.input_labels) == ((3,), 4, ["u"])
+    M = core(Z)
+    late = np.stack([1 + 0 * Z, Z**-3.0])[None, :, :]
+    loop = np.eye(2)[:, :, None] - M[1:, 1:] * late
+    inner = np.linalg.solve(np.moveaxis(loop, -1, 0), np.moveaxis(M[1:, :1], -1, 0))[..., 0].T
+    expected = M[0, 0] + np.sum(M[0, 1:] * late[0] * inner, axis=0)
+    assert_allclose(system(Z), expected, rtol=1e-12)
+    assert_allclose(system.step(60), ct.step_response(system, DT * np.arange(60)).outputs, 1e-12)
+    with pytest.raises(UnsuitableSystemError, match="delays of 0 s close an algebraic loop"):
+        cr.DelaySystem(ct.ss([], [], [], np.eye(2), DT), [0])
+
+
 @pytest.mark.parametrize("kind", ["plant", "loop"])
 def test_long_simulations_without_matrices_are_named_by_python_control_s(kind):
     plant = cr.delayed_ss(LAG, 600, dt=0.002) * 0.5

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from .._checks import finite
 from ..errors import DataError, UnsuitableSystemError
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import ComplexArray, FloatArray, IntArray
+from ..numerics.internal_delays.form import DelayForm
 from .host_margins import HostMargins
 
 PLAIN = frozenset({"squeeze", "transpose"})
@@ -32,6 +33,8 @@ ON_CIRCLE = 1e-8
 class HostResponses(HostMargins):
     """Time responses without matrices."""
 
+    _stepped: tuple[DelayForm, IntArray] | None = None
+
     @abstractmethod
     def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
         """Compute the outputs (p, N) from zero initial state, or from a given one."""
@@ -39,6 +42,37 @@ class HostResponses(HostMargins):
     @abstractmethod
     def dominant_poles(self, count: int = 10) -> ComplexArray:
         """Compute the poles that decay most slowly, or grow fastest."""
+
+    def _next_state(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
+        """Shift the delay lines, for `control.input_output_response` and interconnections."""
+        if not self.dt:
+            return super()._next_state(t, x, u, params)
+        form, state, drive, first = self._driven(x, u)
+        n, p = form.states, form.outputs
+        out = np.empty(self.nstates)
+        out[n + 1 :] = state[n:-1]
+        out[first] = form.C[p:] @ state[:n] + form.D[p:] @ drive
+        out[:n] = form.A @ state[:n] + form.B @ drive
+        return out
+
+    def _output(self, t: Any, x: Any, u: Any, params: Any) -> FloatArray:
+        if not self.dt:
+            return super()._output(t, x, u, params)
+        form, state, drive, _ = self._driven(x, u)
+        p = form.outputs
+        return np.asarray(form.C[:p] @ state[: form.states] + form.D[:p] @ drive)
+
+    def _driven(self, x: Any, u: Any) -> tuple[DelayForm, FloatArray, FloatArray, IntArray]:
+        """Form, state, inputs of the core, and where the delay lines begin in the state."""
+        if self._stepped is None:
+            made = self._form()
+            lengths = np.array(made.delays, dtype=np.int64)
+            self._stepped = made, made.states + np.cumsum(lengths) - lengths
+        form, first = self._stepped
+        state = np.atleast_1d(np.asarray(x, dtype=np.float64))
+        last = np.append(first[1:], self.nstates)[: first.size] - 1
+        given = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        return form, state, np.concatenate([given, state[last]]), first
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
         """Compute the response to any input from zero initial state, sample by sample.

@@ -60,7 +60,7 @@ class DelayOperators(DeferredMatrices):
         try:
             form = merged(form)
         except np.linalg.LinAlgError:
-            raise _algebraic("its delays of 0 s") from None
+            raise algebraic("its delays of 0 s") from None
         labels: dict[str, Any] = dict(names)
         if inputs is not None and len(inputs) == form.inputs == len(set(inputs)):
             labels["inputs"] = list(inputs)
@@ -165,7 +165,7 @@ class DelayOperators(DeferredMatrices):
         try:
             form = forms.feedback(forward, back, float(sign))
         except np.linalg.LinAlgError:
-            raise _algebraic("the direct terms of both") from None
+            raise algebraic("the direct terms of both") from None
         return self._joined(form, common_dt(self, other), self.input_labels, self.output_labels)
 
     def append(self, other: Any) -> Any:
@@ -191,7 +191,7 @@ class DelayOperators(DeferredMatrices):
         try:
             form = forms.closed(both, gain)
         except np.linalg.LinAlgError:
-            raise _algebraic("the direct terms of both") from None
+            raise algebraic("the direct terms of both") from None
         chosen = forms.through(form, np.eye(both.outputs)[rows], np.eye(both.inputs)[:, columns])
         return self._joined(chosen, common_dt(self, other))
 
@@ -217,7 +217,8 @@ class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         return inside(plain(form_of(self), self.dt), (), **names).feedback(other, sign)
 
 
-def _algebraic(what: str) -> UnsuitableSystemError:
+def algebraic(what: str) -> UnsuitableSystemError:
+    """Make the error for a loop without delay that has no solution, or many."""
     return UnsuitableSystemError(
         f"{what} close an algebraic loop that has no solution, or many (I - D2 D1 is singular): "
         "the loop answers itself without any delay. Put a delay or a lag into it"

@@ -6,10 +6,13 @@ import sys
 from typing import Any
 
 import control as ct
+import numpy as np
 
 from ...errors import DelayRangeError, UnsuitableSystemError
+from ...numerics.internal_delays.form import DelayForm, without_zero_delays
 from ..deferred import DeferredMatrices
-from ..operands import whole_samples
+from ..operands import plain, whole_samples
+from ..operators import algebraic
 from ..parts import MAX_DELAY, check_entries
 
 TIMES = "sys.step_response(t), sys.impulse_response(t) and sys.forced_response(t, u)"
@@ -101,3 +104,20 @@ def check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float) -> N
                 f"the delays are {delays} samples; at most {MAX_DELAY} are allowed. Use a longer "
                 "sample time"
             )
+
+
+def without_zeros(
+    core: ct.StateSpace, delays: tuple[float, ...], dt: float
+) -> tuple[ct.StateSpace, tuple[float, ...]]:
+    """Close the channels whose delay is 0.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        They close an algebraic loop.
+    """
+    try:
+        form = without_zero_delays(DelayForm(core.A, core.B, core.C, core.D, delays))
+    except np.linalg.LinAlgError:
+        raise algebraic("its delays of 0 s") from None
+    return plain(form, dt, core.state_labels), form.delays

@@ -24,7 +24,7 @@ from ..operands import plain
 from ..operators import INSIDE, DelayOperators
 from ..parts import named, signal_names
 from .cards import InsideCards
-from .checks import check_core, check_delays, not_rational
+from .checks import check_core, check_delays, not_rational, without_zeros
 from .conversions import InsideConversions
 from .responses import InsideResponses
 
@@ -42,7 +42,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     core : control.StateSpace
         With p + q outputs and m + q inputs; continuous, or discrete with a known sample time.
     internal_delays : sequence of float, optional
-        The q delays: whole samples for a discrete core, s for a continuous one.
+        The q delays: whole samples for a discrete core, s for a continuous one. Those of 0 are
+        closed at once.
     name, inputs, outputs : optional
         Names of the system, of its m inputs and of its p outputs, as for `control.ss`.
 
@@ -56,7 +57,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     ------
     UnsuitableSystemError
         A core that is not a state-space system, discrete without a sample time, or with fewer
-        signals than delays; also on access to the matrices of a continuous system.
+        signals than delays, or with delays of 0 that close an algebraic loop; also on access to the
+        matrices of a continuous system.
     DelayRangeError
         Negative delays, or delays of a discrete core that are not whole samples.
 
@@ -113,6 +115,9 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         q = len(delays)
         input_names = signal_names(inputs, core.input_labels[: core.ninputs - q], "u")
         output_names = signal_names(outputs, core.output_labels[: core.noutputs - q], "y")
+        if 0 in delays:
+            core, delays = without_zeros(core, delays, dt)
+            q = len(delays)
         self._begin(
             core.nstates,
             core.nstates + (int(sum(delays)) if dt else 0),
