@@ -39,6 +39,7 @@ class Missing(str, Enum):  # noqa: UP042
 
     refuse = "refuse"
     keep = "keep"
+    hold = "hold"
 
 
 class Hold(str, Enum):  # noqa: UP042
@@ -114,7 +115,9 @@ To = Annotated[str | None, _OPTION("--to", help="Last time to use, in s or as a 
 MissingOption = Annotated[
     Missing | None,
     _OPTION(
-        "--missing", help="keep: use records with bad cells, gaps or irregular times as they are."
+        "--missing",
+        help="keep: use records with bad cells, gaps or irregular times as they are; hold: the "
+        "input holds its last value meanwhile.",
     ),
 ]
 NaValues = Annotated[
@@ -191,6 +194,8 @@ _CALLS = {
     "quality=None": "--quality none",
     "header=False and column numbers": "--no-header and column numbers",
     "fit_output_error needs": "the fit needs",
+    "Record.from_samples(record.time, record.input, record.output) or read_record(..., "
+    "missing='hold')": "--missing hold",
 }
 """Advice for Python, and for the command line."""
 

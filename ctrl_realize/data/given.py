@@ -58,7 +58,7 @@ def check_input(record: Record, task: str) -> None:
         raise DataError(
             f"{task} needs the input at every sample; missing samples in the input: {missing}. If "
             "it holds its last value, Record.from_samples(record.time, record.input, "
-            "record.output) fills them"
+            "record.output) or read_record(..., missing='hold') fills them"
         )
 
 

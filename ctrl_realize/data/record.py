@@ -172,7 +172,8 @@ class Record(Drawable):
         name = f" {self.name!r}" if self.name else ""
         return (
             f"<Record{name}: {self.n_samples} samples of {self.dt:g} s, "
-            f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}>"
+            f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}"
+            + (f", {self.n_missing} missing values>" if self.n_missing else ">")
         )
 
     def __len__(self) -> int:

@@ -23,6 +23,7 @@ from .signals.names import choose_columns
 from .signals.quality import Rules, rules_of
 from .signals.samples import (
     Samples,
+    check_part,
     labels_of,
     long_samples,
     span_of,
@@ -56,7 +57,7 @@ def read_record(
     variable: str | None = None,
     start: Any = None,
     stop: Any = None,
-    missing: Literal["refuse", "keep"] = "refuse",
+    missing: Literal["refuse", "keep", "hold"] = "refuse",
     na_values: Any = None,
     quality: str | int | None = "auto",
     good: Any = None,
@@ -102,10 +103,12 @@ def read_record(
         a workbook to use.
     start, stop : float, str or datetime, optional
         First and last time to read: in s, or a date and time where the file has dates.
-    missing : {"refuse", "keep"}, optional
+    missing : {"refuse", "keep", "hold"}, optional
         Treatment of cells without a value (empty, ``NaN``, ``Bad``, ``I/O Timeout``, ...), of bad
         qualities, gaps, and repeated or irregular time stamps: an error, or missing samples of the
-        record. An input that was not stored holds its last value; see `Record.from_samples`.
+        record. With ``"hold"``, the input holds its last value where it was not stored, as
+        historians mean it; with gaps and irregular stamps it always does, see
+        `Record.from_samples`.
     na_values : str, float or sequence of them, optional
         Further words and numbers that stand for a missing value, such as -9999.
     quality : str or int, optional
@@ -239,6 +242,7 @@ class _Reading:
     resample: bool
     rest: tuple[Any, Any] | None
     rules: Rules
+    holds: bool
     text: TextOptions
     variable: str | None
     name: str | None
@@ -275,17 +279,18 @@ def _checked(
     text = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
     if dt is not None and not (_is_number(dt) and dt > 0 and math.isfinite(dt)):
         raise OptionError(f"dt={dt!r} must be a positive number of seconds")
-    keep = one_of(missing, "missing", ("refuse", "keep")) == "keep"
-    if keep and resample:
+    missing = one_of(missing, "missing", ("refuse", "keep", "hold"))
+    if missing != "refuse" and resample:
         raise OptionError(
-            "missing='keep' and resample=True exclude each other: expected one of them"
+            f"missing={missing!r} and resample=True exclude each other: expected one of them"
         )
     if rest is not None and (isinstance(rest, str) or np.shape(rest)[:1] != (2,)):
         raise OptionError(f"rest={rest!r}; expected input and output in the steady state")
     return _Reading(
         time, input, output, dt, time_unit, time_format, start, stop, resample,
         None if rest is None else (rest[0], rest[1]),
-        rules_of(keep, na_values, quality, good), text, variable, name, max_bytes,
+        rules_of(missing != "refuse", na_values, quality, good), missing == "hold", text, variable,
+        name, max_bytes,
     )  # fmt: skip
 
 
@@ -294,7 +299,7 @@ def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -
     samples, labels = _samples(table, how, taken)
     labels["name"] = name
     try:
-        record = samples.record(labels, keep=how.rules.keep, resample=how.resample)
+        record = samples.record(labels, keep=how.rules.keep, holds=how.holds, resample=how.resample)
     except TimeAxisError as error:
         raise TimeAxisError(_explained(error, table, samples)) from error
     except DataError as error:
@@ -310,12 +315,14 @@ def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples
         parts = choose_columns(tags, None, how.input, how.output, 1.0)
         span = span_of(how.start, how.stop, axis)
         samples = long_samples(table, long, parts, axis, span, how.rules)
+        check_part(table.path, span, samples.time, axis)
         return samples, labels_of(tags, parts, None)
     taken = [*taken, *how.rules.columns(table)]
     parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
     axis, rows = wide_axis(table, parts, how.time_unit, how.time_format)
-    low, high = span_of(how.start, how.stop, axis)
-    inside = (axis.seconds >= low) & (axis.seconds <= high)
+    span = span_of(how.start, how.stop, axis)
+    inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])
+    check_part(table.path, span, axis.seconds[inside], axis)
     samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
     return samples, labels_of(table, parts, parts.time)
 

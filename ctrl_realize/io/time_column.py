@@ -30,10 +30,14 @@ _HALF_AN_HOUR = 1 / 48
 
 
 class TimeAxis(NamedTuple):
-    """Time in s, and the date of second 0 where the column has dates."""
+    """Time in s, and the date of second 0 where the column has dates.
+
+    ``doubt`` tells if that may be another date.
+    """
 
     seconds: FloatArray
-    start: np.datetime64 | None
+    start: np.datetime64 | None = None
+    doubt: str = ""
 
 
 def time_axis(
@@ -66,7 +70,8 @@ def time_axis(
     named = table.columns[index].unit or unit_named(table.columns[index].name)
     if time_format is not None or not holds_numbers(table, index):
         told = named if unit == "auto" else unit
-        return _since_first(table, index, _parsed_dates(table, index, time_format, told, date))
+        stamps, doubt = _parsed_dates(table, index, time_format, told, date)
+        return _since_first(table, index, stamps)._replace(doubt=doubt)
     untold = unit == "auto" and not named
     if untold:
         _check_epoch(table, index, cells)
@@ -127,7 +132,7 @@ def _since_first(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> Time
 
 def _parsed_dates(
     table: Table, index: int, time_format: str | None, unit: str, date: int | None
-) -> np.ndarray[Any, Any]:
+) -> tuple[np.ndarray[Any, Any], str]:
     cells = [str(cell).strip() for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
@@ -135,9 +140,9 @@ def _parsed_dates(
         days = [str(cell).strip() for cell in table.columns[date].cells]
         cells = [f"{day} {cell}" for day, cell in zip(days, cells, strict=True)]
     elif time_format is None and all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
-        return _parsed_times_of_day(table, index, cells, unit)
+        return _parsed_times_of_day(table, index, cells, unit), ""
     try:
-        stamps, form = stamps_of(cells, time_format)
+        stamps, form, doubt = stamps_of(cells, time_format)
     except OptionError as error:
         raise OptionError(f"{table.path}: {table.title(index)}: {error}") from error
     bad = np.isnat(stamps)
@@ -148,7 +153,7 @@ def _parsed_dates(
             f"neither a number nor a time in the format {form}; give time_format=, or dt= to "
             "ignore the column"
         )
-    return stamps
+    return stamps, doubt
 
 
 def _are_times_of_day(cells: list[str]) -> bool:

@@ -235,11 +235,11 @@ def excel(path):
     table.to_excel(path, index=False, startrow=2, sheet_name="Run 1")
 
 
-_KEEP = {"missing": "keep"}
+_HOLD = {"missing": "hold"}
 FILES = [
     PlantFile("german.csv", german_logger, 0.8, 45, 12, {"output": "Ablufttemperatur"}),
-    PlantFile("historian_wide.csv", historian_wide, 1.5, 117, 10, _KEEP),
-    PlantFile("historian_long.csv", historian_long, 1.5, 117, 10, _KEEP),
+    PlantFile("historian_wide.csv", historian_wide, 1.5, 117, 10, _HOLD),
+    PlantFile("historian_long.csv", historian_long, 1.5, 117, 10, _HOLD),
     PlantFile(
         "four_tests.csv", four_tests, 0.3, 1.2, 0.06,
         {"by": "test", "input": "valve", "output": "flow"}, many=True,

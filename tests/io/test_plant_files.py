@@ -109,6 +109,17 @@ def test_words_that_stand_for_no_value_are_missing(tmp_path, cell):
     )
 
 
+def test_an_input_holds_its_last_value_where_it_was_not_stored(tmp_path):
+    cells = ["1", "Bad", "", "3", "NaN", "4"]
+    rows = [f"{at},{cell},{k}" for k, (at, cell) in enumerate(zip(STAMPS, cells, strict=True))]
+    path = written(tmp_path, "Timestamp,OP,PV", rows)
+    record = cr.read_record(path, missing="hold")
+    assert_array_equal(record.input, [1, 1, 1, 3, 3, 4])
+    assert_array_equal(record.output, np.arange(6.0))
+    kept = cr.read_record(path, missing="keep").input
+    assert_array_equal(kept, [1, np.nan, np.nan, 3, np.nan, 4])
+
+
 def test_a_part_is_read_by_its_dates_newest_first_or_not(tmp_path):
     rows = [f"{at.replace(' ', ',')},{k},{k}" for k, at in enumerate(STAMPS)]
     for lines in (rows, rows[::-1]):
@@ -119,6 +130,15 @@ def test_a_part_is_read_by_its_dates_newest_first_or_not(tmp_path):
         assert_array_equal(cr.read_record(path, start=100, stop=250).output, [2, 3, 4])
     with pytest.raises(OptionError, match=r"start='yesterday'; expected .*'2025-01-01 00:00:00'"):
         cr.read_record(path, start="yesterday")
+    with pytest.raises(
+        DataError, match=r"0 samples .* covers 0 s to 300 s from 2025-01-01 00:00:00"
+    ):
+        cr.read_record(path, start="2025-01-02")
+    oneday = written(tmp_path, "Time,u,y", [f"1/2/2025 0{k}:00,{k},{k}" for k in range(9)])
+    with pytest.raises(
+        OptionError, match=r"start='2025-02-01': '1/2/2025 00:00' may be .*time_format"
+    ):
+        cr.read_record(oneday, start="2025-02-01")
     plain = written(tmp_path, "t,u,y", [f"{k},{k},{k}" for k in range(9)])
     assert_array_equal(cr.read_record(plain, start=2, stop=5).output, [2, 3, 4, 5])
     with pytest.raises(OptionError, match="has no dates"):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...data import Record
-from ...errors import OptionError
+from ...data.resampling import MIN_SAMPLES
+from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.signals.time_axis import axis_fault
 from ..columns import check_lengths
@@ -36,7 +38,7 @@ class Samples:
     input_time: FloatArray | None
     place: Callable[[int], str]
 
-    def record(self, labels: dict[str, Any], *, keep: bool, resample: bool) -> Record:
+    def record(self, labels: dict[str, Any], *, keep: bool, holds: bool, resample: bool) -> Record:
         """Make a record: as it is, with gaps on a finer time axis, or interpolated."""
         if resample:
             return Record.resampled(self.time, self.at_outputs(), self.output, **labels)
@@ -47,7 +49,7 @@ class Samples:
             # a stamp that comes twice was stored twice, or corrected: the later one holds
             last = np.r_[np.diff(time) != 0, True]
             time, input, output = time[last], input[..., last], output[..., last]
-            if axis_fault(time) is None:
+            if axis_fault(time) is None and not (holds and np.isnan(input).any()):
                 return Record(time, input, output, missing="keep", **labels)
         return Record.from_samples(time, input, output, input_time=self.input_time, **labels)
 
@@ -77,8 +79,8 @@ def wide_axis(
         rows, seconds = rows[::-1], seconds[::-1]
         if axis.start is not None:
             start = axis.start + np.timedelta64(round(1e9 * float(seconds[0])), "ns")
-            return TimeAxis(seconds - seconds[0], start), rows
-    return TimeAxis(seconds, axis.start), rows
+            return TimeAxis(seconds - seconds[0], start, axis.doubt), rows
+    return TimeAxis(seconds, axis.start, axis.doubt), rows
 
 
 def wide_samples(
@@ -160,6 +162,16 @@ def span_of(start: Any, stop: Any, axis: TimeAxis) -> tuple[float, float]:
     return low, high
 
 
+def check_part(path: Path, span: tuple[float, float], inside: FloatArray, axis: TimeAxis) -> None:
+    """Refuse a part with too few samples for a record."""
+    if np.isfinite(span).any() and inside.size < MIN_SAMPLES:
+        raise DataError(
+            f"{path}: there are {inside.size} samples between {span[0]:g} s and {span[1]:g} s; "
+            f"the file covers {np.min(axis.seconds):g} s to {np.max(axis.seconds):g} s"
+            + ("" if axis.start is None else f" from {str(axis.start)[:19].replace('T', ' ')} on")
+        )
+
+
 def _second(given: Any, name: str, axis: TimeAxis) -> float:
     if isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool):
         return float(given)
@@ -169,6 +181,8 @@ def _second(given: Any, name: str, axis: TimeAxis) -> float:
         raise OptionError(
             f"{name}={given!r}: the time of the file has no dates; expected a time in s"
         )
+    if axis.doubt:
+        raise OptionError(f"{name}={given!r}: {axis.doubt}")
     try:
         stamp = pd.Timestamp(given)
     except (ValueError, TypeError) as error:

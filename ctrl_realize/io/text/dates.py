@@ -9,7 +9,7 @@ gaps of months where the other is regular. Otherwise the date is ambiguous.
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,20 @@ _REGULAR = 10.0
 weeks where the days change."""
 
 
-def stamps_of(cells: list[str], time_format: str | None) -> tuple[Stamps, str]:
-    """Return time stamps, NaT where a cell is none, and the format in words.
+class Dates(NamedTuple):
+    """Time stamps, NaT where a cell is none.
+
+    ``form`` is their format in words; ``doubt`` tells if they may be other dates, with the same
+    distances between them.
+    """
+
+    stamps: Stamps
+    form: str
+    doubt: str = ""
+
+
+def stamps_of(cells: list[str], time_format: str | None) -> Dates:
+    """Return the time stamps of cells.
 
     Raises
     ------
@@ -39,26 +51,29 @@ def stamps_of(cells: list[str], time_format: str | None) -> tuple[Stamps, str]:
         `time_format` is not a format, or day and month cannot be told apart.
     """
     if time_format is not None:
-        return _parsed(cells, time_format), time_format
+        return Dates(_parsed(cells, time_format), time_format)
     stamps = _parsed(cells, "ISO8601")
     first = next((cell for cell in cells if cell), "")
     if not np.isnat(stamps).all() or not _DATE.fullmatch(_plain(first)):
-        return stamps, "ISO 8601"
+        return Dates(stamps, "ISO 8601")
     plain = [_plain(cell) for cell in cells]
     formats = _formats(plain)
     if not formats:
-        return stamps, "ISO 8601"
+        return Dates(stamps, "ISO 8601")
     read = [_in_format(plain, one) for one in formats]
-    if len(read) == 1 or _same_times(*read):
-        return read[0], formats[0]
+    if len(read) == 1:
+        return Dates(read[0], formats[0])
+    doubt = (
+        f"{first!r} may be written as day and month or as month and day; give "
+        f"time_format={formats[0]!r} or {formats[1]!r}"
+    )
+    if _same_times(*read):
+        return Dates(read[0], formats[0], doubt)
     regular = [_is_regular(one) for one in read]
     if sum(regular) != 1:
-        raise OptionError(
-            f"{first!r} may be written as day and month or as month and day; give "
-            f"time_format={formats[0]!r} or {formats[1]!r}"
-        )
+        raise OptionError(doubt)
     chosen = regular.index(True)
-    return read[chosen], formats[chosen]
+    return Dates(read[chosen], formats[chosen])
 
 
 def _plain(cell: str) -> str:
