@@ -91,7 +91,9 @@ def parameter_change(
     if variance <= 0:
         return None
     ratio = (float(alone @ alone) - float(left @ left)) / (3 * (used.size - 1)) / variance
-    spread = np.linalg.inv((columns / scale).T @ (columns / scale)).diagonal() / scale**2
+    # of the columns, not of their products, whose inverse may have a negative diagonal
+    _, singular, turned = np.linalg.svd(columns / scale, full_matrices=False)
+    spread = np.sum((turned / singular[:, None]) ** 2, axis=0) / scale**2
     errors = np.sqrt(variance * spread)
     return ParameterChange(
         solution[1::3],
