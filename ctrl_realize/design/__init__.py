@@ -5,7 +5,8 @@ All functions use core and delay separately, so that they are exact at any delay
 """
 
 from .delay_line import DelayLineController
-from .loops.delay_robustness import DelayRobustness, delay_robustness
+from .loops.delay_robustness import delay_robustness
+from .loops.delay_robustness_result import DelayRobustness
 from .loops.gang_of_four import gang_of_four
 from .loops.loop_check import LoopCheck
 from .loops.margin_result import Margins

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..design.loops.delay_robustness import DelayRobustness
+from ..design.loops.delay_robustness_result import DelayRobustness
 from ..design.loops.robustness import RobustnessCheck, UncertaintyBound
 from ..numerics.arrays import FloatArray
 from . import style

@@ -6,7 +6,6 @@ times from the identification.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,11 +13,12 @@ import numpy as np
 
 from ..._wording import in_time, interval_in_time
 from ...delayed import DelayedStateSpace
-from ...errors import ModelWarning, UnsuitableSystemError
+from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import ComplexArray
 from ...results import Flag, Result
 from ..siso import interval_of_dead_time
-from .delay_robustness import DelayRobustness, over_interval
+from .delay_robustness import over_interval
+from .delay_robustness_result import DelayRobustness
 from .loop import open_loop
 from .margin_result import Margins
 from .margins import loop_margins
@@ -133,14 +133,10 @@ def _unstable_inside(found: DelayRobustness) -> Flag:
     )
 
 
-def warn_of(check: LoopCheck, advice: str, *, stacklevel: int = 4) -> None:
-    """Warn if the loop is unstable within the interval; `advice` says what to try.
-
-    The warning is attributed to the caller of a design function; its single-thread wrapper is one
-    more frame.
-    """
+def warn_of(check: LoopCheck, advice: str) -> None:
+    """Warn if the loop is unstable within the interval; `advice` says what to try."""
     for flag in check.flags:
-        warnings.warn(ModelWarning(f"{flag}; {advice}"), stacklevel=stacklevel)
+        warn_caller(f"{flag}; {advice}", ModelWarning)
 
 
 def refuse_unstable(check: LoopCheck, what: str, advice: str) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from ...delayed import DelayedStateSpace
 from ..delay_line import DelayLineController
-from ..loops.delay_robustness import DelayRobustness
+from ..loops.delay_robustness_result import DelayRobustness
 from ..loops.loop_check import LoopCheck
 
 

@@ -241,7 +241,7 @@ def smith_predictor(
         "Its closed loop is that of the core and the controller: choose a controller that "
         "stabilizes system.delay_free (design.margins(system.delay_free, controller))",
     )
-    warn_of(check, "give a longer filter_time or a slower controller", stacklevel=3)
+    warn_of(check, "give a longer filter_time or a slower controller")
     return made(check)
 
 
