@@ -10,7 +10,7 @@ import numpy as np
 from ..._checks import one_of, positive, real, system_name
 from ..._parameters import SECONDS, checked_time_unit, slope_unit
 from ..._shown import as_asked, html_card, text_card
-from ..._wording import in_time
+from ..._wording import in_time, times_in
 from ...data.shown_units import in_shown_units
 from ...delayed.operators import BesideDelays
 from ...errors import OptionError
@@ -227,24 +227,19 @@ class PIDController(Delivered, BesideDelays):
             gains.append(f"kd = kp td = {kd:.4g} {unit} {self.gain_unit}".rstrip())
         return ", ".join(gains)
 
-    def _in_time(self, value: float) -> str:
-        """A time in the unit of the record."""
-        if self.time_unit == "s":
-            return in_time(value, 4)
-        return f"{value / SECONDS[self.time_unit]:.4g} {self.time_unit}"
-
     @in_shown_units
     def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         gain = f"{self.kp:.4g} {self.gain_unit}".rstrip()
         rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", gain)]
         if "I" in self.kind:
-            rows.append(("integral ti", self._in_time(self.ti)))
+            rows.append(("integral ti", in_time(self.ti, 4)))
         if "D" in self.kind:
-            rows.append(("derivative td", self._in_time(self.td)))
-            rows.append(("its filter tf", self._in_time(self.tf)))
+            rows.append(("derivative td", in_time(self.td, 4)))
+            rows.append(("its filter tf", in_time(self.tf, 4)))
         if self.kind != "P":
             rows.append(("gains", self._gains()))
-        step = f"{in_time(self.dt, 6)}, {self.method} rule" if self.dt else "none: continuous"
+        with times_in("s"):  # cycle times are set in s or ms
+            step = f"{in_time(self.dt, 6)}, {self.method} rule" if self.dt else "none: continuous"
         rows.append(("sample time", step))
         flags = []
         if self.check is not None:
