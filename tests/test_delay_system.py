@@ -200,7 +200,7 @@ ROOT_LOCI = {
 @pytest.mark.parametrize("case", ROOT_LOCI)
 def test_a_root_locus_solves_its_equation_on_continuous_branches(case):
     system, response = ROOT_LOCI[case]
-    gains = None if case == "continuous" else cr.design.margins(system).gain_margin * GAINS
+    gains = None if case == "discrete" else cr.design.margins(system).gain_margin * GAINS
     locus = cr.design.root_locus(system, gains, count=6)
     assert locus.loci.shape == (locus.gains.size, 6)
     values = (response or system)(locus.loci.ravel())

@@ -71,7 +71,7 @@ def warn_of_lost_delays(states: int) -> None:
     warn_caller(
         f"python-control makes a plain system of {states} states and more here: it is correct, but "
         "its responses take the longer the more states it has. To keep the delays, put the "
-        "delayed system first, use cr.DelaySystem(ct.ss(K)) instead of a controller or gain K, "
+        "delayed system first, use cr.DelaySystem(ct.ss(K)) instead of a controller K, "
         "(1 + L) ** -1 instead of ct.feedback(1, L), cr.interconnect instead of ct.interconnect, "
         "and cr.design.gang_of_four instead of ct.gangof4",
         ModelWarning,

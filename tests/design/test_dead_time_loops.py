@@ -127,8 +127,10 @@ def test_margins_of_a_loop_with_dead_time_and_a_fast_pole_count_right(fast):
         assert ct.feedback(plant * loop).is_stable() is stable
 
 
-@pytest.mark.parametrize("rule", ["simc", "amigo", "ziegler_nichols_ultimate", "optimal"])
-@pytest.mark.parametrize("kind", ["PI", "PID"])
+@pytest.mark.parametrize(
+    ("rule", "kind"),
+    [("simc", "PID"), ("amigo", "PI"), ("ziegler_nichols_ultimate", "PID"), ("optimal", "PI")],
+)
 def test_a_continuous_plant_is_tuned_as_the_limit_of_short_samples(rule, kind):
     plant = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * cr.delay(0.03)
     ours = design.pid(plant, rule, kind)

@@ -116,10 +116,16 @@ def _given(gains: ArrayLike) -> FloatArray:
 
 def _gains(loop: Any) -> FloatArray:
     margin = margins(loop)
-    boundary = margin.gain_margins.max(initial=0.0) if not margin.stable else margin.gain_margin
+    boundary = margin.gain_margin
+    if not margin.stable and margin.gain_margins.size:
+        # an unstable plant may be stable between the first two
+        boundary = float(np.sort(margin.gain_margins)[:2][-1])
     if not 0 < boundary < np.inf:
-        values = np.abs(margin.response[1])
-        boundary = 10 / float(np.median(values[np.isfinite(values)]))
+        # a loop that stays stable: its gain at frequencies of its poles
+        omega, values = margin.response
+        slow = omega <= 2 * np.abs(loop.features()[0]).max(initial=0.0)
+        size = np.abs(values)[slow & np.isfinite(values) & (values != 0)]
+        boundary = 10 / float(np.median(size)) if size.size else 1.0
     return np.geomspace(SPAN[0] * boundary, SPAN[1] * boundary, POINTS)
 
 
