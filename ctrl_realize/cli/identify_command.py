@@ -90,17 +90,16 @@ def _one(
         records[0] if len(records) == 1 else records, method=settings.method, **options
     )
     comparison = None if frf is None else compare_frf(system, frf)
-    written = write_record_files(
-        folder, system, records[0], [source.file for source in sources],
-        frf=frf, comparison=comparison, settings=settings.given, calls=calls, with_report=report,
-    )  # fmt: skip
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
     say(fit_of(system, ModelFit).report())
     if comparison is not None:
         say()
         say(comparison.report())
-    return written
+    return write_record_files(
+        folder, system, records[0], [source.file for source in sources],
+        frf=frf, comparison=comparison, settings=settings.given, calls=calls, with_report=report,
+    )  # fmt: skip
 
 
 def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None:

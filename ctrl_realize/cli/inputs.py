@@ -12,7 +12,7 @@ from typing import Any
 from ..data import Record
 from ..identification.methods import IdentifyOptions, Method
 from ..io import read_record, read_records
-from .options import option_of, words_of
+from .options import words_of
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,7 @@ def words_again(
     separate: bool,
 ) -> list[str]:
     """Return the arguments that reproduce a run, without the output folder."""
-    words = [*map(str, files)]
-    for name, value in settings.given.items():
-        words += [option_of(name), str(value)]
+    words = [*map(str, files), *words_of(settings.given)]
     if settings.joint:
         words.append("--joint")
     if frf is not None:

@@ -71,6 +71,13 @@ Order = Annotated[
     int | None, _OPTION(min=1, help="Model order without the delay. Default: estimated.")
 ]
 MaxDelay = Annotated[int | None, _OPTION(min=1, help="Largest delay to consider, in samples.")]
+Structures = Annotated[
+    list[str] | None, _OPTION(help="Process model: P1D, P2DZ, FOPDT, SOPDT, ...; repeatable.")
+]
+Samples = Annotated[
+    int | None, _OPTION(min=1, help="scan, paper: number of samples of the impulse response.")
+]
+CutoffHz = Annotated[float | None, _OPTION(help="scan, paper: cutoff of the filter, in Hz.")]
 Frf = Annotated[Path | None, _OPTION(help="Measured frequency response to compare the model with.")]
 Joint = Annotated[
     bool, _OPTION("--joint", help="Fit one model to all records, and to the --frf if given.")
@@ -174,8 +181,9 @@ ARGUMENTS = frozenset(
     {"time", "input", "output", "dt", "time_unit", "time_format", "start", "stop", "missing",
      "na_values", "quality", "good", "resample", "rest", "delimiter", "decimal", "encoding",
      "comment", "header", "skip_rows", "variable", "max_bytes", "by", "method", "order",
-     "max_delay", "gains", "frequency", "magnitude", "phase", "real", "imag", "frequency_unit",
-     "magnitude_unit", "phase_unit", "min_coherence", "band_hz", "hold"}
+     "max_delay", "gains", "structures", "samples", "cutoff_hz", "frequency", "magnitude",
+     "phase", "real", "imag", "frequency_unit", "magnitude_unit", "phase_unit", "min_coherence",
+     "band_hz", "hold"}
 )  # fmt: skip
 """Arguments of Python that have an option."""
 

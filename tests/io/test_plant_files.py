@@ -243,14 +243,15 @@ def test_joint_fits_and_steady_states_have_options(folder, tmp_path):
     tests = cr.io.read_records(four, by="test", **columns)
     response = cr.read_frf(tmp_path / "frf.csv", frequency="f", real="re", imag="im")
     for words, expected in (
-        ([str(four), "--by", "test", "--gains", "own", "--input", "valve", "--response", "flow"],
-         cr.identify(tests, order=1, gains="own")),
+        ([str(four), "--by", "test", "--gains", "own", "--input", "valve", "--response", "flow",
+          "--structures", "P1D"],
+         cr.identify(tests, structures="P1D", gains="own")),
         ([str(start), "--rest", "0", "20.3", "--joint", "--frf", str(tmp_path / "frf.csv"),
-          "--frequency", "f", "--real", "re", "--imag", "im"],
+          "--frequency", "f", "--real", "re", "--imag", "im", "--order", "1"],
          cr.identify(cr.read_record(start, rest=(0, 20.3)), order=1, frf=response)),
     ):  # fmt: skip
         out = tmp_path / "out"
-        more = ["--order", "1", "--no-report", "--overwrite"]
+        more = ["--no-report", "--overwrite"]
         assert main(["identify", *words, "-o", str(out), *more]) == 0
         assert cr.load_model(out / "model.json").dead_time == expected.dead_time
         # the command that is kept makes the same model
