@@ -25,6 +25,7 @@ from ...numerics.output_error.step_data import StepData, own_regressors, step_da
 from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.parameters.process_form import ProcessForm
 from ...numerics.separable.varpro import KnownFactor, Structure
+from ...numerics.signals.edges import despike, difference_noise
 from ..process_structures import Structures, requested
 from ..step.steps import found_step
 from .any_input import fit_any_input
@@ -54,6 +55,8 @@ _LAST = 5  # a first step in the last samples of a record has no response to fit
 FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
+_STRAY = 0.01  # part of the first step by which a clean input may stray before it
+_SPIKE = 3  # samples of a spike of the input that do not move a plant
 _DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 
 
@@ -318,7 +321,19 @@ def _edges(record: Record) -> tuple[StepEdge, ...]:
             # It moves only at the very end: there is no response to fit.
             raise
         return ()
-    return edges if len(edges) <= _MOST_EDGES and _holds_between(signal, edges) else ()
+    steps = len(edges) <= _MOST_EDGES and not _moves_before(signal, edges[0])
+    return edges if steps and _holds_between(signal, edges) else ()
+
+
+def _moves_before(signal: FloatArray, edge: StepEdge) -> bool:
+    """Whether a clean input moves before its first edge, by less than counts as one.
+
+    The output may then move before the edge, or respond to it from a motion of its own.
+    """
+    before = signal[: edge.index]
+    if before.size <= 2 * _SPIKE or difference_noise(signal) > 0:
+        return False
+    return float(np.ptp(despike(before, _SPIKE))) > _STRAY * abs(edge.amplitude)
 
 
 def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:

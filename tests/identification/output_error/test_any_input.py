@@ -249,3 +249,14 @@ def test_the_interval_of_a_structure_does_not_depend_on_which_is_chosen():
     alone = cr.fit_output_error(record, structures=[(2, 1)]).fit.structures[0]
     # the noise is that of the chosen structure, which differs by a percent
     assert_allclose(np.diff(zero.interval), np.diff(alone.interval), rtol=0.05)
+
+
+def test_a_small_move_before_the_first_step_is_not_taken_for_its_response():
+    # a twelfth of the step, too small for an edge; the output moves 20 samples before it
+    t, rng = np.arange(600.0), np.random.default_rng(1)
+    u = 1.0 * (t >= 150) - 12.0 * (t >= 200) + 8.0 * (t >= 400)
+    plant = cr.delayed_ss(ct.tf([1.0], [30.0, 1.0]), dead_time=30.0, dt=1.0)
+    record = cr.Record(t, u, np.ravel(plant.simulate(u)) + 0.01 * rng.standard_normal(600))
+    fit = cr.identify(record, structures=[(1, 1)]).fit
+    assert fit.interval[0] <= 30.0 <= fit.interval[1]
+    assert_allclose(fit.dead_time, 30.0, atol=4 * fit.std_given_structure)
