@@ -215,3 +215,15 @@ def test_a_response_that_begins_in_a_gap_is_named_and_the_interval_holds():
     fit = cr.identify(cr.Record(time, 1.0 * (time >= 700) * 3, y, missing="keep")).fit
     assert "between 50 s and 250 s" in next(str(f) for f in fit.flags if f.code == "onset_in_gap")
     assert fit.interval[0] <= DELAY <= fit.interval[1]
+
+
+def test_a_model_is_validated_and_drawn_on_the_samples_that_there_are():
+    record = stored("missing", np.random.default_rng(11), 0.01, True)
+    sys = cr.identify(stored("missing", np.random.default_rng(12), 0.01, True), structures=[(2, 2)])
+    noise = np.std(record.output[record.seen])
+    fit = cr.validation.cross_validate(sys, record).to_numpy()[0, 0]
+    assert_allclose(fit, 100 * (1 - 0.01 / noise), atol=0.1)
+    drawn = record.plot().axes.flat[0].lines[0].get_xdata()
+    assert drawn.size == np.count_nonzero(record.seen)
+    with pytest.raises(DataError, match="a simulation needs complete data"):
+        cr.validation.analyse_residuals(sys, record)

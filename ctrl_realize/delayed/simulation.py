@@ -10,7 +10,7 @@ import numpy as np
 
 from .._checks import one_of
 from ..data import Record
-from ..data.given import check_complete
+from ..data.given import check_complete, check_input
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, later
 from ..numerics.state_space.responses import markov, step_response
@@ -22,15 +22,17 @@ PIECES = 16
 """Largest number of levels that represent the unknown input within a dead time."""
 
 
-def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatArray:
+def simulate_record(
+    system: ct.StateSpace, record: Record, start: str, *, gaps: bool = False
+) -> FloatArray:
     """Simulate the outputs of a record, shape (p, N), with the best initial state.
 
     Errors are weighted by the range of each output. An offset of every output is always estimated,
     with ``start="estimate"`` also the state of the core and the input within the dead times before
-    the record.
+    the record. With `gaps`, outputs may be missing.
     """
     start = one_of(start, "start", ("estimate", "rest"))
-    check_complete(record, "a simulation")
+    (check_input if gaps else check_complete)(record, "a simulation")
     model = as_delayed(system, record)
     u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
     p, N = y.shape
@@ -45,13 +47,17 @@ def simulate_record(system: ct.StateSpace, record: Record, start: str) -> FloatA
     alike = regressors / unit[:, None]
     scale = np.linalg.norm(alike, axis=0)
     scale[scale == 0] = 1.0
-    weights = np.linalg.lstsq(alike / scale, (y - forced).ravel() / unit, rcond=1e-10)[0]
+    alike, target = alike / scale, (y - forced).ravel() / unit
+    if gaps:
+        seen = ~np.isnan(target)
+        alike, target = alike[seen], target[seen]
+    weights = np.linalg.lstsq(alike, target, rcond=1e-10)[0]
     return np.asarray(forced + (regressors @ (weights / scale)).reshape(p, N))
 
 
 def _units(outputs: FloatArray) -> FloatArray:
     """Range of every output relative to the largest one; 1 for a constant output."""
-    ranges = np.ptp(outputs, axis=1)
+    ranges = np.nanmax(outputs, axis=1) - np.nanmin(outputs, axis=1)
     largest = ranges.max() or 1.0
     return np.asarray(np.where(ranges > 0, ranges, largest) / largest)
 

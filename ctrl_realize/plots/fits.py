@@ -152,10 +152,16 @@ def each_record_plot(
     ['valve_16mA (0), 99.6 %', 'valve_16mA (1), 99.6 %']
     """
     held = () if system.fit is None else system.fit.records
-    given = [record for record in (held if records is None else records) if not record.n_missing]
+    given = [
+        record
+        for record in (held if records is None else records)
+        if not np.isnan(record.input).any()
+    ]
     shown = given[:MOST_BESIDE]
     if not shown:
-        raise OptionError("no complete records; expected a model with its fit, or records")
+        raise OptionError(
+            "no records with a complete input; expected a model with its fit, or records"
+        )
     names = distinct(record.name for record in shown)
     columns = 1 if len(shown) == 1 else 2
     rows = each_record_rows(len(given))
@@ -166,12 +172,14 @@ def each_record_plot(
         for axis, record, name in zip(axes, shown, names, strict=False):
             factor, unit = axis_time_unit(float(np.ptp(record.time)), axis)
             measured = np.atleast_2d(record.output)[output]
-            model = simulate_record(system, record, "estimate")[output]
+            model = simulate_record(system, record, "estimate", gaps=True)[output]
             looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
-            time = factor * record.time
-            drawn = list(axis.plot(time, measured, color=style.MEASURED, label="measured"))
+            seen, time = ~np.isnan(measured), factor * record.time
+            drawn = list(
+                axis.plot(time[seen], measured[seen], color=style.MEASURED, label="measured")
+            )
             lines.append([*drawn, *axis.plot(time, model, **looks)])
-            fit = float(fit_percent(measured[None], model[None])[0])
+            fit = float(fit_percent(measured[None, seen], model[None, seen])[0])
             axis.set_title(f"{plain(name, 30)}, {fit:.1f} %", loc="left", fontsize=10)
             axis.set_xlabel(f"time [{unit}]")
             label = with_unit(record.output_labels[output], record.output_units[output])

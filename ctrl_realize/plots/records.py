@@ -166,14 +166,18 @@ def _signals(
     lines: list[Line2D] = []
     for index, (row, label) in enumerate(zip(rows, labels, strict=True)):
         first = {"color": style.MEASURED} if index == 0 else {}
+        seen = ~np.isnan(row)
+        # Single samples between missing ones would be lines without length.
+        points = {} if seen.all() else {"marker": ".", "markersize": 3}
         looks = {
+            **points,
             "color": style.OTHERS[(index - 1) % len(style.OTHERS)],
             "linewidth": 1.5,
             "label": plain(label),
             **first,
             **(kwargs if len(rows) == 1 else {k: v for k, v in kwargs.items() if k != "color"}),
         }
-        lines += axes.plot(time, row, **looks)
+        lines += axes.plot(time[seen], row[seen], **looks)
     return lines
 
 

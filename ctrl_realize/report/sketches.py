@@ -111,7 +111,8 @@ def identification_sketches(
             )
         )
     sketches += fit_sketches(system, step)
-    several = [] if system.fit is None else [one for one in system.fit.records if not one.n_missing]
+    given = () if system.fit is None else system.fit.records
+    several = [one for one in given if not np.isnan(one.input).any()]
     if len(several) > 1:
         sketches.append(_each_record(system, several))
     sketches.append(

@@ -78,8 +78,9 @@ def cross_validate(
         raise DataError("no models; expected at least one, such as {'mine': model}")
 
     def mean_fit(system: Any, record: Record) -> float:
-        simulated = simulate_record(system, record, start)
-        return float(fit_percent(np.atleast_2d(record.output), simulated).mean())
+        simulated = simulate_record(system, record, start, gaps=True)
+        measured = np.atleast_2d(record.output)
+        return float(fit_percent(measured[:, record.seen], simulated[:, record.seen]).mean())
 
     columns: dict[str, dict[str, float]] = {}
     for i, record in enumerate(several):
