@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from .._parameters import gain_unit
 from ..data import Record, StepResponse
 from ..data.given import as_record
 from ..delayed import DelayedStateSpace
@@ -102,7 +103,7 @@ def step_plot(
         lines = _measured_steps(axes, steps, factor, **kwargs)
         if system is not None:
             lines += _model_step(axes, system, longest, factor)
-        axes.set(xlabel=f"time after the step [{unit}]", ylabel=UNIT_STEP)
+        axes.set(xlabel=f"time after the step [{unit}]", ylabel=_step_label(steps[0]))
         return style.finished([axes], [lines], loc="lower right" if rising else "upper right")
 
 
@@ -155,7 +156,7 @@ def onset_plot(
             lines += _model_step(axes, system, shown, factor)
             mark_dead_time(axes, system, factor)
         axes.set_xlim(-before * factor, shown * factor)
-        axes.set(xlabel=f"time after the step [{unit}]", ylabel=UNIT_STEP)
+        axes.set(xlabel=f"time after the step [{unit}]", ylabel=_step_label(steps[0]))
         return style.finished([axes], [lines], loc="center left")
 
 
@@ -242,6 +243,12 @@ def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
     rise = step.dt * (int(reached[0]) if reached.size else step.n_samples // 4)
     wait = 0.0 if system is None else float(np.max(system.dead_time))
     return float(min(max(3 * wait, 1.3 * rise, 12 * step.dt), step.time[-1]))
+
+
+def _step_label(step: StepResponse) -> str:
+    record = step.record
+    ratio = "" if record is None else gain_unit(record.output_units[0], record.input_units[0])
+    return f"unit step response\n[{ratio}]" if ratio else UNIT_STEP
 
 
 def _axis_label(labels: Sequence[str], units: Sequence[str], kind: str, width: int = 26) -> str:

@@ -137,6 +137,7 @@ def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
     above, below = record.plot().figure.axes
     assert (above.get_ylabel(), below.get_ylabel()) == ("output [degC]", "input [%]")
     assert below.get_xlabel() == "time [min]"
+    assert cr.plots.step_plot(record).figure.axes[0].get_ylabel().endswith("[degC/%]")
     cr.save_model(tmp_path / "furnace.json", system)
     again = cr.load_model(tmp_path / "furnace.json").fit
     assert again.report() == system.fit.report()
