@@ -112,6 +112,7 @@ def test_nothing_is_written_where_no_record_is_usable(folder, tmp_path, capsys):
         (["identify", "{folder}/step_0.csv"], "output"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--order", "0"], "--order"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--order", "x"], "--order"),
+        (["identify", "{folder}/step_0.csv", "-o", "{out}", "--structures", "P9D"], "'P9D'"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--method", "magic"], "magic"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--input", "9"], "9"),
         (["compare", "{folder}/frf.csv", "{folder}/frf.csv"], "model"),

@@ -20,6 +20,7 @@ def with_intervals(
     gain: tuple[float, float, Interval],
     dead_time: tuple[float, Interval],
     integrating: bool,
+    several: bool,
 ) -> tuple[Parameter, ...]:
     """Add units and 95 % intervals to the parameters of a fit.
 
@@ -29,11 +30,14 @@ def with_intervals(
     ratio : str
         Unit of the output over that of the input; empty if they are not known.
     gain : tuple
-        Value, standard error for the structure, and interval for all structures.
+        Value, standard error for the structure, and interval.
     dead_time : tuple
-        Standard error for the structure, and interval for all structures.
+        Standard error for the structure, and interval.
     integrating : bool
         Whether the gain is a slope.
+    several : bool
+        Whether the intervals of gain and dead time are those of all structures that the data do not
+        rule out.
     """
     parameters = []
     for name, value, std in found:
@@ -43,10 +47,12 @@ def with_intervals(
             times = -1 if integrating else 0
             finite = bool(np.isfinite(ends).all())
             low, high = ends if finite else (np.nan, np.nan)
-            parameters.append(Parameter(name, value, std, low, high, finite, unit, times))
+            parameters.append(
+                Parameter(name, value, std, low, high, finite and several, unit, times)
+            )
         elif name == "dead_time":
             std, (low, high) = dead_time
-            parameters.append(Parameter(name, value, std, low, high, True, "s", 1))
+            parameters.append(Parameter(name, value, std, low, high, several, "s", 1))
         else:
             ratio_of_times = name.rpartition("_")[0].endswith("damping")
             unit, times = ("", 0) if ratio_of_times else ("s", 1)

@@ -215,6 +215,7 @@ class OutputErrorFit(FractionalDelayFit):
             gain=(self.gain, self.gain_std_given_structure, self.gain_interval),
             dead_time=(self.std_given_structure, self.interval),
             integrating=self.integrators > 0,
+            several=len(self.structures) > 1 and self.better is None,
         )
 
     @property

@@ -81,6 +81,7 @@ def test_a_form_that_the_data_rule_out_is_told_as_an_apparent_dead_time():
     bounded = ProcessStructure("P2D", bounds={"Tp2": (None, 1.0)})
     for asked in ("FOPDT", bounded):
         fit = cr.fit_output_error(record(TWO_LAGS), structures=asked).fit
+        assert not fit.parameter_table()["all_structures"].any()
         assert fit.better is not None
         assert fit.interval_kind == "conditional"
         flag = next(flag for flag in fit.flags if flag.code == "apparent_dead_time")
