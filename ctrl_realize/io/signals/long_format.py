@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import DataError
 from ..columns import Selector, holds_numbers, named
 from ..tables import Column, Table
+from ..units import unit_of
 from .names import DATE_NAMES, TIME_NAMES
 
 TAG_NAMES = frozenset(
@@ -56,7 +57,7 @@ def long_table(
 def tags_as_columns(table: Table, long: LongTable) -> Table:
     """Table with a column for each tag, from which those of the signals are chosen."""
     cells = table.columns[long.value].cells
-    columns = [Column(tag, "", cells[rows]) for tag, rows in long.rows.items()]
+    columns = [Column(tag, unit_of(tag), cells[rows]) for tag, rows in long.rows.items()]
     return Table(table.path, tuple(columns), decimal=table.decimal)
 
 
