@@ -63,7 +63,7 @@ class PIDController(Delivered, BesideDelays):
     ('PI', 1)
     >>> print(pi)
     PID controller PI
-      kind          PI
+      type          PI
       rule          given
       gain kp       0.5
       integral ti   200 ms
@@ -230,7 +230,7 @@ class PIDController(Delivered, BesideDelays):
     @in_shown_units
     def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
         gain = f"{self.kp:.4g} {self.gain_unit}".rstrip()
-        rows = [("kind", self.kind), ("rule", self.rule), ("gain kp", gain)]
+        rows = [("type", self.kind), ("rule", self.rule), ("gain kp", gain)]
         if "I" in self.kind:
             rows.append(("integral ti", in_time(self.ti, 4)))
         if "D" in self.kind:
