@@ -109,19 +109,23 @@ WORLDS = (
 def missing_table(seeds: int, jobs: int, worlds: tuple[str, ...] = WORLDS) -> list[str]:
     """Tabulate coverage of the dead time with and without missing samples."""
     lines = [
-        "| record | structure | rms error | coverage | median width |",
-        "|---|---|---|---|---|",
+        "| record | structure | records | rms error | coverage | median width |",
+        "|---|---|---|---|---|---|",
     ]
     for world in worlds:
         for given in (False, True):
             rows = repeated(functools.partial(one, world, given), seeds, jobs)
-            rms = float(np.sqrt(np.mean(rows[:, 0] ** 2)))
-            lines.append(
-                f"| {world} | {'given' if given else 'chosen'} | {rms:.3g} s "
-                f"| {100 * rows[:, 1].mean():.1f} % | {np.median(rows[:, 2]):.3g} s |"
-            )
-            print(lines[-1], flush=True)
+            lines.append(row_of(world, given, rows))
     return lines
+
+
+def row_of(world: str, given: bool, rows: np.ndarray) -> str:
+    """Row of the table, from error, coverage and width (seeds, 3)."""
+    rms = float(np.sqrt(np.mean(rows[:, 0] ** 2)))
+    return (
+        f"| {world} | {'given' if given else 'chosen'} | {len(rows)} | {rms:.3g} s "
+        f"| {100 * rows[:, 1].mean():.1f} % | {np.median(rows[:, 2]):.3g} s |"
+    )
 
 
 def main(write: Callable[[str], None] = print) -> None:
@@ -135,8 +139,8 @@ def main(write: Callable[[str], None] = print) -> None:
     chosen = tuple(world for world in WORLDS if arguments.worlds in world)
     lines = [
         f"*Simulated furnace (lags {LAGS[0]:g} s and {LAGS[1]:g} s, dead time 90 s to 150 s, a "
-        f"sample every {SCAN:g} s, noise 0.02 beside steps of 3 to 9), {arguments.seeds} seeds a "
-        f"row. `python -m benchmarks.accuracy.missing`, {date.today().isoformat()}, Python "
+        f"sample every {SCAN:g} s, noise 0.02 beside steps of 3 to 9). `python -m "
+        f"benchmarks.accuracy.missing`, {date.today().isoformat()}, Python "
         f"{platform.python_version()}.*",
         "",
         *missing_table(arguments.seeds, arguments.jobs, chosen),
