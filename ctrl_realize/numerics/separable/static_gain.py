@@ -176,11 +176,13 @@ def local_errors(
 
 def _moves(candidate: Candidate, numerator: FloatArray, length: float) -> FloatArray:
     """Steps of the parameters for derivatives by differences, on the diagonal of a matrix."""
+    # A response of nothing has a numerator of zeros, from which any step is as good.
+    largest = float(np.abs(numerator).max()) or 1.0
     steps = np.concatenate(
         [
             [_STEP * min(1 / float(np.abs(candidate.poles).max()), length)],
             np.full(candidate.parameters.size - 1, _STEP),
-            _STEP * np.maximum(np.abs(numerator), _STEP * np.abs(numerator).max()),
+            _STEP * np.maximum(np.abs(numerator), _STEP * largest),
         ]
     )
     return np.diag(steps)
