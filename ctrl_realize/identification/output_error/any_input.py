@@ -86,8 +86,7 @@ def _fit(
     for record in records:
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
-    ways = {name: value for name, value in settings.items() if name != "whiten"}
-    found = fit_sampled(outputs, inputs, dt, latest=latest, **ways)
+    found = fit_sampled(outputs, inputs, dt, latest=latest, **settings)
     if found.explained < FOLLOWS:
         codes = [code for y in found.data.measured if (code := missing_code(y))]
         raise DataError(

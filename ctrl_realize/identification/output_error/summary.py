@@ -118,6 +118,11 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             f"autoregressive noise model, instead of counting {fit.correlation:.3g} samples "
             "as one"
         )
+    elif fit.noise_lags:
+        reasons.append(
+            "the residual is coloured: generalised least squares with an autoregressive noise "
+            f"model of {fit.noise_lags} lags"
+        )
     elif fit.correlation > 1:
         reasons.append(
             f"the residual is correlated: {fit.correlation:.3g} samples count as one "

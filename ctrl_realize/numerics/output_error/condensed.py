@@ -39,10 +39,10 @@ from ..arrays import ComplexArray, FloatArray
 from ..constants import HUBER
 from ..regression.normal_equations import NormalEquations, normal_equations
 from ..separable.responses import Modes, SampledInput
-from ..signals.correlation import autoregression
 from ..signals.excitation import lively_start
 from ..signals.noise import mad_sigma
 from ..signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS
+from ..signals.noise_model import whitening_filter
 
 MOST_LAGS = 1000
 """Longest response, in samples, that is condensed: time grows with its square."""
@@ -168,9 +168,7 @@ def _noise_and_pulse(
     y, u = (x[start : start + count] - np.mean(x[start : start + count]) for x in (y, u))
     pulse = _free_pulse(y, u, lags, huber=huber)
     error = y[lags - 1 :] - fftconvolve(u, pulse, "valid")
-    limit = 3 * mad_sigma(error)
-    centred = np.clip(error - np.median(error), -limit, limit)
-    whiten = np.concatenate([[1.0], -autoregression(centred, MOST_NOISE_LAGS)])
+    whiten = whitening_filter(error, MOST_NOISE_LAGS, 3.0)
     y, u = (lfilter(whiten, [1.0], x)[whiten.size - 1 :] for x in (y, u))
     return whiten, _free_pulse(y, u, lags, huber=huber)
 

@@ -6,10 +6,11 @@ The number of fitted samples is limited by computing time, by our own rule.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.signal import lfilter
 
 from ..arrays import FloatArray, IntArray
 from ..separable.local_terms import Segments
@@ -48,8 +49,6 @@ class SampledData:
         and output divided by it, and the records are then weighted correctly.
     dt : float
         Sample time in s.
-    period : float
-        Shortest period, in s, of the slow disturbances that are modelled; infinite: none.
     offsets : tuple of int
         First sample of each within its record.
     """
@@ -59,7 +58,6 @@ class SampledData:
     starts: tuple[int, ...]
     scales: tuple[float, ...]
     dt: float
-    period: float = np.inf
     offsets: tuple[int, ...] = ()
 
     @cached_property
@@ -111,13 +109,29 @@ class SampledData:
         """Bounds of the records in the concatenated data."""
         return np.concatenate([[0], np.cumsum(self.counts)]).astype(np.int64)
 
+    def whitened(self, noise: FloatArray) -> SampledData:
+        """Filter inputs and outputs alike, with the polynomial that makes the noise white.
+
+        The plant is linear and remains the same. What the filter does to the first input samples,
+        whose past is unknown, has arrived before the samples that are left.
+        """
+        order = noise.size - 1
+        if not order:
+            return self
+        return replace(
+            self,
+            inputs=tuple(lfilter(noise, [1.0], u) for u in self.inputs),
+            outputs=tuple(lfilter(noise, [1.0], y) for y in self.outputs),
+            starts=tuple(start + order for start in self.starts),
+        )
+
     def problem(self, known: KnownFactor) -> Problem:
         """Set up the fit of all records together."""
         clocks = [
             self.dt * (rows - start).astype(np.float64)
             for rows, start in zip(self.rows, self.starts, strict=True)
         ]
-        shapes = [_own_shapes(clock, known, self.period) for clock in clocks]
+        shapes = [_own_shapes(clock, known) for clock in clocks]
         m = int(self.edges[-1])
         if self.complete:
             drive = SeveralInputs(
@@ -134,9 +148,6 @@ class SampledData:
         joined = np.concatenate(
             [y / scale for y, scale in zip(self.measured, self.scales, strict=True)]
         )
-        most = max(shape.shape[1] for shape in shapes)
-        # A shorter record has fewer cosines.
-        shapes = [np.pad(shape, ((0, 0), (0, most - shape.shape[1]))) for shape in shapes]
         segments = Segments(self.edges, np.concatenate(clocks), np.concatenate(shapes))
         return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, segments)
 
@@ -169,13 +180,11 @@ def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) 
     )
 
 
-def _own_shapes(clock: FloatArray, known: KnownFactor, period: float) -> FloatArray:
-    """Level, drift, the free responses of known dynamics, and slow cosines, shape (m, q)."""
+def _own_shapes(clock: FloatArray, known: KnownFactor) -> FloatArray:
+    """Level, drift, and the free responses of known dynamics, shape (m, q)."""
     length = max(float(clock[-1]), 1e-300)
     shapes = [np.ones_like(clock), clock / length]
     for pole in known.poles[known.poles.imag >= 0]:
         wave = np.exp(pole * clock)
         shapes += [wave.real] if pole.imag == 0 else [wave.real, wave.imag]
-    # Cosines of half periods: with a straight line they represent anything slow.
-    shapes += [np.cos(np.pi * k * clock / length) for k in range(1, int(2 * length / period) + 1)]
     return np.stack(shapes, axis=1)

@@ -142,6 +142,8 @@ class OutputErrorEstimate:
     model, with standard errors where they are those of a likelihood. `rounded` is the noise before
     rounding, if the model is that of the likelihood of rounded data. `form` is the form that was
     prescribed, if it is no plain structure, and `at_bound` its parameters that are at a bound.
+    `noise_lags` is the order of the noise model by which the residual of an input other than a step
+    was made white.
     """
 
     dead_time: float
@@ -177,6 +179,7 @@ class OutputErrorEstimate:
     parameters: tuple[ProcessParameter, ...] = ()
     form: ProcessForm | None = None
     at_bound: tuple[str, ...] = ()
+    noise_lags: int = 0
 
     @property
     def robust(self) -> bool:

@@ -67,6 +67,17 @@ _NOTHING = 1e-6  # relative size of a response that has decayed
 _JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singular
 
 
+def whitening_filter(noise: FloatArray, lags: int, wild: float = _WILD) -> FloatArray:
+    """Polynomial ``1 - a_1 z^-1 - ...`` that makes noise white; for white noise it is 1.
+
+    Autoregression (Burg, smallest BIC up to order `lags`) of noise that is cut at so many standard
+    deviations.
+    """
+    limit = wild * mad_sigma(noise)
+    tamed = np.clip(noise - np.median(noise), -limit, limit)
+    return np.concatenate([[1.0], -autoregression(tamed, lags)])
+
+
 def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
     """Autocovariance of noise over its variance, from lag 0 until it has decayed.
 
@@ -80,15 +91,12 @@ def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
     longest : int
         Largest number of lags.
     """
-    limit = _WILD * mad_sigma(quiet)
-    tamed = np.clip(quiet - np.median(quiet), -limit, limit)
-    coefficients = autoregression(tamed, noise_lags(tamed.size))
-    if not coefficients.size:
+    denominator = whitening_filter(quiet, noise_lags(quiet.size))
+    if denominator.size == 1:
         return np.ones(1)
-    denominator = np.concatenate([[1.0], -coefficients])
     slowest = float(np.abs(np.roots(denominator)).max(initial=0.0))
     alive = np.log(_NOTHING) / np.log(min(max(slowest, 1e-3), 1 - 1e-9))
-    pulse = np.zeros(int(min(alive, longest)) + 1 + coefficients.size)
+    pulse = np.zeros(int(min(alive, longest)) + denominator.size)
     pulse[0] = 1.0
     power = np.abs(np.fft.rfft(lfilter([1.0], denominator, pulse), 2 * pulse.size)) ** 2
     covariance: FloatArray = np.fft.irfft(power)[: pulse.size]

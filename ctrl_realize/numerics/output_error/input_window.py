@@ -1,0 +1,195 @@
+"""Fit all structures to records with any input, in white noise or in coloured noise.
+
+A linear plant responds to a filtered input with the equally filtered output. If the residual is
+coloured, inputs and outputs are filtered by its autoregressive model and fitted again (generalised
+least squares [1]_, [2]_): slow disturbances then do not hide fast motion, nor imitate slow poles.
+
+References
+----------
+.. [1] D. W. Clarke, Generalized least squares estimation of the parameters of a dynamic model, IFAC
+   Symposium on Identification in Automatic Control Systems, Prague 1967, paper 3.17.
+.. [2] T. Soderstrom, Convergence properties of the generalised least squares identification method,
+   Automatica 10 (1974) 617-626, doi:10.1016/0005-1098(74)90083-8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import FloatArray, without_gaps
+from ..separable.compared_fits import settled
+from ..separable.poles import poles_from_parameters
+from ..separable.structures import Candidate, Scales, search
+from ..separable.varpro import KnownFactor, Problem, Structure, evaluate, respond
+from ..separable.window import Window, WindowFit, fit_window
+from ..signals.noise import quantisation_step, winsorised_sigma
+from ..signals.noise_model import noise_lags, whitening_filter
+from ..signals.onset import correlation_onset
+from .input_data import SampledData
+
+ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
+"""Every sample counts here, so that orders 4 and 5 would take most of the time."""
+BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
+_NOISE_TURNS = 2
+"""Noise models, each from the residual of the previous fit: the first residual contains what
+the model followed of slow noise. Ablation: coloured noise of any input."""
+_RISES = (2.0, 10.0, 50.0)  # samples, of the starts of the first-order fit, and
+_ONSETS = (1.0, 5.0, 20.0)
+_SMALLEST = 1e-4  # of the range: noise is not taken to be less
+_CONFIDENCE = 0.99  # of a start; ablation: start from the correlation
+_UNLIKE = 1.3  # ratio of noise levels from which weights shorten errors by more than 2 %
+
+
+@dataclass(frozen=True, eq=False)
+class SampledWindow:
+    """Fit of all structures to records that were filtered by a polynomial `noise`, 1 for none.
+
+    `data` are the records before the filter, without the samples that depend on the unknown past.
+    """
+
+    data: SampledData
+    noise: FloatArray
+    scales: Scales
+    fit: WindowFit
+    known: KnownFactor
+    huber: bool
+
+    @property
+    def filtered(self) -> SampledData:
+        """What was fitted."""
+        return self.data.whitened(self.noise)
+
+    def fit_of(self, structures: Sequence[Structure]) -> WindowFit:
+        """Fit other structures to the same data."""
+        return _fit(self.filtered, self.known, structures, self.scales, self.huber)
+
+
+def fit_windows(
+    data: SampledData,
+    known: KnownFactor,
+    structures: Sequence[Structure],
+    limit: float,
+    huber: bool,
+    noise: FloatArray,
+) -> SampledWindow:
+    """Fit structures to filtered records, every record weighted by its noise.
+
+    Dead times are sought up to `limit`, in s.
+    """
+    dt, n, usual = data.dt, max(y.size for y in data.outputs), data.spacing * data.dt
+    order = noise.size - 1
+    alike = (1.0,) * len(data.outputs)
+    data = replace(data, starts=tuple(y.size // 20 for y in data.outputs), scales=alike)
+    filtered = data.whitened(noise)
+    rough = _first_order(filtered.problem(known), n, dt, usual, limit, _seen(filtered, limit))
+    lag = float(-1.0 / rough.poles[0].real)
+    late = int(np.ceil(BEYOND * rough.dead_time / dt))
+    data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
+    length = (max(data.lengths) - order) * dt
+    scales = Scales(max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual), length, dt, limit)
+    whole = _fit(data.whitened(noise), known, structures, scales, huber)
+    levels = _noise_levels(data.whitened(noise), whole)
+    if levels.max() > _UNLIKE * levels.min():
+        mean = float(np.exp(np.mean(np.log(levels))))
+        data = replace(data, scales=tuple(float(level) / mean for level in levels))
+        whole = _fit(data.whitened(noise), known, structures, scales, huber)
+    return SampledWindow(data, noise, scales, whole, known, huber)
+
+
+def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
+    """Fit filtered records; the noise model is the autoregression of the residual.
+
+    Where the residual does not become whiter, the previous fit remains.
+    """
+    found = plain
+    for _ in range(_NOISE_TURNS):
+        best = found.fit.best
+        state = evaluate(found.fit.problem, best.structure, best.parameters[None])
+        model = modelled(found.data, found.known, best.parameters, state.numerator[0])
+        error = found.data.problem(found.known).data - model
+        noise = whitening_filter(error, noise_lags(min(found.data.counts)))
+        limit = plain.scales.latest
+        again = fit_windows(plain.data, plain.known, ORDERS, limit, plain.huber, noise)
+        if not again.fit.correlation < plain.fit.correlation:
+            break
+        found = again
+    return found
+
+
+def window_of(data: SampledData, known: KnownFactor) -> Window:
+    """Set up the fit of all samples."""
+    problem = data.problem(known)
+    window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
+    return replace(window, spacing=data.spacing)
+
+
+def _fit(
+    data: SampledData,
+    known: KnownFactor,
+    structures: Sequence[Structure],
+    scales: Scales,
+    huber: bool,
+) -> WindowFit:
+    window = window_of(data, known)
+    problem = window.problem
+    # after a spike at the start there may be nothing left that moves
+    whole = 1e-9 * max(float(np.ptp(y[~np.isnan(y)])) for y in data.outputs)
+    sigma = _SMALLEST * max(float(np.ptp(problem.data)), whole)
+    noise = sigma, max(quantisation_step(y[~np.isnan(y)]) for y in data.outputs)
+    return fit_window(window, structures, scales, noise, huber)
+
+
+def modelled(
+    data: SampledData, known: KnownFactor, parameters: FloatArray, numerator: FloatArray
+) -> FloatArray:
+    """Output of a model, with local level, drift and initial state."""
+    problem = data.problem(known)
+    model = respond(problem.drive, known, numerator, parameters)
+    own = problem.local_terms(poles_from_parameters(parameters[None, 1:])[0])
+    rest = (problem.data - model)[None, :, None]
+    return np.asarray(problem.data - own.without(rest)[0, :, 0])
+
+
+def _noise_levels(data: SampledData, whole: WindowFit) -> FloatArray:
+    """Residual of the best model in every record, in its unit."""
+    error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+    floor = _SMALLEST * float(np.ptp(whole.window.output))
+    return np.array(
+        [max(winsorised_sigma(part, 0.0), floor) for part in np.split(error, data.edges[1:-1])]
+    )
+
+
+def _seen(data: SampledData, limit: float) -> list[float]:
+    """First lag, in samples, at which the output responds to the input; empty if there is none.
+
+    For an input that changes at every sample the minima are as narrow as the plant is fast, and may
+    lie between the dead times that are tried otherwise. Missing samples are interpolated here.
+    """
+    found = []
+    for u, y in zip(data.inputs, data.outputs, strict=True):
+        most = int(min(limit / data.dt, u.size // 3))
+        if most > 1 and np.ptp(u) > 0:
+            found.append(correlation_onset(u, without_gaps(y), most, _CONFIDENCE).onset)
+    onsets = [float(lag) for lag in found if lag > 0]
+    return [float(np.median(onsets))] if onsets else []
+
+
+def _first_order(
+    problem: Problem, n: int, dt: float, usual: float, limit: float, seen: Sequence[float]
+) -> Candidate:
+    """Best first-order model from a grid of dead times and time constants.
+
+    `usual` is the mean distance of the samples in s, of which `n` would follow every `dt`.
+    """
+    scales = [
+        Scales(min(onset, limit), min(rise * usual, n * dt / 4), n * dt, dt, limit)
+        for rise in _RISES
+        for onset in (*(usual * onset for onset in _ONSETS), *(dt * lag for lag in seen))
+    ]
+    tries = [search(problem, [Structure(1, 1)], each)[Structure(1, 1)] for each in scales]
+    best = min(tries, key=lambda candidate: candidate.cost)
+    # It has converged, because its dead time determines the samples that are used.
+    return settled(problem, replace(best, ends=None), scales[0])
