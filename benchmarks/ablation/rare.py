@@ -198,7 +198,7 @@ MADE_FOR = {
     "exponential before the step": settling_in_a_long_rest,
     "hum": humming,
     "coarse converter": steps_of_a_converter,
-    "slow cosines": slow_disturbance,
+    "coloured noise of any input": slow_disturbance,
     "start from the correlation": far_away,
     "start at the ringing": wandering_output,
     "records weighted by their noise": unequal_sensors,

@@ -97,9 +97,11 @@ def fit_output_error(
     loss : {"huber", "least_squares"}, optional
         Huber's loss (k = 1.345) costs 2 % of accuracy on clean data and is insensitive to outliers.
     noise : {"auto", "white"}, optional
-        For step records. ``"auto"``: if the baseline noise is coloured and the residual does not
-        exceed it, the data are prewhitened by its autoregressive model (generalised least squares).
-        ``"white"``: all samples have equal weight, and correlation only widens the interval.
+        ``"auto"``: coloured noise is prewhitened by its autoregressive model (generalised least
+        squares): for step records if the baseline noise is coloured and the residual does not
+        exceed it, for other inputs if the residual is coloured, no sample is missing, and no
+        structures are given. ``"white"``: all samples have equal weight, and correlation only
+        widens the interval.
     include_known : bool, optional
         Include the known dynamics in the returned model.
     gains : {"common", "own"}, optional

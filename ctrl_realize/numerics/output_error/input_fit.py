@@ -124,9 +124,9 @@ def fit_sampled(
     inputs and outputs are filtered by the residual's autoregressive model, which does not change a
     linear plant. Not if structures are given: the residual may be what they cannot describe.
 
-    Where samples are missing, there is no filter, and the correlation of the residual is that of its
-    samples as if they were neighbours: an average over the gaps, as it counts for the errors of slow
-    parameters.
+    Where samples are missing, there is no filter, and the correlation of the residual is that of
+    its samples as if they were neighbours: an average over the gaps, as it counts for the errors of
+    slow parameters.
     """
     factor = known or KnownFactor()
     data = cut(outputs, inputs, dt)
