@@ -78,12 +78,14 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             low = max(low - hold, 0.0)
         if stepped:
             flags += _earlier_input(fit, codes)
-        coloured = alone and complete and "coloured_residual" in codes
+        white = bool(fit.estimate.noise_lags)
+        coloured = alone and complete and (white or "coloured_residual" in codes)
         step = generalised_step(fit, shown.output, shown.drive) if coloured else None
         if step is not None:
+            flags += coloured_flags(fit, step, shown.output, shown.drive)
+        if step is not None and not white:
             low = max(min(low, step.dead_time - Z_95 * step.dead_time_error), 0.0)
             high = max(high, step.dead_time + Z_95 * step.dead_time_error)
-            flags += coloured_flags(fit, step)
         # Parts of one step are not several responses.
         if not loop and not (stepped and _moves(shown.drive) < 2):
             flags += against_one_model(shown, fit.delay)

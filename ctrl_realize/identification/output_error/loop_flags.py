@@ -9,6 +9,7 @@ from ..._wording import in_time
 from ...data import Record
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import Z_95
+from ...numerics.output_error.result import UnweightedModel
 from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.innovations import feedback_chance
 from ...numerics.validation.instability import unstable_chance
@@ -91,15 +92,31 @@ def generalised_step(
         return None
     lead = fit.gain * float(np.real(np.prod(-fit.poles) / np.prod(-fit.zeros)))
     numerator = lead * np.atleast_1d(np.real(np.poly(fit.zeros)))[::-1]
-    step = white_step(output, drive, fit.dt, fit.dead_time, fit.poles, numerator)
+    return _step(fit, UnweightedModel(fit.dead_time, fit.poles, numerator), output, drive)
+
+
+def _step(
+    fit: OutputErrorFit, start: UnweightedModel, output: FloatArray, drive: FloatArray
+) -> WhiteStep | None:
+    step = white_step(output, drive, fit.dt, *start)
     reach = max(fit.total_delay, fit.dead_time)
     # Farther away, one step of a linearisation is not a valid estimate.
-    return step if step is None or abs(step.dead_time - fit.dead_time) <= reach else None
+    return step if step is None or abs(step.dead_time - start.dead_time) <= reach else None
 
 
-def coloured_flags(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
-    """Flags for what generalised least squares say otherwise than output error."""
-    return [*_unresolved(fit, step), *_noncausal(step)]
+def coloured_flags(
+    fit: OutputErrorFit, step: WhiteStep, output: FloatArray, drive: FloatArray
+) -> list[Flag]:
+    """Flags for what generalised least squares say otherwise than output error.
+
+    Where the fit itself is one of generalised least squares, its dead time may lie at a local
+    minimum that is not negative: least squares show whether it leads to a negative one.
+    """
+    before = fit.estimate.unweighted
+    first: WhiteStep | None = step
+    if before is not None:
+        first = _step(fit, before, output, drive) if np.all(before.poles) else None
+    return [*_unresolved(fit, step), *(_noncausal(first) if first else ())]
 
 
 def _unresolved(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:

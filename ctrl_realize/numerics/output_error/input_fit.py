@@ -133,7 +133,9 @@ def fit_sampled(
     limit = 0.25 * max(y.size for y in data.outputs) * dt if latest is None else latest
     tried = ORDERS if structures is None else tuple(structures)
     part = fit_windows(data, factor, tried, limit, huber, np.ones(1))
+    unweighted = None
     if part.fit.correlation > WHITE and structures is None and whiten and data.complete:
+        unweighted = part.model
         part = in_coloured_noise(part)
     data, stretch = part.data, part.fit
     whole = stretch
@@ -161,7 +163,7 @@ def fit_sampled(
     if sums is not None:
         fit = replace(fit, fitted=_on_stretch(data, fit, factor))
     elif part.noise.size > 1:
-        fit = _of_measured(part, fit)
+        fit = replace(_of_measured(part, fit), unweighted=unweighted)
     elif fit.chain:
         left = correlation_time(whole.window.output - fit.fitted)
         fit = replace(fit, correlation=left, adequate=left <= WHITE)

@@ -29,6 +29,7 @@ from ..signals.noise import quantisation_step, winsorised_sigma
 from ..signals.noise_model import noise_lags, whitening_filter
 from ..signals.onset import correlation_onset
 from .input_data import SampledData
+from .result import UnweightedModel
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""
@@ -61,6 +62,13 @@ class SampledWindow:
     def filtered(self) -> SampledData:
         """What was fitted."""
         return self.data.whitened(self.noise)
+
+    @property
+    def model(self) -> UnweightedModel:
+        """What was chosen to determine the noise."""
+        best = self.fit.best
+        state = evaluate(self.fit.problem, best.structure, best.parameters[None])
+        return UnweightedModel(best.dead_time, best.poles, state.numerator[0])
 
     def fit_of(self, structures: Sequence[Structure]) -> WindowFit:
         """Fit other structures to the same data."""
@@ -106,9 +114,8 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
     """
     found = plain
     for _ in range(_NOISE_TURNS):
-        best = found.fit.best
-        state = evaluate(found.fit.problem, best.structure, best.parameters[None])
-        model = modelled(found.data, found.known, best.parameters, state.numerator[0])
+        parameters = found.fit.best.parameters
+        model = modelled(found.data, found.known, parameters, found.model.numerator)
         error = found.data.problem(found.known).data - model
         noise = whitening_filter(error, noise_lags(min(found.data.counts)))
         limit = plain.scales.latest

@@ -58,6 +58,14 @@ class Followed(NamedTuple):
     by_closest: float
 
 
+class UnweightedModel(NamedTuple):
+    """Model of least squares, all samples alike: dead time in s, poles (n,), numerator."""
+
+    dead_time: float
+    poles: ComplexArray
+    numerator: FloatArray
+
+
 class OtherModel(NamedTuple):
     """Interval of the dead time in s under a model that is not in the table of structures."""
 
@@ -143,7 +151,7 @@ class OutputErrorEstimate:
     rounding, if the model is that of the likelihood of rounded data. `form` is the form that was
     prescribed, if it is no plain structure, and `at_bound` its parameters that are at a bound.
     `noise_lags` is the order of the noise model by which the residual of an input other than a step
-    was made white.
+    was made white, and `unweighted` the least-squares model before.
     """
 
     dead_time: float
@@ -180,6 +188,7 @@ class OutputErrorEstimate:
     form: ProcessForm | None = None
     at_bound: tuple[str, ...] = ()
     noise_lags: int = 0
+    unweighted: UnweightedModel | None = None
 
     @property
     def robust(self) -> bool:
