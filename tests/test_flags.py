@@ -22,7 +22,7 @@ ELSEWHERE = {  # other tests raise them, on smaller records or beside what the f
     "identify_campaign": "amplitude_trend gains_differ lags_differ no_common_gain",
     "bootstrap": "coarse_quantisation",
 }
-FIRST = {("fit_output_error", "cancelled_pair"): 5, ("fit_output_error", "noncausal"): 4}
+FIRST = {("fit_output_error", "noncausal"): 3}
 """First record of a world in which the flag is raised, where it is not that of seed 0."""
 PLAIN = (
     "R1 to R4, white noise 0.1 to 2 %",
