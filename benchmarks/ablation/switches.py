@@ -186,7 +186,7 @@ SWITCHES = (
             f"{FITS}.selection:needless_parameters": giving(0.0),
             f"{STEP}:needless_parameters": giving(0.0),
         },
-        (f"{STEP}:fit_window", f"{FITS}.input_window:fit_window"),
+        (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),
     Switch(
@@ -208,7 +208,7 @@ SWITCHES = (
     Switch(
         "slower poles beside zeros",
         {f"{SEPARABLE}.structures:SLOWER_WITH_ZEROS": value(40.0)},
-        (f"{STEP}:fit_window", f"{FITS}.input_window:fit_window"),
+        (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),
     Switch("chains of equal lags", {f"{FITS}.selection:fit_chains": giving([])}),
@@ -319,18 +319,18 @@ SWITCHES = (
     MODES,
     Switch(
         "coloured noise of any input",
-        {f"{FITS}.input_fit:in_coloured_noise": first},
+        {f"{FITS}.any_input.fit:in_coloured_noise": first},
         called=True,
     ),
     Switch(
         "fourth and fifth lag",
-        {f"{FITS}.input_fit:MORE_LAGS": value(())},
-        (f"{FITS}.input_fit:extended",),
+        {f"{FITS}.any_input.fit:MORE_LAGS": value(())},
+        (f"{FITS}.any_input.fit:extended",),
         called=True,
     ),
-    Switch("start from the correlation", {f"{FITS}.input_window:_seen": giving([])}),
+    Switch("start from the correlation", {f"{FITS}.any_input.window:_seen": giving([])}),
     Switch(
         "records weighted by their noise",
-        {f"{FITS}.input_window:_noise_levels": _alike_noise},
+        {f"{FITS}.any_input.window:_noise_levels": _alike_noise},
     ),
 )

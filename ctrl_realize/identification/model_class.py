@@ -18,7 +18,7 @@ from ..data import Record
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DataError, OrderError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
-from ..numerics.output_error.input_data import MOST_SAMPLES
+from ..numerics.output_error.any_input.data import MOST_SAMPLES
 from ..numerics.signals.noise import correlation_time
 from ..numerics.signals.noise_model import coloured_criterion
 from ..results import Flag

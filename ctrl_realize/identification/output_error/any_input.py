@@ -13,8 +13,8 @@ from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
-from ...numerics.output_error.input_data import SampledData
-from ...numerics.output_error.input_fit import SampledFit, fit_sampled
+from ...numerics.output_error.any_input.data import SampledData
+from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
 from ...numerics.signals.noise import mad_sigma

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..output_error.input_data import SampledData, cut
+from ..output_error.any_input.data import SampledData, cut
 from ..output_error.result import OutputErrorEstimate
 from ..output_error.step_data import StepData, step_scales, window
 from ..separable.local_terms import Segments

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from ctrl_realize.numerics.output_error.condensed import MOST_LAGS, condensed
+from ctrl_realize.numerics.output_error.any_input.condensed import MOST_LAGS, condensed
 from ctrl_realize.numerics.output_error.step_data import (
     StepData,
     fixed_regressors,

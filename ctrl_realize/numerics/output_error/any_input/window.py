@@ -19,17 +19,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import FloatArray, without_gaps
-from ..separable.compared_fits import settled
-from ..separable.poles import poles_from_parameters
-from ..separable.structures import Candidate, Scales, search
-from ..separable.varpro import KnownFactor, Problem, Structure, evaluate, respond
-from ..separable.window import Window, WindowFit, fit_window
-from ..signals.noise import quantisation_step, winsorised_sigma
-from ..signals.noise_model import noise_lags, whitening_filter
-from ..signals.onset import correlation_onset
-from .input_data import SampledData
-from .result import UnweightedModel
+from ...arrays import FloatArray, without_gaps
+from ...separable.compared_fits import settled
+from ...separable.poles import poles_from_parameters
+from ...separable.structures import Candidate, Scales, search
+from ...separable.varpro import KnownFactor, Problem, Structure, evaluate, respond
+from ...separable.window import Window, WindowFit, fit_window
+from ...signals.noise import quantisation_step, winsorised_sigma
+from ...signals.noise_model import noise_lags, whitening_filter
+from ...signals.onset import correlation_onset
+from ..result import UnweightedModel
+from .data import SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""

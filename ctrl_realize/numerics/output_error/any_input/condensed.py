@@ -35,14 +35,14 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.signal import fftconvolve, lfilter
 
-from ..arrays import ComplexArray, FloatArray
-from ..constants import HUBER
-from ..regression.normal_equations import NormalEquations, normal_equations
-from ..separable.responses import Modes, SampledInput
-from ..signals.excitation import lively_start
-from ..signals.noise import mad_sigma
-from ..signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS
-from ..signals.noise_model import whitening_filter
+from ...arrays import ComplexArray, FloatArray
+from ...constants import HUBER
+from ...regression.normal_equations import NormalEquations, normal_equations
+from ...separable.responses import Modes, SampledInput
+from ...signals.excitation import lively_start
+from ...signals.noise import mad_sigma
+from ...signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS
+from ...signals.noise_model import whitening_filter
 
 MOST_LAGS = 1000
 """Longest response, in samples, that is condensed: time grows with its square."""

@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 from scipy.signal import lfilter
 
-from ..arrays import FloatArray, IntArray
-from ..separable.local_terms import Segments
-from ..separable.responses import HeldInput, SampledInput, SeveralInputs, StepSequence
-from ..separable.varpro import KnownFactor, Problem
-from ..signals.excitation import lively_start
+from ...arrays import FloatArray, IntArray
+from ...separable.local_terms import Segments
+from ...separable.responses import HeldInput, SampledInput, SeveralInputs, StepSequence
+from ...separable.varpro import KnownFactor, Problem
+from ...signals.excitation import lively_start
 
 MOST_SAMPLES = 4000
 """Of longer records a stretch is taken: every sample counts, so that time grows with its length.

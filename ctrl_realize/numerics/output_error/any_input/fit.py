@@ -24,21 +24,27 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..parameters.process_form import ProcessForm
-from ..separable.batch_search import fit_batch
-from ..separable.compared_fits import converged
-from ..separable.poles import parameters_from_poles
-from ..separable.structures import Candidate, neighbour_starts, parameter_bounds
-from ..separable.varpro import KnownFactor, Problem, Structure
-from ..separable.window import Window, WindowFit, extended
-from ..signals.correlation import fit_percent
-from ..signals.noise import correlation_time, winsorised_sigma
-from ..validation.own_response import OwnResponse
-from .better_structure import better_structure
+from ...arrays import FloatArray
+from ...parameters.process_form import ProcessForm
+from ...separable.batch_search import fit_batch
+from ...separable.compared_fits import converged
+from ...separable.poles import parameters_from_poles
+from ...separable.structures import Candidate, neighbour_starts, parameter_bounds
+from ...separable.varpro import KnownFactor, Problem, Structure
+from ...separable.window import Window, WindowFit, extended
+from ...signals.correlation import fit_percent
+from ...signals.noise import correlation_time, winsorised_sigma
+from ...validation.own_response import OwnResponse
+from ..better_structure import better_structure
+from ..interval import likelihood_fit
+from ..margins import close_to
+from ..process_models import process_fit
+from ..result import OutputErrorEstimate, followed_by
+from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
-from .input_data import SampledData, cut
-from .input_window import (
+from .data import SampledData, cut
+from .own_response import own_response
+from .window import (
     BEYOND,
     ORDERS,
     SampledWindow,
@@ -47,12 +53,6 @@ from .input_window import (
     modelled,
     window_of,
 )
-from .interval import likelihood_fit
-from .margins import close_to
-from .own_response import own_response
-from .process_models import process_fit
-from .result import OutputErrorEstimate, followed_by
-from .selection import chains_of
 
 WHITE = 3.0
 """Correlation time of the residual, in samples, up to which a model is taken for right: twice what

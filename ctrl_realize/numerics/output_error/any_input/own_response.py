@@ -14,14 +14,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..separable.poles import parameters_from_poles, poles_from_parameters
-from ..separable.varpro import KnownFactor, respond
-from ..signals.correlation import fit_percent
-from ..signals.noise import correlation_time
-from ..validation.own_response import OwnResponse
-from .input_data import SampledData
-from .result import OutputErrorEstimate
+from ...arrays import FloatArray
+from ...separable.poles import parameters_from_poles, poles_from_parameters
+from ...separable.varpro import KnownFactor, respond
+from ...signals.correlation import fit_percent
+from ...signals.noise import correlation_time
+from ...validation.own_response import OwnResponse
+from ..result import OutputErrorEstimate
+from .data import SampledData
 
 _TURNS = 6  # of Gauss and Newton at most
 _STRETCH = 0.01  # of the time constants, for a slope by central differences: off by 1e-4

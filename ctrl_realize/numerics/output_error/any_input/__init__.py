@@ -1,0 +1,1 @@
+"""Fits of records whose input is no single step."""
