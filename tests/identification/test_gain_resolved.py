@@ -187,13 +187,25 @@ def test_the_gas_furnace_has_the_gain_of_box_and_jenkins(shared_data):
         cr.design.pid(cr.identify(record, structures=[(2, 1)]))
 
 
-def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
-    # The gain falls to a half during the record: no model leaves white noise.
+def losing_its_gain():
+    """The gain falls to a half during the record: no model leaves white noise."""
     rng = np.random.default_rng(0)
     u = np.repeat(rng.choice([-1.0, 1.0], 40), 15)
     y = cr.design.ProcessModel(gain=2.0, lag=30.0, dead_time=8.0).system(1.0).simulate(u)
     y = y * np.linspace(1, 0.5, u.size) + 0.005 * rng.standard_normal(u.size)
-    system = cr.identify(cr.Record(np.arange(u.size) * 1.0, u, y))
+    return cr.Record(np.arange(u.size) * 1.0, u, y)
+
+
+def test_a_gain_that_changes_is_no_integrator():
+    system = cr.identify(losing_its_gain())
+    assert "time_varying" in codes(system)
+    assert system.fit.gain == pytest.approx(1.5, abs=0.15)  # the mean of 2 and 1
+    assert system.fit.interval[0] <= 8.0 <= system.fit.interval[1]
+
+
+def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
+    # the noise model, which settles it, is not used for structures that are given
+    system = cr.identify(losing_its_gain(), structures=[(1, 1), (2, 1)])
     assert {"coloured_residual", "gain_not_resolved"} <= codes(system)
     told = next(flag.message for flag in system.fit.flags if flag.code == "gain_not_resolved")
     assert "structures that the data cannot rule out have gains of" in told

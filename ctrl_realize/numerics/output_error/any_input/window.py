@@ -22,6 +22,7 @@ import numpy as np
 from ...arrays import FloatArray, without_gaps
 from ...separable.compared_fits import settled
 from ...separable.poles import poles_from_parameters
+from ...separable.static_gain import StaticGain
 from ...separable.structures import Candidate, Scales, search
 from ...separable.varpro import KnownFactor, Problem, Structure, evaluate, respond
 from ...separable.window import Window, WindowFit, fit_window
@@ -37,6 +38,7 @@ BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is late
 _NOISE_TURNS = 2
 """Noise models, each from the residual of the previous fit: the first residual contains what
 the model followed of slow noise. Ablation: coloured noise of any input."""
+_SETTLED = 3.0  # time constants in a record, in which a response settles but for 5 %
 _RISES = (2.0, 10.0, 50.0)  # samples, of the starts of the first-order fit, and
 _ONSETS = (1.0, 5.0, 20.0)
 _SMALLEST = 1e-4  # of the range: noise is not taken to be less
@@ -110,7 +112,10 @@ def fit_windows(
 def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
     """Fit filtered records; the noise model is the autoregression of the residual.
 
-    Where the residual does not become whiter, the previous fit remains.
+    Where the residual does not become whiter, the previous fit remains. The filter removes the low
+    frequencies, by which a slow pole is told from a disturbance: structures whose response does not
+    settle within the record, or whose gain is not significant, are left out; if no other is left,
+    as for an integrator, the previous fit remains too.
     """
     found = plain
     for _ in range(_NOISE_TURNS):
@@ -120,10 +125,19 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
         noise = whitening_filter(error, noise_lags(min(found.data.counts)))
         limit = plain.scales.latest
         again = fit_windows(plain.data, plain.known, ORDERS, limit, plain.huber, noise)
+        settling = [s for s, c in again.fit.candidates.items() if _settles(again.fit.static(c))]
+        if not settling:
+            break
+        if len(settling) < len(ORDERS):
+            again = fit_windows(plain.data, plain.known, settling, limit, plain.huber, noise)
         if not again.fit.correlation < plain.fit.correlation:
             break
         found = again
     return found
+
+
+def _settles(static: StaticGain) -> bool:
+    return static.significant and not static.integrates and static.slowest >= _SETTLED
 
 
 def window_of(data: SampledData, known: KnownFactor) -> Window:
