@@ -151,7 +151,7 @@ def read_record(
 
     See Also
     --------
-    read_records : Several tests in one file.
+    ctrl_realize.io.read_records : Several tests in one file.
 
     Examples
     --------

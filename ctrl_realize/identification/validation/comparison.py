@@ -149,8 +149,8 @@ def compare(
 
     See Also
     --------
-    cross_validate : A table of the fits on several records.
-    compare_frf : A model and a measured frequency response.
+    ctrl_realize.validation.cross_validate : A table of the fits on several records.
+    ctrl_realize.compare_frf : A model and a measured frequency response.
 
     Notes
     -----
