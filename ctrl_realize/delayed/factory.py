@@ -13,6 +13,7 @@ from .._checks import positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
 from ..results import ModelFit
+from .operands import check_proper
 from .parts import MAX_DELAY, check_core
 from .system import DelayedStateSpace
 
@@ -84,6 +85,8 @@ def delayed_ss(
         )
     if delay is not None and dead_time is not None:
         raise OptionError(f"delay={delay!r} and dead_time={dead_time!r}: expected one of them")
+    if isinstance(core, ct.TransferFunction):
+        check_proper(core, "a model with dead time")
     system = core if isinstance(core, ct.StateSpace) else ct.ss(core)
     settings: dict[str, Any] = {
         "output_delay": output_delay,

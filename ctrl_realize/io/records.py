@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import re
@@ -217,7 +218,9 @@ def read_records(
     >>> [record.name for record in records]
     ['tests up', 'tests down']
     """
-    how = _checked(**options)
+    given = inspect.signature(read_record).bind(path, **options)
+    given.apply_defaults()
+    how = _checked(**{name: value for name, value in given.arguments.items() if name != "path"})
     table = read_table(path, how.text, variable=how.variable, max_bytes=how.max_bytes)
     label = Path(path).stem if how.name is None else how.name
     taken = [] if by is None else find_columns(table, by, "by")
@@ -251,31 +254,31 @@ class _Reading:
 
 def _checked(
     *,
-    time: str | int | None = None,
-    input: Selector | None = None,
-    output: Selector | None = None,
-    dt: float | None = None,
-    time_unit: str = "auto",
-    time_format: str | None = None,
-    delimiter: str = "auto",
-    decimal: str = "auto",
-    encoding: str = "auto",
-    comment: str | None = "auto",
-    header: bool | str = "auto",
-    skip_rows: int = 0,
-    variable: str | None = None,
-    start: Any = None,
-    stop: Any = None,
-    missing: str = "refuse",
-    na_values: Any = None,
-    quality: str | int | None = "auto",
-    good: Any = None,
-    resample: bool = False,
-    rest: Any = None,
-    name: str | None = None,
-    max_bytes: float = MAX_BYTES,
+    time: str | int | None,
+    input: Selector | None,
+    output: Selector | None,
+    dt: float | None,
+    time_unit: str,
+    time_format: str | None,
+    delimiter: str,
+    decimal: str,
+    encoding: str,
+    comment: str | None,
+    header: bool | str,
+    skip_rows: int,
+    variable: str | None,
+    start: Any,
+    stop: Any,
+    missing: str,
+    na_values: Any,
+    quality: str | int | None,
+    good: Any,
+    resample: bool,
+    rest: Any,
+    name: str | None,
+    max_bytes: float,
 ) -> _Reading:
-    """Check the arguments of `read_record`; the defaults are those of its own."""
+    """Check the arguments of `read_record`."""
     text = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
     if dt is not None and not (_is_number(dt) and dt > 0 and math.isfinite(dt)):
         raise OptionError(f"dt={dt!r} must be a positive number of seconds")

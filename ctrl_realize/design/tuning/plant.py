@@ -14,7 +14,7 @@ from ..models.conversions import to_discrete
 from ..models.process_model import ProcessModel
 from ..models.reduction import both_forms, reduce_fopdt, reduce_sopdt
 from ..resolved import check_sign, warn_unresolved
-from ..siso import core_and_dead_time, delayed_system, is_continuous
+from ..siso import core_and_dead_time, delayed_system, is_continuous, proper_ss
 
 FINE = 1000
 """Samples within the total time of a process model, so many that sampling has no effect."""
@@ -37,7 +37,9 @@ def reference_plant(
         return plant, plant, step
     if is_continuous(system):
         if dt is None:
-            exact = system if isinstance(system, DelaySystem) else DelaySystem(ct.ss(system))
+            exact = system
+            if not isinstance(system, DelaySystem):
+                exact = DelaySystem(proper_ss(system, "a PID controller"))
             return both_forms(system)[1], exact, 0.0
         core, dead_time = core_and_dead_time(system, "a PID controller")
         plant = to_discrete(core, dead_time, dt)

@@ -121,7 +121,7 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     elif fit.noise_lags:
         reasons.append(
             "the residual is coloured: generalised least squares with an autoregressive noise "
-            f"model of {fit.noise_lags} lags"
+            f"model of order {fit.noise_lags}"
         )
     elif fit.correlation > 1:
         reasons.append(
