@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from scipy.special import gammainc, ndtr
 
 import ctrl_realize as cr
-from ctrl_realize.bench.imperfections import slew_limited
+from ctrl_realize.numerics.actuators.limits import slew_limited
 from tests import rigs
 
 DT = rigs.TS
@@ -119,7 +119,7 @@ def wrong_step(name: str, time: np.ndarray) -> np.ndarray:
     if name == "two paths":
         return 0.3 * unit_step("R2", time) + 0.7 * unit_step("R2", time - 40 * DT)
     if name == "slew limit":
-        return slew_limited(unit_step("R3", time), 4.0, DT)
+        return slew_limited(unit_step("R3", time), 4.0, 4.0, DT)
     if name == "static friction":
         return _stick_and_slip(unit_step("R2", time))
     bent = unit_step("R3", time)

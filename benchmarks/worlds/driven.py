@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from ctrl_realize.bench.imperfections import with_play
+from ctrl_realize.numerics.actuators.friction import backlash
 
 from .sensors import every
 from .simulation import (
@@ -153,7 +153,7 @@ def telegrams(rng: Rng) -> Case:
 def gears(rng: Rng) -> Case:
     """Play of a fifth to a third of the input's range in front of the plant."""
     plant, u = drawn(rng), levels(rng, (-1.0, -0.5, 0.0, 0.5, 1.0))
-    stem = with_play(held(u), float(rng.uniform(0.4, 0.7)))
+    stem = backlash(held(u), float(rng.uniform(0.4, 0.7)))
     return plant.case(record(u, noisy(rng, sampled(plant.respond(stem)))), gain=np.nan)
 
 

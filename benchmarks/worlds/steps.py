@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ctrl_realize.bench.imperfections import slew_limited, with_play
+from ctrl_realize.numerics.actuators.friction import backlash
+from ctrl_realize.numerics.actuators.limits import slew_limited
 
 from .simulation import (
     DT,
@@ -68,7 +69,7 @@ def slewing(rng: Rng) -> Case:
     """The actuator needs 0.3 to 1 s for the step."""
     plant, u = drawn(rng), step()
     duration = float(rng.uniform(0.3, 1.0))
-    y = sampled(plant.respond(slew_limited(held(u), 1 / duration, H)))
+    y = sampled(plant.respond(slew_limited(held(u), 1 / duration, 1 / duration, H)))
     return plant.case(record(u, noisy(rng, y)), total_delay=plant.total_delay + duration / 2)
 
 
@@ -91,7 +92,7 @@ def play(rng: Rng) -> Case:
     """A gear with a play of 2 to 6 % of the step between the actuator's lag and the plant."""
     plant, u = drawn(rng), step()
     width = float(rng.uniform(0.02, 0.06))
-    stem = with_play(through(held(u), plant.lags[0]), width)
+    stem = backlash(through(held(u), plant.lags[0]), width)
     y = sampled(through(late(plant.gain * stem, plant.dead_time), plant.lags[1]))
     return plant.case(record(u, noisy(rng, y)))
 
@@ -195,7 +196,7 @@ def piped(rng: Rng, u: np.ndarray) -> Case:
 def magnetic(rng: Rng) -> Case:
     """Hysteresis of 10 to 20 % between the lag and the sensor: staircase up and down."""
     plant, u = drawn(rng), up_and_down((0.5, 1.0, 0.5, 0.0), 160)
-    y = sampled(with_play(plant.respond(held(u)), float(rng.uniform(0.1, 0.2)) * plant.gain))
+    y = sampled(backlash(plant.respond(held(u)), float(rng.uniform(0.1, 0.2)) * plant.gain))
     return plant.case(record(u, noisy(rng, y)), gain=np.nan, total_delay=np.nan)
 
 

@@ -13,8 +13,9 @@ from .. import paper
 from .._checks import positive, whole
 from ..data import Record
 from ..errors import DataError, OptionError
+from ..numerics.actuators.friction import backlash
+from ..numerics.actuators.limits import slew_limited
 from ..numerics.arrays import FloatArray
-from .imperfections import slew_limited, with_play
 from .instruments import STROKE_MM, recorded
 from .linear import Core, response_to_held_input, response_to_started_sine
 from .truth import ValveTruth
@@ -310,9 +311,10 @@ class Valve:
         current = np.repeat(held, _OVERSAMPLING)
         stem = response_to_held_input(self._before_stem, current, fine, dead_time)
         if self.slew_limit is not None:
-            stem = slew_limited(stem, self.slew_limit * STROKE_MM, fine)
+            rate = self.slew_limit * STROKE_MM
+            stem = slew_limited(stem, rate, rate, fine)
         if self.hysteresis:
-            stem = with_play(stem, self.hysteresis * STROKE_MM)
+            stem = backlash(stem, self.hysteresis * STROKE_MM)
         # Mean of neighbours: a held input with the same area as linear interpolation.
         lines = np.append(0.5 * (stem[1:] + stem[:-1]), stem[-1])
         lines[0] = stem[0]

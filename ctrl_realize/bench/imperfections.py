@@ -1,4 +1,4 @@
-"""Imperfections of measured records: noise, spikes, rounding, friction."""
+"""Imperfections of measured records: noise, spikes, rounding."""
 
 from __future__ import annotations
 
@@ -51,25 +51,3 @@ def converted(volts: FloatArray, bits: int | None, full_scale: float) -> FloatAr
         return volts
     step = 2 * full_scale / 2**bits
     return np.asarray(np.clip(np.round(volts / step) * step, -full_scale, full_scale))
-
-
-def slew_limited(position: FloatArray, limit: float, dt: float) -> FloatArray:
-    """Follow `position` with at most `limit` per second."""
-    largest = limit * dt
-    out = np.empty_like(position)
-    current = float(position[0])
-    for k, wanted in enumerate(position.tolist()):
-        current += min(max(wanted - current, -largest), largest)
-        out[k] = current
-    return out
-
-
-def with_play(position: FloatArray, width: float) -> FloatArray:
-    """Follow `position` through backlash of total `width`, starting in its middle."""
-    half = width / 2
-    out = np.empty_like(position)
-    current = float(position[0])
-    for k, wanted in enumerate(position.tolist()):
-        current = min(max(current, wanted - half), wanted + half)
-        out[k] = current
-    return out

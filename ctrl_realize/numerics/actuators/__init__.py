@@ -1,0 +1,1 @@
+"""What actuators do that no linear model says: arrays in, arrays out."""
