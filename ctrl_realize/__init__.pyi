@@ -2,6 +2,7 @@
 # each name when it is first asked for. At the top stand thirty names that most users need;
 # results, errors and the further steps of the methods are in the modules.
 
+from . import actuators as actuators
 from . import bench as bench
 from . import data as data
 from . import design as design

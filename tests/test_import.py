@@ -12,6 +12,7 @@ import pytest
 import ctrl_realize as cr
 
 SUBMODULES = {
+    "actuators",
     "bench",
     "data",
     "design",
@@ -68,6 +69,7 @@ def test_every_public_name_is_there_and_documented():
 @pytest.mark.parametrize(
     "module",
     [
+        "actuators",
         "bench",
         "data",
         "design",

@@ -23,6 +23,7 @@ SHARED = 3  # classes and functions from which on a name must be explained
 
 MODULES = (
     cr,
+    cr.actuators,
     cr.bench,
     cr.data,
     cr.design,
@@ -103,7 +104,7 @@ def arguments_of(value: object) -> list[str]:
 
 PUBLIC_BASES = {
     kind.__name__: {base.__name__ for base in kind.__mro__[1:]}
-    for kind in vars(cr.design).values()
+    for kind in [*vars(cr.design).values(), *vars(cr.actuators).values()]
     if inspect.isclass(kind)
 }
 OWNERS = public_names()

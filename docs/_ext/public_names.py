@@ -63,6 +63,7 @@ SUBMODULES = {
     "design": "Controllers for plants with dead time.",
     "export": "Controllers and models for other programs: PLC, C, Python, MATLAB, FMI.",
     "plots": "What each of them draws is on [Pictures](../../pictures.md).",
+    "actuators": "Models of stiction, backlash, slew limits and characteristics.",
     "bench": "Simulated set-ups with known truth.",
     "report": "HTML reports: one self-contained file, the verdict first.",
     "paper": "Every number that the paper prints.",

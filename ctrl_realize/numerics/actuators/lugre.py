@@ -25,7 +25,8 @@ from scipy.integrate import solve_ivp
 
 from ..arrays import FloatArray
 
-_RELATIVE, _ABSOLUTE = 1e-6, 1e-9  # tolerances of the integration, the latter of the travel
+# Tolerances of the integration, the latter of the deviation that static friction holds.
+_RELATIVE, _ABSOLUTE = 1e-6, 1e-9
 
 
 class LuGre(NamedTuple):
@@ -55,6 +56,22 @@ class LuGre(NamedTuple):
         return np.array([velocity, (force - self.spring * position - friction) / self.mass, slip])
 
 
+def lugre_step(state: FloatArray, position: float, stem: LuGre, dt: float) -> FloatArray:
+    """Advance (position, velocity, deflection) by one sample with the drive at `position`."""
+    # The deviation that static friction holds is the scale of the motion.
+    scale = _ABSOLUTE * stem.static / stem.spring
+    found = solve_ivp(
+        stem.slopes,
+        (0.0, dt),
+        state,
+        method="LSODA",
+        args=(stem.spring * position,),
+        rtol=_RELATIVE,
+        atol=scale * np.array([1.0, 1.0 / dt, stem.spring / stem.bristle]),
+    )
+    return np.asarray(found.y[:, -1])
+
+
 def lugre_stem(position: FloatArray, stem: LuGre, dt: float) -> FloatArray:
     """Positions (N,) of a stem whose drive would hold it at `position` without friction.
 
@@ -62,19 +79,8 @@ def lugre_stem(position: FloatArray, stem: LuGre, dt: float) -> FloatArray:
     with relaxed bristles.
     """
     state = np.array([float(position[0]), 0.0, 0.0])
-    span = max(float(np.ptp(position)), 1e-300)
-    scale = _ABSOLUTE * span * np.array([1.0, 1.0 / dt, 1.0])
     out = np.empty(position.size)
     for k, wanted in enumerate(position.tolist()):
         out[k] = state[0]
-        found = solve_ivp(
-            stem.slopes,
-            (0.0, dt),
-            state,
-            method="LSODA",
-            args=(stem.spring * wanted,),
-            rtol=_RELATIVE,
-            atol=scale,
-        )
-        state = found.y[:, -1]
+        state = lugre_step(state, wanted, stem, dt)
     return out

@@ -1,0 +1,288 @@
+"""Limits of an actuator's motion: slew rate, travel, dead zone, backlash, resolution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from .._checks import positive, real
+from ..errors import OptionError
+from ..numerics.actuators.friction import backlash
+from ..numerics.actuators.limits import resolved, saturated, slew_limited, without_dead_zone
+from ..numerics.arrays import FloatArray
+from .base import Actuator, State
+
+
+class _OfTwoSamples(Actuator):
+    """A model whose only state is its position: one step is the array kernel on two samples."""
+
+    _states: ClassVar[tuple[str, ...]] = ("position",)
+
+    def _rest(self, command: float) -> State:
+        return (float(self._simulated(np.array([command]), 1.0)[0]),)
+
+
+@dataclass(frozen=True)
+class SlewRateLimit(_OfTwoSamples):
+    """Motion at no more than a given rate, as of a piston that is filled through an orifice.
+
+    A step of height h takes h / rate. A lag behind it then looks like dead time that grows with
+    the step.
+
+    Parameters
+    ----------
+    opening : float
+        Largest rate upwards, per second.
+    closing : float, optional
+        Largest rate downwards, per second, as a positive number. Default: that upwards.
+
+    Raises
+    ------
+    OptionError
+        A rate that is not a positive number.
+
+    References
+    ----------
+    .. [1] H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall 2002, section 1.2.7.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> piston = cr.actuators.SlewRateLimit(opening=20.0, closing=40.0)
+    >>> print(piston)
+    slew rate at most 20 per s up, 40 per s down
+    >>> piston.simulate([0, 50, 50, 50, 0, 0], dt=1.0).tolist()
+    [0.0, 20.0, 40.0, 50.0, 10.0, 0.0]
+    """
+
+    opening: float
+    closing: float | None = None
+
+    _timed: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        positive(self.opening, "opening", "rate per second")
+        if self.closing is not None:
+            positive(self.closing, "closing", "rate per second")
+
+    def __str__(self) -> str:
+        if self.closing is None or self.closing == self.opening:
+            return f"slew rate at most {self.opening:g} per s"
+        return f"slew rate at most {self.opening:g} per s up, {self.closing:g} per s down"
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        (moved,) = slew_limited(np.array([command]), *self._rates, dt, state[0])
+        return (float(moved),), float(moved)
+
+    @property
+    def _rates(self) -> tuple[float, float]:
+        return self.opening, self.opening if self.closing is None else self.closing
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return slew_limited(command, *self._rates, dt)
+
+
+@dataclass(frozen=True)
+class Backlash(_OfTwoSamples):
+    """Play between drive and stem: after a reversal the command moves by `width` in vain.
+
+    The same as a dead band, and as stiction without a slip jump, ``Stiction(width, 0)``.
+
+    Parameters
+    ----------
+    width : float
+        Total width of the play.
+    start : float, default 0
+        Place within the play at first: 0 its middle, 1 where a rising command moves the stem at
+        once, -1 where a falling one does.
+
+    Raises
+    ------
+    OptionError
+        A width below 0, or a start outside -1...1.
+
+    References
+    ----------
+    .. [1] M. A. A. S. Choudhury, N. F. Thornhill and S. L. Shah, Modelling valve stiction, Control
+       Engineering Practice 13 (2005) 641-658, section 2, doi:10.1016/j.conengprac.2004.05.005.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> gear = cr.actuators.Backlash(2.0)
+    >>> gear.simulate([0, 10, 9, 8, 7]).tolist()
+    [0.0, 9.0, 9.0, 9.0, 8.0]
+    """
+
+    width: float
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        if real(self.width, "width", "width of the play") < 0:
+            raise OptionError(f"width={self.width!r}; expected a value >= 0")
+        within_start(self.start)
+
+    def __str__(self) -> str:
+        return f"backlash of width {self.width:g}"
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        moved = backlash(np.array([state[0], command]), self.width)[1]
+        return (float(moved),), float(moved)
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return backlash(command, self.width, self.start)
+
+
+@dataclass(frozen=True)
+class Resolution(_OfTwoSamples):
+    """Motion in whole steps: smaller changes of the command do not move the stem.
+
+    Unlike backlash it is the same in both directions, and a reversal loses nothing more.
+
+    Parameters
+    ----------
+    step : float
+        Smallest change that moves the stem.
+
+    Raises
+    ------
+    OptionError
+        A step that is not positive.
+
+    References
+    ----------
+    .. [1] H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall 2002, section 1.2.7.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> cr.actuators.Resolution(0.5).simulate([0, 0.4, 0.6, 1.6, 1.2]).tolist()
+    [0.0, 0.0, 0.5, 1.5, 1.5]
+    """
+
+    step: float
+
+    def __post_init__(self) -> None:
+        positive(self.step, "step", "change of the command")
+
+    def __str__(self) -> str:
+        return f"resolution of {self.step:g}"
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        (moved,) = resolved(np.array([command]), self.step, state[0])
+        return (float(moved),), float(moved)
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return resolved(command, self.step)
+
+
+class StaticMap(Actuator):
+    """A map without memory."""
+
+    def _rest(self, command: float) -> State:
+        return ()
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        return (), float(self._simulated(np.array([command]), dt)[0])
+
+
+@dataclass(frozen=True)
+class Saturation(StaticMap):
+    """Travel between two stops.
+
+    Parameters
+    ----------
+    low, high : float
+        Lowest and highest position.
+
+    Raises
+    ------
+    OptionError
+        ``low >= high``, or not finite.
+
+    References
+    ----------
+    .. [1] H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall 2002, section 1.2.7.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> cr.actuators.Saturation(0, 100).simulate([-5, 50, 120]).tolist()
+    [0.0, 50.0, 100.0]
+    """
+
+    low: float = 0.0
+    high: float = 100.0
+
+    def __post_init__(self) -> None:
+        ordered(self.low, self.high)
+
+    def __str__(self) -> str:
+        return f"travel from {self.low:g} to {self.high:g}"
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return saturated(command, self.low, self.high)
+
+
+@dataclass(frozen=True)
+class DeadZone(StaticMap):
+    """No response between two commands, slope 1 outside; as of an overlapped spool valve.
+
+    Parameters
+    ----------
+    low, high : float
+        Between them the output is 0.
+
+    Raises
+    ------
+    OptionError
+        ``low >= high``, or not finite.
+
+    References
+    ----------
+    .. [1] H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall 2002, section 1.2.7.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> cr.actuators.DeadZone(-1, 1).simulate([-3, 0.5, 4]).tolist()
+    [-2.0, 0.0, 3.0]
+    """
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        ordered(self.low, self.high)
+
+    def __str__(self) -> str:
+        return f"dead zone from {self.low:g} to {self.high:g}"
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return without_dead_zone(command, self.low, self.high)
+
+
+def ordered(low: float, high: float) -> None:
+    """Check two ends.
+
+    Raises
+    ------
+    OptionError
+        Not in this order, or not finite.
+    """
+    if not real(low, "low", "lower end") < real(high, "high", "upper end"):
+        raise OptionError(f"low={low!r}, high={high!r}; expected low < high")
+
+
+def within_start(start: float) -> None:
+    """Check a place within play or friction.
+
+    Raises
+    ------
+    OptionError
+        Outside of -1...1.
+    """
+    if not -1 <= real(start, "start", "place within play or friction") <= 1:
+        raise OptionError(f"start={start!r}; expected a value in -1...1")

@@ -1,0 +1,234 @@
+"""Stems that stick: the data-driven models of Choudhury, Kano and He."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from .._checks import positive, real
+from ..errors import OptionError
+from ..numerics.actuators.friction import (
+    StemState,
+    choudhury,
+    choudhury_step,
+    he,
+    he_step,
+    kano,
+    kano_step,
+    stem_at_rest,
+)
+from ..numerics.arrays import FloatArray
+from .base import Actuator, State
+from .limits import within_start
+
+
+@dataclass(frozen=True)
+class _StickAndJump(Actuator):
+    """A model with the two parameters S and J, and the state of a stem with a memory."""
+
+    S: float
+    J: float
+    start: float = 0.0
+
+    _states: ClassVar[tuple[str, ...]] = StemState._fields
+
+    def __post_init__(self) -> None:
+        positive(self.S, "S", "width of dead band plus stick band")
+        if real(self.J, "J", "slip jump") < 0:
+            raise OptionError(f"J={self.J!r}; expected a slip jump >= 0, and usually at most S")
+        within_start(self.start)
+
+    def _rest(self, command: float) -> State:
+        return tuple(float(part) for part in self._at_rest(command))
+
+    def _at_rest(self, command: float) -> StemState:
+        return stem_at_rest(command, self.S, self.J, self.start)
+
+
+def _stem(state: State) -> StemState:
+    """Return a state of plain numbers as that of a stem."""
+    command, position, direction, rest, moving, paused, slope = state
+    return StemState(command, position, direction, rest, moving > 0.5, paused > 0.5, slope)
+
+
+@dataclass(frozen=True)
+class Stiction(_StickAndJump):
+    """Stiction as described by S and J: the data-driven model of Choudhury, Thornhill and Shah.
+
+    At a reversal the stem sticks until the command has changed by S, dead band plus stick band;
+    then it slips by J, and follows at a distance of (S - J) / 2. A stem that stopped because the
+    command paused needs only J. Plotted over the command, the position goes around a parallelogram
+    with a step of height J after each reversal.
+
+    Parameters
+    ----------
+    S : float
+        Dead band plus stick band, in the unit of the command.
+    J : float
+        Slip jump; 0 for backlash of width S, S for a stem that catches up at once.
+    start : float, default 0
+        How the stem came to rest: 1 by a move up, -1 by a move down, 0 relaxed between the two.
+
+    Raises
+    ------
+    OptionError
+        S is not positive, J is negative, or a start outside -1...1.
+
+    References
+    ----------
+    .. [1] M. A. A. S. Choudhury, N. F. Thornhill and S. L. Shah, Modelling valve stiction, Control
+       Engineering Practice 13 (2005) 641-658, section 5 and figure 9,
+       doi:10.1016/j.conengprac.2004.05.005.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.actuators.Stiction(S=4.0, J=2.0, start=1)
+    >>> print(valve)
+    stiction (Choudhury): S = 4, J = 2
+    >>> valve.simulate([0, 4, 8, 6, 4, 3, 2]).tolist()
+    [-1.0, 3.0, 7.0, 7.0, 7.0, 4.0, 3.0]
+    """
+
+    def __str__(self) -> str:
+        return f"stiction (Choudhury): S = {self.S:g}, J = {self.J:g}"
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        after, position = choudhury_step(_stem(state), command, self.S, self.J)
+        return tuple(float(part) for part in after), position
+
+    def _at_rest(self, command: float) -> StemState:
+        # As the array kernel: which side of the friction holds the stem is not part of the model.
+        return super()._at_rest(command)._replace(paused=self.start == 1.0)
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return choudhury(command, self.S, self.J, self.start)
+
+
+@dataclass(frozen=True)
+class KanoStiction(_StickAndJump):
+    """Stiction by the model of Kano and others, which also remembers the side of the friction.
+
+    The same parameters as `Stiction`; after a pause a reversal needs S here, and J there.
+
+    Parameters
+    ----------
+    S : float
+        Dead band plus stick band, in the unit of the command.
+    J : float
+        Slip jump.
+    start : float, default 0
+        How the stem came to rest: 1 by a move up, -1 by a move down, 0 relaxed between the two.
+
+    Raises
+    ------
+    OptionError
+        S is not positive, J is negative, or a start outside -1...1.
+
+    References
+    ----------
+    .. [1] M. Kano, H. Maruta, H. Kugemoto and K. Shimizu, Practical model and detection algorithm
+       for valve stiction, IFAC Symposium on Dynamics and Control of Process Systems, Cambridge
+       2004, section 2.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.actuators.KanoStiction(S=4.0, J=2.0, start=1)
+    >>> valve.simulate([0, 4, 8, 8, 6, 4, 3, 2]).tolist()
+    [-1.0, 3.0, 7.0, 7.0, 7.0, 7.0, 4.0, 3.0]
+    """
+
+    def __str__(self) -> str:
+        return f"stiction (Kano): S = {self.S:g}, J = {self.J:g}"
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        after, position = kano_step(_stem(state), command, self.S, self.J)
+        return tuple(float(part) for part in after), position
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return kano(command, self.S, self.J, self.start)
+
+
+@dataclass(frozen=True)
+class HeStiction(Actuator):
+    """Stiction by the model of He and others: a stem that rests after every slip.
+
+    The command acts like a force that static friction holds up to `static`; when it yields, the
+    stem moves until kinetic friction holds the rest. A slow ramp becomes a staircase of height
+    `J`.
+
+    Parameters
+    ----------
+    static : float
+        Static friction, in the unit of the command.
+    kinetic : float
+        Kinetic friction, at most the static one.
+    start : float, default 0
+        Part of the kinetic friction that holds the stem at first; positive after a move up.
+
+    Attributes
+    ----------
+    S : float
+        Dead band plus stick band, ``static + kinetic``.
+    J : float
+        Slip jump, ``static - kinetic``.
+
+    Raises
+    ------
+    OptionError
+        ``0 <= kinetic <= static`` and ``static > 0`` does not hold, or a start outside -1...1.
+
+    References
+    ----------
+    .. [1] Q. P. He, J. Wang, M. Pottmann and S. J. Qin, A curve fitting method for detecting valve
+       stiction in oscillating control loops, Ind. Eng. Chem. Res. 46 (2007) 4549-4560, section 2,
+       doi:10.1021/ie061219a.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.actuators.HeStiction(static=3.0, kinetic=1.0)
+    >>> valve.S, valve.J
+    (4.0, 2.0)
+    >>> valve.simulate([0, 1, 2, 3, 4, 5, 6]).tolist()
+    [0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 3.0]
+    """
+
+    static: float
+    kinetic: float
+    start: float = 0.0
+
+    _states: ClassVar[tuple[str, ...]] = ("command", "position", "force")
+
+    def __post_init__(self) -> None:
+        positive(self.static, "static", "static friction")
+        if not 0 <= real(self.kinetic, "kinetic", "kinetic friction") <= self.static:
+            raise OptionError(
+                f"static={self.static!r}, kinetic={self.kinetic!r}; expected 0 <= kinetic <= static"
+            )
+        within_start(self.start)
+
+    def __str__(self) -> str:
+        return f"stiction (He): static {self.static:g}, kinetic {self.kinetic:g}"
+
+    @property
+    def S(self) -> float:
+        """Dead band plus stick band."""
+        return self.static + self.kinetic
+
+    @property
+    def J(self) -> float:
+        """Slip jump."""
+        return self.static - self.kinetic
+
+    def _rest(self, command: float) -> State:
+        held = self.start * self.kinetic
+        return (command, command - held, held)
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        last, position, held = state
+        return he_step((last, position, held), command, self.static, self.kinetic)
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return he(command, self.static, self.kinetic, self.start)
