@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -161,6 +163,48 @@ def test_a_model_is_compared_with_a_measured_frf(folder, first, tmp_path, capsys
     }  # fmt: skip
     assert main(["compare", model, frf]) == 0
     assert "written" not in capsys.readouterr().out
+
+
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
+def test_the_result_is_on_the_terminal_before_figures_are_drawn_and_they_can_be_left_out(
+    folder, first, tmp_path
+):
+    model, frf, terminal = str(first[0] / "model.json"), str(folder / "frf.csv"), Terminal()
+    files = [str(folder / f"step_{k}.csv") for k in range(2)]
+    with redirect_stdout(terminal), redirect_stderr(terminal):
+        assert main(["compare", model, frf, "-o", str(tmp_path / "frf")]) == 0
+        said = terminal.getvalue()
+        assert 0 < said.index("relative error") < said.index("drawing the figures")
+        assert said.index("drawing the figures") < said.index("written to")
+        alone = ["--no-report", "-o"]
+        assert main(["compare", model, frf, *alone, str(tmp_path / "table")]) == 0
+        assert main(["identify", *files, *FAST, *alone, str(tmp_path / "many")]) == 0
+    assert "drawing" not in terminal.getvalue().removeprefix(said)
+    assert files_in(tmp_path / "table") == {"frf_comparison.csv", "manifest.json"}
+    names = files_in(tmp_path / "many")
+    assert "records.csv" in names
+    assert not any("report" in name or "figures" in name for name in names)
+
+
+PROBE = """
+import sys
+from ctrl_realize.cli import main
+for words in ["--help"], ["--version"], ["invent"], ["identify", "--help"], ["identify", "nix.csv"]:
+    main(words)
+heavy = {"numpy", "scipy", "control", "matplotlib", "pandas", "jinja2", "joblib", "tqdm", "rich"}
+sys.exit(" ".join(heavy & set(sys.modules)) or 0)
+"""
+
+
+def test_help_version_and_wrong_commands_wait_for_no_heavy_import(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert (done.returncode, "Usage: ctrl-realize identify" in done.stdout) == (0, True)
 
 
 def test_the_same_call_gives_the_same_files(folder, first, tmp_path):

@@ -25,6 +25,7 @@ def run_compare(
     *,
     choices: Mapping[str, Any],
     reading: Mapping[str, Any],
+    report: bool,
     overwrite: bool,
 ) -> int:
     """Compare, write the results if a folder is given, and return the exit code."""
@@ -38,6 +39,9 @@ def run_compare(
         band_hz=choices["band_hz"],
         hold=None if hold == "none" else hold,
     )
+    say(printable(f"{model}: {system!r}"))
+    say(comparison.report())
+    names = ["frf_comparison.csv"]
     if output is not None:
         words = [str(model), str(frf)]
         if choices["min_coherence"] is not None:
@@ -51,20 +55,18 @@ def run_compare(
         words += ["--output", str(output)]
         with appearing(output, run) as folder:
             write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
-            with told_if_it_fails(folder, "the comparison") as written:
-                write_comparison(
-                    folder / "report.html",
-                    system,
-                    measured,
-                    comparison,
-                    files=[model, frf],
-                    calls=[("In a terminal", typed_call("compare", words))],
-                    figures=folder / "figures",
-                )
-                written.append("report.html, figures/")
-    say(printable(f"{model}: {system!r}"))
-    say(comparison.report())
-    if output is not None:
-        names = ", ".join(["frf_comparison.csv", *written])
-        say(f"\nwritten to {printable(str(output))}: {names}")
-    return 0 if output is None or written else 1
+            if report:
+                with told_if_it_fails(folder, "the comparison") as written:
+                    write_comparison(
+                        folder / "report.html",
+                        system,
+                        measured,
+                        comparison,
+                        files=[model, frf],
+                        calls=[("In a terminal", typed_call("compare", words))],
+                        figures=folder / "figures",
+                    )
+                    written.append("report.html, figures/")
+                names += written
+        say(f"\nwritten to {printable(str(output))}: {', '.join(names)}")
+    return 0 if output is None or not report or len(names) > 1 else 1

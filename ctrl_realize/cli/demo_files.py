@@ -24,23 +24,19 @@ from .inputs import typed_call
 _TITLE = "A control valve with dead time, identified"
 
 
-def write_demo_files(folder: Path, result: DemoResult) -> list[str]:
+def write_demo_files(folder: Path, result: DemoResult, *, with_report: bool) -> list[str]:
     """Write all files; return their names."""
     note = "simulated valve, not measured"
     settings = {"seed": result.seed, "simulated": True}
     save_model(folder / "model.json", result.fitted, settings=settings, note=note)
     save_model(folder / "model_paper.json", result.printed, settings=settings, note=note)
     _write_tables(folder, result)
-    _write_report(folder, result)
-    return [
-        "report.html",
-        "model.json",
-        "model_paper.json",
-        "table_1.csv",
-        "frf_simulated.csv",
-        "record_simulated.csv",
-        "figures/",
-    ]
+    names = ["model.json", "model_paper.json", "table_1.csv"]
+    names += ["frf_simulated.csv", "record_simulated.csv"]
+    if with_report:
+        _write_report(folder, result)
+        names = ["report.html", *names, "figures/"]
+    return names
 
 
 def _write_tables(folder: Path, result: DemoResult) -> None:

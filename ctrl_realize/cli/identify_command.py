@@ -9,7 +9,7 @@ from typing import Any
 from ..data import MeasuredFRF
 from ..delayed import fit_of
 from ..errors import CtrlRealizeError, DataError, OptionError
-from ..frequency import compare_frf
+from ..frequency import FRFComparison, compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
 from ..identification.methods import Method
@@ -27,7 +27,7 @@ from .inputs import (
 from .manifest import Run, refuse_other_results
 from .results import campaign_table, write_campaign_files, write_record_files
 from .staging import appearing, kept_rows, refuse_a_file
-from .terminal import complain, one_line, printable, progress, say
+from .terminal import complain, one_line, printable, progress, say, working
 
 _MANY = 12
 """Number of records from which on all cores are used."""
@@ -86,10 +86,11 @@ def _one(
     options: dict[str, Any] = {**settings.choices}
     if settings.joint and frf is not None:
         options["frf"] = frf
-    system = identify_record(
-        records[0] if len(records) == 1 else records, method=settings.method, **options
-    )
-    comparison = None if frf is None else compare_frf(system, frf)
+    with working("identifying"):
+        system = identify_record(
+            records[0] if len(records) == 1 else records, method=settings.method, **options
+        )
+        comparison = None if frf is None else compare_frf(system, frf)
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
     say(fit_of(system, ModelFit).report())
@@ -125,12 +126,18 @@ def _many(
         )  # fmt: skip
         _refuse_useless(campaign)
         comparison = None if frf is None else compare_frf(campaign.system, frf)
+        _say_campaign(campaign, comparison)
         with appearing(output, run) as folder:
             written = write_campaign_files(
                 folder, campaign, [source.file for source in sources],
                 frf=frf, comparison=comparison, settings=settings.given, calls=calls,
                 with_report=report,
             )  # fmt: skip
+    _say_what_is_written(output, ["model.json", "records.csv", "models/"], report and written)
+    return 1 if campaign.failed or not written else 0
+
+
+def _say_campaign(campaign: Campaign, comparison: FRFComparison | None) -> None:
     say(campaign_table(campaign))
     say()
     say(campaign.report())
@@ -140,8 +147,6 @@ def _many(
     if comparison is not None:
         say()
         say(comparison.report())
-    _say_what_is_written(output, ["model.json", "records.csv", "models/"], report and written)
-    return 1 if campaign.failed or not written else 0
 
 
 def _refuse_useless(campaign: Campaign) -> None:

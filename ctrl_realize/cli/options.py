@@ -100,7 +100,7 @@ Jobs = Annotated[
     _OPTION(help="Number of processes; -1: all cores. Default: all cores for 12 records or more."),
 ]
 NoReport = Annotated[
-    bool, _OPTION("--no-report", help="Write the model alone, without report and figures.")
+    bool, _OPTION("--no-report", help="Write models and tables alone, without report and figures.")
 ]
 
 # how to read records

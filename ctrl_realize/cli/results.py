@@ -20,7 +20,7 @@ from ..identification.campaign.campaign import Campaign
 from ..io import save_model
 from ..io.text.csv_files import write_csv
 from ..report.tables import dead_time_cells
-from .terminal import complain, one_line, printable, table
+from .terminal import complain, one_line, printable, table, working
 
 
 def write_record_files(
@@ -102,7 +102,8 @@ def told_if_it_fails(folder: Path, result: str) -> Iterator[list[str]]:
     """Report an error while a report is written, but keep the results: the list stays empty."""
     written: list[str] = []
     try:
-        yield written
+        with working("drawing the figures of the report"):
+            yield written
     except Exception as error:  # for instance a defect of this program, or a full disk
         shutil.rmtree(folder / "figures", ignore_errors=True)
         complain(

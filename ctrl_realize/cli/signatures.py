@@ -146,6 +146,7 @@ def compare(
     skip_rows: o.SkipRows = None,
     variable: o.Variable = None,
     max_bytes: o.MaxBytes = None,
+    no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> int:
     """Compare a model with a measured frequency response.
@@ -169,13 +170,17 @@ def compare(
         no_header=no_header, skip_rows=skip_rows, variable=variable, max_bytes=max_bytes,
     )  # fmt: skip
     choices: dict[str, Any] = {"min_coherence": min_coherence, "band_hz": band, "hold": hold.value}
-    return run_compare(model, frf, output, choices=choices, reading=reading, overwrite=overwrite)
+    return run_compare(
+        model, frf, output,
+        choices=choices, reading=reading, report=not no_report, overwrite=overwrite,
+    )  # fmt: skip
 
 
 def demo(
     output: o.Folder,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,
     jobs: Annotated[int, typer.Option(help="Number of processes; -1: all cores.")] = 1,
+    no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> int:
     """Reproduce the paper from start to end, on simulated data.
@@ -193,4 +198,4 @@ def demo(
     with loading():
         from .demo_command import run_demo_command
 
-    return run_demo_command(output, seed, jobs, overwrite)
+    return run_demo_command(output, seed, jobs, report=not no_report, overwrite=overwrite)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TextIO
 
 import typer
@@ -31,13 +32,23 @@ def _write(text: str, *, to_stderr: bool) -> None:
     # most texts contain names of records and files, which must not control the terminal
     lines = "\n".join(printable(line) for line in text.split("\n"))
     try:
-        typer.echo(lines, err=to_stderr)
+        with _without_bars():
+            typer.echo(lines, err=to_stderr)
     except BrokenPipeError:
         # the buffer, and everything that follows, is discarded
         stream = sys.stderr if to_stderr else sys.stdout
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
+
+
+def _without_bars() -> AbstractContextManager[None]:
+    """Take progress bars away while a text is written, and draw them again below it."""
+    loaded = sys.modules.get("tqdm")
+    if loaded is None:
+        return nullcontext()
+    bars: AbstractContextManager[None] = loaded.tqdm.external_write_mode(file=sys.stderr)
+    return bars
 
 
 def one_line(problem: object) -> str:
@@ -72,6 +83,15 @@ def progress(items: Iterable[Any], total: int, label: str) -> Iterable[Any]:
 
     bar: Iterable[Any] = tqdm(items, total=total, desc=label, disable=None, file=sys.stderr)
     return bar
+
+
+@contextmanager
+def working(label: str) -> Iterator[None]:
+    """Show on stderr, if it is a terminal, what takes a while; the line vanishes at the end."""
+    from tqdm import tqdm
+
+    with tqdm(desc=label, bar_format="{desc} ...", leave=False, disable=None, file=sys.stderr):
+        yield
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int]) -> str:
