@@ -5,6 +5,7 @@
 from . import actuators as actuators
 from . import bench as bench
 from . import data as data
+from . import datasets as datasets
 from . import design as design
 from . import errors as errors
 from . import export as export

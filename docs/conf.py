@@ -11,6 +11,7 @@ ROOT = HERE.parent
 sys.path.insert(0, str(HERE / "_ext"))
 sys.path.insert(0, str(ROOT))
 
+import dataset_pages  # noqa: E402
 import docstring_rules  # noqa: E402
 import flag_table  # noqa: E402
 import public_names  # noqa: E402
@@ -99,6 +100,7 @@ for _name, (_file, _command) in TABLES.items():
     (GENERATED / "tables" / f"{_name}.md").write_text(_first)
     (GENERATED / "tables" / f"{_name}_more.md").write_text(_heading.lstrip("\n") + _rest)
 (GENERATED / "tables" / "flags.md").write_text(flag_table.table(ROOT / "ctrl_realize"))
+(GENERATED / "tables" / "datasets.md").write_text(dataset_pages.page())
 
 # -- notebooks and code cells --------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ SUBMODULES = {
     "actuators",
     "bench",
     "data",
+    "datasets",
     "design",
     "errors",
     "export",

@@ -26,6 +26,7 @@ MODULES = (
     cr.actuators,
     cr.bench,
     cr.data,
+    cr.datasets,
     cr.design,
     cr.frequency,
     cr.identification,

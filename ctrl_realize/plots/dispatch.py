@@ -10,6 +10,7 @@ import control as ct
 from .. import errors
 from ..data.frf import MeasuredFRF
 from ..data.step import StepResponse
+from ..datasets.loading import Dataset
 from ..identification.joint.result import JointFit
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.realization.delay_scan_result import DelayScan
@@ -69,6 +70,11 @@ def _no_curves(result: FitSummary, **kwargs: Any) -> ct.ControlPlot:
         "a model file keeps the report of a fit but not its curves; identify the record "
         "again to plot them"
     )
+
+
+@draw.register
+def _first_of_the_set(result: Dataset, **kwargs: Any) -> ct.ControlPlot:
+    return draw(result.records[0] if result.records else result.frfs[0], **kwargs)
 
 
 # the annotation of the first argument is the kind of result

@@ -64,6 +64,7 @@ SUBMODULES = {
     "export": "Controllers and models for other programs: PLC, C, Python, MATLAB, FMI.",
     "plots": "What each of them draws is on [Pictures](../../pictures.md).",
     "actuators": "Models of stiction, backlash, slew limits and characteristics.",
+    "datasets": "What is known of each set is on [Data sets](../../datasets.md).",
     "bench": "Simulated set-ups with known truth.",
     "report": "HTML reports: one self-contained file, the verdict first.",
     "paper": "Every number that the paper prints.",
