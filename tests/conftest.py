@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import ctrl_realize as cr
+from tests import measured
 
 # Same examples on every run: a failure seen once is seen again. CI machines are slow at times,
 # so no deadline on a single example.
@@ -22,8 +23,6 @@ settings.register_profile(
 settings.register_profile("long", parent=settings.get_profile("suite"), max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
-SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
-
 
 @pytest.fixture(scope="session")
 def valve() -> cr.bench.Valve:
@@ -34,6 +33,4 @@ def valve() -> cr.bench.Valve:
 @pytest.fixture
 def shared_data() -> Path:
     """Folder of measured records, which are not part of the project."""
-    if not SHARED_DATA.is_dir():
-        pytest.skip(f"measured records are not there ({SHARED_DATA.name}/ beside the project)")
-    return SHARED_DATA
+    return measured.shared_folder()

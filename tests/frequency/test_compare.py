@@ -136,7 +136,7 @@ def test_noise_of_the_response_is_no_disagreement():
 
 
 def test_the_response_of_the_motor_contradicts_the_model_of_its_step(shared_data):
-    system = model(shared_data, "dc_motor_tacho/up")
+    system = model("dc_motor_tacho/up")
     comparison = cr.compare_frf(system, cr.read_frf(shared_data / "dc_motor_tacho" / "frf.csv"))
     verdict = report.verdict_of(system, comparison.flags)
     assert verdict.level == "poor"

@@ -282,8 +282,8 @@ def test_circuit_without_delay_is_given_less_than_three_samples(shared_data):
     assert fit.dead_time < 60e-6
 
 
-def test_stage_has_its_authors_poles_as_far_as_the_data_know_them(shared_data):
-    frf = read_frf(shared_data / "stage" / "frf_output_1.csv")
+def test_stage_has_its_authors_poles_as_far_as_the_data_know_them():
+    frf = cr.datasets.load("stage").frf
     fit = cr.fit_frf(frf, 8, dt=1e-4).fit
     for pole in (-131.1 + 1868.1j, -22.70 + 559.8j, -5.447 + 191.4j):
         assert np.abs(fit.poles - pole).min() < 0.02 * abs(pole)
@@ -351,11 +351,10 @@ def test_resonances_over_three_decades_are_found_in_noise():
     assert fit.dead_time == pytest.approx(2e-4, abs=4 * fit.std_given_structure)
 
 
-def test_motor_bench_resonance_and_one_sample_of_delay(shared_data):
-    data = np.load(shared_data / "motor_bench_multisine.npz")
-    dt = float(data["dt"])
-    record = cr.Record(dt * np.arange(data["u"].size), data["u"], data["y"])
-    frf = cr.spectral_frf(record, period=int(data["period"]))
+def test_motor_bench_resonance_and_one_sample_of_delay():
+    record = cr.datasets.load("motor_bench").record
+    dt = record.dt
+    frf = cr.spectral_frf(record, period=2500)
     fit = cr.fit_frf(frf, dt=dt, hold="zoh").fit
     assert fit.dead_time / dt == pytest.approx(1, abs=0.3)
     assert np.abs(fit.poles[-1]) / (2 * np.pi) == pytest.approx(76.6, abs=1)

@@ -39,10 +39,8 @@ def by_n4sid(record, order, block_rows):
         ("cd_player_mimo", 150, 20, {"kernel": "SS"}),
     ],
 )
-def test_realization_predicts_as_well_as_a_subspace_method(
-    shared_data, plant, length, order, options
-):
-    first, second = measured.halves(shared_data, f"{plant}/record")
+def test_realization_predicts_as_well_as_a_subspace_method(plant, length, order, options):
+    first, second = measured.halves(f"{plant}/record")
     hankel = "square" if plant == "robot_arm" else "padded"
     ours = cr.realize(cr.impulse_from_io(first, length, **options), order, hankel=hankel)
     fit = cr.validation.analyse_residuals(ours, second).fit_percent.mean()
@@ -66,10 +64,8 @@ def test_realization_predicts_as_well_as_a_subspace_method(
         ("cd_player_mimo", (6, 12, 20), 5.0, [6]),
     ],
 )
-def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(
-    shared_data, plant, orders, gain, ours
-):
-    first, second = measured.halves(shared_data, f"{plant}/record")
+def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(plant, orders, gain, ours):
+    first, second = measured.halves(f"{plant}/record")
     found = cr.fit_state_space(first, ours)
     fit = cr.validation.analyse_residuals(found, second).fit_percent.mean()
     theirs = []
@@ -84,9 +80,9 @@ def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(
     assert fit > max(theirs, default=0.0) + gain - 1.0
 
 
-def test_the_robot_arm_needs_no_choice_of_method_or_length(shared_data):
+def test_the_robot_arm_needs_no_choice_of_method_or_length():
     # 36 % with the regularized estimate, 97 % with what the default takes
-    first, second = measured.halves(shared_data, "robot_arm/record")
+    first, second = measured.halves("robot_arm/record")
     impulse = cr.impulse_from_io(first)
     assert impulse.method.startswith("OKID")
     model = cr.realize(impulse, 6)

@@ -123,10 +123,8 @@ def test_the_errors_of_a_regularized_response_hold_the_truth_also_where_it_dies_
     ("plant", "length", "delay"),
     [("hairdryer", 60, 3), ("gas_furnace", 40, 3), ("exchanger", 250, 0)],
 )
-def test_measured_plants_have_the_delay_that_their_authors_state(
-    shared_data, options, plant, length, delay
-):
-    g = cr.impulse_from_io(measured.record(shared_data, f"{plant}/record"), length, **options)
+def test_measured_plants_have_the_delay_that_their_authors_state(options, plant, length, delay):
+    g = cr.impulse_from_io(measured.record(f"{plant}/record"), length, **options)
     assert cr.estimate_delay(g, 2, max_delay=15).delay == delay
 
 

@@ -220,9 +220,9 @@ def test_records_fitted_together_know_the_noise_of_their_mean():
     assert low <= 36.4 <= high
 
 
-def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow(shared_data):
-    data = measured.record(shared_data, "dc_motor_tacho/up")
-    fit = measured.fitted(shared_data, "dc_motor_tacho/up")
+def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow():
+    data = measured.record("dc_motor_tacho/up")
+    fit = measured.fitted("dc_motor_tacho/up")
     low, high = fit.interval
     assert fit.at_noise_level
     assert 31 <= fit.delay <= 42

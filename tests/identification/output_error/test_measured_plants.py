@@ -44,16 +44,16 @@ SHORT = {  # dead times of a few samples; no rule was made with the last three p
     [(CANAL, 12, 9), (HEATING, 5, 4), (SINGLE, 4, 4), (SHORT, 25, 19)],
     ids=["canal", "heating", "single", "short"],
 )
-def test_dead_times_are_in_their_bands(shared_data, bands, count, least):
+def test_dead_times_are_in_their_bands(bands, count, least):
     assert len(bands) == count
-    fits = {name: measured.fitted(shared_data, name) for name in bands}
+    fits = {name: measured.fitted(name) for name in bands}
     assert sum(low <= fits[name].delay <= high for name, (low, high) in bands.items()) >= least
 
 
-def test_intervals_meet_the_bands_and_are_not_wider_than_they_must_be(shared_data):
+def test_intervals_meet_the_bands_and_are_not_wider_than_they_must_be():
     widths = []
     for name, (low, high) in (CANAL | HEATING | SINGLE | SHORT).items():
-        fit = measured.fitted(shared_data, name)
+        fit = measured.fitted(name)
         assert fit.delay_interval[0] <= high, name
         assert fit.delay_interval[1] >= low, name
         if name not in SHORT:
@@ -61,18 +61,18 @@ def test_intervals_meet_the_bands_and_are_not_wider_than_they_must_be(shared_dat
     assert np.median(widths) <= 0.6
 
 
-def test_a_misfit_is_never_hidden(shared_data):
+def test_a_misfit_is_never_hidden():
     for name in CANAL | HEATING | SINGLE | SHORT:
-        fit = measured.fitted(shared_data, name)
+        fit = measured.fitted(name)
         flagged = {flag.code for flag in fit.flags}
         assert ("structured_misfit" in flagged) == (not fit.at_noise_level), name
         assert fit.interval[0] <= fit.dead_time <= fit.interval[1]
         assert np.isfinite(fit.onset)
 
 
-def test_a_drift_before_the_step_does_not_make_an_integrator_of_a_lamp(shared_data):
+def test_a_drift_before_the_step_does_not_make_an_integrator_of_a_lamp():
     # Ten samples at rest, a hundred after: the drift is the end of the step before.
-    edges = [measured.record(shared_data, f"heating_system/edge{i}") for i in range(5)]
+    edges = [measured.record(f"heating_system/edge{i}") for i in range(5)]
     fit = cr.fit_output_error(edges).fit
     flags = {flag.code for flag in fit.flags}
     assert "drift" in flags

@@ -252,8 +252,8 @@ def test_intervals_are_in_seconds_and_in_samples():
     assert cr.design.pid(bank.model).check.stable_within_interval is not None
 
 
-def test_the_exchanger_keeps_its_delay_of_zero(shared_data):
-    record = measured.record(shared_data, "exchanger/record")
+def test_the_exchanger_keeps_its_delay_of_zero():
+    record = measured.record("exchanger/record")
     first = cr.impulse_from_io(record.between(0, 1500), 200)
     model = cr.realize(first, 3, feedthrough=True)
     track = cr.DelayTracker(model, max_delay=20, forgetting_time=300.0).track(record)

@@ -102,7 +102,7 @@ def test_an_output_that_knows_nothing_of_the_input_gives_no_delay():
 
 def test_the_motor_has_its_step_and_its_frequency_response_in_one_table(shared_data):
     folder = shared_data / "dc_motor_tacho"
-    record = measured.record(shared_data, "dc_motor_tacho/up")
+    record = measured.record("dc_motor_tacho/up")
     check = cr.validation.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
     table = check.table()
     # 2.5 ms from the step and 2.9 ms from the FRF, by the look of the data's keepers
@@ -118,7 +118,7 @@ def test_the_motor_has_its_step_and_its_frequency_response_in_one_table(shared_d
 
 def test_the_circuit_without_delay_is_not_given_one_by_a_scan_that_doubts_itself(shared_data):
     folder = shared_data / "rlc_zero_delay"
-    record = measured.record(shared_data, "rlc_zero_delay/up")
+    record = measured.record("rlc_zero_delay/up")
     check = cr.validation.compare_delay_estimates(record, frf=cr.read_frf(folder / "frf.csv"))
     table = check.table()
     # The scan sees eight samples, and says that it cannot tell them from none.
@@ -175,8 +175,8 @@ def first_coefficient(record, lag, order=12):
     return (solution / np.sqrt(variance))[2 * order - lag]
 
 
-def test_a_measured_plant_under_random_input_is_agreed_on(shared_data):
-    record = measured.record(shared_data, "hairdryer/record")
+def test_a_measured_plant_under_random_input_is_agreed_on():
+    record = measured.record("hairdryer/record")
     check = cr.validation.compare_delay_estimates(record)
     assert check.agree
     # an input is held for a sample: a first coefficient after two samples is a dead time of one to

@@ -141,10 +141,8 @@ def test_predictions_fall_from_the_noise_model_to_the_simulation():
     ("plant", "length", "order", "least"),
     [("hairdryer", 60, 2, 91.0), ("gas_furnace", 30, 2, 55.0), ("exchanger", 250, 3, 62.0)],
 )
-def test_measured_plants_are_predicted_on_the_half_that_was_not_used(
-    shared_data, plant, length, order, least
-):
-    first, second = halves(shared_data, f"{plant}/record")
+def test_measured_plants_are_predicted_on_the_half_that_was_not_used(plant, length, order, least):
+    first, second = halves(f"{plant}/record")
     model = cr.estimate_delay(cr.impulse_from_io(first, length), order, max_delay=10)
     assert cr.validation.analyse_residuals(model, second).fit_percent[0] > least
     assert cr.validation.predict(model, second, 1).fit_percent[0] > least + 3
