@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 import ctrl_realize as cr
 
@@ -33,23 +38,30 @@ FLOORS = [
 FLOOR = {name: floor for floor, names in enumerate(FLOORS) for name in names}
 # The one way up is `Result.plot`, which loads the plots by name when somebody asks for one.
 
-MODULES = sorted(PACKAGE.rglob("*.py"))
+
+Parts = tuple[str, ...]
 
 
-def parts_of(path: Path) -> tuple[str, ...]:
-    return path.relative_to(PACKAGE).with_suffix("").parts
+@cache
+def sources() -> dict[Parts, list[ast.stmt]]:
+    """Imports of every module, at top level or inside functions, by the parts of its name."""
+    return {
+        path.relative_to(PACKAGE).with_suffix("").parts: [
+            node
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            if isinstance(node, ast.Import | ast.ImportFrom)
+        ]
+        for path in sorted(PACKAGE.rglob("*.py"))
+    }
 
 
-def imported(path: Path) -> set[tuple[str, ...]]:
-    """Modules of the package that a file imports, at top level or inside functions."""
-    package = ["ctrl_realize", *path.relative_to(PACKAGE).parent.parts]
-    known = {parts_of(module) for module in MODULES}
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = []
+def imported(module: Parts) -> set[Parts]:
+    """Modules of the package that a module imports."""
+    package, known, found = ["ctrl_realize", *module[:-1]], sources(), set()
+    for node in known[module]:
         if isinstance(node, ast.Import):
             names = [alias.name.split(".") for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = package[: len(package) - node.level + 1] if node.level else []
             base += node.module.split(".") if node.module else []
             names = [[*base, alias.name] for alias in node.names]
@@ -62,62 +74,62 @@ def imported(path: Path) -> set[tuple[str, ...]]:
     return found
 
 
-IMPORTED = {path: imported(path) for path in MODULES}
+@pytest.fixture(scope="module")
+def graph() -> dict[Parts, set[Parts]]:
+    """What every module of the package imports of it."""
+    return {module: imported(module) for module in sources()}
 
 
-def test_imports_between_folders_only_go_down():
+def test_imports_between_folders_only_go_down(graph):
     offenders = [
-        ("/".join(parts_of(path)), "/".join(target))
-        for path, targets in IMPORTED.items()
+        ("/".join(module), "/".join(target))
+        for module, targets in graph.items()
         for target in targets
-        if target[0] != parts_of(path)[0] and FLOOR[target[0]] >= FLOOR[parts_of(path)[0]]
+        if target[0] != module[0] and FLOOR[target[0]] >= FLOOR[module[0]]
     ]
     assert offenders == []
 
 
-def wing(parts: tuple[str, ...]) -> str:
+def wing(parts: Parts) -> str:
     """Folder of a module below a folder of the first floor; a module of its own otherwise."""
     return "/".join(parts[:2])
 
 
-def test_wings_of_a_folder_do_not_import_one_another_in_a_circle():
-    for folder in {parts_of(path)[0] for path in MODULES if len(parts_of(path)) > 1}:
-        graph: dict[str, set[str]] = {}
-        for path, targets in IMPORTED.items():
-            here = parts_of(path)
-            if here[0] == folder:
-                below = {wing(target) for target in targets if target[0] == folder}
-                graph.setdefault(wing(here), set()).update(below - {wing(here)})
-        try:
-            list(TopologicalSorter(graph).static_order())
-        except CycleError as error:
-            raise AssertionError(f"{folder}: {' <- '.join(error.args[1])}") from None
-
-
-def test_modules_do_not_import_one_another_in_a_circle():
-    graph = {parts_of(path): targets for path, targets in IMPORTED.items()}
+def ordered(graph: dict[Any, set[Any]]) -> str:
+    """Say where imports go round in a circle."""
     try:
         list(TopologicalSorter(graph).static_order())
     except CycleError as error:
-        raise AssertionError(" <- ".join("/".join(parts) for parts in error.args[1])) from None
+        return " <- ".join(str(one) for one in error.args[1])
+    return ""
+
+
+def test_wings_of_a_folder_do_not_import_one_another_in_a_circle(graph):
+    for folder in {module[0] for module in graph if len(module) > 1}:
+        wings: dict[str, set[str]] = {}
+        for module, targets in graph.items():
+            if module[0] == folder:
+                below = {wing(target) for target in targets if target[0] == folder}
+                wings.setdefault(wing(module), set()).update(below - {wing(module)})
+        assert ordered(wings) == "", folder
+
+
+def test_modules_do_not_import_one_another_in_a_circle(graph):
+    assert ordered(graph) == ""
 
 
 def test_a_folder_holds_at_most_sixteen_modules():
-    crowded = {
-        str(folder.relative_to(PACKAGE.parent)): count
-        for folder in {path.parent for path in MODULES}
-        if (count := sum(p.name != "__init__.py" for p in folder.glob("*.py"))) > MOST_MODULES
-    }
-    assert crowded == {}
+    count = Counter(module[:-1] for module in sources() if module[-1] != "__init__")
+    assert {folder: n for folder, n in count.items() if n > MOST_MODULES} == {}
 
 
 def test_numerics_know_only_arrays():
     strangers = {"control", "matplotlib", "pandas", "pathlib", "joblib"}
-    for path in (PACKAGE / "numerics").rglob("*.py"):
-        roots = set()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for module, nodes in sources().items():
+        names = []
+        for node in nodes if module[0] == "numerics" else []:
             if isinstance(node, ast.Import):
-                roots |= {alias.name.split(".")[0] for alias in node.names}
-            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                roots.add(node.module.split(".")[0])
-        assert not roots & strangers, path.name
+                names += [alias.name for alias in node.names]
+            elif node.module and not node.level:
+                names.append(node.module)
+        assert not {name.split(".")[0] for name in names} & strangers, module
