@@ -30,7 +30,7 @@ def valve() -> cr.bench.Valve:
     return cr.bench.valve(pre_step_time=0.5, hold=1.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of measured records, which are not part of the project."""
     return measured.shared_folder()

@@ -207,28 +207,6 @@ def test_a_record_of_any_input_with_another_delay_is_left_out():
     assert fit.delay == pytest.approx(5, abs=0.1)
 
 
-# --- lags, or modes and zeros
-
-
-SPRING = (  # two modes, a zero pair between them, and an actuator
-    ct.tf([1.0, 0.2, 9.0], [1.0, 1.0, 16.0])
-    * ct.tf([4.0], [1.0, 0.3, 4.0])
-    * ct.tf([2.0], [1.0, 2.0])
-)
-
-
-def test_a_plant_with_a_resonance_and_zeros_gets_states_instead_of_lags():
-    record = driven(random_levels(1, 500, 3), core=SPRING, delay=4, noise=0.01)
-    row = cr.identify_campaign([record], progress=False).rows[0]
-    modes = row.system
-    assert modes.fit.lags is not None
-    assert modes.fit.interval[0] - 1e-9 <= 0.4 <= modes.fit.interval[1] + 1e-9
-    poles = np.log(modes.delay_free.poles().astype(complex)) / DT
-    assert np.abs(poles - (-0.5 + 1j * np.sqrt(15.75))).min() < 0.1
-    found = (row.error, row.dead_time, row.interval)
-    assert found == (None, modes.fit.dead_time, modes.fit.interval)
-
-
 # --- the impulse response from any input
 
 

@@ -16,8 +16,8 @@ DT = 0.01
 DELAY = 12.4
 
 
-def cut_from_operation(kind, plant, seed, n=1200, skip=300):
-    """A record that starts while the plant is moving; 5 % noise."""
+def cut_from_operation(kind, plant, seed, n=600, skip=300):
+    """A record that starts while the plant is moving; 3 % noise."""
     rng = np.random.default_rng(seed)
     k = np.arange(n + skip)
     if kind == "prbs":
@@ -25,7 +25,7 @@ def cut_from_operation(kind, plant, seed, n=1200, skip=300):
     else:
         u = np.sin(2 * np.pi * np.cumsum(np.geomspace(0.1, 8, k.size)) * DT)
     y = cr.delayed_ss(plant, dead_time=DELAY * DT, dt=DT).simulate(u)
-    y = y + 0.05 * y.std() * rng.standard_normal(k.size)
+    y = y + 0.03 * y.std() * rng.standard_normal(k.size)
     return cr.Record(k[skip:] * DT, 4 + u[skip:], 3 + y[skip:], name=kind)
 
 
@@ -37,10 +37,11 @@ def test_the_dead_time_is_found_from_operation_with_unknown_start(kind, plant):
     assert fit.std_given_structure / DT < 0.2
     assert fit.interval[0] <= DELAY * DT <= fit.interval[1]
     assert fit.structure == ((1, 1) if plant is R1 else (3, 3))
+    assert fit.flags == ()
 
 
 def test_an_output_that_does_not_follow_the_input_gets_no_answer():
-    good = cut_from_operation("prbs", R1, seed=0, n=600)
+    good = cut_from_operation("prbs", R1, seed=0)
     y = np.random.default_rng(0).standard_normal(600)
     with pytest.raises(DataError, match="does not respond to the input"):
         cr.fit_output_error(cr.Record(good.time, good.input, y), structures=[(1, 1), (2, 2)])
@@ -68,7 +69,7 @@ def bound(plant, u, noise):
 def test_all_samples_of_a_long_record_count():
     colour = 0.9
     rng = np.random.default_rng(2)
-    u = np.repeat(rng.choice([-1.0, 1.0], 800), 10)
+    u = np.repeat(rng.choice([-1.0, 1.0], 500), 10)
     clean = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     noise = 0.05 * float(np.std(clean))
     y = clean + lfilter([1.0], [1.0, -colour], noise * rng.standard_normal(u.size))
@@ -114,18 +115,18 @@ def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample():
     plant = cr.DelayedStateSpace(ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT), 150)
     u = rng.choice([-1.0, 1.0], 1000)
     y = plant.simulate(u) + 0.05 * rng.standard_normal(1000)
-    fit = cr.fit_output_error(cr.Record(DT * np.arange(1000), u, y)).fit
+    record = cr.Record(DT * np.arange(1000), u, y)
+    fit = cr.fit_output_error(record, structures=[(1, 1), (2, 2), (2, 1)]).fit
     assert fit.structure == (1, 1)
     assert abs(fit.delay - 150) < 0.5
     assert fit.delay_interval[0] <= 150 <= fit.delay_interval[1]
 
 
-@pytest.mark.parametrize("pole", [0.98, 1.0])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(("seed", "pole"), [(0, 0.98), (1, 1.0)])
 def test_noise_that_wanders_neither_moves_the_dead_time_nor_becomes_a_pole(pole, seed):
     # as large as the response: the dead time was a sample too late, beside slow or ringing poles
     rng = np.random.default_rng(seed)
-    u = np.repeat(rng.choice([-1.0, 1.0], 300), 5) + 0.3 * rng.standard_normal(1500)
+    u = np.repeat(rng.choice([-1.0, 1.0], 80), 5) + 0.3 * rng.standard_normal(400)
     plant = cr.delayed_ss(ct.tf([2.0], [6.0, 5.5, 1.0]), dead_time=3.4, dt=1.0)
     slow = lfilter([0.2 if pole < 1 else 0.1], [1.0, -pole], rng.standard_normal(u.size))
     y = plant.simulate(u) + slow + 0.03 * rng.standard_normal(u.size)
@@ -137,17 +138,17 @@ def test_noise_that_wanders_neither_moves_the_dead_time_nor_becomes_a_pole(pole,
     assert fit.structure == (2, 2)
 
 
-def test_a_slow_disturbance_does_not_move_the_dead_time():
-    # a fifth of the response, over a period of 60 s: the fit was half a second late
-    rng = np.random.default_rng(0)
-    t = 0.05 * np.arange(1600)
-    u = np.repeat(rng.choice([-1.0, 1.0], 80), 20)
-    plant = ct.tf([0.625], np.poly([-0.5, -1.25]))
-    y = cr.delayed_ss(plant, dead_time=0.8, dt=0.05).simulate(u)
-    y = y + 0.02 * rng.standard_normal(t.size) + 0.2 * np.sin(2 * np.pi * t / 60)
-    fit = cr.fit_output_error(cr.Record(t, u, y)).fit
-    assert fit.interval[0] <= 0.8 <= fit.interval[1]
-    assert abs(fit.dead_time - 0.8) < 0.1
+def test_a_sine_beside_the_response_is_named_and_does_not_move_the_dead_time():
+    # a quarter of the response, over a period of 3 s: a pole and a zero imitate it
+    rng = np.random.default_rng([0, 43])
+    t = 0.02 * np.arange(600)
+    u = np.repeat(rng.choice([-1.0, 1.0], 40), 15)
+    y = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.2, dt=0.02).simulate(u)
+    y = y + 0.5 * np.sin(2 * np.pi * t / 3 + rng.uniform(0, 2 * np.pi))
+    fit = cr.fit_output_error(cr.Record(t, u, y + 0.03 * rng.standard_normal(t.size))).fit
+    assert fit.interval[0] <= 0.2 <= fit.interval[1]
+    assert abs(fit.dead_time - 0.2) < 0.01
+    assert "cancelled_pair" in [flag.code for flag in fit.flags]
 
 
 @pytest.mark.parametrize("rest", [4500, 20000])

@@ -12,58 +12,54 @@ import pytest
 import ctrl_realize as cr
 from tests import measured
 
-# Seconds; the gates of the `slow` records take a quarter of a second longer, give or take.
-GATES = {"1_2": (1.15, 1.45), "1_2_slow": (1.25, 1.85), "2_3": (0.4, 0.85), "2_3_slow": (0.5, 1.25)}
-CANAL = {
-    f"wis_canal/{day}_step_gate{gate}_s{opening}{slow}": tuple(
-        128 * seconds
-        for seconds in GATES[gate + slow]  # in samples
-    )
-    for day, slow in (("20210202", ""), ("20210302", "_slow"))
-    for gate in ("1_2", "2_3")
-    for opening in (25, 100, 255)
-}
-HEATING = {f"heating_system/edge{i}": (0.5, 2.2) for i in range(5)}
-SINGLE = {
+# Samples. Of plants with many records some are taken; `benchmarks.peers` has all of them. The gates
+# of the canal take 1.15 to 1.45 and 0.4 to 0.85 s, in `slow` records a quarter of a second longer,
+# give or take, and have 128 samples a second.
+BANDS = {
+    "wis_canal/20210202_step_gate1_2_s100": (147.2, 185.6),
+    "wis_canal/20210202_step_gate2_3_s255": (51.2, 108.8),
+    "wis_canal/20210302_step_gate1_2_s25_slow": (160.0, 236.8),
+    "wis_canal/20210302_step_gate2_3_s100_slow": (64.0, 160.0),
+    **{f"heating_system/edge{i}": (0.5, 2.2) for i in (0, 2)},
     "air_duct/45": (10, 13),
     "air_duct/90": (10, 13),
     "dc_motor_tacho/up": (31, 42),
     "rlc_zero_delay/up": (-1, 1),
 }
 SHORT = {  # dead times of a few samples; no rule was made with the last three plants
-    **{f"two_cart_drive/v{volts}_{i}": (0.9, 3.4) for volts in ("1_5", "2") for i in range(7)},
-    **{f"sbhs_heater/step{i}": (1, 4.5) for i in (1, 2)},
-    **{f"hdd_arm/edge{i}": (0.8, 3.2) for i in range(3)},
-    **{f"tclab/apm_{i}": (0, 5) for i in range(3)},
-    **{f"tclab/kantor_step50{which}": (0, 5) for which in ("", "_b", "_c")},
+    "two_cart_drive/v1_5_0": (0.9, 3.4),
+    "two_cart_drive/v2_3": (0.9, 3.4),
+    "sbhs_heater/step1": (1, 4.5),
+    "hdd_arm/edge0": (0.8, 3.2),
+    "tclab/apm_1": (0, 5),
+    "tclab/kantor_step50": (0, 5),
 }
 
 
-@pytest.mark.parametrize(
-    ("bands", "count", "least"),
-    [(CANAL, 12, 9), (HEATING, 5, 4), (SINGLE, 4, 4), (SHORT, 25, 19)],
-    ids=["canal", "heating", "single", "short"],
-)
-def test_dead_times_are_in_their_bands(bands, count, least):
-    assert len(bands) == count
-    fits = {name: measured.fitted(name) for name in bands}
-    assert sum(low <= fits[name].delay <= high for name, (low, high) in bands.items()) >= least
+@pytest.fixture(scope="module")
+def fits():
+    return {name: measured.fitted(name) for name in BANDS | SHORT}
 
 
-def test_intervals_meet_the_bands_and_are_not_wider_than_they_must_be():
-    widths = []
-    for name, (low, high) in (CANAL | HEATING | SINGLE | SHORT).items():
-        fit = measured.fitted(name)
-        assert fit.delay_interval[0] <= high, name
-        assert fit.delay_interval[1] >= low, name
-        if name not in SHORT:
-            widths.append((fit.interval[1] - fit.interval[0]) / max(fit.onset, 0.5 * fit.dt))
+def test_dead_times_are_in_their_bands_and_intervals_meet_them(fits):
+    limits = BANDS | SHORT
+    for name, fit in fits.items():
+        assert fit.delay_interval[0] <= limits[name][1], name
+        assert fit.delay_interval[1] >= limits[name][0], name
+    outside = {n for n, fit in fits.items() if not limits[n][0] <= fit.delay <= limits[n][1]}
+    assert len(outside) <= 2
+    assert outside <= set(SHORT)
+
+
+def test_intervals_are_not_wider_than_they_must_be(fits):
+    widths = [
+        np.diff(fits[name].interval) / max(fits[name].onset, 0.5 * fits[name].dt) for name in BANDS
+    ]
     assert np.median(widths) <= 0.6
 
 
-def test_a_misfit_is_never_hidden():
-    for name in CANAL | HEATING | SINGLE | SHORT:
-        fit = measured.fitted(name)
+def test_a_misfit_is_never_hidden(fits):
+    for name, fit in fits.items():
         flagged = {flag.code for flag in fit.flags}
         assert ("structured_misfit" in flagged) == (not fit.at_noise_level), name
         assert fit.interval[0] <= fit.dead_time <= fit.interval[1]
