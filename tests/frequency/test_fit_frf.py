@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import cache
 
 import control as ct
 import numpy as np
@@ -69,19 +70,19 @@ def test_model_is_the_continuous_fit_behind_a_hold_with_its_fractional_delay():
 
 
 @pytest.fixture(scope="module")
-def fifty():
-    return [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(50)]
+def thirty():
+    return [cr.fit_frf(noisy(seed), 2, relative_degree=2, dt=1e-3).fit for seed in range(30)]
 
 
-def test_dead_times_scatter_as_the_stated_deviation_and_are_covered(fifty):
-    fits = fifty
+def test_dead_times_scatter_as_the_stated_deviation_and_are_covered(thirty):
+    fits = thirty
     error = np.array([fit.dead_time - 0.04 for fit in fits])
     std = np.array([fit.std_given_structure for fit in fits])
-    # Standard deviation of 50 runs is known to 10 %; three of them.
+    # Standard deviation of 30 runs is known to 13 %; more than two of them.
     assert error.std() == pytest.approx(std.mean(), rel=0.3)
-    assert abs(error.mean()) < 3 * std.mean() / np.sqrt(50)
+    assert abs(error.mean()) < 3 * std.mean() / np.sqrt(30)
     inside = np.mean([fit.interval[0] <= 0.04 <= fit.interval[1] for fit in fits])
-    assert 0.88 <= inside <= 1.0  # 95 +- 3.1 %, two of them
+    assert 0.88 <= inside <= 1.0  # 95 +- 4.0 %, nearly two of them
     assert np.mean([fit.weighted_rms for fit in fits]) == pytest.approx(1.0, abs=0.03)
 
 
@@ -103,18 +104,18 @@ def bound_of(level):
     return np.sqrt(np.diag(np.linalg.inv(information)))[1:]
 
 
-def test_stated_deviations_are_the_cramer_rao_bounds(fifty):
-    fit = fifty[3]
+def test_stated_deviations_are_the_cramer_rao_bounds(thirty):
+    fit = thirty[3]
     # The misfit of 76 degrees of freedom scales them: 8 % above at most here. The poles' are
     # taken where the fit is, not at the truth.
     assert [fit.std_given_structure, *fit.pole_std] == pytest.approx(bound_of(0.01), rel=0.15)
 
 
-def test_delay_and_poles_reach_their_cramer_rao_bounds(fifty):
+def test_delay_and_poles_reach_their_cramer_rao_bounds(thirty):
     truth = np.array([0.04, -4 * np.pi, -10 * np.pi])
-    found = np.array([[fit.dead_time, *fit.poles.real] for fit in fifty])
+    found = np.array([[fit.dead_time, *fit.poles.real] for fit in thirty])
     rms = np.sqrt(np.mean((found - truth) ** 2, axis=0))
-    # The rms of 50 runs is known to 10 %: nearly three of them.
+    # The rms of 30 runs is known to 13 %: two of them.
     assert rms / bound_of(0.01) == pytest.approx(np.ones(3), abs=0.27)
 
 
@@ -132,13 +133,6 @@ def test_poles_know_their_error_where_the_noise_is_not_told():
     rms = np.sqrt(np.mean(np.square(errors), axis=0))
     # Rms of 16 runs: 18 %, and a deviation from 80 residuals is itself rough.
     assert rms / np.sqrt(np.mean(np.square(stated), axis=0)) == pytest.approx(1, abs=0.4)
-
-
-def test_structure_is_found_from_the_data():
-    # a superfluous parameter must gain 5 in BIC: 2 % of runs
-    fit = cr.fit_frf(noisy(0), dt=1e-3).fit
-    assert (fit.order, fit.relative_degree) == (2, 2)
-    assert fit.interval[0] <= 0.04 <= fit.interval[1]
 
 
 def test_what_is_no_noise_does_not_buy_orders():
@@ -168,14 +162,18 @@ def test_structures_disagree_is_said_where_they_do_by_a_tenth_of_the_dead_time(t
     f = np.geomspace(0.1, top, 60)
     fit = cr.fit_frf(noisy(0, f=f, level=level, plant=plant), dt=1e-3).fit
     assert ("structures_disagree" in {flag.code for flag in fit.flags}) is told
+    # a superfluous parameter must gain 5 in BIC: 2 % of runs
+    assert told or (fit.order, fit.relative_degree) == (2, 2)
     assert fit.interval[0] <= 0.04 <= fit.interval[1]
 
 
-@settings(max_examples=6)
+PLAIN = cache(lambda: cr.fit_frf(noisy(5), 2, dt=1e-3).fit)
+
+
+@settings(max_examples=5)
 @given(st.floats(1e-6, 1e6), st.floats(1e-3, 1e3))
 def test_units_of_output_and_time_change_nothing_else(size, rate):
-    frf = noisy(5)
-    plain = cr.fit_frf(frf, 2, dt=1e-3).fit
+    frf, plain = noisy(5), PLAIN()
     moved = cr.MeasuredFRF(frf.complex * size, F * rate, std=frf.std * size)
     other = cr.fit_frf(moved, 2, dt=1e-3 / rate).fit
     # Minima are found to 1e-9 of the cost, so to 1e-5 of a standard deviation or better.
@@ -187,10 +185,9 @@ def test_units_of_output_and_time_change_nothing_else(size, rate):
     assert_allclose(np.array(other.interval) * rate, plain.interval, rtol=1e-3)
 
 
-def test_simulated_valve_gives_37_samples_within_a_tenth():
+def test_simulated_valve_gives_37_samples_within_a_tenth(valve_frf):
     valve = cr.bench.valve()
-    frf = cr.stepped_sine_frf(valve.stepped_sine(11, points=120))
-    fit = cr.fit_frf(frf, dt=valve.dt).fit
+    fit = cr.fit_frf(valve_frf, dt=valve.dt).fit
     assert (fit.order, fit.relative_degree) == (4, 4)
     assert fit.dead_time / valve.dt == pytest.approx(37, abs=0.3)
     assert fit.interval[0] <= 37 * valve.dt <= fit.interval[1]

@@ -52,9 +52,8 @@ def test_errors_are_as_large_as_stated():
     assert 0.5 < np.sqrt(np.mean(scores)) < 1.3
 
 
-def test_simulated_valve_gives_its_pulse_response_and_its_delay():
-    valve = cr.bench.valve()
-    frf = cr.stepped_sine_frf(valve.stepped_sine(1, points=200))
+def test_simulated_valve_gives_its_pulse_response_and_its_delay(valve_frf):
+    valve, frf = cr.bench.valve(), valve_frf
     dt = 4 * valve.dt
     g = cr.impulse_from_frf(frf, dt, 250)
     exact = cr.delayed_ss(valve.truth.core, dead_time=valve.truth.dead_time, dt=dt).markov(250)

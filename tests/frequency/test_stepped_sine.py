@@ -19,11 +19,6 @@ def sine_record(f, response, *, n=400, dt=0.01, noise=0.0, rng=None, offset=0.3)
     return cr.Record(t, u, y)
 
 
-@pytest.fixture(scope="module")
-def sweep():
-    return cr.bench.valve().stepped_sine(7, points=120)
-
-
 def test_clean_sines_give_the_exact_response_at_the_measured_frequencies():
     f = np.array([0.61, 3.3, 7.77, 20.0])
     H = np.array([1.0, 0.5 - 0.5j, -0.1j, -0.01 + 0.002j])
@@ -33,9 +28,8 @@ def test_clean_sines_give_the_exact_response_at_the_measured_frequencies():
     assert_allclose(frf.coherence, 1, atol=1e-12)
 
 
-def test_simulated_valve_is_measured_within_its_stated_deviation(sweep):
-    valve = cr.bench.valve()
-    frf = cr.stepped_sine_frf(sweep)
+def test_simulated_valve_is_measured_within_its_stated_deviation(valve_frf):
+    valve, frf = cr.bench.valve(), valve_frf
     error = np.abs(frf.complex - valve.truth.frf(frf.frequency_hz).complex)
     # Mean of chi-square/2 over 120 points, std from 5 repeats each: 1 +- 0.13; three of them.
     assert np.sum(error**2) / np.sum(frf.std**2) == pytest.approx(1.0, abs=0.4)

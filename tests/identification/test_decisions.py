@@ -199,9 +199,9 @@ def test_a_noisy_record_of_any_input_weighs_little_beside_a_quiet_one():
 
 
 def test_a_record_of_any_input_with_another_delay_is_left_out():
-    records = [driven(random_levels(k), k, name=f"r{k}") for k in range(4)]
+    records = [driven(random_levels(k, 300), k, name=f"r{k}") for k in range(3)]
     fit = cr.fit_output_error(
-        [*records, driven(random_levels(7), 7, delay=9, name="late")], **ONE
+        [*records, driven(random_levels(7, 300), 7, delay=9, name="late")], **ONE
     ).fit
     assert fit.repeatability.outlying == ("late",)
     assert fit.delay == pytest.approx(5, abs=0.1)

@@ -16,7 +16,6 @@ from benchmarks.worlds.judge import DELAY, GAIN, judged
 
 FAMILIES = [
     (steps.ends_while_rising, 2, "not_settled"),
-    (steps.ends_while_rising, 0, "gain_not_resolved"),  # the model integrates: nothing settles
     (steps.still_coming_to_rest, 0, "earlier_input"),
     (sensors.dead_band_of_a_historian, 0, "held_output"),
     (driven.insensitive, 0, "not_linear"),

@@ -24,12 +24,11 @@ def chain_record(lags: int, hz: float, noise: float, *, delay: float = 37.0, see
     return cr.Record(k * TS, 16.0 * (k >= 0), y)
 
 
-@pytest.mark.parametrize(("lags", "hz"), [(5, 8.0), (8, 12.0)])
-def test_the_delay_before_many_equal_lags_is_found_and_covered(lags, hz):
-    fit = cr.fit_output_error(chain_record(lags, hz, 0.005)).fit
+def test_the_delay_before_many_equal_lags_is_found_and_covered():
+    fit = cr.fit_output_error(chain_record(8, 12.0, 0.005)).fit
     low, high = fit.delay_interval
-    assert fit.structure == (lags, lags)
-    # Free structures of up to five poles are 6 and 13 samples late here.
+    assert fit.structure == (8, 8)
+    # Free structures of up to five poles are 13 samples late here.
     assert abs(fit.delay - 37) < 1.5
     assert low <= 37 <= high
 
@@ -122,15 +121,11 @@ def codes(fit) -> set[str]:
     return {flag.code for flag in fit.flags}
 
 
-@pytest.mark.parametrize(
-    ("spread", "noise", "near"),
-    [(0.45, 0.001, 1.0), (1.0, 0.005, 1.0)],
-)
-def test_the_dead_time_before_a_flow_is_found(spread, noise, near):
-    fit = cr.fit_output_error(flow_record(spread, noise)).fit
+def test_the_dead_time_before_a_flow_is_found():
+    fit = cr.fit_output_error(flow_record(0.45, 0.001)).fit
     low, high = fit.delay_interval
-    # Lags alone put it 20 (narrow) to 6 samples late (wide), in intervals of 15 samples.
-    assert abs(fit.delay - DELAY) < near
+    # Lags alone put it 20 samples late, in an interval of 15 samples.
+    assert abs(fit.delay - DELAY) < 1.0
     assert low <= DELAY <= high
     assert "dispersed_flow" in codes(fit)
     assert "inverse_response" not in codes(fit)
